@@ -1,0 +1,28 @@
+//! The integrators of `casados`.
+//!
+//! Implicit and explicit Runge-Kutta methods for differential-algebraic equations
+//! `f(ẋ, x, u, z, p, t) = 0`, with forward, adjoint and second-order sensitivities that are the exact
+//! derivatives of the discrete step. `no_std`; memory is static, or on the heap with the feature `alloc`.
+//!
+//! A model is a type that implements [`Dae`]; the attributes of `casados-macros` write that
+//! implementation from a Rust function.
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(feature = "alloc")]
+extern crate alloc;
+#[cfg(feature = "std")]
+extern crate std;
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!(
+    "casados needs elementary functions: enable the feature `std`, or `libm` for targets without it"
+);
+
+pub mod model;
+pub mod scalar;
+pub mod shape;
+
+pub use model::{Dae, GraphDae, Ode};
+pub use scalar::{Lanes, Real, Scalar};
+pub use shape::{Dims, Shape};

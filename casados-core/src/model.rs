@@ -1,0 +1,145 @@
+//! The one contract between a model and the engine.
+//!
+//! A model is a differential-algebraic equation `f(ẋ, x, u, z, p, t) = 0` with
+//! `f ∈ R^{nx+nz}`, index 1: `∂f/∂(ẋ, z)` is invertible. Its variables are one flat array
+//! `v = (ẋ, x, z, u, p, t)`; derivatives are taken with respect to all of them but `t`.
+
+use crate::scalar::{Lanes, Scalar};
+use crate::shape::{Array, Plain, Shape};
+
+/// `[T; NX]` of a model.
+pub type ArrayX<M, T> = <<M as Dae>::Shape as Shape>::ArrayX<T>;
+/// `[T; NK]` of a model: one element per unknown `(k, z)`, or per equation.
+pub type ArrayK<M, T> = <<M as Dae>::Shape as Shape>::ArrayK<T>;
+/// `[T; NV]` of a model: one element per variable `(ẋ, x, z, u, p, t)`.
+pub type ArrayV<M, T> = <<M as Dae>::Shape as Shape>::ArrayV<T>;
+/// `[T; NW]` of a model: one element per direction `(x₀, u, p)`.
+pub type ArrayW<M, T> = <<M as Dae>::Shape as Shape>::ArrayW<T>;
+
+/// A differential-algebraic equation with its derivatives: written by `#[dae]` and `#[ode]`.
+///
+/// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
+/// [`Dae::STRUCTURE`].
+pub trait Dae: 'static {
+    /// Dimensions.
+    type Shape: Shape;
+    /// Values of the structural non-zeros of `∂f/∂(ẋ, x, z, u, p)`.
+    type Jacobian<T: Plain>: Array<T>;
+    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ f)` over `(ẋ, x, z, u, p)`.
+    type Hessian<T: Plain>: Array<T>;
+    /// What is known about the model before it runs.
+    const STRUCTURE: Structure;
+
+    /// The residual `f(v)`.
+    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>);
+
+    /// The constant entries of the Jacobian; the others are left as they are. Called once for
+    /// every array that [`Dae::residual_jacobian`] will fill.
+    fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S>);
+
+    /// The residual and the entries of the Jacobian that are not constant.
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S>,
+        f: &mut ArrayK<Self, S>,
+        jacobian: &mut Self::Jacobian<S>,
+    );
+
+    /// The gradient `∇ᵥ(μᵀ f)` over `(ẋ, x, z, u, p)`. The last element, that of `t`, is set to zero.
+    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>);
+
+    /// All entries of the lower triangle of `∇²(μᵀ f)`.
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, hessian: &mut Self::Hessian<S>);
+}
+
+/// A model whose code is generic over every scalar: duals and complex numbers included, which is
+/// what independent checks of its derivatives need. Graph models are; dual models are not.
+pub trait GraphDae: Dae {
+    /// The residual `f(v)`; `v` has `NV` elements and `f` has `NK`.
+    fn residual_of<S: Scalar>(v: &[S], f: &mut [S]);
+    /// The gradient `∇ᵥ(μᵀ f)`, as [`Dae::adjoint`].
+    fn adjoint_of<S: Scalar>(v: &[S], mu: &[S], gradient: &mut [S]);
+}
+
+/// A model in explicit form: row `r` of the residual is `c (ẋ_j − g_j(x, u, p, t))` with a constant `c`
+/// and every `j` occurs once; there are no algebraic states.
+///
+/// Then `g_j = −f_r / c` at `ẋ = 0`, and every derivative of `g` is one of `f`.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an explicit model",
+    label = "explicit Runge-Kutta methods need `ẋ = g(x, u, p, t)`",
+    note = "write the model with `#[ode]`, or as a `#[dae]` whose residual is `ẋ − g(...)`; or integrate it with `Irk`"
+)]
+pub trait Ode: Dae {
+    /// For each state `j`: the row `r` and the coefficient `c`.
+    const ROWS: &'static [(u32, f64)];
+}
+
+/// What is known about a model before it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct Structure {
+    /// Name of the model.
+    pub name: &'static str,
+    /// Names of the differential states, such as `x[3]` or `cart.position`.
+    pub x: &'static [&'static str],
+    /// Names of the algebraic states.
+    pub z: &'static [&'static str],
+    /// Names of the controls.
+    pub u: &'static [&'static str],
+    /// Names of the parameters.
+    pub p: &'static [&'static str],
+    /// Non-zeros of the Jacobian: equation, variable. In order of the blocks
+    /// `f_ẋ, f_x, f_z, f_u, f_p`, within each by row, then by column.
+    pub jacobian: Pattern,
+    /// Where each of the five blocks begins in `jacobian`, and its end.
+    pub blocks: [usize; 6],
+    /// Entries of the Jacobian that are constant.
+    pub constant: &'static [bool],
+    /// Non-zeros of the lower triangle of `∇²(μᵀ f)`: variable ≥ variable.
+    pub hessian: Pattern,
+    /// Equations that are linear in `(ẋ, x, z, u, p)` jointly: they have no second derivatives.
+    pub linear: &'static [bool],
+    /// Numbers of arithmetic operations.
+    pub operations: Operations,
+}
+
+/// Positions of structural non-zeros, in the order of their values.
+#[derive(Clone, Copy, Debug)]
+pub struct Pattern {
+    /// Row of each entry.
+    pub rows: &'static [u32],
+    /// Column of each entry.
+    pub columns: &'static [u32],
+}
+
+impl Pattern {
+    /// The number of entries.
+    #[must_use]
+    pub const fn len(&self) -> usize {
+        self.rows.len()
+    }
+    /// Whether there are no entries.
+    #[must_use]
+    pub const fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+    /// `(row, column)` of an entry.
+    #[must_use]
+    #[inline(always)]
+    pub const fn at(&self, entry: usize) -> (usize, usize) {
+        (self.rows[entry] as usize, self.columns[entry] as usize)
+    }
+}
+
+/// Numbers of arithmetic operations of one evaluation; an elementary function counts as one.
+/// Zero where it is not known (dual models).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Operations {
+    /// `f`
+    pub residual: u32,
+    /// `f` and the entries of its Jacobian that are not constant
+    pub residual_jacobian: u32,
+    /// `∇(μᵀ f)`
+    pub adjoint: u32,
+    /// `∇²(μᵀ f)`
+    pub hessian: u32,
+}

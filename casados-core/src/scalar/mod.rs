@@ -1,0 +1,129 @@
+//! The numbers that model code and kernels are generic over.
+//!
+//! - [`Scalar`]: anything that can be computed with: `f32`, `f64`, registers of them, duals, complex numbers.
+//! - [`Lanes`]: one or more real numbers side by side, each of which can be read and written.
+//! - [`Real`]: one real number, which can be compared: what decisions are made on.
+
+mod real;
+
+use crate::shape::Plain;
+use core::fmt::Debug;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What model code is generic over.
+///
+/// Elementary functions have the meaning of the `f64` methods of the same name.
+pub trait Scalar:
+    Copy
+    + Debug
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The result of a comparison: `bool`, or one per lane.
+    type Mask: Copy;
+
+    /// A constant.
+    fn from_f64(value: f64) -> Self;
+
+    /// `√a`
+    fn sqrt(self) -> Self;
+    /// `∛a`
+    fn cbrt(self) -> Self;
+    /// `eᵃ`
+    fn exp(self) -> Self;
+    /// `2ᵃ`
+    fn exp2(self) -> Self;
+    /// `eᵃ − 1`
+    fn exp_m1(self) -> Self;
+    /// natural logarithm
+    fn ln(self) -> Self;
+    /// `ln(1 + a)`
+    fn ln_1p(self) -> Self;
+    /// logarithm to base 2
+    fn log2(self) -> Self;
+    /// logarithm to base 10
+    fn log10(self) -> Self;
+    /// `sin a`
+    fn sin(self) -> Self;
+    /// `cos a`
+    fn cos(self) -> Self;
+    /// `(sin a, cos a)`
+    fn sin_cos(self) -> (Self, Self);
+    /// `tan a`
+    fn tan(self) -> Self;
+    /// `arcsin a`
+    fn asin(self) -> Self;
+    /// `arccos a`
+    fn acos(self) -> Self;
+    /// `arctan a`
+    fn atan(self) -> Self;
+    /// the angle of `(x, y) = (other, self)`
+    fn atan2(self, other: Self) -> Self;
+    /// `sinh a`
+    fn sinh(self) -> Self;
+    /// `cosh a`
+    fn cosh(self) -> Self;
+    /// `tanh a`
+    fn tanh(self) -> Self;
+    /// `arsinh a`
+    fn asinh(self) -> Self;
+    /// `arcosh a`
+    fn acosh(self) -> Self;
+    /// `artanh a`
+    fn atanh(self) -> Self;
+    /// `√(a² + b²)` without overflow
+    fn hypot(self, other: Self) -> Self;
+    /// `aⁿ`, `n` an integer
+    fn powi(self, n: i32) -> Self;
+    /// `aᵇ`
+    fn powf(self, other: Self) -> Self;
+    /// `|a|`
+    fn abs(self) -> Self;
+    /// `±1`, with the sign of `a`
+    fn signum(self) -> Self;
+
+    /// `a < b`
+    fn lt(self, other: Self) -> Self::Mask;
+    /// `a ≤ b`
+    fn le(self, other: Self) -> Self::Mask;
+    /// `a = b`
+    fn eq(self, other: Self) -> Self::Mask;
+    /// both
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// one or both
+    fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// not
+    fn not(a: Self::Mask) -> Self::Mask;
+    /// `if mask { a } else { b }`, lane by lane
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+}
+
+/// One or more real numbers side by side.
+pub trait Lanes: Scalar + Plain {
+    /// How many.
+    const LANES: usize;
+    /// One of them. `lane < LANES`
+    fn lane(self, lane: usize) -> f64;
+    /// One of them set. `lane < LANES`
+    fn set_lane(&mut self, lane: usize, value: f64);
+}
+
+/// One real number: `f32` or `f64`.
+pub trait Real: Lanes + PartialOrd + Default {
+    /// Zero.
+    const ZERO: Self;
+    /// One.
+    const ONE: Self;
+    /// The distance from one to the next larger number.
+    const EPSILON: Self;
+    /// Neither infinite nor NaN.
+    fn is_finite(self) -> bool;
+    /// The larger one; `other` if `self` is NaN.
+    fn max(self, other: Self) -> Self;
+    /// As `f64`, exactly.
+    fn to_f64(self) -> f64;
+}

@@ -1,0 +1,147 @@
+//! `f32` and `f64`.
+
+use super::{Lanes, Real, Scalar};
+
+/// The methods of one real type, from `std` where it is there and from `libm` elsewhere.
+macro_rules! real {
+    ($t:ident, $($name:ident = $libm:ident),*; $powf:ident, $atan2:ident, $hypot:ident, $sincos:ident) => {
+        impl Scalar for $t {
+            type Mask = bool;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                value as $t
+            }
+            $(
+                #[inline(always)]
+                fn $name(self) -> Self {
+                    #[cfg(feature = "std")]
+                    return <$t>::$name(self);
+                    #[cfg(not(feature = "std"))]
+                    return libm::$libm(self);
+                }
+            )*
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                #[cfg(feature = "std")]
+                return <$t>::sin_cos(self);
+                #[cfg(not(feature = "std"))]
+                return libm::$sincos(self);
+            }
+            #[inline(always)]
+            fn atan2(self, other: Self) -> Self {
+                #[cfg(feature = "std")]
+                return <$t>::atan2(self, other);
+                #[cfg(not(feature = "std"))]
+                return libm::$atan2(self, other);
+            }
+            #[inline(always)]
+            fn hypot(self, other: Self) -> Self {
+                #[cfg(feature = "std")]
+                return <$t>::hypot(self, other);
+                #[cfg(not(feature = "std"))]
+                return libm::$hypot(self, other);
+            }
+            #[inline(always)]
+            fn powf(self, other: Self) -> Self {
+                #[cfg(feature = "std")]
+                return <$t>::powf(self, other);
+                #[cfg(not(feature = "std"))]
+                return libm::$powf(self, other);
+            }
+            // Square and multiply; of a negative exponent, the reciprocal of the positive power.
+            #[inline(always)]
+            fn powi(self, n: i32) -> Self {
+                #[cfg(feature = "std")]
+                return <$t>::powi(self, n);
+                #[cfg(not(feature = "std"))]
+                {
+                    let (mut power, mut base, mut left) = (1.0, self, n.unsigned_abs());
+                    while left > 0 {
+                        if left & 1 == 1 {
+                            power *= base;
+                        }
+                        base *= base;
+                        left >>= 1;
+                    }
+                    if n < 0 { 1.0 / power } else { power }
+                }
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                <$t>::abs(self)
+            }
+            #[inline(always)]
+            fn signum(self) -> Self {
+                <$t>::signum(self)
+            }
+            #[inline(always)]
+            fn lt(self, other: Self) -> bool {
+                self < other
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> bool {
+                self <= other
+            }
+            #[inline(always)]
+            fn eq(self, other: Self) -> bool {
+                self == other
+            }
+            #[inline(always)]
+            fn and(a: bool, b: bool) -> bool {
+                a & b
+            }
+            #[inline(always)]
+            fn or(a: bool, b: bool) -> bool {
+                a | b
+            }
+            #[inline(always)]
+            fn not(a: bool) -> bool {
+                !a
+            }
+            #[inline(always)]
+            fn select(mask: bool, a: Self, b: Self) -> Self {
+                if mask { a } else { b }
+            }
+        }
+
+        impl Lanes for $t {
+            const LANES: usize = 1;
+            #[inline(always)]
+            fn lane(self, _: usize) -> f64 {
+                self as f64
+            }
+            #[inline(always)]
+            fn set_lane(&mut self, _: usize, value: f64) {
+                *self = value as $t;
+            }
+        }
+
+        impl Real for $t {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const EPSILON: Self = <$t>::EPSILON;
+            #[inline(always)]
+            fn is_finite(self) -> bool {
+                <$t>::is_finite(self)
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+        }
+    };
+}
+
+real!(f64, sqrt = sqrt, cbrt = cbrt, exp = exp, exp2 = exp2, exp_m1 = expm1, ln = log, ln_1p = log1p,
+    log2 = log2, log10 = log10, sin = sin, cos = cos, tan = tan, asin = asin, acos = acos, atan = atan,
+    sinh = sinh, cosh = cosh, tanh = tanh, asinh = asinh, acosh = acosh, atanh = atanh;
+    pow, atan2, hypot, sincos);
+real!(f32, sqrt = sqrtf, cbrt = cbrtf, exp = expf, exp2 = exp2f, exp_m1 = expm1f, ln = logf, ln_1p = log1pf,
+    log2 = log2f, log10 = log10f, sin = sinf, cos = cosf, tan = tanf, asin = asinf, acos = acosf, atan = atanf,
+    sinh = sinhf, cosh = coshf, tanh = tanhf, asinh = asinhf, acosh = acoshf, atanh = atanhf;
+    powf, atan2f, hypotf, sincosf);

@@ -1,0 +1,192 @@
+//! Dimensions of a model as types: what lets every array of the library live in static memory.
+//!
+//! Stable Rust has no `[T; M::NX]` in generic code. So the dimensions of a model are a type,
+//! [`Dims`], and [`Shape`] maps an element type to the arrays and matrices of these dimensions.
+
+use bytemuck::Zeroable;
+use core::fmt::Debug;
+use core::ops::{Index, IndexMut};
+use nalgebra::{SMatrix, SVector};
+
+/// An element of static memory: copied freely, and valid when all its bytes are zero.
+pub trait Plain: Copy + Zeroable + Debug + PartialEq + 'static {}
+impl<T: Copy + Zeroable + Debug + PartialEq + 'static> Plain for T {}
+
+/// `[T; N]` of a length that the model knows.
+pub trait Array<T>: Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[T]> + AsMut<[T]> {
+    /// The number of elements.
+    const LEN: usize;
+    /// `[f(0), f(1), ...]`
+    fn from_fn(f: impl FnMut(usize) -> T) -> Self;
+}
+
+impl<T: Plain, const N: usize> Array<T> for [T; N] {
+    const LEN: usize = N;
+    #[inline(always)]
+    fn from_fn(f: impl FnMut(usize) -> T) -> Self {
+        core::array::from_fn(f)
+    }
+}
+
+/// A nalgebra matrix or vector of dimensions that the model knows, column-major.
+pub trait Matrix<T>: Plain + Index<(usize, usize), Output = T> + IndexMut<(usize, usize)> {
+    /// The number of rows.
+    const ROWS: usize;
+    /// The number of columns.
+    const COLUMNS: usize;
+    /// The elements, column after column.
+    fn as_slice(&self) -> &[T];
+    /// The elements, column after column.
+    fn as_mut_slice(&mut self) -> &mut [T];
+}
+
+impl<T: Plain, const R: usize, const C: usize> Matrix<T> for SMatrix<T, R, C> {
+    const ROWS: usize = R;
+    const COLUMNS: usize = C;
+    #[inline(always)]
+    fn as_slice(&self) -> &[T] {
+        self.as_slice()
+    }
+    #[inline(always)]
+    fn as_mut_slice(&mut self) -> &mut [T] {
+        self.as_mut_slice()
+    }
+}
+
+/// The dimensions of a model, and the arrays and matrices they give.
+///
+/// Three index sets occur everywhere:
+/// - unknowns of a stage `(k, z)`, length `NK = NX + NZ`: the rows and columns of the Newton matrix;
+/// - variables of the model `(ẋ, x, z, u, p, t)`, length `NV = 2 NX + NZ + NU + NP + 1`;
+/// - directions of sensitivities `w = (x₀, u, p)`, length `NW = NX + NU + NP`.
+pub trait Shape: 'static {
+    /// Differential states.
+    const NX: usize;
+    /// Algebraic states.
+    const NZ: usize;
+    /// Controls.
+    const NU: usize;
+    /// Parameters.
+    const NP: usize;
+    /// Unknowns of a stage: `NX + NZ`.
+    const NK: usize;
+    /// Variables of the model, time included: `2 NX + NZ + NU + NP + 1`.
+    const NV: usize;
+    /// Directions of sensitivities: `NX + NU + NP`.
+    const NW: usize;
+
+    /// `[T; NX]`
+    type ArrayX<T: Plain>: Array<T>;
+    /// `[T; NZ]`
+    type ArrayZ<T: Plain>: Array<T>;
+    /// `[T; NU]`
+    type ArrayU<T: Plain>: Array<T>;
+    /// `[T; NP]`
+    type ArrayP<T: Plain>: Array<T>;
+    /// `[T; NK]`
+    type ArrayK<T: Plain>: Array<T>;
+    /// `[T; NV]`
+    type ArrayV<T: Plain>: Array<T>;
+    /// `[T; NW]`
+    type ArrayW<T: Plain>: Array<T>;
+
+    /// `SVector<T, NX>`
+    type VectorX<T: Plain>: Matrix<T>;
+    /// `SVector<T, NZ>`
+    type VectorZ<T: Plain>: Matrix<T>;
+    /// `SVector<T, NU>`
+    type VectorU<T: Plain>: Matrix<T>;
+    /// `SVector<T, NP>`
+    type VectorP<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NX, NX>`
+    type MatrixXX<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NX, NU>`
+    type MatrixXU<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NX, NP>`
+    type MatrixXP<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NZ, NX>`
+    type MatrixZX<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NZ, NU>`
+    type MatrixZU<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NZ, NP>`
+    type MatrixZP<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NU, NU>`
+    type MatrixUU<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NU, NP>`
+    type MatrixUP<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NP, NP>`
+    type MatrixPP<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NX, C>`: one column per seed.
+    type MatrixXC<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, NZ, C>`
+    type MatrixZC<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, NU, C>`
+    type MatrixUC<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, NP, C>`
+    type MatrixPC<T: Plain, const C: usize>: Matrix<T>;
+}
+
+/// The dimensions of a model. The last three follow from the first four (see [`Shape`]); they are
+/// written out because stable Rust cannot add in a type.
+#[derive(Clone, Copy, Debug)]
+pub struct Dims<
+    const NX: usize,
+    const NZ: usize,
+    const NU: usize,
+    const NP: usize,
+    const NK: usize,
+    const NV: usize,
+    const NW: usize,
+>;
+
+impl<
+    const NX: usize,
+    const NZ: usize,
+    const NU: usize,
+    const NP: usize,
+    const NK: usize,
+    const NV: usize,
+    const NW: usize,
+> Shape for Dims<NX, NZ, NU, NP, NK, NV, NW>
+{
+    const NX: usize = NX;
+    const NZ: usize = NZ;
+    const NU: usize = NU;
+    const NP: usize = NP;
+    const NK: usize = {
+        assert!(NK == NX + NZ, "NK must be NX + NZ");
+        NK
+    };
+    const NV: usize = {
+        assert!(NV == 2 * NX + NZ + NU + NP + 1, "NV must be 2 NX + NZ + NU + NP + 1");
+        NV
+    };
+    const NW: usize = {
+        assert!(NW == NX + NU + NP, "NW must be NX + NU + NP");
+        NW
+    };
+    type ArrayX<T: Plain> = [T; NX];
+    type ArrayZ<T: Plain> = [T; NZ];
+    type ArrayU<T: Plain> = [T; NU];
+    type ArrayP<T: Plain> = [T; NP];
+    type ArrayK<T: Plain> = [T; NK];
+    type ArrayV<T: Plain> = [T; NV];
+    type ArrayW<T: Plain> = [T; NW];
+    type VectorX<T: Plain> = SVector<T, NX>;
+    type VectorZ<T: Plain> = SVector<T, NZ>;
+    type VectorU<T: Plain> = SVector<T, NU>;
+    type VectorP<T: Plain> = SVector<T, NP>;
+    type MatrixXX<T: Plain> = SMatrix<T, NX, NX>;
+    type MatrixXU<T: Plain> = SMatrix<T, NX, NU>;
+    type MatrixXP<T: Plain> = SMatrix<T, NX, NP>;
+    type MatrixZX<T: Plain> = SMatrix<T, NZ, NX>;
+    type MatrixZU<T: Plain> = SMatrix<T, NZ, NU>;
+    type MatrixZP<T: Plain> = SMatrix<T, NZ, NP>;
+    type MatrixUU<T: Plain> = SMatrix<T, NU, NU>;
+    type MatrixUP<T: Plain> = SMatrix<T, NU, NP>;
+    type MatrixPP<T: Plain> = SMatrix<T, NP, NP>;
+    type MatrixXC<T: Plain, const C: usize> = SMatrix<T, NX, C>;
+    type MatrixZC<T: Plain, const C: usize> = SMatrix<T, NZ, C>;
+    type MatrixUC<T: Plain, const C: usize> = SMatrix<T, NU, C>;
+    type MatrixPC<T: Plain, const C: usize> = SMatrix<T, NP, C>;
+}

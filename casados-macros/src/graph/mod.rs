@@ -1,0 +1,190 @@
+//! A hash-consed expression graph: equal expressions are one node.
+//!
+//! Nodes are created in topological order: the operands of a node have smaller indices than the node.
+//! Constructors simplify in ways that keep the bits of the result (constant folding, `a + 0`, `a · 1`,
+//! `−(−a)`) and take structural zeros as zeros (`0 · a = 0`, whatever `a` is at run time).
+
+use std::collections::HashMap;
+
+/// A node of a graph.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Node(pub u32);
+
+/// What a node computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Op {
+    /// A number, by its bits.
+    Constant(u64),
+    /// A variable of the model, by its index in `(ẋ, x, z, u, p, t)`.
+    Variable(u32),
+    /// A constant that is defined outside of what the macro sees, by its index in the model's list.
+    Opaque(u32),
+    /// An adjoint seed `μ_r`.
+    Seed(u32),
+    /// A function of one argument.
+    Unary(Unary, Node),
+    /// A function of two arguments.
+    Binary(Binary, Node, Node),
+    /// An integer power.
+    Powi(Node, i32),
+    /// `if condition { a } else { b }`
+    Select(Node, Node, Node),
+    /// A condition: `a < b`, `a ≤ b` or `a = b`.
+    Compare(Compare, Node, Node),
+    /// A condition: both.
+    And(Node, Node),
+    /// A condition: one or both.
+    Or(Node, Node),
+    /// A condition: not.
+    Not(Node),
+}
+
+/// Functions of one argument. Names as the methods of `f64`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Unary {
+    Neg,
+    Sqrt,
+    Cbrt,
+    Exp,
+    Exp2,
+    ExpM1,
+    Ln,
+    Ln1p,
+    Log2,
+    Log10,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
+    Tanh,
+    Asinh,
+    Acosh,
+    Atanh,
+    Abs,
+    Signum,
+}
+
+/// Functions of two arguments. Names as the operators and methods of `f64`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Binary {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    Powf,
+    Atan2,
+    Hypot,
+}
+
+/// Comparisons; the others follow by exchange of operands and negation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Compare {
+    Lt,
+    Le,
+    Eq,
+}
+
+/// The graph.
+#[derive(Clone, Debug, Default)]
+pub struct Graph {
+    ops: Vec<Op>,
+    index: HashMap<Op, Node>,
+}
+
+impl Graph {
+    /// What a node computes.
+    pub fn op(&self, node: Node) -> Op {
+        self.ops[node.0 as usize]
+    }
+
+    /// The number of nodes.
+    pub fn len(&self) -> usize {
+        self.ops.len()
+    }
+
+    /// The node of an operation: the one there is, or a new one.
+    fn node(&mut self, op: Op) -> Node {
+        if let Some(&node) = self.index.get(&op) {
+            return node;
+        }
+        let node = Node(u32::try_from(self.ops.len()).expect("graph size is bounded by the evaluator"));
+        self.ops.push(op);
+        self.index.insert(op, node);
+        node
+    }
+
+    /// A number.
+    pub fn constant(&mut self, value: f64) -> Node {
+        self.node(Op::Constant(value.to_bits()))
+    }
+
+    /// The number that a node is, if it is one.
+    pub fn value(&self, node: Node) -> Option<f64> {
+        match self.op(node) {
+            Op::Constant(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// A variable of the model.
+    pub fn variable(&mut self, index: u32) -> Node {
+        self.node(Op::Variable(index))
+    }
+
+    /// A constant from outside.
+    pub fn opaque(&mut self, index: u32) -> Node {
+        self.node(Op::Opaque(index))
+    }
+
+    /// An adjoint seed.
+    pub fn seed(&mut self, row: u32) -> Node {
+        self.node(Op::Seed(row))
+    }
+
+    /// A function of one argument.
+    pub fn unary(&mut self, function: Unary, a: Node) -> Node {
+        self.node(Op::Unary(function, a))
+    }
+
+    /// A function of two arguments.
+    pub fn binary(&mut self, function: Binary, a: Node, b: Node) -> Node {
+        self.node(Op::Binary(function, a, b))
+    }
+
+    /// `aⁿ`
+    pub fn powi(&mut self, a: Node, n: i32) -> Node {
+        self.node(Op::Powi(a, n))
+    }
+
+    /// `if condition { a } else { b }`
+    pub fn select(&mut self, condition: Node, a: Node, b: Node) -> Node {
+        self.node(Op::Select(condition, a, b))
+    }
+
+    /// A comparison of numbers. Of two constants it is folded: see [`Graph::truth`].
+    pub fn compare(&mut self, comparison: Compare, a: Node, b: Node) -> Node {
+        self.node(Op::Compare(comparison, a, b))
+    }
+
+    /// Both conditions.
+    pub fn and(&mut self, a: Node, b: Node) -> Node {
+        self.node(Op::And(a, b))
+    }
+
+    /// One condition or both.
+    pub fn or(&mut self, a: Node, b: Node) -> Node {
+        self.node(Op::Or(a, b))
+    }
+
+    /// Not the condition.
+    pub fn not(&mut self, a: Node) -> Node {
+        self.node(Op::Not(a))
+    }
+}

@@ -1,0 +1,49 @@
+//! The attributes `#[dae]` and `#[ode]`.
+//!
+//! The entry is these few lines; everything else is an ordinary library over `proc_macro2`:
+//! `language` executes the model function symbolically and yields a graph, `graph` differentiates it,
+//! `structure` finds out what can be known before it runs, `emit` writes Rust.
+
+mod emit;
+mod graph;
+mod language;
+mod structure;
+
+use proc_macro::TokenStream;
+
+/// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
+#[proc_macro_attribute]
+pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
+    expand(language::Form::Dae, attribute.into(), item.into()).into()
+}
+
+/// An explicit model `ẋ = g(x, u, p, t)`.
+#[proc_macro_attribute]
+pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
+    expand(language::Form::Ode, attribute.into(), item.into()).into()
+}
+
+/// The item as it was written and, beside it, its model or the errors: an editor stays alive on a
+/// model that is being written.
+fn expand(
+    form: language::Form,
+    attribute: proc_macro2::TokenStream,
+    item: proc_macro2::TokenStream,
+) -> proc_macro2::TokenStream {
+    match language::read(form, attribute, item.clone()) {
+        Ok(source) => {
+            let models: Result<Vec<_>, _> =
+                source.models.into_iter().map(|model| structure::analyse(model)).collect();
+            match models {
+                Ok(models) => emit::expand(source.item, source.place, &models),
+                Err(error) => with_error(item, &error),
+            }
+        }
+        Err(error) => with_error(item, &error),
+    }
+}
+
+fn with_error(item: proc_macro2::TokenStream, error: &syn::Error) -> proc_macro2::TokenStream {
+    let error = error.to_compile_error();
+    quote::quote! { #item #error }
+}

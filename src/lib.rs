@@ -1,0 +1,6 @@
+//! Fast, accurate Runge-Kutta integrators with exact sensitivities for optimal control.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub use casados_core::*;
+pub use casados_macros::{dae, ode};
