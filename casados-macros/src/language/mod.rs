@@ -1,5 +1,12 @@
 //! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes its body.
 
+mod environment;
+mod evaluator;
+mod methods;
+mod place;
+mod types;
+mod value;
+
 use crate::graph::{Graph, Node};
 use proc_macro2::{Span, TokenStream};
 

@@ -1,0 +1,327 @@
+//! What expressions evaluate to while the body of a model is executed symbolically.
+//!
+//! Values are cheap to clone: aggregates are shared and copied when one of the owners writes to them.
+//! Shared references are transparent: `&a` is the value of `a`. Only `&mut` is a value of its own.
+
+use super::environment::Scope;
+use super::methods::iterator::Iter;
+use super::place::Place;
+use super::types::Type;
+use crate::graph::Node;
+use proc_macro2::TokenStream;
+use std::rc::Rc;
+
+/// The value of an expression.
+#[derive(Clone, Debug)]
+pub enum Value {
+    /// A variable that is declared and not assigned yet.
+    Uninitialised,
+    /// An `f64`.
+    Real(Node),
+    /// An integer, always known.
+    Integer(Integer),
+    /// A `bool` that is known.
+    Bool(bool),
+    /// A `bool` that depends on model quantities.
+    Condition(Node),
+    /// A tuple; the empty one is `()`.
+    Tuple(Rc<Vec<Value>>),
+    /// An array or a slice.
+    Array(Rc<Vec<Value>>),
+    /// A struct, or a variant of an enum, that the macro sees the definition of.
+    Struct(Rc<Struct>),
+    /// `a..b` and its relatives.
+    Range(Rc<Range>),
+    /// An iterator that has not been consumed.
+    Iterator(Box<Iter>),
+    /// A closure with its environment.
+    Closure(Rc<Closure>),
+    /// A function that the macro sees.
+    Function(Rc<Function>),
+    /// A function or method of the language named by path: `f64::sqrt`.
+    Builtin(Rc<Builtin>),
+    /// The constructor of a tuple struct or variant, as a function.
+    Constructor(Type, usize),
+    /// `&mut place`
+    Reference(Place),
+    /// A nalgebra matrix or vector.
+    Matrix(Rc<Matrix>),
+    /// An `Option`, known to be there or not.
+    Option(Option<Box<Value>>),
+    /// A constant that is defined where the macro does not see it. It becomes a number when it is used as one.
+    Opaque(Rc<TokenStream>),
+}
+
+impl Value {
+    /// `()`
+    pub fn unit() -> Value {
+        Value::Tuple(Rc::new(Vec::new()))
+    }
+
+    /// An array.
+    pub fn array(elements: Vec<Value>) -> Value {
+        Value::Array(Rc::new(elements))
+    }
+
+    /// A tuple.
+    pub fn tuple(elements: Vec<Value>) -> Value {
+        Value::Tuple(Rc::new(elements))
+    }
+
+    /// A `usize`.
+    pub fn usize(value: usize) -> Value {
+        Value::Integer(Integer { value: value as i128, ty: Some(IntegerType::Usize) })
+    }
+
+    /// A matrix, column after column.
+    pub fn matrix(rows: usize, columns: usize, elements: Vec<Value>) -> Value {
+        Value::Matrix(Rc::new(Matrix { rows, columns, elements }))
+    }
+
+    /// An iterator.
+    pub fn iterator(iterator: Iter) -> Value {
+        Value::Iterator(Box::new(iterator))
+    }
+
+    /// `Some(value)`
+    pub fn some(value: Value) -> Value {
+        Value::Option(Some(Box::new(value)))
+    }
+
+    /// What it is, for errors: "an integer".
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Value::Uninitialised => "a variable without a value",
+            Value::Real(_) => "an `f64`",
+            Value::Integer(_) => "an integer",
+            Value::Bool(_) => "a `bool`",
+            Value::Condition(_) => "a `bool` that depends on model quantities",
+            Value::Tuple(elements) if elements.is_empty() => "`()`",
+            Value::Tuple(_) => "a tuple",
+            Value::Array(_) => "an array",
+            Value::Struct(_) => "a struct",
+            Value::Range(_) => "a range",
+            Value::Iterator(_) => "an iterator",
+            Value::Closure(_) => "a closure",
+            Value::Function(_) | Value::Builtin(_) | Value::Constructor(..) => "a function",
+            Value::Reference(_) => "a mutable reference",
+            Value::Matrix(_) => "a matrix",
+            Value::Option(_) => "an `Option`",
+            Value::Opaque(_) => "a constant that is defined outside of what the macro sees",
+        }
+    }
+}
+
+/// An integer and its type, where it is known (literals get theirs from what they meet).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integer {
+    /// The value, within the range of the type.
+    pub value: i128,
+    /// The type.
+    pub ty: Option<IntegerType>,
+}
+
+/// The integer types of Rust.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum IntegerType {
+    I8,
+    I16,
+    I32,
+    I64,
+    I128,
+    Isize,
+    U8,
+    U16,
+    U32,
+    U64,
+    U128,
+    Usize,
+}
+
+impl IntegerType {
+    /// The type of a name: `usize`.
+    pub fn named(name: &str) -> Option<IntegerType> {
+        use IntegerType::*;
+        Some(match name {
+            "i8" => I8,
+            "i16" => I16,
+            "i32" => I32,
+            "i64" => I64,
+            "i128" => I128,
+            "isize" => Isize,
+            "u8" => U8,
+            "u16" => U16,
+            "u32" => U32,
+            "u64" => U64,
+            "u128" => U128,
+            "usize" => Usize,
+            _ => return None,
+        })
+    }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        use IntegerType::*;
+        match self {
+            I8 => "i8",
+            I16 => "i16",
+            I32 => "i32",
+            I64 => "i64",
+            I128 => "i128",
+            Isize => "isize",
+            U8 => "u8",
+            U16 => "u16",
+            U32 => "u32",
+            U64 => "u64",
+            U128 => "u128",
+            Usize => "usize",
+        }
+    }
+
+    /// The number of bits; that of a 64-bit machine for `usize`.
+    pub fn bits(self) -> u32 {
+        use IntegerType::*;
+        match self {
+            I8 | U8 => 8,
+            I16 | U16 => 16,
+            I32 | U32 => 32,
+            I64 | U64 | Isize | Usize => 64,
+            I128 | U128 => 128,
+        }
+    }
+
+    /// Whether it has negative values.
+    pub fn signed(self) -> bool {
+        use IntegerType::*;
+        matches!(self, I8 | I16 | I32 | I64 | I128 | Isize)
+    }
+
+    /// The smallest value.
+    pub fn min(self) -> i128 {
+        if self.signed() { i128::MIN >> (128 - self.bits()) } else { 0 }
+    }
+
+    /// The largest value (of `u128` as far as the evaluator goes).
+    pub fn max(self) -> i128 {
+        match self {
+            IntegerType::U128 => i128::MAX,
+            _ if self.signed() => i128::MAX >> (128 - self.bits()),
+            _ => (1i128 << self.bits()) - 1,
+        }
+    }
+}
+
+/// A value of a user's struct or enum.
+#[derive(Clone, Debug)]
+pub struct Struct {
+    /// Its definition.
+    pub definition: Rc<Definition>,
+    /// Index of the variant; 0 for structs.
+    pub variant: usize,
+    /// Values of the fields in order of the definition.
+    pub fields: Vec<Value>,
+}
+
+/// The definition of a struct or enum.
+#[derive(Debug)]
+pub struct Definition {
+    /// Its name.
+    pub name: String,
+    /// Whether it is an enum.
+    pub is_enum: bool,
+    /// One variant for structs.
+    pub variants: Vec<Variant>,
+    /// Generic parameters.
+    pub generics: syn::Generics,
+    /// Where it stands: what its field types refer to.
+    pub scope: Rc<Scope>,
+}
+
+/// A variant of an enum, or the fields of a struct.
+#[derive(Debug)]
+pub struct Variant {
+    /// Name of the variant; that of the struct.
+    pub name: String,
+    /// Names (`0`, `1` for tuple structs) and types.
+    pub fields: Vec<(String, syn::Type)>,
+    /// What the constructor looks like.
+    pub style: Style,
+    /// `= 3` of an enum.
+    pub discriminant: Option<syn::Expr>,
+}
+
+/// How a struct is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// `S { a: f64 }`
+    Named,
+    /// `S(f64)`
+    Tuple,
+    /// `S`
+    Unit,
+}
+
+/// `start..end`, `start..=end` and their relatives.
+#[derive(Clone, Debug)]
+pub struct Range {
+    /// The first.
+    pub start: Option<Value>,
+    /// The end.
+    pub end: Option<Value>,
+    /// Whether the end belongs to it.
+    pub inclusive: bool,
+}
+
+/// A closure and the scope in which it was written (or the copies that it took with it).
+#[derive(Debug)]
+pub struct Closure {
+    /// As written.
+    pub closure: Rc<syn::ExprClosure>,
+    /// What it sees.
+    pub scope: Rc<Scope>,
+}
+
+/// A function that the macro sees.
+#[derive(Debug)]
+pub struct Function {
+    /// Signature and body.
+    pub item: Rc<syn::ItemFn>,
+    /// Where it stands.
+    pub scope: Rc<Scope>,
+    /// Generic arguments that were given.
+    pub turbofish: Vec<Generic>,
+    /// The `impl` block it belongs to, and the type it was named by.
+    pub owner: Option<(Rc<syn::ItemImpl>, Type)>,
+}
+
+/// A function of the language that is named by path.
+#[derive(Clone, Debug)]
+pub struct Builtin {
+    /// The type in front: `f64` in `f64::sqrt`, `Vector3<f64>` in `Vector3::new`.
+    pub owner: Option<Type>,
+    /// The path: `["core", "array", "from_fn"]`, `["f64", "sqrt"]`; local `use` items are resolved.
+    pub path: Vec<String>,
+    /// Generic arguments of the last segment.
+    pub turbofish: Vec<Generic>,
+}
+
+/// A generic argument.
+#[derive(Clone, Debug)]
+pub enum Generic {
+    /// A type.
+    Type(Type),
+    /// A constant.
+    Const(Integer),
+}
+
+/// A nalgebra matrix, column-major.
+#[derive(Clone, Debug)]
+pub struct Matrix {
+    /// Rows.
+    pub rows: usize,
+    /// Columns; 1 for vectors.
+    pub columns: usize,
+    /// Elements, column after column.
+    pub elements: Vec<Value>,
+}
