@@ -22,7 +22,12 @@ compile_error!(
 pub mod model;
 pub mod scalar;
 pub mod shape;
+pub mod tableau;
 
 pub use model::{Dae, GraphDae, Ode};
 pub use scalar::{Lanes, Real, Scalar};
 pub use shape::{Dims, Shape};
+pub use tableau::{
+    Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4,
+    Tableau, TableauError,
+};

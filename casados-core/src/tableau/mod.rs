@@ -1,0 +1,224 @@
+//! Butcher tableaux, as data with their properties.
+//!
+//! One step of a Runge-Kutta method with `S` stages:
+//!
+//! ```text
+//! ξ_i = x_n + h Σ_j a_ij k_j        0 = f(k_i, ξ_i, u, z_i, p, t_n + c_i h)
+//! x_{n+1} = x_n + h Σ_i b_i k_i
+//! ```
+//!
+//! A method is a type that names a tableau ([`Method`]): [`Gauss`], [`RadauIIA`], [`Rk4`], ...;
+//! or [`Custom`], whose tableau is made by [`Tableau::new`] and given to the integrator when it is built.
+
+mod conditions;
+mod explicit;
+mod gauss;
+mod interpolation;
+mod radau;
+
+pub use explicit::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Midpoint, Rk4};
+pub use gauss::Gauss;
+pub use radau::RadauIIA;
+
+use core::fmt;
+
+/// A Runge-Kutta method with `S` stages whose tableau is known at compile time.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` has no tableau with {S} stages",
+    label = "no such method",
+    note = "`Gauss<S>` and `RadauIIA<S>` exist for S = 1..=9; a tableau of your own is `Custom<S>`, made by `Tableau::new`"
+)]
+pub trait Method<const S: usize>: 'static {
+    /// The coefficients.
+    const TABLEAU: Tableau<S>;
+}
+
+/// A method with `S` stages whose [`Tableau`] is given when the integrator is built.
+#[derive(Clone, Copy, Debug)]
+pub struct Custom<const S: usize>;
+
+/// The coefficients of a Runge-Kutta method with `S` stages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tableau<const S: usize> {
+    name: &'static str,
+    order: usize,
+    stage_order: usize,
+    a: [[f64; S]; S],
+    b: [f64; S],
+    c: [f64; S],
+}
+
+impl<const S: usize> Tableau<S> {
+    /// A published tableau with its published orders; tests check them.
+    const fn known(
+        name: &'static str,
+        order: usize,
+        stage_order: usize,
+        a: [[f64; S]; S],
+        b: [f64; S],
+        c: [f64; S],
+    ) -> Self {
+        Self { name, order, stage_order, a, b, c }
+    }
+
+    /// A tableau of the user's own. Its orders are computed.
+    ///
+    /// # Errors
+    /// [`TableauError`] if `S = 0`, if a coefficient is not finite, or if `c_i = Σ_j a_ij` or `Σ_i b_i = 1`
+    /// is violated by more than coefficients that are rounded once to `f64` explain, which is
+    /// `(S + 1) ε` times the sum of the absolute values. Write `1.0 / 3.0`, not `0.3333`.
+    pub fn new(a: [[f64; S]; S], b: [f64; S], c: [f64; S]) -> Result<Self, TableauError> {
+        let mut tableau = Self { name: "custom", order: 0, stage_order: 0, a, b, c };
+        tableau.check()?;
+        tableau.order = tableau.computed_order();
+        tableau.stage_order = tableau.computed_stage_order();
+        Ok(tableau)
+    }
+
+    /// The same tableau under another name.
+    #[must_use]
+    pub const fn named(mut self, name: &'static str) -> Self {
+        self.name = name;
+        self
+    }
+
+    /// Name of the method.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+    /// `a_ij`, row by row.
+    #[must_use]
+    pub const fn a(&self) -> &[[f64; S]; S] {
+        &self.a
+    }
+    /// The weights `b_i`.
+    #[must_use]
+    pub const fn b(&self) -> &[f64; S] {
+        &self.b
+    }
+    /// The nodes `c_i`.
+    #[must_use]
+    pub const fn c(&self) -> &[f64; S] {
+        &self.c
+    }
+    /// Order of convergence for ordinary differential equations. For a tableau of the user's own it is
+    /// exact up to 10, above that what the simplifying assumptions `B`, `C`, `D` prove.
+    #[must_use]
+    pub const fn order(&self) -> usize {
+        self.order
+    }
+    /// The largest `q` with `B(q)` and `C(q)`: order of the stage values.
+    #[must_use]
+    pub const fn stage_order(&self) -> usize {
+        self.stage_order
+    }
+
+    /// `a_ij = 0` for `j ≥ i`: stages are computed one after the other.
+    #[must_use]
+    pub const fn is_explicit(&self) -> bool {
+        let mut i = 0;
+        while i < S {
+            let mut j = i;
+            while j < S {
+                if self.a[i][j] != 0.0 {
+                    return false;
+                }
+                j += 1;
+            }
+            i += 1;
+        }
+        true
+    }
+
+    /// The last stage is the end of the step: `a_si = b_i`.
+    #[must_use]
+    pub const fn is_stiffly_accurate(&self) -> bool {
+        let mut j = 0;
+        while j < S {
+            if self.a[S - 1][j] != self.b[j] {
+                return false;
+            }
+            j += 1;
+        }
+        S > 0
+    }
+
+    /// Whether quadratic invariants are kept: `b_i a_ij + b_j a_ji = b_i b_j` to rounding.
+    #[must_use]
+    pub const fn is_symplectic(&self) -> bool {
+        let (a, b) = (&self.a, &self.b);
+        let mut i = 0;
+        while i < S {
+            let mut j = 0;
+            while j <= i {
+                let (p, q, r) = (b[i] * a[i][j], b[j] * a[j][i], b[i] * b[j]);
+                // Each product carries the rounding of two factors and its own.
+                let bound = 2.0 * f64::EPSILON * (p.abs() + q.abs() + r.abs());
+                if (p + q - r).abs() > bound {
+                    return false;
+                }
+                j += 1;
+            }
+            i += 1;
+        }
+        true
+    }
+
+    /// Whether the method is the collocation method of its nodes: they are distinct, and `C(S)` holds.
+    /// Then its stages define a polynomial of degree `S`; see [`Tableau::weights`].
+    #[must_use]
+    pub const fn is_collocation(&self) -> bool {
+        let mut i = 0;
+        while i < S {
+            let mut j = 0;
+            while j < i {
+                if self.c[i] == self.c[j] {
+                    return false;
+                }
+                j += 1;
+            }
+            i += 1;
+        }
+        self.stage_order >= S
+    }
+}
+
+/// Why a user's own tableau was refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TableauError {
+    /// There are no stages.
+    Empty,
+    /// A coefficient is infinite or NaN.
+    NotFinite,
+    /// `c_i ≠ Σ_j a_ij`
+    RowSum {
+        /// The stage `i`, from 0.
+        stage: usize,
+        /// `Σ_j a_ij`
+        sum: f64,
+        /// `c_i`
+        node: f64,
+    },
+    /// `Σ_i b_i ≠ 1`
+    WeightSum {
+        /// `Σ_i b_i`
+        sum: f64,
+    },
+}
+
+impl fmt::Display for TableauError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => f.write_str("a tableau needs at least one stage"),
+            Self::NotFinite => f.write_str("a coefficient of the tableau is not finite"),
+            Self::RowSum { stage, sum, node } => {
+                write!(f, "row {stage} of A sums to {sum:e}, but c[{stage}] = {node:e}")
+            }
+            Self::WeightSum { sum } => write!(f, "the weights b sum to {sum:e} instead of 1"),
+        }
+    }
+}
+
+impl core::error::Error for TableauError {}
