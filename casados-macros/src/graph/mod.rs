@@ -1,8 +1,31 @@
 //! A hash-consed expression graph: equal expressions are one node.
 //!
 //! Nodes are created in topological order: the operands of a node have smaller indices than the node.
-//! Constructors simplify in ways that keep the bits of the result (constant folding, `a + 0`, `a · 1`,
-//! `−(−a)`) and take structural zeros as zeros (`0 · a = 0`, whatever `a` is at run time).
+//! Constructors simplify in ways that keep the bits of the result, the sign of a zero apart (constant
+//! folding, `a + 0`, `a · 1`, `−(−a)`), and take structural zeros as zeros (`0 · a = 0`, `a − a = 0`,
+//! whatever `a` is at run time). Derivative code is written with the operations of `algebra`, which may
+//! also round differently.
+//!
+//! Nothing here recurses along the graph: it may be deeper than a stack.
+
+mod algebra;
+mod count;
+mod elimination;
+mod evaluate;
+mod hash;
+mod hessian;
+mod jacobian;
+mod print;
+mod reverse;
+mod rules;
+mod simplify;
+mod sparsity;
+
+pub use evaluate::Point;
+pub use hessian::hessian;
+pub use jacobian::jacobian;
+pub use reverse::gradient;
+pub use sparsity::Degree;
 
 use std::collections::HashMap;
 
@@ -91,17 +114,39 @@ pub enum Compare {
     Eq,
 }
 
+impl Op {
+    /// The nodes that it is computed from.
+    pub fn operands(self) -> impl Iterator<Item = Node> {
+        let operands = match self {
+            Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_) => [None; 3],
+            Op::Unary(_, a) | Op::Powi(a, _) | Op::Not(a) => [Some(a), None, None],
+            Op::Binary(_, a, b) | Op::Compare(_, a, b) | Op::And(a, b) | Op::Or(a, b) => {
+                [Some(a), Some(b), None]
+            }
+            Op::Select(condition, a, b) => [Some(condition), Some(a), Some(b)],
+        };
+        operands.into_iter().flatten()
+    }
+}
+
+impl Node {
+    /// As an index of an array with one element per node.
+    pub fn at(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// The graph.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     ops: Vec<Op>,
-    index: HashMap<Op, Node>,
+    index: HashMap<Op, Node, hash::BuildHasher>,
 }
 
 impl Graph {
     /// What a node computes.
     pub fn op(&self, node: Node) -> Op {
-        self.ops[node.0 as usize]
+        self.ops[node.at()]
     }
 
     /// The number of nodes.
@@ -146,45 +191,5 @@ impl Graph {
     /// An adjoint seed.
     pub fn seed(&mut self, row: u32) -> Node {
         self.node(Op::Seed(row))
-    }
-
-    /// A function of one argument.
-    pub fn unary(&mut self, function: Unary, a: Node) -> Node {
-        self.node(Op::Unary(function, a))
-    }
-
-    /// A function of two arguments.
-    pub fn binary(&mut self, function: Binary, a: Node, b: Node) -> Node {
-        self.node(Op::Binary(function, a, b))
-    }
-
-    /// `aⁿ`
-    pub fn powi(&mut self, a: Node, n: i32) -> Node {
-        self.node(Op::Powi(a, n))
-    }
-
-    /// `if condition { a } else { b }`
-    pub fn select(&mut self, condition: Node, a: Node, b: Node) -> Node {
-        self.node(Op::Select(condition, a, b))
-    }
-
-    /// A comparison of numbers. Of two constants it is folded: see [`Graph::truth`].
-    pub fn compare(&mut self, comparison: Compare, a: Node, b: Node) -> Node {
-        self.node(Op::Compare(comparison, a, b))
-    }
-
-    /// Both conditions.
-    pub fn and(&mut self, a: Node, b: Node) -> Node {
-        self.node(Op::And(a, b))
-    }
-
-    /// One condition or both.
-    pub fn or(&mut self, a: Node, b: Node) -> Node {
-        self.node(Op::Or(a, b))
-    }
-
-    /// Not the condition.
-    pub fn not(&mut self, a: Node) -> Node {
-        self.node(Op::Not(a))
     }
 }

@@ -1,7 +1,9 @@
 //! What can be known about a model before it runs: structural index, explicit form, linear rows, and the
 //! derivatives that the engine will ask for, as graphs.
 
-use crate::graph::Node;
+mod index;
+
+use crate::graph::{self, Degree, Node};
 use crate::language::Model;
 
 /// A model with its derivatives and its structure.
@@ -12,6 +14,8 @@ pub struct Analysis {
     pub jacobian: Vec<(u32, u32, Node)>,
     /// Where each block begins in `jacobian`, and its end.
     pub blocks: [usize; 6],
+    /// Which entries of `jacobian` depend on no variable (on constants from outside they may).
+    pub constant: Vec<bool>,
     /// `∇(μᵀ f)` over `(ẋ, x, z, u, p)`.
     pub gradient: Vec<Node>,
     /// Non-zeros of the lower triangle of `∇²(μᵀ f)`, `(variable, variable, value)`.
@@ -20,9 +24,109 @@ pub struct Analysis {
     pub linear: Vec<bool>,
     /// For an explicit model: for each state its row and coefficient.
     pub explicit: Option<Vec<(u32, f64)>>,
+    /// Numbers of operations.
+    pub operations: Operations,
+}
+
+/// Numbers of operations of one evaluation; an elementary function is one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Operations {
+    /// `f`
+    pub residual: u32,
+    /// `f` and the entries of its Jacobian that are not constant
+    pub residual_jacobian: u32,
+    /// `∇(μᵀ f)`
+    pub adjoint: u32,
+    /// `∇²(μᵀ f)`
+    pub hessian: u32,
 }
 
 /// Derives everything, or says why the model is no index-1 DAE.
-pub fn analyse(_model: Model) -> syn::Result<Analysis> {
-    todo!()
+pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
+    let names = &model.variables;
+    let ends = [names.x.len(), names.x.len(), names.z.len(), names.u.len(), names.p.len()];
+    let ends = ends.map({
+        let mut end = 0;
+        move |length| {
+            end += length as u32;
+            end
+        }
+    });
+    let variables = ends[4];
+    check_length(&model)?;
+
+    let graph = &mut model.graph;
+    let mut jacobian = graph::jacobian(graph, &model.residual, variables);
+    let block = |variable: u32| ends.partition_point(|&end| end <= variable);
+    jacobian.sort_by_key(|&(row, variable, _)| (block(variable), row, variable));
+    let mut blocks = [0; 6];
+    for (begin, index) in blocks.iter_mut().zip(0..) {
+        *begin = jacobian.partition_point(|&(_, variable, _)| block(variable) < index);
+    }
+    index::check(&model, &jacobian, ends)?;
+
+    let graph = &mut model.graph;
+    let values: Vec<Node> = jacobian.iter().map(|entry| entry.2).collect();
+    let constant: Vec<bool> =
+        graph.degrees(&values, |_| true).iter().map(|&degree| degree == Degree::Constant).collect();
+    let linear: Vec<bool> = graph
+        .degrees(&model.residual, |variable| variable < variables)
+        .iter()
+        .map(|&degree| degree <= Degree::Linear)
+        .collect();
+    let seeded: Vec<(Node, Node)> =
+        (0..).zip(&model.residual).map(|(row, &f)| (f, graph.seed(row))).collect();
+    let gradient = graph::gradient(graph, &seeded, variables);
+    let hessian = graph::hessian(graph, &seeded, variables);
+
+    let varying = values.iter().zip(&constant).filter(|(_, constant)| !**constant).map(|(value, _)| *value);
+    let residual_jacobian: Vec<Node> = model.residual.iter().copied().chain(varying).collect();
+    let operations = Operations {
+        residual: graph.operations(&model.residual),
+        residual_jacobian: graph.operations(&residual_jacobian),
+        adjoint: graph.operations(&gradient),
+        hessian: graph.operations(&hessian.iter().map(|entry| entry.2).collect::<Vec<_>>()),
+    };
+    let explicit = explicit(&model, &jacobian, ends);
+    Ok(Analysis { model, jacobian, blocks, constant, gradient, hessian, linear, explicit, operations })
+}
+
+/// As many equations as unknowns.
+fn check_length(model: &Model) -> syn::Result<()> {
+    let (equations, nx, nz) = (model.residual.len(), model.variables.x.len(), model.variables.z.len());
+    if equations == nx + nz {
+        return Ok(());
+    }
+    let span = match (model.spans.first(), model.spans.last()) {
+        (Some(&first), Some(&last)) => first.join(last).unwrap_or(first),
+        _ => model.name.span(),
+    };
+    let unknowns = if nz == 0 {
+        format!("{nx} (one per state)")
+    } else {
+        format!("{} ({nx} states and {nz} algebraic states)", nx + nz)
+    };
+    let message = format!("the residual has {equations} equations where the model needs {unknowns}");
+    Err(syn::Error::new(span, message))
+}
+
+/// For each state its row and the constant coefficient of its derivative, if every row has exactly one
+/// derivative and there are no algebraic states.
+fn explicit(model: &Model, jacobian: &[(u32, u32, Node)], ends: [u32; 5]) -> Option<Vec<(u32, f64)>> {
+    let nx = ends[0];
+    if ends[2] != ends[1] {
+        return None;
+    }
+    let derivatives = jacobian.iter().take_while(|entry| entry.1 < nx);
+    let mut rows = vec![None; nx as usize];
+    let mut count = 0;
+    for (expected, &(row, variable, value)) in (0..).zip(derivatives) {
+        let coefficient = model.graph.value(value)?;
+        if row != expected || !coefficient.is_normal() || rows[variable as usize].is_some() {
+            return None;
+        }
+        rows[variable as usize] = Some((row, coefficient));
+        count += 1;
+    }
+    if count == nx { rows.into_iter().collect() } else { None }
 }

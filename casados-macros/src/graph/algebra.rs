@@ -1,0 +1,160 @@
+//! Arithmetic for derivative code: simplifications that save operations but may round differently, and
+//! selections kept outside of products.
+//!
+//! The derivative of `if c { √x } else { 0 }` is `if c { w / (2 √x) } else { 0 }`, never
+//! `(if c { w } else { 0 }) / (2 √x)`: at `x = 0` that would be `0 · ∞`. So what is zero in one branch
+//! stays a selection, and products go inside.
+
+use super::{Binary, Graph, Node, Op, Unary};
+
+/// Selections deeper than this are multiplied from outside: work stays linear in their depth.
+const DEPTH: usize = 8;
+
+/// A condition, and the branch in which a value is not zero.
+type Branch = (Node, bool);
+
+impl Graph {
+    pub(super) fn is_zero(&self, a: Node) -> bool {
+        self.value(a) == Some(0.0)
+    }
+
+    /// A value that is zero outside of one branch: that branch, and the value there.
+    fn branch(&self, a: Node) -> Option<(Branch, Node)> {
+        match self.op(a) {
+            Op::Select(condition, x, y) if self.is_zero(y) => Some(((condition, true), x)),
+            Op::Select(condition, x, y) if self.is_zero(x) => Some(((condition, false), y)),
+            _ => None,
+        }
+    }
+
+    /// Takes a value out of the branches outside of which it is zero.
+    fn peel(&self, mut a: Node, branches: &mut Vec<Branch>) -> Node {
+        for _ in 0..DEPTH {
+            let Some((branch, inner)) = self.branch(a) else { break };
+            branches.push(branch);
+            a = inner;
+        }
+        a
+    }
+
+    /// Puts a value into branches.
+    fn wrap(&mut self, mut a: Node, mut branches: Vec<Branch>) -> Node {
+        let zero = self.constant(0.0);
+        while let Some((condition, taken)) = branches.pop() {
+            if branches.contains(&(condition, !taken)) {
+                return zero;
+            }
+            if !branches.contains(&(condition, taken)) {
+                let (x, y) = if taken { (a, zero) } else { (zero, a) };
+                a = self.select(condition, x, y);
+            }
+        }
+        a
+    }
+
+    /// `−a`
+    pub(super) fn negative(&mut self, a: Node) -> Node {
+        let mut branches = Vec::new();
+        let a = self.peel(a, &mut branches);
+        let a = self.unary(Unary::Neg, a);
+        self.wrap(a, branches)
+    }
+
+    /// `a + b`
+    pub(super) fn plus(&mut self, a: Node, b: Node) -> Node {
+        if let (Some(((c, in_a), x)), Some(((d, in_b), y))) = (self.branch(a), self.branch(b))
+            && c == d
+        {
+            let zero = self.constant(0.0);
+            let (x, y) = match (in_a, in_b) {
+                (true, false) => (x, y),
+                (false, true) => (y, x),
+                (true, true) => (self.plus_inside(x, y), zero),
+                (false, false) => (zero, self.plus_inside(x, y)),
+            };
+            return self.select(c, x, y);
+        }
+        self.plus_inside(a, b)
+    }
+
+    fn plus_inside(&mut self, a: Node, b: Node) -> Node {
+        let ((x, factor_a), (y, factor_b)) = (self.multiple(a), self.multiple(b));
+        if x == y && self.value(x).is_none() {
+            let factor = self.constant(factor_a + factor_b);
+            return self.binary(Binary::Mul, factor, x);
+        }
+        self.binary(Binary::Add, a, b)
+    }
+
+    /// `a` as a multiple `(x, c)` of something else: `a = c x`.
+    fn multiple(&self, a: Node) -> (Node, f64) {
+        match self.op(a) {
+            Op::Unary(Unary::Neg, x) => (x, -1.0),
+            Op::Binary(Binary::Mul, x, y) => match (self.value(x), self.value(y)) {
+                (Some(factor), _) => (y, factor),
+                (_, Some(factor)) => (x, factor),
+                _ => (a, 1.0),
+            },
+            _ => (a, 1.0),
+        }
+    }
+
+    /// `a − b`
+    pub(super) fn minus(&mut self, a: Node, b: Node) -> Node {
+        let b = self.negative(b);
+        self.plus(a, b)
+    }
+
+    /// `a · b`
+    pub(super) fn times(&mut self, a: Node, b: Node) -> Node {
+        let mut branches = Vec::new();
+        let (a, b) = (self.peel(a, &mut branches), self.peel(b, &mut branches));
+        let product = self.product(a, b);
+        self.wrap(product, branches)
+    }
+
+    fn product(&mut self, a: Node, b: Node) -> Node {
+        for (factor, other) in [(a, b), (b, a)] {
+            if let Some(value) = self.value(factor) {
+                return self.scaled(value, other);
+            }
+        }
+        // (x / y) y = x
+        for (quotient, other) in [(a, b), (b, a)] {
+            if let Op::Binary(Binary::Div, x, y) = self.op(quotient)
+                && y == other
+            {
+                return x;
+            }
+        }
+        self.binary(Binary::Mul, a, b)
+    }
+
+    /// A constant times a node, with constant factors of the node taken together.
+    fn scaled(&mut self, factor: f64, a: Node) -> Node {
+        if let Op::Binary(function @ (Binary::Mul | Binary::Div), x, y) = self.op(a) {
+            if let Some(value) = self.value(x) {
+                let x = self.constant(factor * value);
+                return self.binary(function, x, y);
+            }
+            if let Some(value) = self.value(y) {
+                let y = if function == Binary::Mul { factor * value } else { factor / value };
+                let y = self.constant(y);
+                return self.binary(Binary::Mul, y, x);
+            }
+        }
+        let factor = self.constant(factor);
+        self.binary(Binary::Mul, factor, a)
+    }
+
+    /// `a / b`
+    pub(super) fn over(&mut self, a: Node, b: Node) -> Node {
+        let mut branches = Vec::new();
+        let a = self.peel(a, &mut branches);
+        let quotient = match self.value(b) {
+            Some(value) => self.scaled(1.0 / value, a),
+            None => self.binary(Binary::Div, a, b),
+        };
+        self.wrap(quotient, branches)
+    }
+}

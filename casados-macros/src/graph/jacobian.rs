@@ -1,0 +1,100 @@
+//! The sparse Jacobian.
+
+use super::elimination::{Linearised, Order};
+use super::{Graph, Node, Op};
+
+/// The structural non-zeros `(output, variable, value)` of the Jacobian of outputs with respect to the
+/// variables `0..variables`, by output, then variable. Of several elimination orders the one with the
+/// fewest operations for outputs and Jacobian together.
+pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<(u32, u32, Node)> {
+    best(graph, &[Order::Reverse, Order::Markowitz, Order::Forward], outputs, |graph, order, budget| {
+        jacobian_in_order(graph, outputs, variables, order, budget)
+    })
+}
+
+/// Tries elimination orders on copies of the graph and keeps the one with the fewest operations.
+pub fn best(
+    graph: &mut Graph,
+    orders: &[Order],
+    beside: &[Node],
+    derive: impl Fn(&mut Graph, Order, usize) -> Option<(Vec<(u32, u32, Node)>, usize)>,
+) -> Vec<(u32, u32, Node)> {
+    let mut best: Option<(u32, Graph, Vec<(u32, u32, Node)>)> = None;
+    let mut budget = usize::MAX;
+    for &order in orders {
+        let mut copy = graph.clone();
+        let Some((entries, products)) = derive(&mut copy, order, budget) else { continue };
+        // No order is worth many times the work of another.
+        budget = budget.min(products.saturating_mul(2).saturating_add(1000));
+        let needed: Vec<Node> = beside.iter().copied().chain(entries.iter().map(|entry| entry.2)).collect();
+        let operations = copy.operations(&needed);
+        if best.as_ref().is_none_or(|best| operations < best.0) {
+            best = Some((operations, copy, entries));
+        }
+    }
+    let Some((_, copy, entries)) = best else { return Vec::new() };
+    *graph = copy;
+    entries
+}
+
+/// The Jacobian by one elimination order, and the products it took; `None` if they are more than `budget`.
+pub fn jacobian_in_order(
+    graph: &mut Graph,
+    outputs: &[Node],
+    variables: u32,
+    order: Order,
+    budget: usize,
+) -> Option<(Vec<(u32, u32, Node)>, usize)> {
+    let active = graph.active(outputs.iter().copied(), variables);
+    let nodes: Vec<Node> =
+        graph.reachable(outputs).into_iter().filter(|node| active[node.at()]).collect();
+    let vertices = Vertices::new(graph, &nodes, variables, active.len());
+    let mut linearised = Linearised::new(vertices.count as usize + outputs.len());
+    for &node in &nodes {
+        for (operand, partial) in graph.partials(node, |operand| active[operand.at()]).into_iter().flatten() {
+            linearised.add_edge(graph, vertices.of(operand), vertices.of(node), partial);
+        }
+    }
+    let one = graph.constant(1.0);
+    for (row, &output) in (vertices.count..).zip(outputs) {
+        if active[output.at()] {
+            linearised.add_edge(graph, vertices.of(output), row, one);
+        }
+    }
+    let products = linearised.eliminate(graph, variables..vertices.count, order, budget)?;
+    let rows = &linearised.into[vertices.count as usize..];
+    let entries = (0..).zip(rows).flat_map(|(row, entries)| {
+        entries.iter().map(move |(&variable, &value)| (row, variable, value))
+    });
+    Some((entries.collect(), products))
+}
+
+/// Numbers of vertices: variables keep theirs, intermediate nodes follow in topological order.
+pub struct Vertices {
+    of: Vec<u32>,
+    /// How many there are.
+    pub count: u32,
+}
+
+impl Vertices {
+    /// Numbers the variables and some nodes.
+    pub fn new(graph: &Graph, nodes: &[Node], variables: u32, len: usize) -> Self {
+        let mut of = vec![u32::MAX; len];
+        let mut count = variables;
+        for &node in nodes {
+            of[node.at()] = match graph.op(node) {
+                Op::Variable(index) => index,
+                _ => {
+                    count += 1;
+                    count - 1
+                }
+            };
+        }
+        Self { of, count }
+    }
+
+    /// The vertex of a node.
+    pub fn of(&self, node: Node) -> u32 {
+        self.of[node.at()]
+    }
+}

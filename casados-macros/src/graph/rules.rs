@@ -1,0 +1,330 @@
+//! Derivatives of every operation.
+
+use super::{Binary, Graph, Node, Op, Unary};
+use std::f64::consts::{LN_2, LOG2_E, LOG10_E};
+
+/// Operands and what belongs to each; an operand occurs once.
+pub type PerOperand = [Option<(Node, Node)>; 2];
+
+impl Graph {
+    /// `∂c/∂a` of a function `c` of one argument `a`, in forms that neither cancel nor overflow where
+    /// that is cheap.
+    fn unary_partial(&mut self, function: Unary, a: Node, c: Node) -> Node {
+        let one = self.constant(1.0);
+        match function {
+            Unary::Neg => self.constant(-1.0),
+            Unary::Sqrt => {
+                let half = self.constant(0.5);
+                self.over(half, c)
+            }
+            Unary::Cbrt => {
+                let (third, square) = (self.constant(1.0 / 3.0), self.times(c, c));
+                self.over(third, square)
+            }
+            Unary::Exp => c,
+            Unary::Exp2 => {
+                let ln2 = self.constant(LN_2);
+                self.times(ln2, c)
+            }
+            // c + 1 would lose everything where a is very negative.
+            Unary::ExpM1 => self.unary(Unary::Exp, a),
+            Unary::Ln => self.over(one, a),
+            Unary::Ln1p => {
+                let sum = self.plus(one, a);
+                self.over(one, sum)
+            }
+            Unary::Log2 => {
+                let factor = self.constant(LOG2_E);
+                self.over(factor, a)
+            }
+            Unary::Log10 => {
+                let factor = self.constant(LOG10_E);
+                self.over(factor, a)
+            }
+            Unary::Sin => self.unary(Unary::Cos, a),
+            Unary::Cos => {
+                let sin = self.unary(Unary::Sin, a);
+                self.negative(sin)
+            }
+            Unary::Tan => {
+                let square = self.times(c, c);
+                self.plus(one, square)
+            }
+            Unary::Asin => {
+                let (_, root) = self.one_minus_square(a);
+                self.over(one, root)
+            }
+            Unary::Acos => {
+                let ((_, root), minus_one) = (self.one_minus_square(a), self.constant(-1.0));
+                self.over(minus_one, root)
+            }
+            Unary::Atan => {
+                let square = self.times(a, a);
+                let sum = self.plus(one, square);
+                self.over(one, sum)
+            }
+            Unary::Sinh => self.unary(Unary::Cosh, a),
+            Unary::Cosh => self.unary(Unary::Sinh, a),
+            Unary::Tanh => {
+                let square = self.times(c, c);
+                self.minus(one, square)
+            }
+            // Where a² overflows this is zero, which is what it rounds to beside anything else.
+            Unary::Asinh => {
+                let square = self.times(a, a);
+                let sum = self.plus(one, square);
+                let root = self.unary(Unary::Sqrt, sum);
+                self.over(one, root)
+            }
+            Unary::Acosh => {
+                let (below, above) = (self.minus(a, one), self.plus(a, one));
+                let (below, above) = (self.unary(Unary::Sqrt, below), self.unary(Unary::Sqrt, above));
+                let root = self.times(below, above);
+                self.over(one, root)
+            }
+            Unary::Atanh => {
+                let (difference, _) = self.one_minus_square(a);
+                self.over(one, difference)
+            }
+            Unary::Abs => self.unary(Unary::Signum, a),
+            Unary::Signum => self.constant(0.0),
+        }
+    }
+
+    /// `1 − a²` as `(1 − a)(1 + a)`, which does not cancel near `|a| = 1`, and its square root.
+    fn one_minus_square(&mut self, a: Node) -> (Node, Node) {
+        let one = self.constant(1.0);
+        let (below, above) = (self.minus(one, a), self.plus(one, a));
+        let product = self.times(below, above);
+        (product, self.unary(Unary::Sqrt, product))
+    }
+
+    /// `∂c/∂a` (`first`) or `∂c/∂b` of a function `c` of two arguments.
+    fn binary_partial(&mut self, function: Binary, a: Node, b: Node, c: Node, first: bool) -> Node {
+        let one = self.constant(1.0);
+        match (function, first) {
+            (Binary::Add, _) | (Binary::Sub, true) => one,
+            (Binary::Sub, false) => self.constant(-1.0),
+            (Binary::Mul, true) => b,
+            (Binary::Mul, false) => a,
+            (Binary::Div, true) => self.over(one, b),
+            (Binary::Div, false) => {
+                let reciprocal = self.over(one, b);
+                let product = self.times(c, reciprocal);
+                self.negative(product)
+            }
+            (Binary::Powf, true) => {
+                let lower = self.minus(b, one);
+                let power = match self.value(lower) {
+                    Some(n) if n == n.trunc() && n.abs() <= 64.0 => self.powi(a, n as i32),
+                    _ => self.binary(Binary::Powf, a, lower),
+                };
+                self.times(b, power)
+            }
+            // At a = 0 the function does not depend on b, but the logarithm is infinite.
+            (Binary::Powf, false) => {
+                let (zero, ln) = (self.constant(0.0), self.unary(Unary::Ln, a));
+                let (product, at_zero) =
+                    (self.times(c, ln), self.compare(super::Compare::Eq, a, zero));
+                self.select(at_zero, zero, product)
+            }
+            (Binary::Atan2, _) => {
+                let (aa, bb) = (self.times(a, a), self.times(b, b));
+                let sum = self.plus(aa, bb);
+                let above = if first { b } else { self.negative(a) };
+                self.over(above, sum)
+            }
+            (Binary::Hypot, true) => self.over(a, c),
+            (Binary::Hypot, false) => self.over(b, c),
+        }
+    }
+
+    /// The operands of a node that satisfy a predicate, with the partial derivatives.
+    pub(super) fn partials(&mut self, node: Node, active: impl Fn(Node) -> bool) -> PerOperand {
+        let zero = self.constant(0.0);
+        let one = self.constant(1.0);
+        let both = match self.op(node) {
+            Op::Unary(function, a) if active(a) => {
+                [Some((a, self.unary_partial(function, a, node))), None]
+            }
+            Op::Powi(a, n) if active(a) => {
+                let (factor, power) = (self.constant(f64::from(n)), self.powi(a, n.saturating_sub(1)));
+                [Some((a, self.times(factor, power))), None]
+            }
+            Op::Binary(function, a, b) => [
+                active(a).then(|| (a, self.binary_partial(function, a, b, node, true))),
+                active(b).then(|| (b, self.binary_partial(function, a, b, node, false))),
+            ],
+            Op::Select(condition, a, b) => [
+                active(a).then(|| (a, self.select(condition, one, zero))),
+                active(b).then(|| (b, self.select(condition, zero, one))),
+            ],
+            _ => [None, None],
+        };
+        match both {
+            [Some((a, p)), Some((b, q))] if a == b => [Some((a, self.plus(p, q))), None],
+            both => both.map(|part| part.filter(|&(_, partial)| partial != zero)),
+        }
+    }
+
+    /// The operands of a node that satisfy a predicate, with `w` times the partial derivatives.
+    pub(super) fn pull(&mut self, node: Node, w: Node, active: impl Fn(Node) -> bool) -> PerOperand {
+        match self.op(node) {
+            Op::Binary(Binary::Div, a, b) if a != b => {
+                let quotient = self.over(w, b);
+                [
+                    active(a).then_some((a, quotient)),
+                    active(b).then(|| {
+                        let product = self.times(node, quotient);
+                        (b, self.negative(product))
+                    }),
+                ]
+            }
+            _ => {
+                self.partials(node, active).map(|part| part.map(|(operand, p)| (operand, self.times(w, p))))
+            }
+        }
+    }
+
+    /// `w` times the second partial derivatives of a node with respect to the operands that satisfy a
+    /// predicate: `(j, k, value)`, pairs of different operands once.
+    pub(super) fn second(
+        &mut self,
+        node: Node,
+        w: Node,
+        active: impl Fn(Node) -> bool + Copy,
+    ) -> Vec<(Node, Node, Node)> {
+        let two = self.constant(2.0);
+        match self.op(node) {
+            Op::Unary(Unary::Neg | Unary::Abs | Unary::Signum, _)
+            | Op::Binary(Binary::Add | Binary::Sub, ..)
+            | Op::Select(..) => Vec::new(),
+            Op::Binary(Binary::Mul, a, b) if a == b && active(a) => vec![(a, a, self.times(two, w))],
+            Op::Binary(Binary::Mul, a, b) if active(a) && active(b) => vec![(a, b, w)],
+            Op::Binary(Binary::Mul, ..) => Vec::new(),
+            Op::Binary(Binary::Div, a, b) if a != b => {
+                let [_, Some((_, partial))] = self.pull(node, w, active) else { return Vec::new() };
+                let one = self.constant(1.0);
+                let reciprocal = self.over(one, b);
+                let mut arcs = Vec::new();
+                if active(a) {
+                    let quotient = self.over(w, b);
+                    let product = self.times(quotient, reciprocal);
+                    arcs.push((a, b, self.negative(product)));
+                }
+                let minus_two = self.constant(-2.0);
+                let twice = self.times(minus_two, reciprocal);
+                arcs.push((b, b, self.times(twice, partial)));
+                arcs
+            }
+            Op::Unary(Unary::Sqrt, a) if active(a) => {
+                let [Some((_, first)), _] = self.pull(node, w, active) else { return Vec::new() };
+                let minus_half = self.constant(-0.5);
+                let factor = self.over(minus_half, a);
+                vec![(a, a, self.times(first, factor))]
+            }
+            Op::Unary(Unary::Ln, a) if active(a) => {
+                let [Some((_, first)), _] = self.pull(node, w, active) else { return Vec::new() };
+                let partial = self.unary_partial(Unary::Ln, a, node);
+                let product = self.times(first, partial);
+                vec![(a, a, self.negative(product))]
+            }
+            op => self.second_by_rules(op, w, active),
+        }
+    }
+
+    /// The rules applied to the partial derivatives, on a graph of their own in which the operands are
+    /// variables: what operands are made of must not be differentiated.
+    fn second_by_rules(
+        &mut self,
+        op: Op,
+        w: Node,
+        active: impl Fn(Node) -> bool,
+    ) -> Vec<(Node, Node, Node)> {
+        let operands: Vec<Node> = op.operands().collect();
+        let mut scratch = Graph::default();
+        let places: Vec<Node> = (0..)
+            .zip(&operands)
+            .map(|(index, &operand)| match self.value(operand) {
+                Some(value) => scratch.constant(value),
+                None => scratch.variable(index),
+            })
+            .collect();
+        let is_active = |place: usize| active(operands[place]);
+        let node = match op {
+            Op::Unary(function, _) => scratch.unary(function, places[0]),
+            Op::Powi(_, n) => scratch.powi(places[0], n),
+            Op::Binary(function, ..) => scratch.binary(function, places[0], places[1]),
+            _ => return Vec::new(),
+        };
+        let mut arcs: Vec<(Node, Node, Node)> = Vec::new();
+        for j in 0..operands.len() {
+            for k in 0..=j {
+                if !is_active(j) || !is_active(k) {
+                    continue;
+                }
+                let Some((_, partial)) =
+                    scratch.partials(node, |node| node == places[j]).into_iter().flatten().next()
+                else {
+                    continue;
+                };
+                let second = scratch.tangent(partial, places[k]);
+                if scratch.is_zero(second) {
+                    continue;
+                }
+                let second = self.graft(&scratch, second, &operands);
+                let mut value = self.times(w, second);
+                if j != k && operands[j] == operands[k] {
+                    value = self.plus(value, value);
+                }
+                match arcs.iter_mut().find(|arc| arc.0 == operands[j] && arc.1 == operands[k]) {
+                    Some(arc) => arc.2 = self.plus(arc.2, value),
+                    None => arcs.push((operands[j], operands[k], value)),
+                }
+            }
+        }
+        arcs
+    }
+
+    /// The derivative of a small expression with respect to a variable.
+    fn tangent(&mut self, of: Node, variable: Node) -> Node {
+        let zero = self.constant(0.0);
+        let one = self.constant(1.0);
+        let mut tangents = vec![zero; of.at() + 1];
+        for node in self.reachable(&[of]) {
+            if node == variable {
+                tangents[node.at()] = one;
+                continue;
+            }
+            let parts = self.partials(node, |operand| tangents[operand.at()] != zero);
+            for (operand, partial) in parts.into_iter().flatten() {
+                let product = self.times(partial, tangents[operand.at()]);
+                tangents[node.at()] = self.plus(tangents[node.at()], product);
+            }
+        }
+        tangents[of.at()]
+    }
+
+    /// An expression of another graph, with other nodes for its variables.
+    fn graft(&mut self, from: &Graph, node: Node, variables: &[Node]) -> Node {
+        let mut image = vec![node; node.at() + 1];
+        for node in from.reachable(&[node]) {
+            let at = |node: Node| image[node.at()];
+            image[node.at()] = match from.op(node) {
+                Op::Constant(bits) => self.constant(f64::from_bits(bits)),
+                Op::Variable(index) => variables[index as usize],
+                Op::Opaque(index) => self.opaque(index),
+                Op::Seed(index) => self.seed(index),
+                Op::Unary(function, a) => self.unary(function, at(a)),
+                Op::Binary(function, a, b) => self.binary(function, at(a), at(b)),
+                Op::Powi(a, n) => self.powi(at(a), n),
+                Op::Select(condition, a, b) => self.select(at(condition), at(a), at(b)),
+                Op::Compare(comparison, a, b) => self.compare(comparison, at(a), at(b)),
+                Op::And(a, b) => self.and(at(a), at(b)),
+                Op::Or(a, b) => self.or(at(a), at(b)),
+                Op::Not(a) => self.not(at(a)),
+            };
+        }
+        image[node.at()]
+    }
+}
