@@ -23,6 +23,8 @@ pub mod model;
 pub mod scalar;
 pub mod shape;
 pub mod tableau;
+#[cfg(feature = "testing")]
+pub mod testing;
 
 pub use model::{Dae, GraphDae, Ode};
 pub use scalar::{Lanes, Real, Scalar};

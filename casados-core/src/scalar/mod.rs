@@ -4,6 +4,10 @@
 //! - [`Lanes`]: one or more real numbers side by side, each of which can be read and written.
 //! - [`Real`]: one real number, which can be compared: what decisions are made on.
 
+#[cfg(feature = "testing")]
+mod complex;
+#[cfg(feature = "num-dual")]
+mod dual;
 mod real;
 
 use crate::shape::Plain;

@@ -1,0 +1,203 @@
+//! Running error analysis: a number and a bound of its rounding error.
+//!
+//! Every operation adds what it rounds and carries on what its arguments have lost, to first order
+//! (Wilkinson; Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3). Run through emitted code it
+//! yields condition times epsilon of every entry, which is what tolerances of comparisons are made of.
+
+use crate::scalar::{Lanes, Scalar};
+use bytemuck::Zeroable;
+use core::f64::consts::{LN_2, LN_10};
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Unit roundoff.
+const U: f64 = 0.5 * f64::EPSILON;
+/// Elementary functions of the standard library are off by less than one unit in the last place.
+const FUNCTION: f64 = 2.0 * U;
+
+/// A number and a bound of its rounding error.
+#[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
+pub(super) struct Bounded {
+    pub value: f64,
+    pub error: f64,
+}
+
+impl Bounded {
+    /// A number that is exact.
+    pub const fn exact(value: f64) -> Self {
+        Self { value, error: 0.0 }
+    }
+
+    /// A function of one argument, its value and the size of its derivative.
+    fn function(self, value: f64, derivative: f64) -> Self {
+        Self { value, error: carried(derivative, self.error) + FUNCTION * value.abs() }
+    }
+}
+
+/// What an argument's error becomes; an exact argument stays exact where the derivative is infinite.
+fn carried(derivative: f64, error: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { derivative.abs() * error }
+}
+
+/// The bound of a rounding: zero where nothing was lost, so that exact numbers stay exact.
+fn rounding(value: f64, lost: f64) -> f64 {
+    if lost == 0.0 { 0.0 } else { U * value.abs() }
+}
+
+impl Add for Bounded {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        let value = self.value + other.value;
+        // What the sum has rounded (Knuth's TwoSum).
+        let other_part = value - self.value;
+        let lost = (self.value - (value - other_part)) + (other.value - other_part);
+        Self { value, error: self.error + other.error + rounding(value, lost) }
+    }
+}
+
+impl Sub for Bounded {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Bounded {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        let value = self.value * other.value;
+        let carried =
+            self.value.abs() * other.error + other.value.abs() * self.error + self.error * other.error;
+        let lost = self.value.mul_add(other.value, -value);
+        Self { value, error: carried + rounding(value, lost) }
+    }
+}
+
+impl Div for Bounded {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        let left = (other.value.abs() - other.error).max(0.0);
+        let carried = self.error + value.abs() * other.error;
+        let carried = if carried == 0.0 { 0.0 } else { carried / left };
+        let lost = value.mul_add(-other.value, self.value);
+        Self { value, error: carried + rounding(value, lost) }
+    }
+}
+
+impl Neg for Bounded {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { value: -self.value, error: self.error }
+    }
+}
+
+/// Functions of one argument `a` with value `f`: the derivative.
+macro_rules! functions {
+    ($($name:ident($a:ident, $f:ident) = $derivative:expr;)*) => {
+        $(
+            fn $name(self) -> Self {
+                let $a = self.value;
+                let $f = $a.$name();
+                self.function($f, $derivative)
+            }
+        )*
+    };
+}
+
+impl Scalar for Bounded {
+    type Mask = bool;
+
+    fn from_f64(value: f64) -> Self {
+        Self::exact(value)
+    }
+    functions! {
+        sqrt(a, f) = 0.5 / f;
+        cbrt(a, f) = f / (3.0 * a);
+        exp(a, f) = f;
+        exp2(a, f) = LN_2 * f;
+        exp_m1(a, f) = f + 1.0;
+        ln(a, f) = 1.0 / a;
+        ln_1p(a, f) = 1.0 / (1.0 + a);
+        log2(a, f) = 1.0 / (a * LN_2);
+        log10(a, f) = 1.0 / (a * LN_10);
+        sin(a, f) = a.cos();
+        cos(a, f) = a.sin();
+        tan(a, f) = 1.0 + f * f;
+        asin(a, f) = 1.0 / (1.0 - a * a).sqrt();
+        acos(a, f) = 1.0 / (1.0 - a * a).sqrt();
+        atan(a, f) = 1.0 / (1.0 + a * a);
+        sinh(a, f) = a.cosh();
+        cosh(a, f) = a.sinh();
+        tanh(a, f) = 1.0 - f * f;
+        asinh(a, f) = 1.0 / (1.0 + a * a).sqrt();
+        acosh(a, f) = 1.0 / (a * a - 1.0).sqrt();
+        atanh(a, f) = 1.0 / (1.0 - a * a);
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        (self.sin(), self.cos())
+    }
+    fn atan2(self, other: Self) -> Self {
+        let value = self.value.atan2(other.value);
+        let square = self.value * self.value + other.value * other.value;
+        Self {
+            value,
+            error: carried(other.value / square, self.error)
+                + carried(self.value / square, other.error)
+                + FUNCTION * value.abs(),
+        }
+    }
+    fn hypot(self, other: Self) -> Self {
+        let value = self.value.hypot(other.value);
+        Self { value, error: self.error + other.error + FUNCTION * value }
+    }
+    // Square and multiply: as many roundings as the exponent, at most.
+    fn powi(self, n: i32) -> Self {
+        let value = self.value.powi(n);
+        let derivative = f64::from(n) * self.value.powi(n - 1);
+        Self { value, error: carried(derivative, self.error) + f64::from(n.unsigned_abs()) * U * value.abs() }
+    }
+    fn powf(self, other: Self) -> Self {
+        let value = self.value.powf(other.value);
+        let error = carried(other.value * self.value.powf(other.value - 1.0), self.error)
+            + carried(value * self.value.ln(), other.error);
+        Self { value, error: error + FUNCTION * value.abs() }
+    }
+    fn abs(self) -> Self {
+        Self { value: self.value.abs(), error: self.error }
+    }
+    fn signum(self) -> Self {
+        Self::exact(self.value.signum())
+    }
+    fn lt(self, other: Self) -> bool {
+        self.value < other.value
+    }
+    fn le(self, other: Self) -> bool {
+        self.value <= other.value
+    }
+    fn eq(self, other: Self) -> bool {
+        self.value == other.value
+    }
+    fn and(a: bool, b: bool) -> bool {
+        a & b
+    }
+    fn or(a: bool, b: bool) -> bool {
+        a | b
+    }
+    fn not(a: bool) -> bool {
+        !a
+    }
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+}
+
+impl Lanes for Bounded {
+    const LANES: usize = 1;
+    fn lane(self, _: usize) -> f64 {
+        self.value
+    }
+    // A number that comes from code which does not carry the bound along is at least rounded.
+    fn set_lane(&mut self, _: usize, value: f64) {
+        *self = Self { value, error: f64::EPSILON * value.abs() };
+    }
+}

@@ -1,0 +1,246 @@
+//! A model's own derivatives as dense matrices, and the same from independent sources.
+
+use super::bounded::Bounded;
+use super::forward::Forward;
+use crate::model::{ArrayK, ArrayV, Dae, GraphDae};
+use crate::scalar::{Lanes, Scalar};
+use crate::shape::{Array, Shape};
+use nalgebra::DMatrix;
+use num_complex::Complex64;
+use num_dual::{Dual64, HyperDual64};
+use std::vec::Vec;
+
+/// The complex step.
+const STEP: f64 = 1e-200;
+
+/// How many operations of a reference stand against one of [`Forward`]: a complex
+/// division rounds three times in each part.
+const REFERENCE: f64 = 4.0;
+
+/// Values, and bounds of their errors.
+#[derive(Clone, Debug)]
+pub(super) struct Estimate {
+    pub value: DMatrix<f64>,
+    pub error: DMatrix<f64>,
+}
+
+impl Estimate {
+    fn of(values: &DMatrix<Bounded>, factor: f64) -> Self {
+        Self { value: values.map(|b| b.value), error: values.map(|b| factor * b.error) }
+    }
+}
+
+/// Variables that derivatives are taken by: all but `t`.
+pub(super) const fn variables<M: Dae>() -> usize {
+    M::Shape::NV - 1
+}
+
+/// A point in another arithmetic.
+fn lift<M: Dae, S: Lanes>(v: &ArrayV<M, f64>) -> ArrayV<M, S> {
+    Array::from_fn(|i| S::from_f64(v[i]))
+}
+
+fn filled<S: Lanes, A: Array<S>>(value: f64) -> A {
+    A::from_fn(|_| S::from_f64(value))
+}
+
+/// `f(v)`
+pub(super) fn residual<M: Dae, S: Lanes>(v: &ArrayV<M, S>) -> ArrayK<M, S> {
+    let mut f = filled::<S, ArrayK<M, S>>(f64::NAN);
+    M::residual(v, &mut f);
+    f
+}
+
+/// `f(v)` beside its Jacobian, and the Jacobian. Entries that nothing has written are NaN.
+pub(super) fn jacobian<M: Dae, S: Lanes>(v: &ArrayV<M, f64>) -> (ArrayK<M, S>, DMatrix<S>) {
+    let mut f = filled::<S, ArrayK<M, S>>(f64::NAN);
+    let mut values = filled::<S, M::Jacobian<S>>(f64::NAN);
+    M::jacobian_constants(&mut values);
+    M::residual_jacobian(&lift::<M, S>(v), &mut f, &mut values);
+    let mut dense = DMatrix::from_element(M::Shape::NK, variables::<M>(), S::from_f64(0.0));
+    for entry in 0..M::STRUCTURE.jacobian.len() {
+        dense[M::STRUCTURE.jacobian.at(entry)] = values[entry];
+    }
+    (f, dense)
+}
+
+/// `∇(μᵀ f)`, with `t`.
+pub(super) fn adjoint<M: Dae, S: Lanes>(v: &ArrayV<M, S>, mu: &[f64]) -> ArrayV<M, S> {
+    let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
+    let mut gradient = filled::<S, ArrayV<M, S>>(f64::NAN);
+    M::adjoint(v, &mu, &mut gradient);
+    gradient
+}
+
+/// `∇²(μᵀ f)`, both triangles.
+pub(super) fn hessian<M: Dae, S: Lanes>(v: &ArrayV<M, f64>, mu: &[f64]) -> DMatrix<S> {
+    let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
+    let mut values = filled::<S, M::Hessian<S>>(f64::NAN);
+    M::hessian(&lift::<M, S>(v), &mu, &mut values);
+    let mut dense = DMatrix::from_element(variables::<M>(), variables::<M>(), S::from_f64(0.0));
+    for entry in 0..M::STRUCTURE.hessian.len() {
+        let (i, j) = M::STRUCTURE.hessian.at(entry);
+        dense[(i, j)] = values[entry];
+        dense[(j, i)] = values[entry];
+    }
+    dense
+}
+
+/// The model's own values with bounds of their rounding.
+pub(super) fn own_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> Estimate {
+    let bounds = jacobian::<M, Bounded>(v).1;
+    Estimate { value: jacobian::<M, f64>(v).1, error: bounds.map(|b| b.error) }
+}
+
+/// The model's own gradient as one column, with bounds.
+pub(super) fn own_adjoint<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+    let bounds = adjoint::<M, Bounded>(&lift::<M, Bounded>(v), mu);
+    let values = adjoint::<M, f64>(v, mu);
+    Estimate {
+        value: DMatrix::from_fn(M::Shape::NV, 1, |i, _| values[i]),
+        error: DMatrix::from_fn(M::Shape::NV, 1, |i, _| bounds[i].error),
+    }
+}
+
+/// The model's own Hessian with bounds.
+pub(super) fn own_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+    let bounds = hessian::<M, Bounded>(v, mu);
+    Estimate { value: hessian::<M, f64>(v, mu), error: bounds.map(|b| b.error) }
+}
+
+/// A function of a point in another arithmetic, at `v` in the direction of variable `j`.
+fn at<S: Scalar>(
+    v: &[f64],
+    outputs: usize,
+    seed: impl Fn(usize, f64) -> S,
+    function: impl Fn(&[S], &mut [S]),
+) -> Vec<S> {
+    let point: Vec<S> = v.iter().enumerate().map(|(i, &value)| seed(i, value)).collect();
+    let mut f: Vec<S> = core::iter::repeat_n(S::from_f64(0.0), outputs).collect();
+    function(&point, &mut f);
+    f
+}
+
+fn forward_seed(j: usize) -> impl Fn(usize, f64) -> Forward<Bounded> {
+    move |i, value| Forward { re: Bounded::exact(value), d: Bounded::exact(f64::from(u8::from(i == j))) }
+}
+
+/// The Jacobian by `num-dual`.
+pub(super) fn dual_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> Estimate {
+    let value = by_columns(variables::<M>(), M::Shape::NK, |j| {
+        let seed = |i, value| Dual64::new(value, f64::from(u8::from(i == j)));
+        at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<Dual64>).iter().map(|f| f.eps).collect()
+    });
+    Estimate { value, error: jacobian_bounds::<M>(v) }
+}
+
+/// The Jacobian by the complex step.
+pub(super) fn complex_jacobian<M: GraphDae>(v: &ArrayV<M, f64>) -> Estimate {
+    let value = by_columns(variables::<M>(), M::Shape::NK, |j| {
+        at(v.as_ref(), M::Shape::NK, complex_seed(j), M::residual_of::<Complex64>)
+            .iter()
+            .map(|f| f.im / STEP)
+            .collect()
+    });
+    Estimate { value, error: jacobian_bounds::<M>(v) }
+}
+
+fn complex_seed(j: usize) -> impl Fn(usize, f64) -> Complex64 {
+    move |i, value| Complex64::new(value, if i == j { STEP } else { 0.0 })
+}
+
+fn jacobian_bounds<M: GraphDae>(v: &ArrayV<M, f64>) -> DMatrix<f64> {
+    by_columns(variables::<M>(), M::Shape::NK, |j| {
+        at(v.as_ref(), M::Shape::NK, forward_seed(j), M::residual_of::<Forward<Bounded>>)
+            .iter()
+            .map(|f| REFERENCE * f.d.error)
+            .collect()
+    })
+}
+
+/// The Hessian of `μᵀ f` by the hyper-duals of `num-dual`.
+pub(super) fn dual_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+    let n = variables::<M>();
+    let (mut value, mut error) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    let is = |i: usize, j: usize| f64::from(u8::from(i == j));
+    for i in 0..n {
+        for j in 0..=i {
+            let seed = |k, value| HyperDual64::new(value, is(k, i), is(k, j), 0.0);
+            let f = at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<HyperDual64>);
+            // Rows without second derivative add exact zeros.
+            let mut sum = Bounded::exact(0.0);
+            if f.iter().any(|f| f.eps1eps2 != 0.0) {
+                let seed = |k, value| Forward {
+                    re: Forward { re: Bounded::exact(value), d: Bounded::exact(is(k, i)) },
+                    d: Forward { re: Bounded::exact(is(k, j)), d: Bounded::exact(0.0) },
+                };
+                let bounds = at(v.as_ref(), M::Shape::NK, seed, M::residual_of::<Forward<Forward<Bounded>>>);
+                for ((f, bound), &mu) in f.iter().zip(&bounds).zip(mu) {
+                    let term = Bounded { value: f.eps1eps2, error: bound.d.d.error };
+                    sum = sum + Bounded::exact(mu) * term;
+                }
+            }
+            (value[(i, j)], value[(j, i)]) = (sum.value, sum.value);
+            (error[(i, j)], error[(j, i)]) = (REFERENCE * sum.error, REFERENCE * sum.error);
+        }
+    }
+    Estimate { value, error }
+}
+
+/// The Hessian of `μᵀ f` by the complex step through the model's gradient.
+pub(super) fn complex_hessian<M: GraphDae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+    let n = variables::<M>();
+    fn seeds<S: Scalar>(mu: &[f64]) -> Vec<S> {
+        mu.iter().map(|&mu| S::from_f64(mu)).collect()
+    }
+    let value = by_columns(n, n, |j| {
+        let gradient = |v: &[Complex64], g: &mut [Complex64]| M::adjoint_of(v, &seeds(mu), g);
+        let column = at(v.as_ref(), M::Shape::NV, complex_seed(j), gradient);
+        column[..n].iter().map(|g| g.im / STEP).collect()
+    });
+    let error = by_columns(n, n, |j| {
+        let gradient = |v: &[Forward<Bounded>], g: &mut [Forward<Bounded>]| {
+            M::adjoint_of(v, &seeds(mu), g);
+        };
+        let column = at(v.as_ref(), M::Shape::NV, forward_seed(j), gradient);
+        column[..n].iter().map(|g| REFERENCE * g.d.error).collect()
+    });
+    Estimate { value, error }
+}
+
+/// The Jacobian by differences of the residual.
+pub(super) fn difference_jacobian<M: Dae>(v: &ArrayV<M, f64>) -> Estimate {
+    by_differences::<M>(v, M::Shape::NK, |v| residual::<M, Bounded>(v).as_ref().to_vec())
+}
+
+/// The Hessian by differences of the model's gradient.
+pub(super) fn difference_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
+    by_differences::<M>(v, variables::<M>(), |v| {
+        adjoint::<M, Bounded>(v, mu).as_ref()[..variables::<M>()].to_vec()
+    })
+}
+
+/// Derivatives of a function of the point by each variable.
+fn by_differences<M: Dae>(
+    v: &ArrayV<M, f64>,
+    outputs: usize,
+    function: impl Fn(&ArrayV<M, Bounded>) -> Vec<Bounded>,
+) -> Estimate {
+    let point = lift::<M, Bounded>(v);
+    let columns: Vec<Vec<Bounded>> = (0..variables::<M>())
+        .map(|j| {
+            super::differences::derivative(v[j], outputs, |value| {
+                let mut moved = point;
+                moved[j] = value;
+                function(&moved)
+            })
+        })
+        .collect();
+    let dense = DMatrix::from_fn(outputs, columns.len(), |i, j| columns[j][i]);
+    Estimate::of(&dense, 1.0)
+}
+
+fn by_columns(columns: usize, rows: usize, column: impl Fn(usize) -> Vec<f64>) -> DMatrix<f64> {
+    let values: Vec<Vec<f64>> = (0..columns).map(column).collect();
+    DMatrix::from_fn(rows, columns, |i, j| values[j][i])
+}

@@ -1,0 +1,25 @@
+//! Checks of models and integrators, for `cargo test` on a model of one's own.
+//!
+//! - [`check_derivatives`]: Jacobian, adjoint and Hessian of a model against `num-dual`, the complex step
+//!   and differences ([`check_by_differences`] for dual models); [`check_pattern`]: zeros where zeros were declared.
+//! - [`convergence`]: an integrator against an exact solution, with the order that it reaches.
+//!
+//! Every check returns a report that prints as a table and whose `assert` panics with it. Tolerances are not chosen:
+//! they are bounds of the rounding errors at the point in question, or estimates of truncation.
+
+mod bounded;
+mod convergence;
+mod derivatives;
+mod differences;
+mod evaluate;
+mod forward;
+mod points;
+mod report;
+
+pub use convergence::{Convergence, convergence};
+pub use derivatives::{check_by_differences, check_derivatives, check_pattern};
+pub use points::{Points, Random};
+pub use report::{Deviation, Report, Row};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,144 @@
+//! Where a model is checked: given points, or random ones in given ranges.
+
+use crate::model::{ArrayV, Dae};
+use crate::shape::{Array, Shape};
+use core::ops::RangeInclusive;
+use std::vec::Vec;
+
+/// Points `v = (ẋ, x, z, u, p, t)` at which a model is checked.
+///
+/// Random points are the same in every run: the generator has a fixed seed, which can be chosen.
+#[derive(Clone, Debug)]
+pub struct Points<M: Dae> {
+    given: Vec<ArrayV<M, f64>>,
+    count: usize,
+    seed: u64,
+    ranges: Vec<(f64, f64)>,
+}
+
+impl<M: Dae> Points<M> {
+    /// As many random points, every variable in `[-1, 1]` unless a range is set for it.
+    #[must_use]
+    pub fn random(count: usize) -> Self {
+        Self {
+            given: Vec::new(),
+            count,
+            seed: 1,
+            ranges: core::iter::repeat_n((-1.0, 1.0), M::Shape::NV).collect(),
+        }
+    }
+
+    /// These points, `v = (ẋ, x, z, u, p, t)`.
+    #[must_use]
+    pub fn given(points: impl IntoIterator<Item = ArrayV<M, f64>>) -> Self {
+        Self { given: points.into_iter().collect(), ..Self::random(0) }
+    }
+
+    /// Random points around a given one: each variable within `radius · max(|v|, 1)` of it.
+    #[must_use]
+    pub fn around(point: &ArrayV<M, f64>, radius: f64, count: usize) -> Self {
+        let mut points = Self::random(count);
+        for (range, &value) in points.ranges.iter_mut().zip(point.as_ref()) {
+            let width = radius * value.abs().max(1.0);
+            *range = (value - width, value + width);
+        }
+        points
+    }
+
+    /// Another sequence of random points.
+    #[must_use]
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// The range of all variables.
+    #[must_use]
+    pub fn all(self, range: RangeInclusive<f64>) -> Self {
+        self.block(0, M::Shape::NV, &range)
+    }
+    /// The range of `ẋ[i]`.
+    #[must_use]
+    pub fn xdot(self, i: usize, range: RangeInclusive<f64>) -> Self {
+        self.block(i, 1, &range)
+    }
+    /// The range of `x[i]`.
+    #[must_use]
+    pub fn x(self, i: usize, range: RangeInclusive<f64>) -> Self {
+        self.block(M::Shape::NX + i, 1, &range)
+    }
+    /// The range of `z[i]`.
+    #[must_use]
+    pub fn z(self, i: usize, range: RangeInclusive<f64>) -> Self {
+        self.block(2 * M::Shape::NX + i, 1, &range)
+    }
+    /// The range of `u[i]`.
+    #[must_use]
+    pub fn u(self, i: usize, range: RangeInclusive<f64>) -> Self {
+        self.block(2 * M::Shape::NX + M::Shape::NZ + i, 1, &range)
+    }
+    /// The range of `p[i]`.
+    #[must_use]
+    pub fn p(self, i: usize, range: RangeInclusive<f64>) -> Self {
+        self.block(2 * M::Shape::NX + M::Shape::NZ + M::Shape::NU + i, 1, &range)
+    }
+    /// The range of `t`.
+    #[must_use]
+    pub fn t(self, range: RangeInclusive<f64>) -> Self {
+        self.block(M::Shape::NV - 1, 1, &range)
+    }
+
+    fn block(mut self, first: usize, count: usize, range: &RangeInclusive<f64>) -> Self {
+        self.ranges[first..first + count].fill((*range.start(), *range.end()));
+        self
+    }
+
+    /// The points, the given ones first.
+    pub(super) fn list(&self) -> Vec<ArrayV<M, f64>> {
+        let mut random = Random::new(self.seed);
+        let mut points = self.given.clone();
+        points.extend((0..self.count).map(|_| {
+            <ArrayV<M, f64> as Array<f64>>::from_fn(|i| {
+                let (low, high) = self.ranges[i];
+                low + (high - low) * random.unit()
+            })
+        }));
+        points
+    }
+}
+
+/// The generator SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine.
+#[derive(Clone, Debug)]
+pub struct Random(u64);
+
+impl Random {
+    /// A generator; equal seeds give equal sequences.
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// 64 random bits.
+    pub const fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number in `[0, 1)`.
+    pub const fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    /// A number in `[-1, 1)`.
+    pub const fn symmetric(&mut self) -> f64 {
+        2.0 * self.unit() - 1.0
+    }
+
+    /// An integer in `0..n`; `n` is not zero.
+    pub const fn below(&mut self, n: usize) -> usize {
+        (self.bits() % n as u64) as usize
+    }
+}

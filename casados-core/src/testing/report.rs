@@ -1,0 +1,198 @@
+//! What a check found: a table, and the entries that are wrong.
+
+use core::fmt;
+use std::string::String;
+use std::vec::Vec;
+
+/// How many wrong entries are listed by name.
+const LISTED: usize = 12;
+
+/// What a check found. It prints as a table; [`Report::assert`] panics with the table if anything is wrong.
+#[derive(Clone, Debug)]
+#[must_use = "a report says whether the check has passed: call `assert` or look at `passed`"]
+pub struct Report {
+    /// What was checked.
+    pub title: String,
+    /// One row for each quantity and what it was compared with.
+    pub rows: Vec<Row>,
+    /// The first entries that are wrong.
+    pub wrong: Vec<Deviation>,
+}
+
+/// The comparison of one quantity with one reference.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What was compared.
+    pub quantity: &'static str,
+    /// With what.
+    pub reference: &'static str,
+    /// Entries compared.
+    pub entries: usize,
+    /// Entries about which the comparison says nothing: neither side is finite, or there is no bound of the error, or
+    /// it is larger than a thousandth of the largest entry.
+    pub inconclusive: usize,
+    /// Entries that are wrong.
+    pub wrong: usize,
+    /// The largest difference.
+    pub difference: f64,
+    /// The largest difference relative to its tolerance.
+    pub ratio: f64,
+}
+
+/// An entry that is wrong.
+#[derive(Clone, Debug)]
+pub struct Deviation {
+    /// What was compared.
+    pub quantity: &'static str,
+    /// With what.
+    pub reference: &'static str,
+    /// Which entry: equations and variables by name.
+    pub entry: String,
+    /// The number of the point.
+    pub point: usize,
+    /// What it is.
+    pub value: f64,
+    /// What it should be.
+    pub expected: f64,
+    /// How much it may differ.
+    pub tolerance: f64,
+}
+
+/// One entry to compare.
+pub(super) struct Entry {
+    pub value: f64,
+    pub expected: f64,
+    pub tolerance: f64,
+}
+
+impl Report {
+    pub(super) fn new(title: String) -> Self {
+        Self { title, rows: Vec::new(), wrong: Vec::new() }
+    }
+
+    /// Whether nothing is wrong, and every row has said something.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        !self.rows.is_empty()
+            && self
+                .rows
+                .iter()
+                .all(|row| row.wrong == 0 && (row.entries == 0 || row.inconclusive < row.entries))
+    }
+
+    /// Panics with the report if anything is wrong.
+    #[track_caller]
+    pub fn assert(&self) {
+        assert!(self.passed(), "{self}");
+    }
+
+    /// Compares entries. `scale` is the largest entry; `name` names the entry of an index.
+    pub(super) fn compare(
+        &mut self,
+        quantity: &'static str,
+        reference: &'static str,
+        point: usize,
+        scale: f64,
+        entries: impl Iterator<Item = (usize, Entry)>,
+        name: impl Fn(usize) -> String,
+    ) {
+        let known = self.rows.iter().position(|r| r.quantity == quantity && r.reference == reference);
+        let index = known.unwrap_or_else(|| {
+            self.rows.push(Row {
+                quantity,
+                reference,
+                entries: 0,
+                inconclusive: 0,
+                wrong: 0,
+                difference: 0.0,
+                ratio: 0.0,
+            });
+            self.rows.len() - 1
+        });
+        let row = &mut self.rows[index];
+        for (i, entry) in entries {
+            row.entries += 1;
+            let Entry { value, expected, tolerance } = entry;
+            let difference = (value - expected).abs();
+            if (!value.is_finite() && !expected.is_finite()) || !tolerance.is_finite() {
+                row.inconclusive += 1;
+                continue;
+            }
+            // Written so that a NaN is wrong.
+            if difference <= tolerance {
+                let silent = tolerance > 1e-3 * scale.max(expected.abs());
+                row.inconclusive += usize::from(silent && difference != 0.0);
+                row.difference = row.difference.max(difference);
+                if tolerance > 0.0 {
+                    row.ratio = row.ratio.max(difference / tolerance);
+                }
+            } else {
+                row.wrong += 1;
+                row.difference = worst(row.difference, difference);
+                row.ratio = worst(row.ratio, difference / tolerance);
+                if self.wrong.len() < LISTED {
+                    self.wrong.push(Deviation {
+                        quantity,
+                        reference,
+                        entry: name(i),
+                        point,
+                        value,
+                        expected,
+                        tolerance,
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The larger one; NaN is the worst.
+fn worst(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        writeln!(
+            f,
+            "{:<24} {:<16} {:>8} {:>7} {:>6} {:>10} {:>10}",
+            "quantity", "against", "entries", "silent", "wrong", "max |Δ|", "|Δ|/tol"
+        )?;
+        for row in &self.rows {
+            writeln!(
+                f,
+                "{:<24} {:<16} {:>8} {:>7} {:>6} {:>10.1e} {:>10.2e}",
+                row.quantity,
+                row.reference,
+                row.entries,
+                row.inconclusive,
+                row.wrong,
+                row.difference,
+                row.ratio
+            )?;
+        }
+        for wrong in &self.wrong {
+            writeln!(
+                f,
+                "wrong: {} {} is {:.17e}, {} says {:.17e}: off by {:.1e}, allowed {:.1e} (point {})",
+                wrong.quantity,
+                wrong.entry,
+                wrong.value,
+                wrong.reference,
+                wrong.expected,
+                (wrong.value - wrong.expected).abs(),
+                wrong.tolerance,
+                wrong.point
+            )?;
+        }
+        let total: usize = self.rows.iter().map(|row| row.wrong).sum();
+        if total > self.wrong.len() {
+            writeln!(f, "... and {} more", total - self.wrong.len())?;
+        }
+        if total == 0 && !self.passed() {
+            writeln!(f, "nothing was compared: no entry is finite, or no tolerance is small")?;
+        }
+        Ok(())
+    }
+}
