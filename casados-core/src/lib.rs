@@ -19,16 +19,23 @@ compile_error!(
     "casados needs elementary functions: enable the feature `std`, or `libm` for targets without it"
 );
 
+pub mod error;
 pub mod model;
+pub mod options;
+pub mod result;
 pub mod scalar;
 pub mod shape;
+pub mod statistics;
 pub mod tableau;
 #[cfg(feature = "testing")]
 pub mod testing;
 
+pub use error::Error;
 pub use model::{Dae, GraphDae, Ode};
+pub use options::Options;
 pub use scalar::{Lanes, Real, Scalar};
 pub use shape::{Dims, Shape};
+pub use statistics::Statistics;
 pub use tableau::{
     Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4,
     Tableau, TableauError,

@@ -15,6 +15,40 @@ pub type ArrayK<M, T> = <<M as Dae>::Shape as Shape>::ArrayK<T>;
 pub type ArrayV<M, T> = <<M as Dae>::Shape as Shape>::ArrayV<T>;
 /// `[T; NW]` of a model: one element per direction `(x₀, u, p)`.
 pub type ArrayW<M, T> = <<M as Dae>::Shape as Shape>::ArrayW<T>;
+/// `SVector<T, NX>` of a model.
+pub type VectorX<M, T> = <<M as Dae>::Shape as Shape>::VectorX<T>;
+/// `SVector<T, NZ>` of a model.
+pub type VectorZ<M, T> = <<M as Dae>::Shape as Shape>::VectorZ<T>;
+/// `SVector<T, NU>` of a model.
+pub type VectorU<M, T> = <<M as Dae>::Shape as Shape>::VectorU<T>;
+/// `SVector<T, NP>` of a model.
+pub type VectorP<M, T> = <<M as Dae>::Shape as Shape>::VectorP<T>;
+/// `SMatrix<T, NX, NX>` of a model.
+pub type MatrixXX<M, T> = <<M as Dae>::Shape as Shape>::MatrixXX<T>;
+/// `SMatrix<T, NX, NU>` of a model.
+pub type MatrixXU<M, T> = <<M as Dae>::Shape as Shape>::MatrixXU<T>;
+/// `SMatrix<T, NX, NP>` of a model.
+pub type MatrixXP<M, T> = <<M as Dae>::Shape as Shape>::MatrixXP<T>;
+/// `SMatrix<T, NZ, NX>` of a model.
+pub type MatrixZX<M, T> = <<M as Dae>::Shape as Shape>::MatrixZX<T>;
+/// `SMatrix<T, NZ, NU>` of a model.
+pub type MatrixZU<M, T> = <<M as Dae>::Shape as Shape>::MatrixZU<T>;
+/// `SMatrix<T, NZ, NP>` of a model.
+pub type MatrixZP<M, T> = <<M as Dae>::Shape as Shape>::MatrixZP<T>;
+/// `SMatrix<T, NU, NU>` of a model.
+pub type MatrixUU<M, T> = <<M as Dae>::Shape as Shape>::MatrixUU<T>;
+/// `SMatrix<T, NU, NP>` of a model.
+pub type MatrixUP<M, T> = <<M as Dae>::Shape as Shape>::MatrixUP<T>;
+/// `SMatrix<T, NP, NP>` of a model.
+pub type MatrixPP<M, T> = <<M as Dae>::Shape as Shape>::MatrixPP<T>;
+/// `SMatrix<T, NX, C>` of a model.
+pub type MatrixXC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixXC<T, C>;
+/// `SMatrix<T, NZ, C>` of a model.
+pub type MatrixZC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixZC<T, C>;
+/// `SMatrix<T, NU, C>` of a model.
+pub type MatrixUC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixUC<T, C>;
+/// `SMatrix<T, NP, C>` of a model.
+pub type MatrixPC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixPC<T, C>;
 
 /// A differential-algebraic equation with its derivatives: written by `#[dae]` and `#[ode]`.
 ///

@@ -9,8 +9,33 @@ use core::ops::{Index, IndexMut};
 use nalgebra::{SMatrix, SVector};
 
 /// An element of static memory: copied freely, and valid when all its bytes are zero.
-pub trait Plain: Copy + Zeroable + Debug + PartialEq + 'static {}
-impl<T: Copy + Zeroable + Debug + PartialEq + 'static> Plain for T {}
+pub trait Plain: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static {}
+impl<T: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static> Plain for T {}
+
+/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put on
+/// the parameters of the struct.
+macro_rules! plain {
+    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+        impl<$($generics)*> Clone for $type {
+            #[inline(always)]
+            fn clone(&self) -> Self {
+                *self
+            }
+        }
+        impl<$($generics)*> Copy for $type {}
+        impl<$($generics)*> PartialEq for $type {
+            fn eq(&self, other: &Self) -> bool {
+                true $(&& self.$field == other.$field)*
+            }
+        }
+        impl<$($generics)*> core::fmt::Debug for $type {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.debug_struct(stringify!($type))$(.field(stringify!($field), &self.$field))*.finish()
+            }
+        }
+    };
+}
+pub(crate) use plain;
 
 /// `[T; N]` of a length that the model knows.
 pub trait Array<T>: Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[T]> + AsMut<[T]> {

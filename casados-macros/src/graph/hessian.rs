@@ -60,8 +60,8 @@ pub fn hessian_in_order(
     }
     let products = linearised.eliminate(graph, variables..vertices.count, order, budget)?;
     let rows = &linearised.arcs[..variables as usize];
-    let entries = (0..).zip(rows).flat_map(|(row, entries)| {
-        entries.range(..=row).map(move |(&column, &value)| (row, column, value))
-    });
+    let entries = (0..)
+        .zip(rows)
+        .flat_map(|(row, entries)| entries.range(..=row).map(move |(&column, &value)| (row, column, value)));
     Some((entries.collect(), products))
 }

@@ -46,8 +46,7 @@ pub fn jacobian_in_order(
     budget: usize,
 ) -> Option<(Vec<(u32, u32, Node)>, usize)> {
     let active = graph.active(outputs.iter().copied(), variables);
-    let nodes: Vec<Node> =
-        graph.reachable(outputs).into_iter().filter(|node| active[node.at()]).collect();
+    let nodes: Vec<Node> = graph.reachable(outputs).into_iter().filter(|node| active[node.at()]).collect();
     let vertices = Vertices::new(graph, &nodes, variables, active.len());
     let mut linearised = Linearised::new(vertices.count as usize + outputs.len());
     for &node in &nodes {
@@ -63,9 +62,9 @@ pub fn jacobian_in_order(
     }
     let products = linearised.eliminate(graph, variables..vertices.count, order, budget)?;
     let rows = &linearised.into[vertices.count as usize..];
-    let entries = (0..).zip(rows).flat_map(|(row, entries)| {
-        entries.iter().map(move |(&variable, &value)| (row, variable, value))
-    });
+    let entries = (0..)
+        .zip(rows)
+        .flat_map(|(row, entries)| entries.iter().map(move |(&variable, &value)| (row, variable, value)));
     Some((entries.collect(), products))
 }
 

@@ -124,8 +124,7 @@ impl Graph {
             // At a = 0 the function does not depend on b, but the logarithm is infinite.
             (Binary::Powf, false) => {
                 let (zero, ln) = (self.constant(0.0), self.unary(Unary::Ln, a));
-                let (product, at_zero) =
-                    (self.times(c, ln), self.compare(super::Compare::Eq, a, zero));
+                let (product, at_zero) = (self.times(c, ln), self.compare(super::Compare::Eq, a, zero));
                 self.select(at_zero, zero, product)
             }
             (Binary::Atan2, _) => {
@@ -144,9 +143,7 @@ impl Graph {
         let zero = self.constant(0.0);
         let one = self.constant(1.0);
         let both = match self.op(node) {
-            Op::Unary(function, a) if active(a) => {
-                [Some((a, self.unary_partial(function, a, node))), None]
-            }
+            Op::Unary(function, a) if active(a) => [Some((a, self.unary_partial(function, a, node))), None],
             Op::Powi(a, n) if active(a) => {
                 let (factor, power) = (self.constant(f64::from(n)), self.powi(a, n.saturating_sub(1)));
                 [Some((a, self.times(factor, power))), None]
@@ -180,9 +177,7 @@ impl Graph {
                     }),
                 ]
             }
-            _ => {
-                self.partials(node, active).map(|part| part.map(|(operand, p)| (operand, self.times(w, p))))
-            }
+            _ => self.partials(node, active).map(|part| part.map(|(operand, p)| (operand, self.times(w, p)))),
         }
     }
 
@@ -235,12 +230,7 @@ impl Graph {
 
     /// The rules applied to the partial derivatives, on a graph of their own in which the operands are
     /// variables: what operands are made of must not be differentiated.
-    fn second_by_rules(
-        &mut self,
-        op: Op,
-        w: Node,
-        active: impl Fn(Node) -> bool,
-    ) -> Vec<(Node, Node, Node)> {
+    fn second_by_rules(&mut self, op: Op, w: Node, active: impl Fn(Node) -> bool) -> Vec<(Node, Node, Node)> {
         let operands: Vec<Node> = op.operands().collect();
         let mut scratch = Graph::default();
         let places: Vec<Node> = (0..)

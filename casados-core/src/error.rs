@@ -1,0 +1,217 @@
+//! Every way in which a run can end without a result.
+
+use core::fmt;
+
+/// Why there is no result: what, where, and the values that say so.
+///
+/// After an error the integrator is usable, and its warm start is as it was before the call.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Error {
+    /// An option has a value that makes no sense.
+    InvalidOption {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// An argument of a call has an element that is infinite or NaN.
+    NonFiniteInput {
+        /// The argument.
+        argument: Argument,
+        /// The element; of matrices in column-major order.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// The model has parameters, and they were never set.
+    ParametersNotSet,
+    /// Start values were asked for with `Start::Given`, and they were never given.
+    StartNotGiven,
+    /// The model returned an infinite value or NaN.
+    NonFiniteModel {
+        /// What was evaluated.
+        quantity: Quantity,
+        /// The equation, the row of the residual.
+        equation: usize,
+        /// The value.
+        value: f64,
+        /// Where.
+        at: Place,
+    },
+    /// The Newton matrix is singular to rounding: with this step size the unknown is not determined.
+    Singular {
+        /// The unknown: the state whose derivative it is, or the algebraic state.
+        unknown: &'static str,
+        /// Where.
+        at: Place,
+    },
+    /// Newton's method did not converge.
+    NotConverged {
+        /// The residual of an equation relative to the magnitude of its terms, the largest.
+        residual: f64,
+        /// The equation that has it.
+        equation: usize,
+        /// The unknown with the largest last increment relative to its size.
+        unknown: &'static str,
+        /// This increment.
+        increment: f64,
+        /// Where it ended.
+        at: Place,
+    },
+    /// A result is beyond the range of the number type, though every stage was computed.
+    Overflow {
+        /// The step.
+        step: usize,
+        /// The variable, or direction, that overflows.
+        index: usize,
+    },
+    /// A time outside the interval of the last successful call.
+    OutsideInterval {
+        /// The time.
+        t: f64,
+        /// Begin of the interval.
+        start: f64,
+        /// End of the interval.
+        end: f64,
+    },
+    /// A question about the last successful call, and there was none.
+    NoResult,
+    /// The memory of a mode could not be allocated.
+    OutOfMemory {
+        /// Its size; the largest number if that is not even a number.
+        bytes: usize,
+    },
+}
+
+/// Where in a run: all counted from zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The step of the interval.
+    pub step: usize,
+    /// The stage of the step.
+    pub stage: usize,
+    /// The iteration of Newton's method; of an explicit method zero.
+    pub iteration: usize,
+}
+
+/// An argument of a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Argument {
+    /// The state at the start, `x0`.
+    X0,
+    /// The control `u`.
+    U,
+    /// The length of the interval, `h`.
+    H,
+    /// The parameters `p`.
+    P,
+    /// The time at the start, `t0`, or of dense output, `t`.
+    T,
+    /// The adjoint seed `λ`.
+    Lambda,
+    /// The forward seed of `x0`.
+    SeedX,
+    /// The forward seed of `u`.
+    SeedU,
+    /// The forward seed of `p`.
+    SeedP,
+    /// The start value of `ẋ` for Newton's method.
+    StartXdot,
+    /// The start value of `z` for Newton's method.
+    StartZ,
+}
+
+/// What a model was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Quantity {
+    /// `f`
+    Residual,
+    /// An entry of `∂f/∂(ẋ, x, z, u, p)`.
+    Jacobian,
+    /// An entry of `∇(μᵀ f)`; its place is a variable, not an equation.
+    Adjoint,
+    /// An entry of `∇²(μᵀ f)`; its place is a variable, not an equation.
+    Hessian,
+}
+
+impl fmt::Display for Argument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Argument::X0 => "x0",
+            Argument::U => "u",
+            Argument::H => "h",
+            Argument::P => "p",
+            Argument::T => "t",
+            Argument::Lambda => "lambda",
+            Argument::SeedX => "the seed of x0",
+            Argument::SeedU => "the seed of u",
+            Argument::SeedP => "the seed of p",
+            Argument::StartXdot => "the start value of xdot",
+            Argument::StartZ => "the start value of z",
+        })
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "step {}, stage {}, iteration {}", self.step, self.stage, self.iteration)
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Error::InvalidOption { option, value, reason } => {
+                write!(f, "the option `{option}` is {value}, but {reason}")
+            }
+            Error::NonFiniteInput { argument: Argument::H, value, .. } => write!(f, "h is {value}"),
+            Error::NonFiniteInput { argument: Argument::T, value, .. } => write!(f, "t is {value}"),
+            Error::NonFiniteInput { argument, index, value } => {
+                write!(f, "element {index} of {argument} is {value}")
+            }
+            Error::ParametersNotSet => {
+                f.write_str("the model has parameters: call `set_parameters` before the first step")
+            }
+            Error::StartNotGiven => {
+                f.write_str("the start values are `Start::Given`: call `set_start` before the first step")
+            }
+            Error::NonFiniteModel { quantity, equation, value, at } => match quantity {
+                Quantity::Residual => write!(f, "equation {equation} of the model is {value} at {at}"),
+                Quantity::Jacobian => {
+                    write!(f, "a derivative of equation {equation} of the model is {value} at {at}")
+                }
+                Quantity::Adjoint => {
+                    write!(f, "the adjoint of the model is {value} for variable {equation} at {at}")
+                }
+                Quantity::Hessian => {
+                    write!(f, "a second derivative of the model is {value} for variable {equation} at {at}")
+                }
+            },
+            Error::Singular { unknown, at } => write!(
+                f,
+                "the Newton matrix is singular in the column of `{unknown}` at {at}: with this step size the \
+                 equations do not determine it"
+            ),
+            Error::NotConverged { residual, equation, unknown, increment, at } => write!(
+                f,
+                "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
+                 relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
+            ),
+            Error::Overflow { step, index } => {
+                write!(f, "element {index} of the result overflows in step {step}")
+            }
+            Error::OutsideInterval { t, start, end } => {
+                write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
+            }
+            Error::NoResult => f.write_str("there is no result yet: no call has succeeded"),
+            Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}

@@ -1,0 +1,87 @@
+//! What can be chosen about an integrator.
+
+use crate::error::Error;
+
+/// What can be chosen about an integrator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Steps of equal size in one interval.
+    pub steps: usize,
+    /// How the stages of an implicit method are solved; explicit methods do not read it.
+    pub newton: Newton,
+    /// Where Newton's method starts.
+    pub start: Start,
+}
+
+impl Default for Options {
+    /// One step; full Newton to rounding from the last solution.
+    fn default() -> Self {
+        Self { steps: 1, newton: Newton::default(), start: Start::default() }
+    }
+}
+
+/// How the equations of the stages are solved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Newton {
+    /// The iteration ends when its error is expected below this, relative to the size of each unknown
+    /// (of a derivative `ẋ` also below `|x/h|`, the change that rounds to none in `x`).
+    /// Zero, the default, means rounding: a few units in the last place of the number type.
+    pub tolerance: f64,
+    /// With a tolerance: more iterations than these are the error `NotConverged`.
+    pub max_iterations: usize,
+    /// Which Jacobian the iteration takes. Sensitivities always take the one of the solution.
+    pub jacobian: Jacobian,
+    /// Exactly these iterations, and no test for convergence: the same run time in every call.
+    pub fixed_iterations: Option<usize>,
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        Self { tolerance: 0.0, max_iterations: 50, jacobian: Jacobian::Full, fixed_iterations: None }
+    }
+}
+
+/// The Jacobian in Newton's method.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Jacobian {
+    /// Evaluated and factorised in every iteration.
+    #[default]
+    Full,
+    /// Evaluated and factorised once in each step, at the start values.
+    Frozen,
+}
+
+/// Where Newton's method starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// `ẋ = 0`, `z = 0` in every step.
+    Zero,
+    /// The values given with `set_start`, in every step.
+    Given,
+    /// The stages of the same step in the last successful call; zero (or the given values, if there
+    /// are any) in the first one.
+    #[default]
+    Warm,
+}
+
+impl Options {
+    /// # Errors
+    /// [`Error::InvalidOption`] for the first value that makes no sense.
+    pub fn check(&self) -> Result<(), Error> {
+        let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
+        if self.steps == 0 {
+            return invalid("steps", 0.0, "an interval has at least one step");
+        }
+        let newton = &self.newton;
+        if !(newton.tolerance >= 0.0 && newton.tolerance.is_finite()) {
+            return invalid("newton.tolerance", newton.tolerance, "a tolerance is a number not below zero");
+        }
+        if newton.max_iterations == 0 {
+            return invalid("newton.max_iterations", 0.0, "Newton's method takes at least one iteration");
+        }
+        if newton.fixed_iterations == Some(0) {
+            return invalid("newton.fixed_iterations", 0.0, "Newton's method takes at least one iteration");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,196 @@
+//! What the calls of an integrator return: nalgebra vectors and matrices of the model's dimensions.
+//!
+//! Every result contains the smaller ones and dereferences to them: `forward.x` is the end state
+//! and `hessian.dx_du` the Jacobian of the same call.
+
+use crate::model::{
+    Dae, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX, MatrixZC,
+    MatrixZP, MatrixZU, MatrixZX, VectorP, VectorU, VectorX, VectorZ,
+};
+use crate::shape::{Plain, plain};
+use bytemuck::Zeroable;
+use core::ops::Deref;
+
+/// The solution.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Nominal<M: Dae, T: Plain = f64> {
+    /// Differential states at the end of the interval.
+    pub x: VectorX<M, T>,
+    /// Algebraic states at the end of the interval.
+    pub z: VectorZ<M, T>,
+    /// Algebraic states at the start of the interval.
+    pub z0: VectorZ<M, T>,
+}
+
+/// The solution and its derivatives with respect to `x₀`, `u` and `p`.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Forward<M: Dae, T: Plain = f64> {
+    /// `x`, `z` and `z0`.
+    pub nominal: Nominal<M, T>,
+    /// `∂x/∂x₀`
+    pub dx_dx0: MatrixXX<M, T>,
+    /// `∂x/∂u`
+    pub dx_du: MatrixXU<M, T>,
+    /// `∂x/∂p`
+    pub dx_dp: MatrixXP<M, T>,
+    /// `∂z/∂x₀` at the end of the interval.
+    pub dz_dx0: MatrixZX<M, T>,
+    /// `∂z/∂u` at the end of the interval.
+    pub dz_du: MatrixZU<M, T>,
+    /// `∂z/∂p` at the end of the interval.
+    pub dz_dp: MatrixZP<M, T>,
+    /// `∂z/∂x₀` at the start of the interval.
+    pub dz0_dx0: MatrixZX<M, T>,
+    /// `∂z/∂u` at the start of the interval.
+    pub dz0_du: MatrixZU<M, T>,
+    /// `∂z/∂p` at the start of the interval.
+    pub dz0_dp: MatrixZP<M, T>,
+}
+
+/// The solution and its derivatives in `C` directions.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Directional<M: Dae, T: Plain, const C: usize> {
+    /// `x`, `z` and `z0`.
+    pub nominal: Nominal<M, T>,
+    /// `∂x/∂(x₀, u, p) · seeds`
+    pub dx: MatrixXC<M, T, C>,
+    /// `∂z/∂(x₀, u, p) · seeds` at the end of the interval.
+    pub dz: MatrixZC<M, T, C>,
+    /// `∂z/∂(x₀, u, p) · seeds` at the start of the interval.
+    pub dz0: MatrixZC<M, T, C>,
+}
+
+/// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Seeds<M: Dae, T: Plain, const C: usize> {
+    /// `δx₀`
+    pub x0: MatrixXC<M, T, C>,
+    /// `δu`
+    pub u: MatrixUC<M, T, C>,
+    /// `δp`
+    pub p: MatrixPC<M, T, C>,
+}
+
+/// The solution and the gradients of `λᵀx` for each of `C` seeds `λ`, one a column.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Adjoint<M: Dae, T: Plain = f64, const C: usize = 1> {
+    /// `x`, `z` and `z0`.
+    pub nominal: Nominal<M, T>,
+    /// `∇(λᵀx)` with respect to `x₀`
+    pub grad_x0: MatrixXC<M, T, C>,
+    /// `∇(λᵀx)` with respect to `u`
+    pub grad_u: MatrixUC<M, T, C>,
+    /// `∇(λᵀx)` with respect to `p`
+    pub grad_p: MatrixPC<M, T, C>,
+}
+
+/// The solution, its derivatives, and the gradient of `λᵀx`.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
+    /// The solution and its derivatives.
+    pub forward: Forward<M, T>,
+    /// `∇(λᵀx)` with respect to `x₀`
+    pub grad_x0: VectorX<M, T>,
+    /// `∇(λᵀx)` with respect to `u`
+    pub grad_u: VectorU<M, T>,
+    /// `∇(λᵀx)` with respect to `p`
+    pub grad_p: VectorP<M, T>,
+}
+
+/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`.
+///
+/// The Hessian over `(x₀, u, p)` is symmetric to the last bit; of its blocks beside the diagonal
+/// the upper ones are given.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Hessian<M: Dae, T: Plain = f64> {
+    /// The solution, its derivatives, and the gradient.
+    pub first: ForwardAdjoint<M, T>,
+    /// `∂²(λᵀx)/∂x₀²`
+    pub h_xx: MatrixXX<M, T>,
+    /// `∂²(λᵀx)/∂x₀∂u`
+    pub h_xu: MatrixXU<M, T>,
+    /// `∂²(λᵀx)/∂u²`
+    pub h_uu: MatrixUU<M, T>,
+    /// `∂²(λᵀx)/∂x₀∂p`
+    pub h_xp: MatrixXP<M, T>,
+    /// `∂²(λᵀx)/∂u∂p`
+    pub h_up: MatrixUP<M, T>,
+    /// `∂²(λᵀx)/∂p²`
+    pub h_pp: MatrixPP<M, T>,
+}
+
+/// The solution at a time inside the interval.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Dense<M: Dae, T: Plain = f64> {
+    /// Differential states.
+    pub x: VectorX<M, T>,
+    /// Algebraic states.
+    pub z: VectorZ<M, T>,
+}
+
+/// The solution at a time inside the interval, and its derivatives.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct DenseForward<M: Dae, T: Plain = f64> {
+    /// `x` and `z`.
+    pub dense: Dense<M, T>,
+    /// `∂x/∂x₀`
+    pub dx_dx0: MatrixXX<M, T>,
+    /// `∂x/∂u`
+    pub dx_du: MatrixXU<M, T>,
+    /// `∂x/∂p`
+    pub dx_dp: MatrixXP<M, T>,
+    /// `∂z/∂x₀`
+    pub dz_dx0: MatrixZX<M, T>,
+    /// `∂z/∂u`
+    pub dz_du: MatrixZU<M, T>,
+    /// `∂z/∂p`
+    pub dz_dp: MatrixZP<M, T>,
+}
+
+plain!([M: Dae, T: Plain] Nominal<M, T> { x, z, z0 });
+plain!([M: Dae, T: Plain] Forward<M, T> { nominal, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp, dz0_dx0, dz0_du, dz0_dp });
+plain!([M: Dae, T: Plain, const C: usize] Directional<M, T, C> { nominal, dx, dz, dz0 });
+plain!([M: Dae, T: Plain, const C: usize] Seeds<M, T, C> { x0, u, p });
+plain!([M: Dae, T: Plain, const C: usize] Adjoint<M, T, C> { nominal, grad_x0, grad_u, grad_p });
+plain!([M: Dae, T: Plain] ForwardAdjoint<M, T> { forward, grad_x0, grad_u, grad_p });
+plain!([M: Dae, T: Plain] Hessian<M, T> { first, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
+plain!([M: Dae, T: Plain] Dense<M, T> { x, z });
+plain!([M: Dae, T: Plain] DenseForward<M, T> { dense, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp });
+
+/// A result contains a smaller one.
+macro_rules! contains {
+    ($outer:ident.$field:ident: $inner:ident, $($generics:tt)*) => {
+        contains!(@ [$($generics)*] $outer $field $inner);
+    };
+    (@ [] $outer:ident $field:ident $inner:ident) => {
+        impl<M: Dae, T: Plain> Deref for $outer<M, T> {
+            type Target = $inner<M, T>;
+            fn deref(&self) -> &Self::Target {
+                &self.$field
+            }
+        }
+    };
+    (@ [C] $outer:ident $field:ident $inner:ident) => {
+        impl<M: Dae, T: Plain, const C: usize> Deref for $outer<M, T, C> {
+            type Target = $inner<M, T>;
+            fn deref(&self) -> &Self::Target {
+                &self.$field
+            }
+        }
+    };
+}
+contains!(Forward.nominal: Nominal,);
+contains!(Adjoint.nominal: Nominal, C);
+contains!(Directional.nominal: Nominal, C);
+contains!(ForwardAdjoint.forward: Forward,);
+contains!(Hessian.first: ForwardAdjoint,);
+contains!(DenseForward.dense: Dense,);

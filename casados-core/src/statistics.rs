@@ -1,0 +1,19 @@
+//! What the last call did.
+
+/// What the last call did, successful or not.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Statistics {
+    /// Steps that were completed.
+    pub steps: usize,
+    /// Iterations of Newton's method, all steps together.
+    pub iterations: usize,
+    /// Evaluations of the residual alone at all stages; of an explicit method, of one stage.
+    pub residuals: usize,
+    /// Evaluations of the residual and the Jacobian at all stages; of an explicit method, of one stage.
+    pub jacobians: usize,
+    /// Factorisations of the Newton matrix.
+    pub factorizations: usize,
+    /// The residual of an equation relative to the magnitude of its terms, as it was last computed,
+    /// the largest of all steps.
+    pub residual: f64,
+}
