@@ -8,6 +8,8 @@
 //! The benchmark of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation for use
 //! in CasADi": aircraft after Malz et al. (2019), turbines after Zanon et al. (2013).
 
+use nalgebra::{Matrix3, Vector3};
+
 /// SI units, but for the turbines and the tether: [`TURBINE_SCALE`](awe::TURBINE_SCALE),
 /// [`TETHER_SCALE`](awe::TETHER_SCALE).
 pub mod awe {
@@ -193,6 +195,11 @@ pub mod awe {
         force
     }
 
+    /// What the turbines generate, W.
+    pub fn power(x: &State) -> f64 {
+        TURBINE_EFFICIENCY * TURBINE_SCALE * x.kappa * apparent_wind(x.q, x.dq).norm().powi(3)
+    }
+
     /// The matrix `S` with `S v = ω × v`.
     fn skew(omega: Vector3<f64>) -> Matrix3<f64> {
         let [x, y, z] = [omega.x, omega.y, omega.z];
@@ -221,7 +228,7 @@ pub mod awe {
     pub fn awe(xdot: State, x: State, u: Control, z: [f64; 1]) -> Residual {
         let (q, dq, ddq) = (x.q, x.dq, xdot.dq);
 
-        // Air.
+        // Air: on the wings and on the turbines.
         let wind = apparent_wind(q, dq);
         let speed = wind.norm();
         let (alpha, beta) = flow_angles(x.r.transpose() * wind);
@@ -231,10 +238,7 @@ pub mod awe {
         let force = x.r * flip(lift) * pressure;
         let moment = flip(twist.component_mul(&Vector3::new(SPAN, CHORD, SPAN))) * pressure;
 
-        // Turbines.
-        let kappa = TURBINE_SCALE * x.kappa;
-        let turbines = wind * (kappa * speed);
-        let power = TURBINE_EFFICIENCY * kappa * speed.powi(3);
+        let turbines = wind * (TURBINE_SCALE * x.kappa * speed);
 
         // The tether is straight, turns with the kite, and has mass but no weight.
         let tension = q * (TETHER_SCALE * z[0]);
@@ -259,7 +263,35 @@ pub mod awe {
             kappa: xdot.kappa - u.kappa,
             velocity: xdot.q - dq,
             tether: (ddc + 2.0 * TETHER_DAMPING * dc + TETHER_DAMPING * TETHER_DAMPING * c) / CONSTRAINT,
-            cost: xdot.cost - running_cost(&xdot, &u, beta, power),
+            cost: xdot.cost - running_cost(&xdot, &u, beta, power(&x)),
         }
+    }
+}
+
+impl From<[f64; 23]> for awe::State {
+    fn from(x: [f64; 23]) -> Self {
+        Self {
+            q: Vector3::from_column_slice(&x[0..3]),
+            dq: Vector3::from_column_slice(&x[3..6]),
+            omega: Vector3::from_column_slice(&x[6..9]),
+            r: Matrix3::from_column_slice(&x[9..18]),
+            delta: Vector3::from_column_slice(&x[18..21]),
+            kappa: x[21],
+            cost: x[22],
+        }
+    }
+}
+
+impl From<[f64; 4]> for awe::Control {
+    fn from([aileron, elevator, rudder, kappa]: [f64; 4]) -> Self {
+        Self { delta: Vector3::new(aileron, elevator, rudder), kappa }
+    }
+}
+
+impl From<awe::Residual> for [f64; 24] {
+    fn from(f: awe::Residual) -> Self {
+        let numbers = f.force.iter().chain(&f.moment).chain(&f.rotation).chain(&f.delta).chain([&f.kappa]);
+        let mut numbers = numbers.chain(&f.velocity).chain([&f.tether, &f.cost]);
+        core::array::from_fn(|_| numbers.next().copied().unwrap_or(f64::NAN))
     }
 }

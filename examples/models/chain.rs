@@ -1,6 +1,6 @@
 //! A chain of masses on springs: the first hangs at the wall, the velocity of the last is controlled.
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 
 /// The chain with `(NX - 3) / 6` free masses between the wall and the controlled end.
 ///
@@ -34,4 +34,17 @@ pub fn chain<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 3]) -> [f6
         residual[end + axis] -= u[axis];
     }
     residual
+}
+
+/// A chain stretched to one metre and a little disturbed: where examples and benchmarks start.
+pub fn stretched<const NX: usize>() -> SVector<f64, NX> {
+    let free = (NX - 3) / 6;
+    SVector::from_fn(|i, _| {
+        let (mass, axis) = (i / 3, i % 3);
+        if mass > free {
+            return 0.1 * ((i - 3 * free - 2) as f64).sin();
+        }
+        let along = if axis == 0 { (mass + 1) as f64 / (free + 1) as f64 } else { 0.0 };
+        along + 0.01 * ((i + 1) as f64).cos()
+    })
 }

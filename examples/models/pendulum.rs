@@ -1,6 +1,6 @@
 //! A pendulum on a cart, pushed by a force.
 
-/// Angle zero is upright; counted from there in the direction of the cart's motion.
+/// Angle zero is upright. The ball is at (position − length sin(angle), length cos(angle)).
 ///
 /// x = [position m, angle rad, velocity m/s, angular velocity rad/s], u = [force N].
 pub fn pendulum(xdot: [f64; 4], x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
@@ -15,7 +15,7 @@ pub fn pendulum(xdot: [f64; 4], x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
     let mass = CART + BALL - BALL * cos * cos;
     let centrifugal = BALL * LENGTH * sin * omega * omega;
 
-    let acceleration = (-centrifugal + BALL * G * cos * sin + force) / mass;
-    let angular = (-centrifugal * cos + force * cos + (CART + BALL) * G * sin) / (LENGTH * mass);
+    let acceleration = (force - centrifugal + BALL * G * cos * sin) / mass;
+    let angular = (force * cos - centrifugal * cos + (CART + BALL) * G * sin) / (LENGTH * mass);
     [xdot[0] - velocity, xdot[1] - omega, xdot[2] - acceleration, xdot[3] - angular]
 }

@@ -31,6 +31,11 @@ impl Record {
     }
 
     /// A list of numbers.
+    pub fn array<const N: usize>(&self, key: &str) -> Result<[f64; N], String> {
+        Ok(self.vector(key)?.into())
+    }
+
+    /// A list of numbers.
     pub fn vector<const N: usize>(&self, key: &str) -> Result<SVector<f64, N>, String> {
         Ok(SVector::from_column_slice(&self.numbers(key, N)?))
     }
