@@ -32,7 +32,7 @@ impl Record {
 
     /// A list of numbers.
     pub fn array<const N: usize>(&self, key: &str) -> Result<[f64; N], String> {
-        Ok(self.vector(key)?.into())
+        Ok(self.vector::<N>(key)?.into())
     }
 
     /// A list of numbers.
