@@ -2,8 +2,8 @@
 //! linear time, and a debug build the whole stack. Values that cross a cut go through an array, in
 //! which a slot is reused as soon as its value has been read for the last time.
 
-use super::schedule::{Step, is_leaf, operands};
-use crate::graph::{Graph, Node};
+use super::schedule::{Step, is_leaf};
+use crate::graph::{Graph, Node, Op};
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 
@@ -41,7 +41,7 @@ pub fn read(graph: &Graph, outputs: &[Node], step: Step) -> impl Iterator<Item =
         Step::Compute(node) | Step::SinCos(node, _) => (None, Some(graph.op(node))),
         Step::Store(output) => (Some(outputs[output]), None),
     };
-    stored.into_iter().chain(op.into_iter().flat_map(operands))
+    stored.into_iter().chain(op.into_iter().flat_map(Op::operands))
 }
 
 /// Cuts a function into pieces of at most `limit` statements.

@@ -1,12 +1,11 @@
 //! What rustdoc says about a model.
 
-use super::model::Written;
 use crate::structure::Analysis;
 use proc_macro2::TokenStream;
 use quote::quote;
 
 /// The user's text, then what is known about the model: one row of a table for each instance.
-pub fn of_type(original: &syn::Ident, models: &[Analysis], written: &[Written]) -> TokenStream {
+pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
     let Some(first) = models.first() else {
         return TokenStream::new();
     };
@@ -24,16 +23,15 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis], written: &[Written]) 
     let head: Vec<String> = parameters.into_iter().chain(head).collect();
     lines.push(row(&head));
     lines.push(row(&vec![String::from("---"); head.len()]));
-    for (Analysis { model, jacobian, hessian, .. }, written) in models.iter().zip(written) {
+    for Analysis { model, jacobian, constant, hessian, operations, .. } in models {
         let variables = &model.variables;
-        let operations = &written.operations;
         let numbers = [
             variables.x.len(),
             variables.z.len(),
             variables.u.len(),
             variables.p.len(),
             jacobian.len(),
-            written.constant,
+            constant.iter().filter(|&&constant| constant).count(),
             hessian.len(),
             operations.residual as usize,
             operations.residual_jacobian as usize,

@@ -5,6 +5,7 @@ mod documentation;
 mod model;
 mod routine;
 mod schedule;
+mod structure;
 
 use crate::language::Place;
 use crate::structure::Analysis;
@@ -17,13 +18,12 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
         return Ok(item);
     };
     let original = original(&item).map(|(name, _)| name).unwrap_or_else(|| first.model.name.clone());
-    let written: Vec<model::Written> = models.iter().map(model::write).collect::<syn::Result<_>>()?;
+    let implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
 
     let name = &first.model.name;
     let visibility = &first.model.visibility;
-    let documentation = documentation::of_type(&original, models, &written);
+    let documentation = documentation::of_type(&original, models);
     let generics = generics(first.model.instance.iter().map(|instance| (&instance.name, &instance.ty)));
-    let implementations = written.iter().map(|written| &written.tokens);
     let declaration = quote! {
         #documentation
         #[derive(Clone, Copy, Debug)]
@@ -33,14 +33,14 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
             #item
             #declaration
             #visibility struct #name #generics;
-            #(#implementations)*
+            #implementations
         }),
         Place::Inside => {
             let mut module: syn::ItemMod = syn::parse2(item)?;
             let inside = quote! {
                 #declaration
                 pub struct #name #generics;
-                #(#implementations)*
+                #implementations
             };
             let Some((_, items)) = &mut module.content else {
                 return Err(syn::Error::new_spanned(module, "a model needs a module with its content"));

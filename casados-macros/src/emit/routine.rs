@@ -26,17 +26,9 @@ pub struct Routine<'a> {
     pub stores: Vec<(&'a str, usize, Node)>,
 }
 
-/// A routine as Rust, and what it costs.
-pub struct Code {
-    /// The functions.
-    pub text: String,
-    /// The number of operations.
-    pub operations: u32,
-}
-
 impl Routine<'_> {
     /// Writes the routine. `S: Scalar` must be in scope.
-    pub fn write(&self, graph: &Graph, variables: &Variables, opaque: usize) -> Code {
+    pub fn write(&self, graph: &Graph, variables: &Variables, opaque: usize) -> String {
         let outputs: Vec<Node> = self.stores.iter().map(|store| store.2).collect();
         let steps = schedule::schedule(graph, &outputs);
         let operations = steps.iter().copied().flat_map(chunk::computed).count();
@@ -59,7 +51,7 @@ impl Routine<'_> {
                 writer.function(&mut text, &name, "#[inline(never)]\n", &steps, piece, plan.slots);
             }
         }
-        Code { text, operations: operations as u32 }
+        text
     }
 }
 
@@ -153,7 +145,7 @@ impl Writer<'_> {
                     let _ = writeln!(text, "let {} = {};", self.atom(node), self.expression(node));
                 }
                 Step::SinCos(sin, cos) => {
-                    let argument = schedule::operands(self.graph.op(sin)).map(|a| self.atom(a)).next();
+                    let argument = self.graph.op(sin).operands().map(|a| self.atom(a)).next();
                     let _ = writeln!(
                         text,
                         "let ({}, {}) = {}.sin_cos();",

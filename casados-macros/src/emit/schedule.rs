@@ -15,44 +15,23 @@ pub enum Step {
     Store(usize),
 }
 
-/// The operands of an operation.
-pub fn operands(op: Op) -> impl Iterator<Item = Node> {
-    let list = match op {
-        Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_) => [None; 3],
-        Op::Unary(_, a) | Op::Powi(a, _) | Op::Not(a) => [Some(a), None, None],
-        Op::Binary(_, a, b) | Op::Compare(_, a, b) | Op::And(a, b) | Op::Or(a, b) => [Some(a), Some(b), None],
-        Op::Select(condition, a, b) => [Some(condition), Some(a), Some(b)],
-    };
-    list.into_iter().flatten()
-}
-
 /// Whether a node is there before anything is computed.
 pub fn is_leaf(op: Op) -> bool {
-    operands(op).next().is_none()
+    op.operands().next().is_none()
 }
 
 /// The statements that compute the outputs, each operand before its uses.
 pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
-    let Some(last) = outputs.iter().map(|node| node.0 as usize).max() else {
+    let Some(last) = outputs.iter().map(|node| node.at()).max() else {
         return Vec::new();
     };
     let op = |index: usize| graph.op(Node(index as u32));
 
-    let mut needed = vec![false; last + 1];
-    for output in outputs {
-        needed[output.0 as usize] = true;
-    }
-    for index in (0..=last).rev() {
-        if needed[index] {
-            operands(op(index)).for_each(|node| needed[node.0 as usize] = true);
-        }
-    }
-
     // Registers that a subtree needs (Sethi and Ullman): the hungrier operand comes first.
     let mut registers = vec![0u32; last + 1];
     let mut pairs: HashMap<Node, (Option<Node>, Option<Node>)> = HashMap::new();
-    for index in (0..=last).filter(|&index| needed[index]) {
-        let mut needs: Vec<u32> = operands(op(index)).map(|node| registers[node.0 as usize]).collect();
+    for index in graph.reachable(outputs).into_iter().map(Node::at) {
+        let mut needs: Vec<u32> = op(index).operands().map(|node| registers[node.at()]).collect();
         needs.sort_unstable_by(|a, b| b.cmp(a));
         registers[index] = (0..).zip(&needs).map(|(held, need)| held + need).max().unwrap_or(0).max(1);
         match op(index) {
@@ -68,15 +47,15 @@ pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
     for (number, &output) in outputs.iter().enumerate() {
         stack.push((output, false));
         while let Some((node, ready)) = stack.pop() {
-            let index = node.0 as usize;
+            let index = node.at();
             if done[index] {
                 continue;
             }
             if !ready {
                 stack.push((node, true));
-                let mut list: Vec<Node> = operands(op(index)).filter(|node| !done[node.0 as usize]).collect();
+                let mut list: Vec<Node> = op(index).operands().filter(|node| !done[node.at()]).collect();
                 list.reverse();
-                list.sort_by_key(|node| registers[node.0 as usize]);
+                list.sort_by_key(|node| registers[node.at()]);
                 stack.extend(list.into_iter().map(|node| (node, false)));
                 continue;
             }
@@ -89,8 +68,8 @@ pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
                 _ => None,
             };
             if let Some((Some(sin), Some(cos))) = pair {
-                done[sin.0 as usize] = true;
-                done[cos.0 as usize] = true;
+                done[sin.at()] = true;
+                done[cos.at()] = true;
                 steps.push(Step::SinCos(sin, cos));
             } else {
                 steps.push(Step::Compute(node));
@@ -117,11 +96,11 @@ mod tests {
         for &step in &steps {
             match step {
                 Step::Compute(node) => {
-                    assert!(operands(graph.op(node)).all(|operand| ready(&computed, operand)));
+                    assert!(graph.op(node).operands().all(|operand| ready(&computed, operand)));
                     assert!(computed.insert(node));
                 }
                 Step::SinCos(sin, cos) => {
-                    assert!(operands(graph.op(sin)).all(|operand| ready(&computed, operand)));
+                    assert!(graph.op(sin).operands().all(|operand| ready(&computed, operand)));
                     assert!(computed.insert(sin) && computed.insert(cos));
                 }
                 Step::Store(output) => {
