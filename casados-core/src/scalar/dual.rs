@@ -51,9 +51,9 @@ macro_rules! dual {
                     let (mut power, mut base, mut left) = (Self::from(1.0), self, n);
                     while left > 0 {
                         if left & 1 == 1 {
-                            power = power * base;
+                            power *= base;
                         }
-                        base = base * base;
+                        base *= base;
                         left >>= 1;
                     }
                     return power;

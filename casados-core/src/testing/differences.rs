@@ -13,7 +13,11 @@ const STEPS: core::ops::RangeInclusive<i32> = 2..=10;
 /// The derivative of each output at `a`, with its error: that of rounding (carried through the function
 /// by running error analysis) and that of truncation (the difference between two successive step sizes, which is
 /// 255 times the truncation error of the smaller one). The step size is the one with the smallest error.
-pub(super) fn derivative(a: f64, outputs: usize, function: impl Fn(Bounded) -> Vec<Bounded>) -> Vec<Bounded> {
+pub(super) fn derivative(
+    a: f64,
+    outputs: usize,
+    mut function: impl FnMut(Bounded) -> Vec<Bounded>,
+) -> Vec<Bounded> {
     let size = a.abs().max(1.0);
     // A power of two: the steps themselves are exact.
     let size = (2.0_f64).powi(size.log2().floor() as i32);
@@ -22,7 +26,7 @@ pub(super) fn derivative(a: f64, outputs: usize, function: impl Fn(Bounded) -> V
     let mut last: Option<Vec<Bounded>> = None;
     for k in STEPS {
         let h = size * (2.0_f64).powi(-k);
-        let moved = |m: f64| {
+        let mut moved = |m: f64| {
             let value = a + m * h;
             // What the sum has rounded: exact by Sterbenz or one more subtraction.
             let error = ((value - a) - m * h).abs().max((value - m * h - a).abs());

@@ -2,6 +2,8 @@
 //!
 //! - [`check_derivatives`]: Jacobian, adjoint and Hessian of a model against `num-dual`, the complex step
 //!   and differences ([`check_by_differences`] for dual models); [`check_pattern`]: zeros where zeros were declared.
+//! - [`check_sensitivities`]: forward, adjoint and second-order sensitivities of an integrator against each other
+//!   and against differences of its solution; [`check_exact`]: against a closed form.
 //! - [`convergence`]: an integrator against an exact solution, with the order that it reaches.
 //!
 //! Every check returns a report that prints as a table and whose `assert` panics with it. Tolerances are not chosen:
@@ -13,13 +15,17 @@ mod derivatives;
 mod differences;
 mod evaluate;
 mod forward;
+mod integrator;
 mod points;
 mod report;
+mod sensitivities;
 
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};
+pub use integrator::Integrator;
 pub use points::{Points, Random};
 pub use report::{Deviation, Report, Row};
+pub use sensitivities::{Exact, check_exact, check_sensitivities};
 
 #[cfg(test)]
 mod tests;

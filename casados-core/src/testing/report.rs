@@ -37,6 +37,10 @@ pub struct Row {
     pub difference: f64,
     /// The largest difference relative to its tolerance.
     pub ratio: f64,
+    /// The largest tolerance that was finite.
+    pub tolerance: f64,
+    /// The largest entry.
+    pub scale: f64,
 }
 
 /// An entry that is wrong.
@@ -106,10 +110,13 @@ impl Report {
                 wrong: 0,
                 difference: 0.0,
                 ratio: 0.0,
+                tolerance: 0.0,
+                scale: 0.0,
             });
             self.rows.len() - 1
         });
         let row = &mut self.rows[index];
+        row.scale = row.scale.max(scale);
         for (i, entry) in entries {
             row.entries += 1;
             let Entry { value, expected, tolerance } = entry;
@@ -118,6 +125,7 @@ impl Report {
                 row.inconclusive += 1;
                 continue;
             }
+            row.tolerance = row.tolerance.max(tolerance);
             // Written so that a NaN is wrong.
             if difference <= tolerance {
                 let silent = tolerance > 1e-3 * scale.max(expected.abs());
@@ -156,19 +164,21 @@ impl fmt::Display for Report {
         writeln!(f, "{}", self.title)?;
         writeln!(
             f,
-            "{:<24} {:<16} {:>8} {:>7} {:>6} {:>10} {:>10}",
-            "quantity", "against", "entries", "silent", "wrong", "max |Δ|", "|Δ|/tol"
+            "{:<24} {:<18} {:>8} {:>7} {:>6} {:>9} {:>9} {:>9} {:>9}",
+            "quantity", "against", "entries", "silent", "wrong", "largest", "max |Δ|", "max tol", "|Δ|/tol"
         )?;
         for row in &self.rows {
             writeln!(
                 f,
-                "{:<24} {:<16} {:>8} {:>7} {:>6} {:>10.1e} {:>10.2e}",
+                "{:<24} {:<18} {:>8} {:>7} {:>6} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e}",
                 row.quantity,
                 row.reference,
                 row.entries,
                 row.inconclusive,
                 row.wrong,
+                row.scale,
                 row.difference,
+                row.tolerance,
                 row.ratio
             )?;
         }
