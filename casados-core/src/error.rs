@@ -17,6 +17,11 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// The tableau that was given to an explicit integrator is implicit.
+    NotExplicit {
+        /// The stage that needs itself or a later one.
+        stage: usize,
+    },
     /// An argument of a call has an element that is infinite or NaN.
     NonFiniteInput {
         /// The argument.
@@ -168,6 +173,9 @@ impl fmt::Display for Error {
         match *self {
             Error::InvalidOption { option, value, reason } => {
                 write!(f, "the option `{option}` is {value}, but {reason}")
+            }
+            Error::NotExplicit { stage } => {
+                write!(f, "the tableau is not explicit: stage {stage} needs itself or a later one")
             }
             Error::NonFiniteInput { argument: Argument::H, value, .. } => write!(f, "h is {value}"),
             Error::NonFiniteInput { argument: Argument::T, value, .. } => write!(f, "t is {value}"),

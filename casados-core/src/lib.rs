@@ -19,6 +19,8 @@ compile_error!(
     "casados needs elementary functions: enable the feature `std`, or `libm` for targets without it"
 );
 
+#[cfg(feature = "alloc")]
+pub mod erk;
 pub mod error;
 pub mod model;
 pub mod options;
@@ -30,6 +32,8 @@ pub mod tableau;
 #[cfg(feature = "testing")]
 pub mod testing;
 
+#[cfg(feature = "alloc")]
+pub use erk::Erk;
 pub use error::Error;
 pub use model::{Dae, GraphDae, Ode};
 pub use options::Options;

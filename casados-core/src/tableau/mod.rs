@@ -117,18 +117,23 @@ impl<const S: usize> Tableau<S> {
     /// `a_ij = 0` for `j ≥ i`: stages are computed one after the other.
     #[must_use]
     pub const fn is_explicit(&self) -> bool {
+        self.first_implicit_stage().is_none()
+    }
+
+    /// The first stage that needs itself or a later one.
+    pub(crate) const fn first_implicit_stage(&self) -> Option<usize> {
         let mut i = 0;
         while i < S {
             let mut j = i;
             while j < S {
                 if self.a[i][j] != 0.0 {
-                    return false;
+                    return Some(i);
                 }
                 j += 1;
             }
             i += 1;
         }
-        true
+        None
     }
 
     /// The last stage is the end of the step: `a_si = b_i`.

@@ -1,0 +1,155 @@
+//! The discrete adjoint: backwards over the steps and over the stages of each.
+//!
+//! ```text
+//! k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)      ξ̄_i = g_xᵀ k̄_i
+//! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
+//! ```
+
+use super::step::{Grid, Point, Record, Scheme, add, check};
+use crate::error::{Error, Place, Quantity};
+use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
+use crate::scalar::Real;
+use crate::shape::{Array, Shape};
+use bytemuck::Zeroable;
+
+/// The adjoint variables of a step, one column per seed: `R` is the longest row, of which the first
+/// `columns` elements are used.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(super) struct Sweep<M: Ode, T: Real, R: Array<T>, const S: usize> {
+    pub jacobian: M::Jacobian<T>,
+    pub gradient: ArrayV<M, T>,
+    /// `(λ_n, λ_u, λ_p)`
+    pub lambda: ArrayW<M, R>,
+    /// `k̄_i` of the current stage.
+    kbar: ArrayX<M, R>,
+    /// `ξ̄_i`
+    xibar: [ArrayX<M, R>; S],
+}
+
+impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
+    /// Fresh memory.
+    pub fn init(&mut self) {
+        M::jacobian_constants(&mut self.jacobian);
+    }
+
+    /// Seeds: of each state the columns.
+    pub fn seed(&mut self, columns: usize, seed: impl Fn(usize, usize) -> T) {
+        for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
+            for (column, value) in lambda.as_mut()[..columns].iter_mut().enumerate() {
+                *value = seed(x, column);
+            }
+        }
+    }
+
+    /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of every
+    /// stage for the Hessian.
+    pub fn run(
+        &mut self,
+        scheme: &Scheme<M, T, S>,
+        grid: Grid<T>,
+        point: &mut Point<M, T>,
+        records: &[Record<M, T, S>],
+        columns: usize,
+        mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
+    ) -> Result<(), Error> {
+        for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
+            lambda.as_mut()[..columns].fill(T::ZERO);
+        }
+        for (step, record) in records.iter().enumerate().rev() {
+            let multipliers = multipliers.as_deref_mut().map(|of_steps| &mut of_steps[step]);
+            self.step(scheme, grid, point, record, step, columns, multipliers)?;
+        }
+        Ok(())
+    }
+
+    #[expect(clippy::too_many_arguments)]
+    fn step(
+        &mut self,
+        scheme: &Scheme<M, T, S>,
+        grid: Grid<T>,
+        point: &mut Point<M, T>,
+        record: &Record<M, T, S>,
+        step: usize,
+        columns: usize,
+        mut multipliers: Option<&mut [ArrayK<M, T>; S]>,
+    ) -> Result<(), Error> {
+        for stage in (0..S).rev() {
+            let at = Place { step, stage, iteration: 0 };
+            self.stage_seed(scheme, grid.h, stage, columns);
+            point.go(scheme, grid, record, at)?;
+            if columns == 1 {
+                let mu = ArrayK::<M, T>::from_fn(|equation| {
+                    let row = scheme.rows[equation];
+                    row.factor * self.kbar[row.state].as_ref()[0]
+                });
+                self.pull_one(point, &mu, at)?;
+                self.keep(stage);
+                if let Some(multipliers) = &mut multipliers {
+                    multipliers[stage] = mu;
+                }
+            } else {
+                point.jacobian(&mut self.jacobian, at)?;
+                self.pull_many(scheme, stage, columns);
+            }
+        }
+        for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
+            for xibar in &self.xibar {
+                add(T::ONE, &xibar[x].as_ref()[..columns], lambda.as_mut());
+            }
+        }
+        Ok(())
+    }
+
+    /// `k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)`
+    fn stage_seed(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
+        for (x, kbar) in self.kbar.as_mut().iter_mut().enumerate() {
+            let kbar = &mut kbar.as_mut()[..columns];
+            kbar.fill(T::ZERO);
+            add(scheme.b[stage], self.lambda[x].as_ref(), kbar);
+            for (a, xibar) in scheme.a.iter().zip(&self.xibar).skip(stage + 1) {
+                if a[stage] != T::ZERO {
+                    add(a[stage], xibar[x].as_ref(), kbar);
+                }
+            }
+            for value in kbar {
+                *value = h * *value;
+            }
+        }
+    }
+
+    /// `∇(μᵀ f)` by reverse mode.
+    fn pull_one(&mut self, point: &Point<M, T>, mu: &ArrayK<M, T>, at: Place) -> Result<(), Error> {
+        M::adjoint(&point.v, mu, &mut self.gradient);
+        check(self.gradient.as_ref(), Quantity::Adjoint, at, |variable| variable)
+    }
+
+    /// The gradient to where it belongs: `ξ̄_i` and `λ_w`.
+    fn keep(&mut self, stage: usize) {
+        let nx = M::Shape::NX;
+        for (x, xibar) in self.xibar[stage].as_mut().iter_mut().enumerate() {
+            xibar.as_mut()[0] = self.gradient[nx + x];
+        }
+        for w in nx..M::Shape::NW {
+            let lambda = self.lambda[w].as_mut();
+            lambda[0] = lambda[0] + self.gradient[nx + w];
+        }
+    }
+
+    /// Products with the Jacobian, one evaluation for all seeds.
+    fn pull_many(&mut self, scheme: &Scheme<M, T, S>, stage: usize, columns: usize) {
+        let nx = M::Shape::NX;
+        let xibar = &mut self.xibar[stage];
+        for row in xibar.as_mut() {
+            row.as_mut()[..columns].fill(T::ZERO);
+        }
+        for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
+            let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
+            let row = scheme.rows[equation];
+            let coefficient = row.factor * self.jacobian[entry];
+            let w = variable - nx;
+            let sum = if w < nx { xibar[w].as_mut() } else { self.lambda[w].as_mut() };
+            add(coefficient, &self.kbar[row.state].as_ref()[..columns], sum);
+        }
+    }
+}

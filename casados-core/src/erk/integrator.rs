@@ -1,0 +1,413 @@
+//! The calls of an explicit integrator: each answers one question, with nothing else computed.
+
+use super::adjoint::Sweep;
+use super::forward::{Seeded, Unit, Variation, write};
+use super::hessian::Curvature;
+use super::step::{Base, Counts, Grid, Record, Scheme};
+use super::storage::{List, Slot};
+use crate::error::{Argument, Error};
+use crate::model::{ArrayK, ArrayW, MatrixXC, Ode, VectorP, VectorU, VectorX};
+use crate::options::Options;
+use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Nominal, Seeds};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Shape};
+use crate::statistics::Statistics;
+use crate::tableau::{Custom, Method, Tableau};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+use core::ops::Range;
+
+/// An explicit Runge-Kutta integrator of model `M` with method `B`, which has `S` stages.
+///
+/// An interval of length `h` is divided into [`Options::steps`] equal steps. Derivatives are those of
+/// the discrete map, exact to rounding. Memory of a mode is allocated in its first call.
+///
+/// ```text
+/// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// let step = erk.forward(&x0, &u, 0.05)?;
+/// ```
+pub struct Integrator<M: Ode, B, T: Real, const S: usize> {
+    scheme: Scheme<M, T, S>,
+    options: Options,
+    start: T,
+    parameters_set: bool,
+    base: Slot<Base<M, T, S>>,
+    trajectory: List<Record<M, T, S>>,
+    multipliers: List<[ArrayK<M, T>; S]>,
+    variation: Slot<Variation<M, T, ArrayW<M, T>, S>>,
+    sweep: Slot<Sweep<M, T, [T; 1], S>>,
+    sweeps: Slot<Sweep<M, T, ArrayW<M, T>, S>>,
+    curvature: Slot<Curvature<M, T>>,
+    nominal: Slot<Nominal<M, T>>,
+    forward: Slot<Forward<M, T>>,
+    adjoint: Slot<Adjoint<M, T>>,
+    forward_adjoint: Slot<ForwardAdjoint<M, T>>,
+    hessian: Slot<Hessian<M, T>>,
+    method: PhantomData<B>,
+}
+
+impl<M: Ode, B: Method<S>, T: Real, const S: usize> Integrator<M, B, T, S> {
+    /// An integrator with the tableau of `B`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] if `options.steps` is zero; [`Error::OutOfMemory`].
+    pub fn new(options: Options) -> Result<Self, Error> {
+        const { assert!(B::TABLEAU.is_explicit(), "the tableau of this method is not explicit") };
+        Self::build(&B::TABLEAU, options)
+    }
+}
+
+impl<M: Ode, T: Real, const S: usize> Integrator<M, Custom<S>, T, S> {
+    /// An integrator with a tableau of the user's own.
+    ///
+    /// # Errors
+    /// [`Error::NotExplicit`] if it is implicit; as `new` otherwise.
+    pub fn with_tableau(tableau: &Tableau<S>, options: Options) -> Result<Self, Error> {
+        match tableau.first_implicit_stage() {
+            None => Self::build(tableau, options),
+            Some(stage) => Err(Error::NotExplicit { stage }),
+        }
+    }
+}
+
+impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
+    fn build(tableau: &Tableau<S>, options: Options) -> Result<Self, Error> {
+        options.check()?;
+        let mut integrator = Self {
+            scheme: Scheme::new(tableau),
+            options,
+            start: T::ZERO,
+            parameters_set: M::Shape::NP == 0,
+            base: Slot::empty(),
+            trajectory: List::empty(),
+            multipliers: List::empty(),
+            variation: Slot::empty(),
+            sweep: Slot::empty(),
+            sweeps: Slot::empty(),
+            curvature: Slot::empty(),
+            nominal: Slot::empty(),
+            forward: Slot::empty(),
+            adjoint: Slot::empty(),
+            forward_adjoint: Slot::empty(),
+            hessian: Slot::empty(),
+            method: PhantomData,
+        };
+        integrator.base.get(|_| ())?;
+        Ok(integrator)
+    }
+
+    /// The options it was made with.
+    #[must_use]
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// What the last call did.
+    #[must_use]
+    pub fn statistics(&self) -> Statistics {
+        let counts = self.base.peek().map_or_else(Counts::default, |base| base.point.counts);
+        Statistics {
+            steps: counts.steps,
+            residuals: counts.residuals,
+            jacobians: counts.jacobians,
+            ..Statistics::default()
+        }
+    }
+
+    /// The parameters of all later calls.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]; the parameters are as before.
+    pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        finite(p.as_slice(), Argument::P)?;
+        let base = self.base.get(|_| ())?;
+        let first = 2 * M::Shape::NX + M::Shape::NU;
+        base.point.v.as_mut()[first..first + M::Shape::NP].copy_from_slice(p.as_slice());
+        self.parameters_set = true;
+        Ok(())
+    }
+
+    /// The time at the start of the interval in all later calls; zero unless it was set.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]; the time is as before.
+    pub fn set_time(&mut self, t0: T) -> Result<(), Error> {
+        finite(&[t0], Argument::T)?;
+        self.start = t0;
+        Ok(())
+    }
+
+    /// The state at the end of an interval of length `h`.
+    ///
+    /// # Errors
+    /// Input or model values that are not finite, parameters that were never set, overflow, and in the
+    /// first call of a mode [`Error::OutOfMemory`].
+    pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
+        let grid = self.begin(x0, u, h)?;
+        let base = self.base.get(|_| ())?;
+        base.run(&self.scheme, grid)?;
+        let result = self.nominal.get(|_| ())?;
+        write_state(base, result);
+        Ok(result)
+    }
+
+    /// The state at the end and its derivatives with respect to `x₀`, `u` and `p`.
+    ///
+    /// # Errors
+    /// As [`Integrator::solve`].
+    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error> {
+        let grid = self.begin(x0, u, h)?;
+        let (base, variation) = (self.base.get(|_| ())?, self.variation.get(Variation::init)?);
+        let result = self.forward.get(|_| ())?;
+        variation.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()))?;
+        write_forward(grid, base, variation, result)?;
+        Ok(result)
+    }
+
+    /// The state at the end and its derivatives in the directions of `C` seeds.
+    ///
+    /// # Errors
+    /// As [`Integrator::solve`].
+    pub fn directional<const C: usize>(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        seeds: &Seeds<M, T, C>,
+    ) -> Result<Directional<M, T, C>, Error> {
+        finite(seeds.x0.as_slice(), Argument::SeedX)?;
+        finite(seeds.u.as_slice(), Argument::SeedU)?;
+        finite(seeds.p.as_slice(), Argument::SeedP)?;
+        let grid = self.begin(x0, u, h)?;
+        let (base, variation) = (self.base.get(|_| ())?, self.variation.get(Variation::init)?);
+        let mut result = Directional::zeroed();
+        // As many columns at once as the memory of `forward` holds.
+        let most = M::Shape::NW.max(1);
+        let start = base.x;
+        for first in (0..C.max(1)).step_by(most) {
+            let columns = most.min(C - first);
+            base.x = start;
+            variation.run(&self.scheme, grid, base, Seeded { seeds, first, columns }, |_, _, _| Ok(()))?;
+            write(variation.dx.as_ref(), 0..columns, &mut result.dx, first, grid.steps - 1)?;
+        }
+        write_state(base, &mut result.nominal);
+        Ok(result)
+    }
+
+    /// The state at the end and the gradient of `λᵀx`.
+    ///
+    /// # Errors
+    /// As [`Integrator::solve`].
+    pub fn adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
+        finite(lambda.as_slice(), Argument::Lambda)?;
+        let grid = self.begin(x0, u, h)?;
+        let (base, sweep) = (self.base.get(|_| ())?, self.sweep.get(Sweep::init)?);
+        let records = self.trajectory.get(grid.steps)?;
+        let result = self.adjoint.get(|_| ())?;
+        base.record(&self.scheme, grid, records)?;
+        sweep.seed(1, |x, _| lambda.as_slice()[x]);
+        sweep.run(&self.scheme, grid, &mut base.point, records, 1, None)?;
+        write_gradient(sweep, 0..1, result, 0)?;
+        write_state(base, &mut result.nominal);
+        Ok(result)
+    }
+
+    /// The state at the end and the gradients of `λᵀx` for `C` seeds `λ`, the columns of `lambdas`.
+    ///
+    /// # Errors
+    /// As [`Integrator::solve`].
+    pub fn adjoint_many<const C: usize>(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambdas: &MatrixXC<M, T, C>,
+    ) -> Result<Adjoint<M, T, C>, Error> {
+        finite(lambdas.as_slice(), Argument::Lambda)?;
+        let grid = self.begin(x0, u, h)?;
+        let (base, sweep) = (self.base.get(|_| ())?, self.sweeps.get(Sweep::init)?);
+        let records = self.trajectory.get(grid.steps)?;
+        let mut result = Adjoint::zeroed();
+        base.record(&self.scheme, grid, records)?;
+        // As many seeds at once as the memory holds: one row of directions.
+        let most = M::Shape::NW.max(1);
+        for first in (0..C).step_by(most) {
+            let columns = most.min(C - first);
+            sweep.seed(columns, |x, column| lambdas[(x, first + column)]);
+            sweep.run(&self.scheme, grid, &mut base.point, records, columns, None)?;
+            write_gradient(sweep, 0..columns, &mut result, first)?;
+        }
+        write_state(base, &mut result.nominal);
+        Ok(result)
+    }
+
+    /// The state at the end, its derivatives, and the gradient of `λᵀx`.
+    ///
+    /// # Errors
+    /// As [`Integrator::solve`].
+    pub fn forward_adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&ForwardAdjoint<M, T>, Error> {
+        finite(lambda.as_slice(), Argument::Lambda)?;
+        let grid = self.begin(x0, u, h)?;
+        let (base, variation) = (self.base.get(|_| ())?, self.variation.get(Variation::init)?);
+        let result = self.forward_adjoint.get(|_| ())?;
+        variation.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()))?;
+        write_forward(grid, base, variation, &mut result.forward)?;
+        // With the Jacobian at hand the gradient is a product.
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        for w in 0..M::Shape::NW {
+            let mut sum = T::ZERO;
+            for (x, &lambda) in lambda.as_slice().iter().enumerate() {
+                sum = sum + lambda * variation.dx[x][w];
+            }
+            if !sum.is_finite() {
+                return Err(Error::Overflow { step: grid.steps - 1, index: w });
+            }
+            *gradient_element(result, w, nx, nu) = sum;
+        }
+        Ok(result)
+    }
+
+    /// The state at the end, its derivatives, and the gradient and Hessian of `λᵀx`.
+    ///
+    /// # Errors
+    /// As [`Integrator::solve`].
+    pub fn hessian(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        finite(lambda.as_slice(), Argument::Lambda)?;
+        let grid = self.begin(x0, u, h)?;
+        let (base, sweep) = (self.base.get(|_| ())?, self.sweep.get(Sweep::init)?);
+        let (variation, curvature) = (self.variation.get(Variation::init)?, self.curvature.get(|_| ())?);
+        let (records, multipliers) = (self.trajectory.get(grid.steps)?, self.multipliers.get(grid.steps)?);
+        let result = self.hessian.get(|_| ())?;
+
+        // The adjoint first: then the forward sweep meets each stage with its multipliers known, and no
+        // derivative of a stage has to be kept.
+        let start = base.x;
+        base.record(&self.scheme, grid, records)?;
+        sweep.seed(1, |x, _| lambda.as_slice()[x]);
+        sweep.run(&self.scheme, grid, &mut base.point, records, 1, Some(multipliers))?;
+        curvature.start();
+        base.x = start;
+        base.point.counts.steps = 0;
+        variation.run(&self.scheme, grid, base, Unit, |point, dxi, at| {
+            curvature.add(&self.scheme, point, &multipliers[at.step][at.stage], dxi, at)
+        })?;
+
+        write_forward(grid, base, variation, &mut result.first.forward)?;
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        for (w, lambda) in sweep.lambda.as_ref().iter().enumerate() {
+            let [value] = *lambda;
+            if !value.is_finite() {
+                return Err(Error::Overflow { step: 0, index: w });
+            }
+            *gradient_element(&mut result.first, w, nx, nu) = value;
+        }
+        write_hessian(curvature, result)?;
+        Ok(result)
+    }
+
+    /// Checks the input, and goes to the start of the interval.
+    fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Grid<T>, Error> {
+        let base = self.base.get(|_| ())?;
+        base.point.counts = Counts::default();
+        if !self.parameters_set {
+            return Err(Error::ParametersNotSet);
+        }
+        finite(x0.as_slice(), Argument::X0)?;
+        finite(u.as_slice(), Argument::U)?;
+        finite(&[h], Argument::H)?;
+        base.x.as_mut().copy_from_slice(x0.as_slice());
+        let first = 2 * M::Shape::NX;
+        base.point.v.as_mut()[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
+        let steps = self.options.steps;
+        Ok(Grid { start: self.start, h: h / T::from_f64(steps as f64), steps })
+    }
+}
+
+fn finite<T: Real>(values: &[T], argument: Argument) -> Result<(), Error> {
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(Error::NonFiniteInput { argument, index, value: values[index].to_f64() }),
+    }
+}
+
+fn write_state<M: Ode, T: Real, const S: usize>(base: &Base<M, T, S>, result: &mut Nominal<M, T>) {
+    result.x.as_mut_slice().copy_from_slice(base.x.as_ref());
+}
+
+fn write_forward<M: Ode, T: Real, const S: usize>(
+    grid: Grid<T>,
+    base: &Base<M, T, S>,
+    variation: &Variation<M, T, ArrayW<M, T>, S>,
+    result: &mut Forward<M, T>,
+) -> Result<(), Error> {
+    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+    let (dx, step) = (variation.dx.as_ref(), grid.steps - 1);
+    write(dx, 0..nx, &mut result.dx_dx0, 0, step)?;
+    write(dx, nx..nx + nu, &mut result.dx_du, 0, step)?;
+    write(dx, nx + nu..nw, &mut result.dx_dp, 0, step)?;
+    write_state(base, &mut result.nominal);
+    Ok(())
+}
+
+fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
+    sweep: &Sweep<M, T, R, S>,
+    source: Range<usize>,
+    result: &mut Adjoint<M, T, C>,
+    first: usize,
+) -> Result<(), Error> {
+    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    let lambda = sweep.lambda.as_ref();
+    write(&lambda[..nx], source.clone(), &mut result.grad_x0, first, 0)?;
+    write(&lambda[nx..nx + nu], source.clone(), &mut result.grad_u, first, 0)?;
+    write(&lambda[nx + nu..], source, &mut result.grad_p, first, 0)
+}
+
+/// Element `w` of the gradient.
+fn gradient_element<M: Ode, T: Real>(
+    result: &mut ForwardAdjoint<M, T>,
+    w: usize,
+    nx: usize,
+    nu: usize,
+) -> &mut T {
+    if w < nx {
+        &mut result.grad_x0.as_mut_slice()[w]
+    } else if w < nx + nu {
+        &mut result.grad_u.as_mut_slice()[w - nx]
+    } else {
+        &mut result.grad_p.as_mut_slice()[w - nx - nu]
+    }
+}
+
+fn write_hessian<M: Ode, T: Real>(
+    curvature: &mut Curvature<M, T>,
+    result: &mut Hessian<M, T>,
+) -> Result<(), Error> {
+    curvature.mirror();
+    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+    let rows = curvature.sum.as_ref();
+    let (x, u, p) = (0..nx, nx..nx + nu, nx + nu..nw);
+    write(&rows[x.clone()], x.clone(), &mut result.h_xx, 0, 0)?;
+    write(&rows[x.clone()], u.clone(), &mut result.h_xu, 0, 0)?;
+    write(&rows[u.clone()], u.clone(), &mut result.h_uu, 0, 0)?;
+    write(&rows[x], p.clone(), &mut result.h_xp, 0, 0)?;
+    write(&rows[u], p.clone(), &mut result.h_up, 0, 0)?;
+    write(&rows[p.clone()], p, &mut result.h_pp, 0, 0)
+}
