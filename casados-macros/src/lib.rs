@@ -30,20 +30,22 @@ fn expand(
     attribute: proc_macro2::TokenStream,
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
-    match language::read(form, attribute, item.clone()) {
-        Ok(source) => {
-            let models: Result<Vec<_>, _> =
-                source.models.into_iter().map(|model| structure::analyse(model)).collect();
-            match models {
-                Ok(models) => emit::expand(source.item, source.place, &models),
-                Err(error) => with_error(item, &error),
+    let models = language::read(form, attribute, item.clone()).and_then(|source| {
+        let mut models = Vec::new();
+        let mut errors: Option<syn::Error> = None;
+        for model in source.models {
+            match structure::analyse(model) {
+                Ok(model) => models.push(model),
+                Err(error) => match &mut errors {
+                    Some(errors) => errors.combine(error),
+                    None => errors = Some(error),
+                },
             }
         }
-        Err(error) => with_error(item, &error),
-    }
-}
-
-fn with_error(item: proc_macro2::TokenStream, error: &syn::Error) -> proc_macro2::TokenStream {
-    let error = error.to_compile_error();
-    quote::quote! { #item #error }
+        match errors {
+            Some(errors) => Err(errors),
+            None => emit::expand(source.item, source.place, &models),
+        }
+    });
+    models.unwrap_or_else(|error| emit::with_errors(item, &error))
 }

@@ -1,0 +1,54 @@
+//! What rustdoc says about a model.
+
+use crate::structure::Analysis;
+use proc_macro2::TokenStream;
+use quote::quote;
+
+/// The user's text, then what is known about the model: one row of a table for each instance.
+pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
+    let Some(first) = models.first() else {
+        return TokenStream::new();
+    };
+    let documentation = &first.model.documentation;
+    let separator = (!documentation.is_empty()).then(|| quote!(#[doc = ""]));
+
+    let parameters: Vec<String> = first.model.instance.iter().map(|i| format!("`{}`", i.name)).collect();
+    let mut lines = vec![format!(
+        "The model of `{original}`: dimensions, structural non-zeros of its Jacobian (constant ones among \
+         them) and of the lower triangle of its Hessian, and operations per evaluation."
+    )];
+    lines.push(String::new());
+    let head = ["nx", "nz", "nu", "np", "Jacobian", "constant", "Hessian", "`f`", "`f` and Jacobian"];
+    let head = head.into_iter().chain(["`∇(μᵀf)`", "`∇²(μᵀf)`"]).map(String::from);
+    let head: Vec<String> = parameters.into_iter().chain(head).collect();
+    lines.push(row(&head));
+    lines.push(row(&vec![String::from("---"); head.len()]));
+    for Analysis { model, jacobian, constant, hessian, operations, .. } in models {
+        let variables = &model.variables;
+        let numbers = [
+            variables.x.len(),
+            variables.z.len(),
+            variables.u.len(),
+            variables.p.len(),
+            jacobian.len(),
+            constant.iter().filter(|&&constant| constant).count(),
+            hessian.len(),
+            operations.residual as usize,
+            operations.residual_jacobian as usize,
+            operations.adjoint as usize,
+            operations.hessian as usize,
+        ];
+        let instance = model.instance.iter().map(|instance| instance.value.to_string());
+        lines.push(row(&instance.chain(numbers.map(|n| n.to_string())).collect::<Vec<_>>()));
+    }
+    let lines = lines.into_iter().map(|line| if line.is_empty() { line } else { format!(" {line}") });
+    quote! {
+        #(#documentation)*
+        #separator
+        #(#[doc = #lines])*
+    }
+}
+
+fn row(cells: &[String]) -> String {
+    format!("| {} |", cells.join(" | "))
+}

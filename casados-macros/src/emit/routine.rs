@@ -1,0 +1,309 @@
+//! A list of expressions as Rust functions: straight-line code, generic over the scalar.
+
+use super::chunk::{self, Chunk, Plan};
+use super::schedule::{self, Step};
+use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
+use crate::language::Variables;
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// The most statements of one function. Functions that are one piece of several are not inlined: all of
+/// them in one cost a compiler three to four times as long (4,700 statements: 1.5 s against 5 s in `f64`) and
+/// run no faster.
+const LIMIT: usize = 500;
+
+/// A function to be written.
+pub struct Routine<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Its documentation: one line.
+    pub documentation: &'a str,
+    /// The arrays it reads: name and length.
+    pub inputs: &'a [(&'a str, usize)],
+    /// The arrays it writes: name and length.
+    pub outputs: &'a [(&'a str, usize)],
+    /// What it writes: array, element, value.
+    pub stores: Vec<(&'a str, usize, Node)>,
+}
+
+impl Routine<'_> {
+    /// Writes the routine. `S: Scalar` must be in scope.
+    pub fn write(&self, graph: &Graph, variables: &Variables, opaque: usize) -> String {
+        let outputs: Vec<Node> = self.stores.iter().map(|store| store.2).collect();
+        let steps = schedule::schedule(graph, &outputs);
+        let operations = steps.iter().copied().flat_map(chunk::computed).count();
+        let plan = chunk::plan(graph, &outputs, &steps, LIMIT);
+        let mut names = vec![u32::MAX; graph.len()];
+        for (name, node) in (0..).zip(steps.iter().copied().flat_map(chunk::computed)) {
+            names[node.0 as usize] = name;
+        }
+        let writer = Writer { routine: self, graph, variables, opaque, outputs: &outputs, names: &names };
+
+        let mut text = String::new();
+        let count = if operations == 1 { "operation" } else { "operations" };
+        let _ = writeln!(text, "/// {} {operations} {count}.", self.documentation);
+        if let [whole] = plan.chunks.as_slice() {
+            writer.function(&mut text, self.name, "#[inline]\npub ", &steps, whole, 0);
+        } else {
+            writer.driver(&mut text, &plan);
+            for (number, piece) in plan.chunks.iter().enumerate() {
+                let name = format!("{}_{number}", self.name);
+                writer.function(&mut text, &name, "#[inline(never)]\n", &steps, piece, plan.slots);
+            }
+        }
+        text
+    }
+}
+
+struct Writer<'a> {
+    routine: &'a Routine<'a>,
+    graph: &'a Graph,
+    variables: &'a Variables,
+    opaque: usize,
+    outputs: &'a [Node],
+    /// Number of the local variable of each node.
+    names: &'a [u32],
+}
+
+impl Writer<'_> {
+    fn signature(&self, text: &mut String, name: &str, slots: usize) {
+        let _ = write!(text, "fn {name}<S: Scalar>(");
+        if self.opaque > 0 {
+            let _ = write!(text, "c: &[f64; {}], ", self.opaque);
+        }
+        for (array, length) in self.routine.inputs {
+            let _ = write!(text, "{array}: &[S; {length}], ");
+        }
+        if slots > 0 {
+            let _ = write!(text, "w: &mut [S; {slots}], ");
+        }
+        for (array, length) in self.routine.outputs {
+            let _ = write!(text, "{array}: &mut [S; {length}], ");
+        }
+        text.truncate(text.trim_end_matches([',', ' ']).len());
+        text.push_str(") {\n");
+    }
+
+    /// The function that calls the pieces.
+    fn driver(&self, text: &mut String, plan: &Plan) {
+        text.push_str("pub ");
+        self.signature(text, self.routine.name, 0);
+        let mut arguments: Vec<&str> = Vec::new();
+        arguments.extend((self.opaque > 0).then_some("c"));
+        arguments.extend(self.routine.inputs.iter().map(|input| input.0));
+        if plan.slots > 0 {
+            let _ = writeln!(text, "let mut w = [S::from_f64(0.0); {}];", plan.slots);
+            arguments.push("&mut w");
+        }
+        arguments.extend(self.routine.outputs.iter().map(|output| output.0));
+        let arguments = arguments.join(", ");
+        for number in 0..plan.chunks.len() {
+            let _ = writeln!(text, "{}_{number}({arguments});", self.routine.name);
+        }
+        text.push_str("}\n");
+    }
+
+    fn function(
+        &self,
+        text: &mut String,
+        name: &str,
+        modifiers: &str,
+        steps: &[Step],
+        piece: &Chunk,
+        slots: usize,
+    ) {
+        text.push_str(modifiers);
+        self.signature(text, name, slots);
+        let steps = &steps[piece.steps.clone()];
+
+        let read = steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step));
+        let (mut variables, mut seeds) = (BTreeSet::new(), BTreeSet::new());
+        for node in read {
+            match self.graph.op(node) {
+                Op::Variable(index) => variables.insert(index),
+                Op::Seed(row) => seeds.insert(row),
+                _ => false,
+            };
+        }
+        for index in variables {
+            let _ = writeln!(text, "let {} = v[{index}];", self.variable(index));
+        }
+        for row in seeds {
+            let _ = writeln!(text, "let mu_{row} = mu[{row}];");
+        }
+        for &(node, slot) in &piece.loads {
+            let name = self.names[node.0 as usize];
+            if self.is_condition(node) {
+                let _ = writeln!(text, "let v{name} = S::eq(w[{slot}], S::from_f64(1.0));");
+            } else {
+                let _ = writeln!(text, "let v{name} = w[{slot}];");
+            }
+        }
+        for &step in steps {
+            match step {
+                Step::Compute(node) => {
+                    let _ = writeln!(text, "let {} = {};", self.atom(node), self.expression(node));
+                }
+                Step::SinCos(sin, cos) => {
+                    let argument = self.graph.op(sin).operands().map(|a| self.atom(a)).next();
+                    let _ = writeln!(
+                        text,
+                        "let ({}, {}) = {}.sin_cos();",
+                        self.atom(sin),
+                        self.atom(cos),
+                        argument.unwrap_or_default()
+                    );
+                }
+                Step::Store(output) => {
+                    let (array, index, node) = &self.routine.stores[output];
+                    let _ = writeln!(text, "{array}[{index}] = {};", self.atom(*node));
+                }
+            }
+            for node in chunk::computed(step) {
+                let Some(slot) = piece.spills.get(&node) else { continue };
+                let atom = self.atom(node);
+                if self.is_condition(node) {
+                    let _ =
+                        writeln!(text, "w[{slot}] = S::select({atom}, S::from_f64(1.0), S::from_f64(0.0));");
+                } else {
+                    let _ = writeln!(text, "w[{slot}] = {atom};");
+                }
+            }
+        }
+        text.push_str("}\n");
+    }
+
+    fn is_condition(&self, node: Node) -> bool {
+        matches!(self.graph.op(node), Op::Compare(..) | Op::And(..) | Op::Or(..) | Op::Not(_))
+    }
+
+    /// The local variable of a variable of the model.
+    fn variable(&self, index: u32) -> String {
+        let Variables { x, z, u, p } = self.variables;
+        let mut index = index as usize;
+        for (name, list) in [("xdot", x), ("x", x), ("z", z), ("u", u), ("p", p)] {
+            if index < list.len() {
+                return format!("{name}_{index}");
+            }
+            index -= list.len();
+        }
+        String::from("t")
+    }
+
+    /// A node where it is used: a local variable or a constant.
+    fn atom(&self, node: Node) -> String {
+        match self.graph.op(node) {
+            Op::Constant(bits) => format!("S::from_f64({})", number(f64::from_bits(bits))),
+            Op::Opaque(index) => format!("S::from_f64(c[{index}])"),
+            Op::Variable(index) => self.variable(index),
+            Op::Seed(row) => format!("mu_{row}"),
+            _ => format!("v{}", self.names[node.0 as usize]),
+        }
+    }
+
+    /// A node where it is computed.
+    fn expression(&self, node: Node) -> String {
+        let atom = |node: Node| self.atom(node);
+        match self.graph.op(node) {
+            Op::Unary(Unary::Neg, a) => format!("-{}", atom(a)),
+            Op::Unary(function, a) => format!("{}.{}()", atom(a), unary(function)),
+            Op::Binary(function, a, b) => {
+                let (a, b) = (atom(a), atom(b));
+                match function {
+                    Binary::Add => format!("{a} + {b}"),
+                    Binary::Sub => format!("{a} - {b}"),
+                    Binary::Mul => format!("{a} * {b}"),
+                    Binary::Div => format!("{a} / {b}"),
+                    Binary::Powf => format!("{a}.powf({b})"),
+                    Binary::Atan2 => format!("{a}.atan2({b})"),
+                    Binary::Hypot => format!("{a}.hypot({b})"),
+                }
+            }
+            Op::Powi(a, n) => format!("{}.powi({n})", atom(a)),
+            Op::Select(condition, a, b) => {
+                format!("S::select({}, {}, {})", atom(condition), atom(a), atom(b))
+            }
+            Op::Compare(comparison, a, b) => {
+                let name = match comparison {
+                    Compare::Lt => "lt",
+                    Compare::Le => "le",
+                    Compare::Eq => "eq",
+                };
+                format!("S::{name}({}, {})", atom(a), atom(b))
+            }
+            Op::And(a, b) => format!("S::and({}, {})", atom(a), atom(b)),
+            Op::Or(a, b) => format!("S::or({}, {})", atom(a), atom(b)),
+            Op::Not(a) => format!("S::not({})", atom(a)),
+            Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_) => atom(node),
+        }
+    }
+}
+
+/// A number such that reading it gives the same bits.
+pub fn number(value: f64) -> String {
+    if value.is_finite() {
+        format!("{value:?}")
+    } else if value.is_nan() {
+        format!("f64::from_bits({:#x})", value.to_bits())
+    } else if value > 0.0 {
+        String::from("f64::INFINITY")
+    } else {
+        String::from("f64::NEG_INFINITY")
+    }
+}
+
+fn unary(function: Unary) -> &'static str {
+    match function {
+        Unary::Neg => "neg",
+        Unary::Sqrt => "sqrt",
+        Unary::Cbrt => "cbrt",
+        Unary::Exp => "exp",
+        Unary::Exp2 => "exp2",
+        Unary::ExpM1 => "exp_m1",
+        Unary::Ln => "ln",
+        Unary::Ln1p => "ln_1p",
+        Unary::Log2 => "log2",
+        Unary::Log10 => "log10",
+        Unary::Sin => "sin",
+        Unary::Cos => "cos",
+        Unary::Tan => "tan",
+        Unary::Asin => "asin",
+        Unary::Acos => "acos",
+        Unary::Atan => "atan",
+        Unary::Sinh => "sinh",
+        Unary::Cosh => "cosh",
+        Unary::Tanh => "tanh",
+        Unary::Asinh => "asinh",
+        Unary::Acosh => "acosh",
+        Unary::Atanh => "atanh",
+        Unary::Abs => "abs",
+        Unary::Signum => "signum",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_bits() {
+        let list =
+            [0.0, -0.0, 0.1, -1.0 / 3.0, 1e300, 5e-324, f64::MIN_POSITIVE, f64::MAX, 1e22, 123456789.0];
+        for value in list {
+            let text = number(value);
+            let expression: syn::Expr = syn::parse_str(&text).unwrap();
+            let (sign, literal) = match &expression {
+                syn::Expr::Unary(unary) => (-1.0, &*unary.expr),
+                other => (1.0, other),
+            };
+            let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Float(literal), .. }) = literal else {
+                panic!("`{text}` is no number of floating point");
+            };
+            let read: f64 = sign * literal.base10_parse::<f64>().unwrap();
+            assert_eq!(read.to_bits(), value.to_bits(), "{text}");
+        }
+        assert_eq!(number(f64::INFINITY), "f64::INFINITY");
+        assert_eq!(number(f64::NEG_INFINITY), "f64::NEG_INFINITY");
+        assert_eq!(number(f64::from_bits(0x7ff8_0000_0000_0001)), "f64::from_bits(0x7ff8000000000001)");
+    }
+}

@@ -1,0 +1,149 @@
+//! The order in which a function computes: depth first from its outputs, so that values are used soon
+//! after they are there and a compiler can keep them in registers.
+
+use crate::graph::{Graph, Node, Op, Unary};
+use std::collections::HashMap;
+
+/// One statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Compute a node.
+    Compute(Node),
+    /// Compute the sine and the cosine of the same argument.
+    SinCos(Node, Node),
+    /// Store an output, by its index in the list of outputs.
+    Store(usize),
+}
+
+/// Whether a node is there before anything is computed.
+pub fn is_leaf(op: Op) -> bool {
+    op.operands().next().is_none()
+}
+
+/// The statements that compute the outputs, each operand before its uses.
+pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
+    let Some(last) = outputs.iter().map(|node| node.at()).max() else {
+        return Vec::new();
+    };
+    let op = |index: usize| graph.op(Node(index as u32));
+
+    // Registers that a subtree needs (Sethi and Ullman): the hungrier operand comes first.
+    let mut registers = vec![0u32; last + 1];
+    let mut pairs: HashMap<Node, (Option<Node>, Option<Node>)> = HashMap::new();
+    for index in graph.reachable(outputs).into_iter().map(Node::at) {
+        let mut needs: Vec<u32> = op(index).operands().map(|node| registers[node.at()]).collect();
+        needs.sort_unstable_by(|a, b| b.cmp(a));
+        registers[index] = (0..).zip(&needs).map(|(held, need)| held + need).max().unwrap_or(0).max(1);
+        match op(index) {
+            Op::Unary(Unary::Sin, a) => pairs.entry(a).or_default().0 = Some(Node(index as u32)),
+            Op::Unary(Unary::Cos, a) => pairs.entry(a).or_default().1 = Some(Node(index as u32)),
+            _ => {}
+        }
+    }
+
+    let mut done = vec![false; last + 1];
+    let mut steps = Vec::new();
+    let mut stack = Vec::new();
+    for (number, &output) in outputs.iter().enumerate() {
+        stack.push((output, false));
+        while let Some((node, ready)) = stack.pop() {
+            let index = node.at();
+            if done[index] {
+                continue;
+            }
+            if !ready {
+                stack.push((node, true));
+                let mut list: Vec<Node> = op(index).operands().filter(|node| !done[node.at()]).collect();
+                list.reverse();
+                list.sort_by_key(|node| registers[node.at()]);
+                stack.extend(list.into_iter().map(|node| (node, false)));
+                continue;
+            }
+            done[index] = true;
+            if is_leaf(op(index)) {
+                continue;
+            }
+            let pair = match op(index) {
+                Op::Unary(Unary::Sin | Unary::Cos, a) => pairs.get(&a).copied(),
+                _ => None,
+            };
+            if let Some((Some(sin), Some(cos))) = pair {
+                done[sin.at()] = true;
+                done[cos.at()] = true;
+                steps.push(Step::SinCos(sin, cos));
+            } else {
+                steps.push(Step::Compute(node));
+            }
+        }
+        steps.push(Step::Store(number));
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::Binary;
+
+    /// Every operand is computed before its use, every value once, every output stored once.
+    fn check(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
+        let steps = schedule(graph, outputs);
+        let mut computed = std::collections::HashSet::new();
+        let mut stored = vec![false; outputs.len()];
+        let ready = |computed: &std::collections::HashSet<Node>, node| {
+            is_leaf(graph.op(node)) || computed.contains(&node)
+        };
+        for &step in &steps {
+            match step {
+                Step::Compute(node) => {
+                    assert!(graph.op(node).operands().all(|operand| ready(&computed, operand)));
+                    assert!(computed.insert(node));
+                }
+                Step::SinCos(sin, cos) => {
+                    assert!(graph.op(sin).operands().all(|operand| ready(&computed, operand)));
+                    assert!(computed.insert(sin) && computed.insert(cos));
+                }
+                Step::Store(output) => {
+                    assert!(ready(&computed, outputs[output]));
+                    assert!(!std::mem::replace(&mut stored[output], true));
+                }
+            }
+        }
+        assert!(stored.iter().all(|&stored| stored));
+        steps
+    }
+
+    #[test]
+    fn sine_and_cosine_of_one_argument_are_one_statement() {
+        let mut g = Graph::default();
+        let x = g.variable(0);
+        let (s, c) = (g.unary(Unary::Sin, x), g.unary(Unary::Cos, x));
+        let product = g.binary(Binary::Mul, s, c);
+        assert_eq!(check(&g, &[product]), [Step::SinCos(s, c), Step::Compute(product), Step::Store(0)]);
+        // The cosine alone is not accompanied by a sine that nobody asked for.
+        assert_eq!(check(&g, &[c]), [Step::Compute(c), Step::Store(0)]);
+    }
+
+    #[test]
+    fn unused_nodes_are_not_computed_and_leaves_are_no_statements() {
+        let mut g = Graph::default();
+        let x = g.variable(0);
+        let unused = g.unary(Unary::Exp, x);
+        let two = g.constant(2.0);
+        assert_eq!(check(&g, &[x, two]), [Step::Store(0), Step::Store(1)]);
+        assert!(!check(&g, &[x]).contains(&Step::Compute(unused)));
+        assert_eq!(schedule(&g, &[]), []);
+    }
+
+    #[test]
+    fn a_long_chain_does_not_recurse() {
+        let mut g = Graph::default();
+        let x = g.variable(0);
+        let mut node = x;
+        for _ in 0..100_000 {
+            let next = g.unary(Unary::Atan, node);
+            node = g.binary(Binary::Add, x, next);
+        }
+        assert_eq!(check(&g, &[node]).len(), 200_001);
+    }
+}
