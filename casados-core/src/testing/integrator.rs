@@ -1,7 +1,7 @@
 //! What the checks ask of an integrator, and its answers as flat arrays.
 
 use crate::error::Error;
-use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::model::{Dae, Ode, VectorP, VectorU, VectorX};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -169,3 +169,55 @@ fn derivatives<M: Dae>(f: &Forward<M>) -> DMatrix<f64> {
         }
     })
 }
+
+/// The trait of an integrator that has the calls.
+macro_rules! integrator {
+    ([$($generics:tt)*] $model:ident, $type:ty, $reset:expr) => {
+        impl<$($generics)*> Integrator<$model> for $type {
+            fn set_parameters(&mut self, p: &VectorP<$model, f64>) -> Result<(), Error> {
+                <$type>::set_parameters(self, p)
+            }
+            fn reset(&mut self) {
+                let reset: fn(&mut Self) = $reset;
+                reset(self);
+            }
+            fn solve(
+                &mut self,
+                x0: &VectorX<$model, f64>,
+                u: &VectorU<$model, f64>,
+                h: f64,
+            ) -> Result<&Nominal<$model>, Error> {
+                <$type>::solve(self, x0, u, h)
+            }
+            fn forward(
+                &mut self,
+                x0: &VectorX<$model, f64>,
+                u: &VectorU<$model, f64>,
+                h: f64,
+            ) -> Result<&Forward<$model>, Error> {
+                <$type>::forward(self, x0, u, h)
+            }
+            fn adjoint(
+                &mut self,
+                x0: &VectorX<$model, f64>,
+                u: &VectorU<$model, f64>,
+                h: f64,
+                lambda: &VectorX<$model, f64>,
+            ) -> Result<&Adjoint<$model>, Error> {
+                <$type>::adjoint(self, x0, u, h, lambda)
+            }
+            fn hessian(
+                &mut self,
+                x0: &VectorX<$model, f64>,
+                u: &VectorU<$model, f64>,
+                h: f64,
+                lambda: &VectorX<$model, f64>,
+            ) -> Result<&Hessian<$model>, Error> {
+                <$type>::hessian(self, x0, u, h, lambda)
+            }
+        }
+    };
+}
+
+// An explicit method has no warm start.
+integrator!([M: Ode, B: 'static, const S: usize] M, crate::erk::Integrator<M, B, f64, S>, |_| {});
