@@ -4,13 +4,14 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 pub type BuildHasher = BuildHasherDefault<Multiply>;
 
-/// Multiply and rotate, word by word.
+/// Multiplies word by word and folds the upper half of the product onto the lower: constants such as small
+/// integers differ in their upper bits only.
 #[derive(Clone, Default)]
 pub struct Multiply(u64);
 
 impl Hasher for Multiply {
     fn finish(&self) -> u64 {
-        self.0.rotate_left(26)
+        self.0
     }
     fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
@@ -27,6 +28,7 @@ impl Hasher for Multiply {
         self.write_u64(word as u64);
     }
     fn write_u64(&mut self, word: u64) {
-        self.0 = (self.0 ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+        let product = u128::from(self.0 ^ word ^ 0x243f_6a88_85a3_08d3) * 0x9e37_79b9_7f4a_7c15;
+        self.0 = product as u64 ^ (product >> 64) as u64;
     }
 }

@@ -20,6 +20,8 @@ mod reverse;
 mod rules;
 mod simplify;
 mod sparsity;
+#[cfg(test)]
+mod tests;
 
 pub use evaluate::Point;
 pub use hessian::hessian;

@@ -2,6 +2,8 @@
 //! derivatives that the engine will ask for, as graphs.
 
 mod index;
+#[cfg(test)]
+mod tests;
 
 use crate::graph::{self, Degree, Node};
 use crate::language::Model;
@@ -101,12 +103,13 @@ fn check_length(model: &Model) -> syn::Result<()> {
         (Some(&first), Some(&last)) => first.join(last).unwrap_or(first),
         _ => model.name.span(),
     };
-    let unknowns = if nz == 0 {
-        format!("{nx} (one per state)")
-    } else {
-        format!("{} ({nx} states and {nz} algebraic states)", nx + nz)
+    let plural = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+    let unknowns = match nz {
+        0 => format!("{nx} (one per state)"),
+        _ => format!("{} ({} and {})", nx + nz, plural(nx, "state"), plural(nz, "algebraic state")),
     };
-    let message = format!("the residual has {equations} equations where the model needs {unknowns}");
+    let message =
+        format!("the residual has {} where the model needs {unknowns}", plural(equations, "equation"));
     Err(syn::Error::new(span, message))
 }
 

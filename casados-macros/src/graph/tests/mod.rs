@@ -1,0 +1,6 @@
+mod costs;
+mod derivatives;
+mod expression;
+mod models;
+mod rules;
+mod simplification;

@@ -1,0 +1,276 @@
+//! Derivatives of every operation against closed values and differences.
+
+use super::expression::E;
+use crate::graph::{Binary, Graph, Node, Op, Point, Unary, gradient, hessian};
+use std::cell::RefCell;
+use std::f64::consts::{E as EULER, LN_2, LOG2_E, LOG10_E};
+
+/// A function of two variables: its value, gradient and Hessian `[aa, ab, bb]`.
+struct Function {
+    graph: Graph,
+    outputs: [Node; 6],
+}
+
+impl Function {
+    fn new(build: impl Fn(E, E) -> Node) -> Self {
+        let graph = RefCell::new(Graph::default());
+        let v = E::variables(&graph, 2);
+        let f = build(v[0], v[1]);
+        let mut graph = graph.into_inner();
+        let one = graph.constant(1.0);
+        let zero = graph.constant(0.0);
+        let first = gradient(&mut graph, &[(f, one)], 2);
+        let mut second = [zero; 3];
+        for (row, column, value) in hessian(&mut graph, &[(f, one)], 2) {
+            second[(row + column) as usize] = value;
+        }
+        Self { graph, outputs: [f, first[0], first[1], second[0], second[1], second[2]] }
+    }
+
+    /// `[f, f_a, f_b, f_aa, f_ab, f_bb]`
+    fn at(&self, a: f64, b: f64) -> [f64; 6] {
+        let values = self.graph.evaluate(&self.outputs, Point { variables: &[a, b], ..Point::default() });
+        std::array::from_fn(|i| values[i])
+    }
+}
+
+fn unary(function: Unary) -> Function {
+    Function::new(|a, _| a.unary(function).1)
+}
+
+/// Central difference of order 8, and a bound of its rounding error for values of the given size.
+fn difference(f: impl Fn(f64) -> f64, at: f64, h: f64) -> (f64, f64) {
+    let weights = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+    let mut sum = 0.0;
+    let mut size: f64 = 0.0;
+    for (k, weight) in (1..).zip(weights) {
+        let (right, left) = (f(at + f64::from(k) * h), f(at - f64::from(k) * h));
+        sum += weight * (right - left);
+        size = size.max(right.abs()).max(left.abs());
+    }
+    // An elementary function is within 2 ulp, the weights add up to 2.1.
+    (sum / h, 8.0 * f64::EPSILON * size / h)
+}
+
+/// All derivatives at a point against differences of the value and of the first derivatives. `h` is small
+/// beside the distance to the next singularity: with ratio 1/100 the truncation error of order 8 is
+/// below 1e-15 of the derivative times a factorial over 630, together below 1e-12.
+fn check_differences(name: &str, function: &Function, a: f64, b: f64, h: f64) {
+    let exact = function.at(a, b);
+    let check = |what: &str, value: f64, (reference, rounding): (f64, f64)| {
+        let error = (value - reference).abs();
+        let bound = rounding + 1e-11 * value.abs().max(1.0);
+        assert!(error <= bound, "{name} {what} at ({a}, {b}): {value} instead of {reference}");
+    };
+    check("f_a", exact[1], difference(|a| function.at(a, b)[0], a, h));
+    check("f_aa", exact[3], difference(|a| function.at(a, b)[1], a, h));
+    check("f_b", exact[2], difference(|b| function.at(a, b)[0], b, h));
+    check("f_ab", exact[4], difference(|b| function.at(a, b)[1], b, h));
+    check("f_bb", exact[5], difference(|b| function.at(a, b)[2], b, h));
+}
+
+#[test]
+fn functions_of_one_argument_against_differences() {
+    use Unary::*;
+    let everywhere: &[f64] = &[-2.3, -0.7, 0.4, 1.9];
+    let positive: &[f64] = &[0.3, 1.0, 2.7, 40.0];
+    let unit: &[f64] = &[-0.8, -0.3, 0.2, 0.7];
+    let nonzero: &[f64] = &[-3.0, -0.6, 0.5, 2.0];
+    let cases: &[(Unary, &[f64])] = &[
+        (Neg, everywhere),
+        (Sqrt, positive),
+        (Cbrt, nonzero),
+        (Exp, everywhere),
+        (Exp2, everywhere),
+        (ExpM1, everywhere),
+        (Ln, positive),
+        (Ln1p, &[-0.6, 0.1, 3.0]),
+        (Log2, positive),
+        (Log10, positive),
+        (Sin, everywhere),
+        (Cos, everywhere),
+        (Tan, &[-1.0, 0.3, 1.1, 2.5]),
+        (Asin, unit),
+        (Acos, unit),
+        (Atan, everywhere),
+        (Sinh, everywhere),
+        (Cosh, everywhere),
+        (Tanh, everywhere),
+        (Asinh, everywhere),
+        (Acosh, &[1.5, 2.0, 10.0]),
+        (Atanh, unit),
+        (Abs, nonzero),
+        (Signum, nonzero),
+    ];
+    for &(function, points) in cases {
+        for &a in points {
+            check_differences(&format!("{function:?}"), &unary(function), a, 0.0, 1.0 / 512.0);
+        }
+    }
+}
+
+/// Values of first and second derivatives that are known in closed form.
+#[test]
+fn functions_of_one_argument_against_closed_values() {
+    use Unary::*;
+    let cases = [
+        (Neg, 3.0, -1.0, 0.0),
+        (Sqrt, 4.0, 0.25, -1.0 / 32.0),
+        (Sqrt, 1e-200, 5e99, -2.5e299),
+        (Cbrt, 8.0, 1.0 / 12.0, -1.0 / 144.0),
+        (Cbrt, -8.0, 1.0 / 12.0, 1.0 / 144.0),
+        (Exp, 1.0, EULER, EULER),
+        (Exp2, 3.0, 8.0 * LN_2, 8.0 * LN_2 * LN_2),
+        (ExpM1, -50.0, (-50f64).exp(), (-50f64).exp()),
+        (Ln, 4.0, 0.25, -1.0 / 16.0),
+        (Ln1p, 3.0, 0.25, -1.0 / 16.0),
+        (Log2, 8.0, LOG2_E / 8.0, -LOG2_E / 64.0),
+        (Log10, 10.0, LOG10_E / 10.0, -LOG10_E / 100.0),
+        (Sin, 0.0, 1.0, 0.0),
+        (Cos, 0.0, 0.0, -1.0),
+        (Tan, 0.0, 1.0, 0.0),
+        (Tan, std::f64::consts::FRAC_PI_4, 2.0, 4.0),
+        (Asin, 0.6, 1.25, 0.6 / 0.512),
+        (Acos, 0.6, -1.25, -0.6 / 0.512),
+        (Atan, 2.0, 0.2, -4.0 / 25.0),
+        (Atan, 1e200, 0.0, 0.0),
+        (Sinh, LN_2, 1.25, 0.75),
+        (Cosh, LN_2, 0.75, 1.25),
+        (Tanh, LN_2, 0.64, -0.768),
+        (Asinh, 0.75, 0.8, -0.384),
+        (Acosh, 1.25, 4.0 / 3.0, -80.0 / 27.0),
+        (Atanh, 0.5, 4.0 / 3.0, 16.0 / 9.0),
+        (Abs, -2.0, -1.0, 0.0),
+        (Abs, 2.0, 1.0, 0.0),
+        (Signum, -2.0, 0.0, 0.0),
+    ];
+    for (function, a, first, second) in cases {
+        let [_, f_a, _, f_aa, _, _] = unary(function).at(a, 0.0);
+        // A handful of operations, each within 2 ulp, none of which cancels at these points.
+        let close =
+            |value: f64, reference: f64| (value - reference).abs() <= 16.0 * f64::EPSILON * reference.abs();
+        assert!(close(f_a, first), "{function:?}' at {a}: {f_a} instead of {first}");
+        assert!(close(f_aa, second), "{function:?}'' at {a}: {f_aa} instead of {second}");
+    }
+}
+
+/// `1 − a²` would lose half of the digits here. `1 − a` is exact.
+#[test]
+fn no_cancellation_near_one() {
+    let distance = 2f64.powi(-40);
+    let a = 1.0 - distance;
+    let close = |value: f64, reference: f64| (value / reference - 1.0).abs() < 16.0 * f64::EPSILON;
+    let root = (distance * (2.0 - distance)).sqrt();
+    assert!(close(unary(Unary::Asin).at(a, 0.0)[1], 1.0 / root));
+    assert!(close(unary(Unary::Acos).at(a, 0.0)[1], -1.0 / root));
+    assert!(close(unary(Unary::Atanh).at(a, 0.0)[1], 1.0 / (distance * (2.0 - distance))));
+    let root = (distance * (2.0 + distance)).sqrt();
+    assert!(close(unary(Unary::Acosh).at(1.0 + distance, 0.0)[1], 1.0 / root));
+    assert!(close(unary(Unary::Acosh).at(1e200, 0.0)[1], 1e-200));
+}
+
+#[test]
+fn functions_of_two_arguments() {
+    let signs = [(0.7, 1.3), (-0.7, 1.3), (2.1, -0.4), (-1.1, -0.9)];
+    let functions = [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Atan2, Binary::Hypot];
+    for function in functions {
+        let derivatives = Function::new(|a, b| a.binary(function, b).1);
+        for (a, b) in signs {
+            check_differences(&format!("{function:?}"), &derivatives, a, b, 1.0 / 512.0);
+        }
+    }
+    let power = Function::new(|a, b| a.binary(Binary::Powf, b).1);
+    for (a, b) in [(0.7, 1.3), (2.0, -0.5), (3.0, 2.0)] {
+        check_differences("Powf", &power, a, b, 1.0 / 512.0);
+    }
+}
+
+/// Both operands are the same, depend on each other, or one is constant.
+#[test]
+fn operands_that_are_not_independent() {
+    type Build = fn(E, E) -> Node;
+    let cases: [(&str, Build); 16] = [
+        ("a + a", |a, _| (a + a).1),
+        ("a a", |a, _| (a * a).1),
+        ("a / a", |a, _| (a / a).1),
+        ("sin a / a", |a, _| (a.unary(Unary::Sin) / a).1),
+        ("a sin a", |a, _| (a.unary(Unary::Sin) * a).1),
+        ("cos(−a)", |a, _| (-a).unary(Unary::Cos).1),
+        ("√(3 a)", |a, _| (3.0 * a).sqrt().1),
+        ("1 / (2 a)", |a, _| (1.0 / (2.0 * a)).1),
+        ("a / 3", |a, _| (a / 3.0).1),
+        ("aᵃ", |a, _| a.binary(Binary::Powf, a).1),
+        ("2.5ᵃ", |a, _| a.of(2.5).binary(Binary::Powf, a).1),
+        ("atan2(a, 2)", |a, _| a.binary(Binary::Atan2, a.of(2.0)).1),
+        ("hypot(a, a)", |a, _| a.binary(Binary::Hypot, a).1),
+        ("hypot(a b, b)", |a, b| (a * b).binary(Binary::Hypot, b).1),
+        ("(a − b) (b − a)", |a, b| ((a - b) * (b - a)).1),
+        ("(a b)² / (a + b)", |a, b| ((a * b) * (a * b) / (a + b)).1),
+    ];
+    for (name, build) in cases {
+        for (a, b) in [(0.7, 1.3), (2.0, 0.4)] {
+            check_differences(name, &Function::new(build), a, b, 1.0 / 512.0);
+        }
+    }
+}
+
+#[test]
+fn powers() {
+    for n in [-3, -2, -1, 0, 1, 2, 3, 4, 7] {
+        for a in [-1.4, 0.6, 2.0] {
+            let derivatives = Function::new(|a, _| a.powi(n).1);
+            check_differences(&format!("powi {n}"), &derivatives, a, 0.0, 1.0 / 512.0);
+        }
+    }
+    for exponent in [-1.5, -1.0, 0.15, 0.5, 1.0, 2.0, 3.0, 4.2561] {
+        for a in [0.6, 1.0, 2.0] {
+            let derivatives = Function::new(|a, _| a.powf(exponent).1);
+            check_differences(&format!("powf {exponent}"), &derivatives, a, 0.0, 1.0 / 512.0);
+        }
+    }
+    // Finite derivatives at zero stay finite.
+    assert_eq!(Function::new(|a, _| a.powf(2.5).1).at(0.0, 0.0), [0.0; 6]);
+    assert_eq!(Function::new(|a, _| a.powi(3).1).at(0.0, 0.0), [0.0; 6]);
+    assert_eq!(Function::new(|a, _| a.powf(2.0).1).at(0.0, 0.0)[3], 2.0);
+    let power = Function::new(|a, b| a.binary(Binary::Powf, b).1).at(0.0, 3.0);
+    assert_eq!(power, [0.0; 6]);
+    assert_eq!(Function::new(|a, _| a.powi(i32::MIN).1).at(1.0, 0.0)[1], f64::from(i32::MIN));
+}
+
+/// The branch not taken may be singular.
+#[test]
+fn selection_differentiates_the_branch_taken() {
+    let piecewise = Function::new(|a, b| {
+        let zero = a.of(0.0);
+        zero.if_less(a, b * a.sqrt(), zero).1
+    });
+    assert_eq!(piecewise.at(0.0, 3.0), [0.0; 6]);
+    assert_eq!(piecewise.at(-1.0, 3.0), [0.0; 6]);
+    assert_eq!(piecewise.at(4.0, 3.0), [6.0, 0.75, 2.0, -3.0 / 32.0, 0.25, 0.0]);
+    let nested = Function::new(|a, b| {
+        let (zero, two) = (a.of(0.0), a.of(2.0));
+        let inner = a.if_less(b, a / b, b.unary(Unary::Ln) / a);
+        zero.if_less(a, inner, two * b / (a - 1.0)).1
+    });
+    // 2 b / (a − 1) at a = 0
+    assert_eq!(nested.at(0.0, 3.0), [-6.0, -6.0, -2.0, -12.0, -2.0, 0.0]);
+    check_differences("a / b", &nested, 0.5, 1.5, 1.0 / 512.0);
+    check_differences("ln b / a", &nested, 2.0, 0.7, 1.0 / 512.0);
+    check_differences("2 b / (a − 1)", &nested, -1.0, 0.7, 1.0 / 512.0);
+    // One minimum, both of whose branches contain the variables.
+    let minimum = Function::new(|a, b| {
+        let product = a * b;
+        product.if_less(a, product, a).sqrt().1
+    });
+    check_differences("√min(a b, a)", &minimum, 2.0, 0.7, 1.0 / 512.0);
+    check_differences("√min(a b, a)", &minimum, 2.0, 1.7, 1.0 / 512.0);
+}
+
+/// A selection of constants has no derivative, and a condition none either.
+#[test]
+fn conditions_are_not_differentiated() {
+    let step = Function::new(|a, b| a.if_less(b, a.of(1.0), a.of(-1.0)).1);
+    for output in &step.outputs[1..] {
+        assert_eq!(step.graph.op(*output), Op::Constant(0));
+    }
+}

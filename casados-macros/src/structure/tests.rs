@@ -1,0 +1,210 @@
+use super::{Analysis, analyse};
+use crate::graph::{Binary, Graph, Node, Op, Unary};
+use crate::language::{Model, Variables};
+use proc_macro2::Span;
+
+/// A model with the given dimensions `[nx, nz, nu, np]`.
+fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Vec<Node>) -> Model {
+    let names = |name: &str, count: usize| (0..count).map(|i| format!("{name}[{i}]")).collect();
+    let mut graph = Graph::default();
+    let v: Vec<Node> = (0..2 * nx + nz + nu + np + 1).map(|i| graph.variable(i as u32)).collect();
+    let residual = build(&mut graph, &v);
+    Model {
+        name: syn::Ident::new("Test", Span::call_site()),
+        visibility: syn::Visibility::Inherited,
+        documentation: Vec::new(),
+        instance: Vec::new(),
+        variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
+        spans: vec![Span::call_site(); residual.len()],
+        graph,
+        residual,
+        opaque: Vec::new(),
+        uses: Vec::new(),
+        krate: syn::parse_quote!(::casados),
+    }
+}
+
+fn refusal(model: Model) -> String {
+    match analyse(model) {
+        Ok(_) => panic!("the model was accepted"),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn accepted(model: Model) -> Analysis {
+    analyse(model).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn sub(g: &mut Graph, a: Node, b: Node) -> Node {
+    g.binary(Binary::Sub, a, b)
+}
+
+fn mul(g: &mut Graph, a: Node, b: Node) -> Node {
+    g.binary(Binary::Mul, a, b)
+}
+
+/// `2 (ẋ₁ − u x₀) = 0`, `ẋ₀ − p x₁ = 0`
+#[test]
+fn explicit_model() {
+    let analysis = accepted(model([2, 0, 1, 1], |g, v| {
+        let two = g.constant(2.0);
+        let (first, second) = (mul(g, v[4], v[2]), mul(g, v[5], v[3]));
+        let (first, second) = (sub(g, v[1], first), sub(g, v[0], second));
+        vec![mul(g, two, first), second]
+    }));
+    assert_eq!(analysis.explicit, Some(vec![(1, 1.0), (0, 2.0)]));
+    let positions: Vec<_> = analysis.jacobian.iter().map(|entry| (entry.0, entry.1)).collect();
+    assert_eq!(positions, [(0, 1), (1, 0), (0, 2), (1, 3), (0, 4), (1, 5)]);
+    assert_eq!(analysis.blocks, [0, 2, 4, 4, 5, 6]);
+    assert_eq!(analysis.constant, [true, true, false, false, false, false]);
+    assert_eq!(analysis.linear, [false, false]);
+    let hessian: Vec<_> = analysis.hessian.iter().map(|entry| (entry.0, entry.1)).collect();
+    assert_eq!(hessian, [(4, 2), (5, 3)]);
+    assert_eq!(analysis.gradient.len(), 6);
+    // u x₀, ẋ₁ −, 2 ·, p x₁, ẋ₀ −
+    assert_eq!(analysis.operations.residual, 5);
+}
+
+/// What is not explicit: a derivative twice, one with a varying or an unknown coefficient, an algebraic state.
+#[test]
+fn implicit_models() {
+    let coefficient = |coefficient: fn(&mut Graph, &[Node]) -> Node| {
+        accepted(model([1, 0, 1, 0], move |g, v| {
+            let factor = coefficient(g, v);
+            let product = mul(g, factor, v[0]);
+            vec![sub(g, product, v[1])]
+        }))
+    };
+    assert!(coefficient(|g, _| g.constant(-3.0)).explicit.is_some());
+    assert!(coefficient(|_, v| v[2]).explicit.is_none());
+    assert!(coefficient(|_, v| v[3]).explicit.is_none());
+    let outside = coefficient(|g, _| g.opaque(0));
+    assert!(outside.explicit.is_none());
+    assert_eq!(outside.constant, [true, true]);
+    assert_eq!(outside.linear, [true]);
+    assert!(coefficient(|_, v| v[0]).explicit.is_none());
+
+    let coupled = accepted(model([2, 0, 0, 0], |g, v| vec![sub(g, v[0], v[1]), sub(g, v[1], v[2])]));
+    assert!(coupled.explicit.is_none());
+    let algebraic = accepted(model([1, 1, 0, 0], |g, v| vec![sub(g, v[0], v[1]), sub(g, v[2], v[1])]));
+    assert!(algebraic.explicit.is_none());
+    assert_eq!(algebraic.blocks, [0, 1, 3, 4, 4, 4]);
+}
+
+#[test]
+fn linear_equations() {
+    let analysis = accepted(model([2, 0, 1, 0], |g, v| {
+        let sine = g.unary(Unary::Sin, v[5]);
+        let (with_time, product) = (mul(g, sine, v[2]), mul(g, v[2], v[4]));
+        vec![sub(g, v[0], with_time), sub(g, v[1], product)]
+    }));
+    assert_eq!(analysis.linear, [true, false]);
+    // Time is no direction of derivatives, but the entry varies with it.
+    assert_eq!(analysis.constant, [true, true, false, false, false]);
+    assert!(analysis.jacobian.iter().all(|entry| entry.1 < 5));
+}
+
+#[test]
+fn number_of_equations() {
+    assert_eq!(
+        refusal(model([2, 1, 0, 0], |_, v| vec![v[0], v[1]])),
+        "the residual has 2 equations where the model needs 3 (2 states and 1 algebraic state)"
+    );
+    assert_eq!(
+        refusal(model([1, 0, 0, 0], |_, v| vec![v[0], v[1]])),
+        "the residual has 2 equations where the model needs 1 (one per state)"
+    );
+    assert!(refusal(model([1, 0, 0, 0], |_, _| Vec::new())).contains("0 equations"));
+}
+
+const END: &str = ": the model is not of index 1";
+
+fn reason(model: Model) -> String {
+    let message = refusal(model);
+    message.split(END).next().unwrap_or_default().to_string()
+}
+
+/// The pendulum in Cartesian coordinates: the multiplier is in no equation that it could be determined from.
+#[test]
+fn index_three() {
+    let pendulum = |g: &mut Graph, v: &[Node]| {
+        let (dx, x, z) = (&v[0..4], &v[4..8], v[8]);
+        let (fx, fy) = (mul(g, z, x[0]), mul(g, z, x[1]));
+        let (xx, yy) = (mul(g, x[0], x[0]), mul(g, x[1], x[1]));
+        let square = g.binary(Binary::Add, xx, yy);
+        let one = g.constant(1.0);
+        vec![
+            sub(g, dx[0], x[2]),
+            sub(g, dx[1], x[3]),
+            sub(g, dx[2], fx),
+            sub(g, dx[3], fy),
+            sub(g, square, one),
+        ]
+    };
+    assert_eq!(
+        reason(model([4, 1, 0, 0], pendulum)),
+        "equation 4 contains neither a derivative nor an algebraic state; `xdot[2]`, `xdot[3]` and `z[0]` are \
+         determined only by equations 2 and 3"
+    );
+}
+
+#[test]
+fn over_and_underdetermined() {
+    // Two equations for ẋ₀, none for z₀.
+    let twice = |g: &mut Graph, v: &[Node]| vec![sub(g, v[0], v[1]), sub(g, v[1], v[0])];
+    assert_eq!(
+        reason(model([1, 1, 0, 0], twice)),
+        "equations 0 and 1 determine only `xdot[0]`; `z[0]` is determined by no equation"
+    );
+    // The matching exists only through an entry that cancels.
+    let cancels = |g: &mut Graph, v: &[Node]| {
+        let sum = g.binary(Binary::Add, v[0], v[1]);
+        let (rest, first) = (sub(g, sum, v[1]), sub(g, v[0], v[2]));
+        vec![first, rest]
+    };
+    assert!(reason(model([2, 0, 0, 0], cancels)).starts_with("equations 0 and 1 determine only `xdot[0]`"));
+    // Two separate parts, each named on its own.
+    let two = |g: &mut Graph, v: &[Node]| {
+        vec![sub(g, v[0], v[4]), sub(g, v[0], v[5]), sub(g, v[1], v[4]), sub(g, v[1], v[5])]
+    };
+    assert_eq!(
+        reason(model([4, 0, 0, 0], two)),
+        "equations 0 and 1 determine only `xdot[0]`; equations 2 and 3 determine only `xdot[1]`; `xdot[2]` is \
+         determined by no equation; `xdot[3]` is determined by no equation"
+    );
+}
+
+/// The matching needs an augmenting path along all equations: equation i has ẋᵢ and ẋᵢ₋₁, the last one only
+/// the last but one.
+#[test]
+fn long_augmenting_path() {
+    let n = 300;
+    let chain = |closed: bool| {
+        model([n, 0, 0, 0], move |g, v| {
+            (0..n)
+                .map(
+                    |i| if i == n - 1 { v[0] } else { sub(g, v[i], v[i + usize::from(closed || i + 2 < n)]) },
+                )
+                .collect()
+        })
+    };
+    assert!(accepted(chain(true)).explicit.is_none());
+    assert!(reason(chain(false)).contains("`xdot[299]` is determined by no equation"));
+}
+
+#[test]
+fn derivatives_of_named_states() {
+    let mut model = model([1, 1, 0, 0], |g, v| vec![sub(g, v[1], v[2]), v[2]]);
+    model.variables.x[0] = "cart.position".into();
+    assert!(reason(model).contains("the derivative of `cart.position` is determined by no equation"));
+}
+
+#[test]
+fn residual_may_be_a_variable_or_a_constant() {
+    let analysis = accepted(model([1, 0, 0, 0], |_, v| vec![v[0]]));
+    assert_eq!(analysis.explicit, Some(vec![(0, 1.0)]));
+    assert_eq!(analysis.model.graph.op(analysis.gradient[0]), Op::Seed(0));
+    assert!(
+        reason(model([1, 0, 0, 0], |g, _| vec![g.constant(1.0)])).contains("equation 0 contains neither")
+    );
+}
