@@ -82,6 +82,9 @@ pub enum Error {
         /// End of the interval.
         end: f64,
     },
+    /// The nodes of the tableau define no polynomial through the stages: there is no dense output, and
+    /// there are no algebraic states at the ends of the interval.
+    NoInterpolation,
     /// A question about the last successful call, and there was none.
     NoResult,
     /// The memory of a mode could not be allocated.
@@ -216,6 +219,9 @@ impl fmt::Display for Error {
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
             }
+            Error::NoInterpolation => f.write_str(
+                "the tableau is not that of a collocation method: there is no polynomial through its stages",
+            ),
             Error::NoResult => f.write_str("there is no result yet: no call has succeeded"),
             Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }

@@ -22,6 +22,9 @@ compile_error!(
 #[cfg(feature = "alloc")]
 pub mod erk;
 pub mod error;
+pub mod irk;
+pub mod linalg;
+pub mod memory;
 pub mod model;
 pub mod options;
 pub mod result;
@@ -35,6 +38,10 @@ pub mod testing;
 #[cfg(feature = "alloc")]
 pub use erk::Erk;
 pub use error::Error;
+pub use irk::Irk;
+#[cfg(feature = "alloc")]
+pub use memory::Heap;
+pub use memory::{Inline, mode};
 pub use model::{Dae, GraphDae, Ode};
 pub use options::Options;
 pub use scalar::{Lanes, Real, Scalar};

@@ -14,7 +14,7 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// One step; full Newton to rounding from the last solution.
+    /// One step; full Newton to rounding, from zero.
     fn default() -> Self {
         Self { steps: 1, newton: Newton::default(), start: Start::default() }
     }
@@ -54,13 +54,13 @@ pub enum Jacobian {
 /// Where Newton's method starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// `ẋ = 0`, `z = 0` in every step.
+    /// `ẋ = 0`, `z = 0` in every step: the same input gives the same bits in every call.
+    #[default]
     Zero,
     /// The values given with `set_start`, in every step.
     Given,
     /// The stages of the same step in the last successful call; zero (or the given values, if there
     /// are any) in the first one.
-    #[default]
     Warm,
 }
 

@@ -1,0 +1,318 @@
+//! Forward sensitivities: implicit function theorem at the converged stages.
+//!
+//! ```text
+//! J dK = −(f_x,i V_n + f_w,i)        V_{n+1} = V_n + h Σ_i b_i dk_i
+//! ```
+//!
+//! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
+
+use super::record::{Coefficients, Work, copy};
+use super::step::check;
+use crate::error::Error;
+use crate::linalg::axpy;
+use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
+use crate::result::{DenseForward, Directional, ForwardAdjoint, Seeds};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Plain, Shape};
+use bytemuck::Zeroable;
+
+/// Derivatives of one step in directions that are the elements of `R`.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Sweep<M: Dae, R: Plain, const S: usize> {
+    /// `dx_n/dw` at the start of the step.
+    pub(crate) v: ArrayX<M, R>,
+    /// `d(k, z)/dw` at its stages.
+    pub(crate) dy: ArrayK<M, [R; S]>,
+}
+copy!([M: Dae, R: Plain, const S: usize] Sweep<M, R, S>);
+
+/// How the directions depend on `w`.
+pub(crate) trait Directions<T, R> {
+    /// `row += factor · dw_index`
+    fn add(&self, index: usize, factor: T, row: &mut R);
+}
+
+/// One direction for each element of `w`.
+pub(crate) struct Identity;
+
+impl<T: Real, R: Array<T>> Directions<T, R> for Identity {
+    #[inline(always)]
+    fn add(&self, index: usize, factor: T, row: &mut R) {
+        row[index] = row[index] + factor;
+    }
+}
+
+/// The rows of a matrix: each direction is a column.
+pub(crate) struct Rows<'a, R>(pub &'a [R]);
+
+impl<T: Real, R: Array<T>> Directions<T, R> for Rows<'_, R> {
+    #[inline(always)]
+    fn add(&self, index: usize, factor: T, row: &mut R) {
+        if let Some(direction) = self.0.get(index) {
+            axpy(factor, direction.as_ref(), row.as_mut());
+        }
+    }
+}
+
+impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
+    /// `V_0`
+    pub(crate) fn start<T: Real>(&mut self, directions: &impl Directions<T, R>)
+    where
+        R: Array<T>,
+    {
+        for (index, row) in self.v.as_mut().iter_mut().enumerate() {
+            row.as_mut().fill(T::ZERO);
+            directions.add(index, T::ONE, row);
+        }
+    }
+
+    /// `dK` of a step that is linearised.
+    pub(crate) fn stages<T: Real>(&mut self, work: &Work<M, T, S>, directions: &impl Directions<T, R>)
+    where
+        R: Array<T>,
+    {
+        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::Shape::NX);
+        // Of the first variable that is a direction, `u_0`: columns of the Jacobian minus this are `w`.
+        let shift = nx + M::Shape::NZ;
+        let Self { v, dy } = self;
+        for row in dy.as_mut().as_flattened_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        for (stage, jacobian) in work.linear.jacobian.iter().enumerate() {
+            let entries = jacobian.as_ref();
+            for e in blocks[1]..blocks[2] {
+                let (r, c) = pattern.at(e);
+                axpy(-entries[e], v[c - nx].as_ref(), dy[r][stage].as_mut());
+            }
+            for e in blocks[3]..blocks[5] {
+                let (r, c) = pattern.at(e);
+                directions.add(c - shift, -entries[e], &mut dy[r][stage]);
+            }
+        }
+        work.linear.factors.solve(dy);
+    }
+
+    /// `V_{n+1}`
+    pub(crate) fn advance<T: Real>(&mut self, coefficients: &Coefficients<T, S>, h: T)
+    where
+        R: Array<T>,
+    {
+        for (v, dk) in self.v.as_mut().iter_mut().zip(self.dy.as_ref()) {
+            for (b, dk) in coefficients.b.iter().zip(dk) {
+                axpy(h * *b, dk.as_ref(), v.as_mut());
+            }
+        }
+    }
+
+    /// Derivatives `row` of `x` at the point of the step where the weights are `weights`.
+    pub(crate) fn differential<T: Real>(&self, state: usize, h: T, weights: &[T; S], row: &mut R)
+    where
+        R: Array<T>,
+    {
+        *row = self.v[state];
+        for (b, dk) in weights.iter().zip(&self.dy[state]) {
+            axpy(h * *b, dk.as_ref(), row.as_mut());
+        }
+    }
+
+    /// Derivatives `row` of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
+    pub(crate) fn algebraic<T: Real>(&self, state: usize, lagrange: &[T; S], row: &mut R)
+    where
+        R: Array<T>,
+    {
+        row.as_mut().fill(T::ZERO);
+        for (l, dz) in lagrange.iter().zip(&self.dy[M::Shape::NX + state]) {
+            axpy(*l, dz.as_ref(), row.as_mut());
+        }
+    }
+}
+
+/// Memory of forward sensitivities.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
+    pub(crate) result: ForwardAdjoint<M, T>,
+    pub(crate) dense: DenseForward<M, T>,
+    pub(crate) sweep: Sweep<M, ArrayW<M, T>, S>,
+    pub(crate) row: ArrayW<M, T>,
+}
+copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
+
+impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
+    /// After a step that is linearised.
+    pub(crate) fn step(
+        &mut self,
+        work: &Work<M, T, S>,
+        coefficients: &Coefficients<T, S>,
+        n: usize,
+        count: usize,
+    ) {
+        if n == 0 {
+            self.sweep.start(&Identity);
+        } else {
+            self.sweep.advance(coefficients, work.inputs.h);
+        }
+        self.sweep.stages(work, &Identity);
+        let Self { result, sweep, row, .. } = self;
+        let result = &mut result.forward;
+        if n == 0 {
+            for state in 0..M::Shape::NZ {
+                sweep.algebraic(state, &coefficients.start, row);
+                split(row.as_ref(), state, &mut result.dz0_dx0, &mut result.dz0_du, &mut result.dz0_dp);
+            }
+        }
+        if n + 1 == count {
+            for state in 0..M::Shape::NZ {
+                sweep.algebraic(state, &coefficients.end, row);
+                split(row.as_ref(), state, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
+            }
+            for state in 0..M::Shape::NX {
+                sweep.differential(state, work.inputs.h, &coefficients.b, row);
+                split(row.as_ref(), state, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
+            }
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(&mut self, work: &Work<M, T, S>, step: usize) -> Result<(), Error> {
+        let result = &mut self.result.forward;
+        result.nominal = work.result;
+        for values in [
+            result.dx_dx0.as_slice(),
+            result.dx_du.as_slice(),
+            result.dx_dp.as_slice(),
+            result.dz_dx0.as_slice(),
+            result.dz_du.as_slice(),
+            result.dz_dp.as_slice(),
+            result.dz0_dx0.as_slice(),
+            result.dz0_du.as_slice(),
+            result.dz0_dp.as_slice(),
+        ] {
+            check(values, step)?;
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
+    /// `∇(λᵀx)` from the derivatives of `x`.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn gradient(&mut self, lambda: &[T]) -> Result<(), Error> {
+        let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut self.result;
+        product(lambda, forward.dx_dx0.as_slice(), grad_x0.as_mut_slice());
+        product(lambda, forward.dx_du.as_slice(), grad_u.as_mut_slice());
+        product(lambda, forward.dx_dp.as_slice(), grad_p.as_mut_slice());
+        check(grad_x0.as_slice(), 0)?;
+        check(grad_u.as_slice(), 0)?;
+        check(grad_p.as_slice(), 0)
+    }
+}
+
+/// `gradientᵀ = λᵀ S`, with `S` column after column.
+fn product<T: Real>(lambda: &[T], matrix: &[T], gradient: &mut [T]) {
+    if lambda.is_empty() {
+        gradient.fill(T::ZERO);
+        return;
+    }
+    for (gradient, column) in gradient.iter_mut().zip(matrix.chunks_exact(lambda.len())) {
+        *gradient = lambda.iter().zip(column).fold(T::ZERO, |sum, (l, s)| sum + *l * *s);
+    }
+}
+
+/// A row over the directions `(x₀, u, p)`, written to row `r` of three matrices.
+pub(crate) fn split<T: Real>(
+    row: &[T],
+    r: usize,
+    x: &mut impl Matrix<T>,
+    u: &mut impl Matrix<T>,
+    p: &mut impl Matrix<T>,
+) {
+    let mut values = row.iter();
+    copy_row(&mut values, r, x);
+    copy_row(&mut values, r, u);
+    copy_row(&mut values, r, p);
+}
+
+fn copy_row<'a, T: Real, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
+    for column in 0..A::COLUMNS {
+        if let Some(value) = values.next() {
+            to[(r, column)] = *value;
+        }
+    }
+}
+
+/// Memory of sensitivities in `C` directions.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct DirectionalMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
+    pub(crate) result: Directional<M, T, C>,
+    pub(crate) sweep: Sweep<M, [T; C], S>,
+    /// The seeds, one row for each element of `w`.
+    pub(crate) seeds: ArrayW<M, [T; C]>,
+}
+copy!([M: Dae, T: Plain, const S: usize, const C: usize] DirectionalMemory<M, T, S, C>);
+
+impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S, C> {
+    pub(crate) fn seed(&mut self, seeds: &Seeds<M, T, C>) {
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        for (w, row) in self.seeds.as_mut().iter_mut().enumerate() {
+            *row = core::array::from_fn(|column| {
+                if w < nx {
+                    seeds.x0[(w, column)]
+                } else if w < nx + nu {
+                    seeds.u[(w - nx, column)]
+                } else {
+                    seeds.p[(w - nx - nu, column)]
+                }
+            });
+        }
+    }
+
+    /// After a step that is linearised.
+    pub(crate) fn step(
+        &mut self,
+        work: &Work<M, T, S>,
+        coefficients: &Coefficients<T, S>,
+        n: usize,
+        count: usize,
+    ) {
+        let Self { result, sweep, seeds } = self;
+        let directions = Rows(seeds.as_ref());
+        if n == 0 {
+            sweep.start(&directions);
+        } else {
+            sweep.advance(coefficients, work.inputs.h);
+        }
+        sweep.stages(work, &directions);
+        let mut row = [T::ZERO; C];
+        for state in 0..M::Shape::NZ {
+            if n == 0 {
+                sweep.algebraic(state, &coefficients.start, &mut row);
+                copy_row(&mut row.iter(), state, &mut result.dz0);
+            }
+            if n + 1 == count {
+                sweep.algebraic(state, &coefficients.end, &mut row);
+                copy_row(&mut row.iter(), state, &mut result.dz);
+            }
+        }
+        if n + 1 == count {
+            for state in 0..M::Shape::NX {
+                sweep.differential(state, work.inputs.h, &coefficients.b, &mut row);
+                copy_row(&mut row.iter(), state, &mut result.dx);
+            }
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(&mut self, work: &Work<M, T, S>, step: usize) -> Result<(), Error> {
+        self.result.nominal = work.result;
+        check(self.result.dx.as_slice(), step)?;
+        check(self.result.dz.as_slice(), step)?;
+        check(self.result.dz0.as_slice(), step)
+    }
+}

@@ -1,0 +1,203 @@
+//! Second-order sensitivities: symmetric, in one pass over the steps that the adjoint takes.
+//!
+//! ```text
+//! d²(λᵀ x_N)/dw² = − Σ_n Σ_i D_iᵀ [∇²(μ_iᵀ f)_i] D_i
+//! ```
+//!
+//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep. The product with the sparse matrix in
+//! the middle comes first, `G = H D`, then the lower triangle of `Dᵀ G`.
+
+use super::adjoint::Backward;
+use super::forward::{ForwardMemory, Sweep};
+use super::record::{Coefficients, Linearization, Step, Work, copy};
+use super::step::check;
+use crate::error::{Error, Place, Quantity};
+use crate::linalg::axpy;
+use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
+use crate::result::{ForwardAdjoint, Hessian};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Plain, Shape};
+use bytemuck::Zeroable;
+
+/// Memory of second-order sensitivities.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
+    pub(crate) result: Hessian<M, T>,
+    pub(crate) backward: Backward<M, T, S, 1>,
+    /// `D` at one stage.
+    d: ArrayV<M, ArrayW<M, T>>,
+    /// `G = H D` at one stage.
+    g: ArrayV<M, ArrayW<M, T>>,
+    /// The Hessian over `w`, its lower triangle.
+    sum: ArrayW<M, ArrayW<M, T>>,
+    /// `μ` at one stage.
+    mu: ArrayK<M, T>,
+    /// Entries of `∇²(μᵀ f)` at one stage.
+    entries: M::Hessian<T>,
+}
+copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
+
+/// What the way back needs of a step.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct HessianStep<M: Dae, T: Plain, const S: usize> {
+    linear: Linearization<M, T, S>,
+    sweep: Sweep<M, ArrayW<M, T>, S>,
+}
+copy!([M: Dae, T: Plain, const S: usize] HessianStep<M, T, S>);
+
+impl<M: Dae, T: Plain, const S: usize> HessianStep<M, T, S> {
+    /// Remembers a step on the way forth.
+    pub(crate) fn record(&mut self, work: &Work<M, T, S>, forward: &ForwardMemory<M, T, S>) {
+        self.linear = work.linear;
+        self.sweep = forward.sweep;
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
+    /// The way back.
+    ///
+    /// # Errors
+    /// A second derivative of the model that is not finite.
+    pub(crate) fn run(
+        &mut self,
+        work: &mut Work<M, T, S>,
+        coefficients: &Coefficients<T, S>,
+        steps: &[Step<M, T, S>],
+        records: &[HessianStep<M, T, S>],
+        seed: &[T],
+    ) -> Result<(), Error> {
+        self.backward.start(seed);
+        for row in self.sum.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
+            self.backward.step(&record.linear, coefficients, work.inputs.h);
+            work.place(coefficients, n, &step.x, &step.y);
+            for stage in 0..S {
+                for (to, mu) in self.mu.as_mut().iter_mut().zip(self.backward.mu.as_ref()) {
+                    [*to] = mu[stage];
+                }
+                M::hessian(&work.points[stage], &self.mu, &mut self.entries);
+                if let Some((entry, value)) = super::evaluate::not_finite(self.entries.as_ref()) {
+                    return Err(Error::NonFiniteModel {
+                        quantity: Quantity::Hessian,
+                        equation: M::STRUCTURE.hessian.at(entry).0,
+                        value,
+                        at: Place { step: n, stage, iteration: 0 },
+                    });
+                }
+                self.place_directions(&record.sweep, coefficients, work.inputs.h, stage);
+                self.subtract();
+            }
+        }
+        Ok(())
+    }
+
+    /// `D` at a stage.
+    fn place_directions(
+        &mut self,
+        sweep: &Sweep<M, ArrayW<M, T>, S>,
+        coefficients: &Coefficients<T, S>,
+        h: T,
+        stage: usize,
+    ) {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        for state in 0..nx {
+            self.d[state] = sweep.dy[state][stage];
+            sweep.differential(state, h, &coefficients.a[stage], &mut self.d[nx + state]);
+        }
+        for state in 0..nz {
+            self.d[2 * nx + state] = sweep.dy[nx + state][stage];
+        }
+        for w in nx..M::Shape::NW {
+            let row = self.d[nx + nz + w].as_mut();
+            row.fill(T::ZERO);
+            row[w] = T::ONE;
+        }
+    }
+
+    /// `sum −= Dᵀ H D`, the lower triangle.
+    fn subtract(&mut self) {
+        let Self { d, g, sum, entries, .. } = self;
+        let pattern = M::STRUCTURE.hessian;
+        for row in g.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        for (e, value) in entries.as_ref().iter().enumerate() {
+            let (r, c) = pattern.at(e);
+            axpy(*value, d[c].as_ref(), g[r].as_mut());
+            if r != c {
+                axpy(*value, d[r].as_ref(), g[c].as_mut());
+            }
+        }
+        for (d, g) in d.as_ref().iter().zip(g.as_ref()) {
+            for (w, (sum, d)) in sum.as_mut().iter_mut().zip(d.as_ref()).enumerate() {
+                if *d != T::ZERO {
+                    axpy(-*d, &g.as_ref()[..=w], &mut sum.as_mut()[..=w]);
+                }
+            }
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(&mut self, forward: &ForwardMemory<M, T, S>) -> Result<(), Error> {
+        let (nx, nu, np) = (M::Shape::NX, M::Shape::NU, M::Shape::NP);
+        let Self { result, backward, sum, .. } = self;
+        result.first.forward = forward.result.forward;
+        for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
+            *to = *from;
+        }
+        let mut gradient = backward.gradient.as_ref()[nx..].iter();
+        for (to, [from]) in result.first.grad_u.as_mut_slice().iter_mut().zip(&mut gradient) {
+            *to = *from;
+        }
+        for (to, [from]) in result.first.grad_p.as_mut_slice().iter_mut().zip(gradient) {
+            *to = *from;
+        }
+        symmetric(&mut result.h_xx, sum.as_ref(), 0);
+        symmetric(&mut result.h_uu, sum.as_ref(), nx);
+        symmetric(&mut result.h_pp, sum.as_ref(), nx + nu);
+        for x in 0..nx {
+            for u in 0..nu {
+                result.h_xu[(x, u)] = sum[nx + u][x];
+            }
+            for p in 0..np {
+                result.h_xp[(x, p)] = sum[nx + nu + p][x];
+            }
+        }
+        for u in 0..nu {
+            for p in 0..np {
+                result.h_up[(u, p)] = sum[nx + nu + p][nx + u];
+            }
+        }
+        let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
+        for values in [
+            grad_x0.as_slice(),
+            grad_u.as_slice(),
+            grad_p.as_slice(),
+            result.h_xx.as_slice(),
+            result.h_xu.as_slice(),
+            result.h_uu.as_slice(),
+            result.h_xp.as_slice(),
+            result.h_up.as_slice(),
+            result.h_pp.as_slice(),
+        ] {
+            check(values, 0)?;
+        }
+        Ok(())
+    }
+}
+
+/// A block on the diagonal, from its lower triangle.
+fn symmetric<T: Real, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
+    for r in 0..A::ROWS {
+        for c in 0..=r {
+            let value = lower[offset + r][offset + c];
+            block[(r, c)] = value;
+            block[(c, r)] = value;
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Implicit Runge-Kutta methods for fully implicit differential-algebraic equations of index 1.
+//!
+//! For one step of size `h` the unknowns `k_i ≈ ẋ` and `z_i` at the stages solve
+//!
+//! ```text
+//! ξ_i = x_n + h Σ_j a_ij k_j        0 = f(k_i, ξ_i, u, z_i, p, t_n + c_i h)        i = 1 … s
+//! x_{n+1} = x_n + h Σ_i b_i k_i
+//! ```
+//!
+//! by Newton's method. Sensitivities are the exact derivatives of this discrete map, by the implicit
+//! function theorem at the converged stages: the Jacobian is evaluated and factorised there, whatever the
+//! iteration took. `z` at the ends of an interval is the polynomial through the stages; for stiffly
+//! accurate methods its value at the end is the last stage.
+//!
+//! One file for each thing: `evaluate` the model at the stages, `assemble` the Newton matrix, `newton`, `step`,
+//! `forward`, `adjoint`, `hessian`, `dense`; `record` is the memory, `run` what all calls share, `integrator`
+//! what users see.
+
+mod adjoint;
+mod assemble;
+mod dense;
+mod evaluate;
+mod forward;
+mod hessian;
+mod integrator;
+mod newton;
+mod record;
+mod run;
+mod step;
+
+pub use adjoint::AdjointMemory;
+pub use forward::{DirectionalMemory, ForwardMemory};
+pub use integrator::Integrator;
+
+use crate::memory::Memory;
+use crate::model::Dae;
+use crate::scalar::Real;
+use crate::tableau::{Custom, Gauss, Method, RadauIIA};
+
+/// The implicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
+///
+/// ```ignore
+/// let mut irk = Irk::<Pendulum, Gauss<4>>::new(Options { steps: 2, ..Default::default() })?;
+/// let step = irk.forward(&x0, &u, 0.05)?;
+/// ```
+#[cfg(feature = "alloc")]
+pub type Irk<M, B, T = f64, W = crate::memory::Heap> = <B as Implicit>::Integrator<M, T, W>;
+/// The implicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
+#[cfg(not(feature = "alloc"))]
+pub type Irk<M, B, T, W> = <B as Implicit>::Integrator<M, T, W>;
+
+/// A method that an implicit integrator takes.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an implicit Runge-Kutta method",
+    note = "`Gauss<S>`, `RadauIIA<S>` and `Custom<S>` are"
+)]
+pub trait Implicit {
+    /// Its integrator.
+    type Integrator<M: Dae, T: Real, W: Memory>;
+}
+
+impl<const S: usize> Implicit for Gauss<S>
+where
+    Self: Method<S>,
+{
+    type Integrator<M: Dae, T: Real, W: Memory> = Integrator<M, Self, S, T, W>;
+}
+impl<const S: usize> Implicit for RadauIIA<S>
+where
+    Self: Method<S>,
+{
+    type Integrator<M: Dae, T: Real, W: Memory> = Integrator<M, Self, S, T, W>;
+}
+impl<const S: usize> Implicit for Custom<S> {
+    type Integrator<M: Dae, T: Real, W: Memory> = Integrator<M, Self, S, T, W>;
+}

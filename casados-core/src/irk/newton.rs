@@ -1,0 +1,151 @@
+//! Newton's method on the stages of one step.
+//!
+//! ```text
+//! J Δ = −f(y),   y ← y + Δ
+//! ```
+//!
+//! It has converged as soon as one of these holds, both of them invariant under scaling of equations
+//! and of variables:
+//! - the residual of every equation is at rounding level, `|f_r| ≤ 4 ε Σ_c |∂f_r/∂v_c v_c|`;
+//! - the increment that would come next is expected below the tolerance relative to the size of each
+//!   unknown. The increments `‖Δ‖ = max_c |Δ_c| / |y_c|` shrink by `θ`, so the next one is `θ ‖Δ‖/(1−θ)` with a
+//!   frozen Jacobian (Hairer and Wanner, Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since
+//!   then `θ` squares too.
+//!
+//! Where rounding errors of the model are larger than expected the increments stop shrinking. Then it
+//! has converged too if they are small: more cannot be known.
+
+use super::assemble::unknown_name;
+use super::record::{Coefficients, Work};
+use crate::error::{Error, Place};
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::options::{Jacobian, Newton};
+use crate::scalar::Real;
+use crate::statistics::Statistics;
+
+/// Residuals below this many ε of their terms are rounding errors.
+const ROUNDING: f64 = 4.0;
+/// Increments that no longer shrink are rounding errors of the model below this many ε.
+const NOISE: f64 = 1e5;
+
+impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
+    /// Solves the stages of a step from the start values in `y`; whether the Jacobian that is stored is
+    /// that of the solution.
+    ///
+    /// # Errors
+    /// A value of the model that is not finite, a singular matrix, no convergence.
+    pub(crate) fn newton(
+        &mut self,
+        coefficients: &Coefficients<T, S>,
+        options: &Newton,
+        step: usize,
+        x: &ArrayX<M, T>,
+        y: &mut ArrayK<M, [T; S]>,
+        statistics: &mut Statistics,
+    ) -> Result<bool, Error> {
+        let rounding = T::EPSILON * T::from_f64(ROUNDING);
+        let noise = T::EPSILON * T::from_f64(NOISE);
+        let tolerance = T::from_f64(options.tolerance).max(rounding);
+        let full = options.jacobian == Jacobian::Full;
+        let most = options.fixed_iterations.unwrap_or(options.max_iterations);
+        let test = options.fixed_iterations.is_none();
+        let mut last = Increment { size: T::ZERO, unknown: 0, stage: 0 };
+        let mut iteration = 0;
+        loop {
+            self.place(coefficients, step, x, y);
+            let current = full || iteration == 0;
+            if current {
+                statistics.jacobians += 1;
+                self.evaluate_jacobian(step, iteration)?;
+            } else {
+                statistics.residuals += 1;
+                self.evaluate_residual(step, iteration)?;
+            }
+            if test {
+                let (residual, equation, stage) = self.relative_residual();
+                let stuck = iteration == most;
+                if residual <= rounding || stuck && last.size <= noise && residual <= noise {
+                    statistics.residual = residual.to_f64().max(statistics.residual);
+                    return Ok(current);
+                }
+                if stuck {
+                    return Err(Error::NotConverged {
+                        residual: residual.to_f64(),
+                        equation,
+                        unknown: unknown_name::<M>(last.unknown),
+                        increment: last.size.to_f64(),
+                        at: Place { step, stage, iteration },
+                    });
+                }
+            }
+            if current {
+                statistics.factorizations += 1;
+                self.linear.factor(coefficients, self.inputs.h, step, iteration)?;
+            }
+            self.linear.factors.solve(&mut self.residual);
+            let increment = self.update(y);
+            iteration += 1;
+            statistics.iterations += 1;
+            if !increment.size.is_finite() {
+                return Err(Error::NotConverged {
+                    residual: f64::INFINITY,
+                    equation: 0,
+                    unknown: unknown_name::<M>(increment.unknown),
+                    increment: increment.size.to_f64(),
+                    at: Place { step, stage: increment.stage, iteration },
+                });
+            }
+            if test {
+                if iteration > 1 {
+                    let rate = increment.size / last.size;
+                    let next = if full {
+                        rate * rate * increment.size
+                    } else {
+                        rate / (T::ONE - rate) * increment.size
+                    };
+                    // A rate near one says nothing about the next increment.
+                    let shrinks = rate + rate < T::ONE;
+                    if shrinks && next <= tolerance || !shrinks && increment.size <= noise {
+                        return Ok(false);
+                    }
+                }
+                if increment.size == T::ZERO {
+                    return Ok(false);
+                }
+            } else if iteration == most {
+                return Ok(false);
+            }
+            last = increment;
+        }
+    }
+
+    /// `y ← y − Δ` with `Δ` where the residual was; the largest increment relative to the unknown, of
+    /// which the largest stage counts.
+    fn update(&mut self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
+        let mut largest = Increment { size: T::ZERO, unknown: 0, stage: 0 };
+        for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.residual.as_ref()).enumerate() {
+            let (mut size, mut change, mut at) = (T::ZERO, T::ZERO, 0);
+            for (stage, (y, [delta])) in y.iter_mut().zip(delta).enumerate() {
+                *y = *y - *delta;
+                size = y.abs().max(size);
+                if !(delta.abs() <= change) {
+                    (change, at) = (delta.abs(), stage);
+                }
+            }
+            // No increment is none, also of zero; an unknown that became zero changed by all it was.
+            let relative = if change == T::ZERO { T::ZERO } else { change / size.max(change) };
+            if !(relative <= largest.size) {
+                largest = Increment { size: relative, unknown, stage: at };
+            }
+        }
+        largest
+    }
+}
+
+/// The largest increment of an iteration.
+struct Increment<T> {
+    /// Relative to the unknown.
+    size: T,
+    unknown: usize,
+    stage: usize,
+}

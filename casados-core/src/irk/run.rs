@@ -1,0 +1,196 @@
+//! What all calls of an integrator share: arguments checked, steps taken, and the record of them kept only
+//! if everything succeeded.
+
+use super::evaluate::not_finite;
+use super::record::{Coefficients, Step, Work};
+use super::step::From;
+use crate::error::{Argument, Error};
+use crate::memory::Memory;
+use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::options::{Options, Start};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use crate::statistics::Statistics;
+use crate::tableau::Tableau;
+
+/// The part of an integrator that every call needs.
+pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
+    pub options: Options,
+    pub coefficients: Coefficients<T, S>,
+    pub statistics: Statistics,
+    work: W::Nominal<Work<M, T, S>>,
+    /// The record of the last successful call, and that of the call that runs.
+    tapes: [W::Tape<Step<M, T, S>>; 2],
+    kept: usize,
+    /// Whether any call succeeded.
+    any: bool,
+    /// Whether the record is a warm start.
+    warm: bool,
+    given: bool,
+    parameters: bool,
+    time: T,
+}
+
+/// The arguments of a call that are the same for all.
+pub(crate) struct Arguments<'a, M: Dae, T: Real> {
+    pub x0: &'a VectorX<M, T>,
+    pub u: &'a VectorU<M, T>,
+    pub h: T,
+}
+
+/// What a call has to work with after its steps were taken.
+pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize> {
+    pub work: &'a mut Work<M, T, S>,
+    pub coefficients: &'a Coefficients<T, S>,
+    pub steps: &'a [Step<M, T, S>],
+    pub statistics: &'a mut Statistics,
+}
+
+impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
+    pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        options.check()?;
+        if options.steps > W::STEPS {
+            return Err(Error::InvalidOption {
+                option: "steps",
+                value: options.steps as f64,
+                reason: "the memory of the integrator has fewer",
+            });
+        }
+        let coefficients = Coefficients::<T, S>::new(tableau);
+        let ends = [&coefficients.start, &coefficients.end];
+        if M::Shape::NZ > 0 && ends.iter().any(|weights| not_finite(*weights).is_some()) {
+            return Err(Error::NoInterpolation);
+        }
+        Ok(Self {
+            options,
+            coefficients,
+            statistics: Statistics::default(),
+            work: Default::default(),
+            tapes: Default::default(),
+            kept: 0,
+            any: false,
+            warm: false,
+            given: false,
+            parameters: false,
+            time: T::ZERO,
+        })
+    }
+
+    pub fn reserve(&mut self) -> Result<(), Error> {
+        W::nominal(&mut self.work)?.prepare();
+        for tape in &mut self.tapes {
+            W::tape(tape, self.options.steps)?;
+        }
+        Ok(())
+    }
+
+    pub fn reset(&mut self) {
+        self.warm = false;
+    }
+
+    pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        check(Argument::P, p.as_slice())?;
+        W::nominal(&mut self.work)?.parameters = *p;
+        self.parameters = true;
+        Ok(())
+    }
+
+    pub fn set_time(&mut self, t: T) -> Result<(), Error> {
+        check(Argument::T, &[t])?;
+        self.time = t;
+        Ok(())
+    }
+
+    pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
+        check(Argument::StartXdot, xdot.as_slice())?;
+        check(Argument::StartZ, z.as_slice())?;
+        let given = W::nominal(&mut self.work)?.given.as_mut();
+        for (to, from) in given.iter_mut().zip(xdot.as_slice().iter().chain(z.as_slice())) {
+            *to = *from;
+        }
+        self.given = true;
+        Ok(())
+    }
+
+    /// The steps of a call, with `after` called after each.
+    pub fn steps(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        mut after: impl FnMut(&mut Parts<'_, M, T, S>, usize, &Step<M, T, S>, bool) -> Result<(), Error>,
+    ) -> Result<Parts<'_, M, T, S>, Error> {
+        let Self { options, coefficients, statistics, work, tapes, .. } = self;
+        *statistics = Statistics::default();
+        check(Argument::X0, arguments.x0.as_slice())?;
+        check(Argument::U, arguments.u.as_slice())?;
+        check(Argument::H, &[arguments.h])?;
+        if M::Shape::NP > 0 && !self.parameters {
+            return Err(Error::ParametersNotSet);
+        }
+        let work = W::nominal(work)?;
+        work.prepare();
+        work.inputs.u = *arguments.u;
+        work.inputs.p = work.parameters;
+        work.inputs.t = self.time;
+        work.inputs.interval = arguments.h;
+        work.inputs.h = arguments.h / T::from_f64(options.steps as f64);
+        work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
+        let [first, second] = tapes;
+        let (kept, running) = if self.kept == 0 { (first, second) } else { (second, first) };
+        let steps = W::tape(running, options.steps)?;
+        let from = match options.start {
+            Start::Zero => From::Zero,
+            Start::Given if !self.given => return Err(Error::StartNotGiven),
+            Start::Warm if self.warm => From::Record(W::tape(kept, options.steps)?),
+            Start::Warm if !self.given => From::Zero,
+            Start::Given | Start::Warm => From::Given,
+        };
+        work.integrate(
+            coefficients,
+            options,
+            &from,
+            steps,
+            statistics,
+            |work, n, step, current, statistics| {
+                after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, current)
+            },
+        )?;
+        Ok(Parts { work, coefficients, steps, statistics })
+    }
+
+    /// Everything succeeded: the record of this call is the one to keep.
+    pub fn keep(&mut self) -> Result<&Work<M, T, S>, Error> {
+        let work = W::nominal(&mut self.work)?;
+        work.kept = work.inputs;
+        self.kept = 1 - self.kept;
+        self.any = true;
+        self.warm = true;
+        Ok(work)
+    }
+
+    /// The last successful call.
+    pub fn last(&mut self) -> Result<Parts<'_, M, T, S>, Error> {
+        if !self.any {
+            return Err(Error::NoResult);
+        }
+        let work = W::nominal(&mut self.work)?;
+        let [first, second] = &mut self.tapes;
+        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        Ok(Parts { work, coefficients: &self.coefficients, steps, statistics: &mut self.statistics })
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> Parts<'_, M, T, S> {
+    /// See [`Work::linearize`].
+    pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, current: bool) -> Result<(), Error> {
+        self.work.linearize(self.coefficients, n, step, current, self.statistics)
+    }
+}
+
+/// # Errors
+/// [`Error::NonFiniteInput`]
+pub(crate) fn check<T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
+    match not_finite(values) {
+        Some((index, value)) => Err(Error::NonFiniteInput { argument, index, value }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,19 @@
+//! The inner loops.
+
+use crate::scalar::Real;
+
+/// `y += a x`
+#[inline(always)]
+pub(crate) fn axpy<T: Real>(a: T, x: &[T], y: &mut [T]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y = *y + a * *x;
+    }
+}
+
+/// `x /= a`
+#[inline(always)]
+pub(crate) fn divide<T: Real>(x: &mut [T], a: T) {
+    for x in x {
+        *x = *x / a;
+    }
+}

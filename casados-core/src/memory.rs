@@ -1,0 +1,357 @@
+//! Where the memory of an integrator is.
+//!
+//! - [`Heap`] (feature `alloc`): the memory of a mode (forward, adjoint, ...) is allocated, zeroed, by the first
+//!   call of that mode or when it is reserved; no later call allocates. Large models never touch the stack.
+//! - [`Inline`]: everything is inside the integrator itself, for one mode that is part of the type and at
+//!   most `STEPS` steps. A call that the mode has no memory for does not compile.
+
+use crate::error::Error;
+use crate::irk::{AdjointMemory, DirectionalMemory};
+use crate::model::Dae;
+use crate::scalar::Real;
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// What memory can hold.
+pub trait Stored: Zeroable + Send + Sync + 'static {}
+impl<V: Zeroable + Send + Sync + 'static> Stored for V {}
+
+/// What the memory of an [`Inline`] integrator is for. Every mode contains `solve`.
+pub mod mode {
+    /// `solve`
+    #[derive(Clone, Copy, Debug)]
+    pub struct Nominal;
+    /// `forward`, `forward_adjoint` and `dense_forward`
+    #[derive(Clone, Copy, Debug)]
+    pub struct Forward;
+    /// `directional` with `C` directions
+    #[derive(Clone, Copy, Debug)]
+    pub struct Directional<const C: usize>;
+    /// `adjoint`, with `C` seeds
+    #[derive(Clone, Copy, Debug)]
+    pub struct Adjoint<const C: usize = 1>;
+    /// `hessian` and all that `Forward` has
+    #[derive(Clone, Copy, Debug)]
+    pub struct Hessian;
+}
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// Where memory is: [`Heap`] or [`Inline`].
+pub trait Memory: sealed::Sealed + 'static {
+    /// A place for what every call needs.
+    type Nominal<V: Stored>: Default + Send + Sync;
+    /// A place for what is remembered of every step.
+    type Tape<V: Stored>: Default + Send + Sync;
+    /// A place for forward sensitivities.
+    type Forward<V: Stored>: Default + Send + Sync;
+    /// A place for forward sensitivities in given directions.
+    type Directional<M: Dae, T: Real, const S: usize>: Default + Send + Sync;
+    /// A place for adjoint sensitivities.
+    type Adjoint<M: Dae, T: Real, const S: usize>: Default + Send + Sync;
+    /// A place for second-order sensitivities.
+    type Hessian<V: Stored>: Default + Send + Sync;
+    /// A place for what second-order sensitivities remember of every step.
+    type HessianTape<V: Stored>: Default + Send + Sync;
+
+    /// The most steps that there is memory for.
+    const STEPS: usize;
+
+    /// Memory of what every call needs.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn nominal<V: Stored>(place: &mut Self::Nominal<V>) -> Result<&mut V, Error>;
+    /// Memory of the steps.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn tape<V: Stored>(place: &mut Self::Tape<V>, steps: usize) -> Result<&mut [V], Error>;
+}
+
+/// Memory with a place for forward sensitivities.
+#[diagnostic::on_unimplemented(
+    message = "this memory has no place for forward sensitivities",
+    note = "use `Heap`, `Inline<mode::Forward>` or `Inline<mode::Hessian>`"
+)]
+pub trait WithForward: Memory {
+    /// The memory.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn forward<V: Stored>(place: &mut Self::Forward<V>) -> Result<&mut V, Error>;
+}
+
+/// Memory with a place for `C` directions.
+#[diagnostic::on_unimplemented(
+    message = "this memory has no place for {C} directions",
+    note = "use `Heap` or `Inline<mode::Directional<{C}>>`"
+)]
+pub trait WithDirectional<const C: usize>: Memory {
+    /// The memory.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn directional<M: Dae, T: Real, const S: usize>(
+        place: &mut Self::Directional<M, T, S>,
+    ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error>;
+}
+
+/// Memory with a place for the adjoint of `C` seeds.
+#[diagnostic::on_unimplemented(
+    message = "this memory has no place for the adjoint of {C} seeds",
+    note = "use `Heap` or `Inline<mode::Adjoint<{C}>>`"
+)]
+pub trait WithAdjoint<const C: usize>: Memory {
+    /// The memory.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn adjoint<M: Dae, T: Real, const S: usize>(
+        place: &mut Self::Adjoint<M, T, S>,
+    ) -> Result<&mut AdjointMemory<M, T, S, C>, Error>;
+}
+
+/// Memory with a place for second-order sensitivities.
+#[diagnostic::on_unimplemented(
+    message = "this memory has no place for second-order sensitivities",
+    note = "use `Heap` or `Inline<mode::Hessian>`"
+)]
+pub trait WithHessian: WithForward {
+    /// The memory.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn hessian<V: Stored>(place: &mut Self::Hessian<V>) -> Result<&mut V, Error>;
+    /// Memory of the steps.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn hessian_tape<V: Stored>(place: &mut Self::HessianTape<V>, steps: usize) -> Result<&mut [V], Error>;
+}
+
+/// No place.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Absent;
+
+/// A value inside the integrator.
+#[derive(Clone, Copy, Debug)]
+pub struct Inside<V>(V);
+
+impl<V: Zeroable> Default for Inside<V> {
+    fn default() -> Self {
+        Self(V::zeroed())
+    }
+}
+
+/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps.
+#[derive(Clone, Copy, Debug)]
+pub struct Inline<Mode, const STEPS: usize = 1>(PhantomData<fn() -> Mode>);
+
+impl<Mode, const STEPS: usize> sealed::Sealed for Inline<Mode, STEPS> {}
+
+/// The places of one mode.
+macro_rules! inline {
+    ([$($constant:ident)?] $mode:ty {
+        forward: $forward:ty, directional: $directional:ty, adjoint: $adjoint:ty, hessian: $hessian:ty, hessian_tape: $tape:ty,
+    }) => {
+        impl<$(const $constant: usize,)? const STEPS: usize> Memory for Inline<$mode, STEPS> {
+            type Nominal<V: Stored> = Inside<V>;
+            type Tape<V: Stored> = Inside<[V; STEPS]>;
+            type Forward<V: Stored> = $forward;
+            type Directional<M: Dae, T: Real, const S: usize> = $directional;
+            type Adjoint<M: Dae, T: Real, const S: usize> = $adjoint;
+            type Hessian<V: Stored> = $hessian;
+            type HessianTape<V: Stored> = $tape;
+            const STEPS: usize = STEPS;
+            fn nominal<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
+                Ok(&mut place.0)
+            }
+            fn tape<V: Stored>(place: &mut Inside<[V; STEPS]>, steps: usize) -> Result<&mut [V], Error> {
+                steps_of(&mut place.0, steps)
+            }
+        }
+    };
+}
+
+inline!([] mode::Nominal {
+    forward: Absent, directional: Absent, adjoint: Absent, hessian: Absent, hessian_tape: Absent,
+});
+inline!([] mode::Forward {
+    forward: Inside<V>, directional: Absent, adjoint: Absent, hessian: Absent, hessian_tape: Absent,
+});
+inline!([C] mode::Directional<C> {
+    forward: Absent, directional: Inside<DirectionalMemory<M, T, S, C>>, adjoint: Absent, hessian: Absent,
+    hessian_tape: Absent,
+});
+inline!([C] mode::Adjoint<C> {
+    forward: Absent, directional: Absent, adjoint: Inside<AdjointMemory<M, T, S, C>>, hessian: Absent,
+    hessian_tape: Absent,
+});
+inline!([] mode::Hessian {
+    forward: Inside<V>, directional: Absent, adjoint: Absent, hessian: Inside<V>,
+    hessian_tape: Inside<[V; STEPS]>,
+});
+
+impl<const STEPS: usize> WithForward for Inline<mode::Forward, STEPS> {
+    fn forward<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
+        Ok(&mut place.0)
+    }
+}
+impl<const STEPS: usize> WithForward for Inline<mode::Hessian, STEPS> {
+    fn forward<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
+        Ok(&mut place.0)
+    }
+}
+impl<const C: usize, const STEPS: usize> WithDirectional<C> for Inline<mode::Directional<C>, STEPS> {
+    fn directional<M: Dae, T: Real, const S: usize>(
+        place: &mut Self::Directional<M, T, S>,
+    ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error> {
+        Ok(&mut place.0)
+    }
+}
+impl<const C: usize, const STEPS: usize> WithAdjoint<C> for Inline<mode::Adjoint<C>, STEPS> {
+    fn adjoint<M: Dae, T: Real, const S: usize>(
+        place: &mut Self::Adjoint<M, T, S>,
+    ) -> Result<&mut AdjointMemory<M, T, S, C>, Error> {
+        Ok(&mut place.0)
+    }
+}
+impl<const STEPS: usize> WithHessian for Inline<mode::Hessian, STEPS> {
+    fn hessian<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
+        Ok(&mut place.0)
+    }
+    fn hessian_tape<V: Stored>(place: &mut Inside<[V; STEPS]>, steps: usize) -> Result<&mut [V], Error> {
+        steps_of(&mut place.0, steps)
+    }
+}
+
+fn steps_of<V: Stored>(place: &mut [V], steps: usize) -> Result<&mut [V], Error> {
+    place.get_mut(..steps).ok_or(Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) })
+}
+
+#[cfg(feature = "alloc")]
+pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap};
+
+#[cfg(feature = "alloc")]
+mod heap {
+    use super::*;
+    use alloc::boxed::Box;
+    use alloc::vec::Vec;
+    use bytemuck::allocation::{try_zeroed_box, try_zeroed_slice_box};
+    use core::any::Any;
+
+    /// Memory on the heap: allocated when it is needed first.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Heap;
+
+    /// A value on the heap.
+    #[derive(Debug)]
+    pub struct Allocated<V>(Option<Box<V>>);
+
+    /// Values on the heap, one for each step.
+    #[derive(Debug)]
+    pub struct AllocatedTape<V>(Option<Box<[V]>>);
+
+    /// Values on the heap, one of each type that was asked for: types differ in the number of seeds.
+    #[derive(Debug, Default)]
+    pub struct AllocatedByType(Vec<Box<dyn Any + Send + Sync>>);
+
+    impl<V> Default for Allocated<V> {
+        fn default() -> Self {
+            Self(None)
+        }
+    }
+    impl<V> Default for AllocatedTape<V> {
+        fn default() -> Self {
+            Self(None)
+        }
+    }
+
+    fn allocate<V: Stored>() -> Result<Box<V>, Error> {
+        try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<V>() })
+    }
+
+    impl<V: Stored> Allocated<V> {
+        fn open(&mut self) -> Result<&mut V, Error> {
+            if self.0.is_none() {
+                self.0 = Some(allocate()?);
+            }
+            self.0.as_deref_mut().ok_or(Error::OutOfMemory { bytes: size_of::<V>() })
+        }
+    }
+
+    impl<V: Stored> AllocatedTape<V> {
+        fn open(&mut self, steps: usize) -> Result<&mut [V], Error> {
+            let error = Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) };
+            if self.0.is_none() {
+                self.0 = Some(try_zeroed_slice_box(steps).map_err(|()| error)?);
+            }
+            self.0.as_deref_mut().ok_or(error)
+        }
+    }
+
+    impl AllocatedByType {
+        fn open<V: Stored>(&mut self) -> Result<&mut V, Error> {
+            let error = Error::OutOfMemory { bytes: size_of::<V>() };
+            let index = match self.0.iter().position(|value| (**value).is::<V>()) {
+                Some(index) => index,
+                None => {
+                    let value: Box<V> = allocate()?;
+                    self.0.try_reserve(1).map_err(|_| error)?;
+                    self.0.push(value);
+                    self.0.len() - 1
+                }
+            };
+            self.0.get_mut(index).and_then(|value| value.downcast_mut()).ok_or(error)
+        }
+    }
+
+    impl sealed::Sealed for Heap {}
+
+    impl Memory for Heap {
+        type Nominal<V: Stored> = Allocated<V>;
+        type Tape<V: Stored> = AllocatedTape<V>;
+        type Forward<V: Stored> = Allocated<V>;
+        type Directional<M: Dae, T: Real, const S: usize> = AllocatedByType;
+        type Adjoint<M: Dae, T: Real, const S: usize> = AllocatedByType;
+        type Hessian<V: Stored> = Allocated<V>;
+        type HessianTape<V: Stored> = AllocatedTape<V>;
+        const STEPS: usize = usize::MAX;
+        fn nominal<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
+            place.open()
+        }
+        fn tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
+            place.open(steps)
+        }
+    }
+    impl WithForward for Heap {
+        fn forward<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
+            place.open()
+        }
+    }
+    impl<const C: usize> WithDirectional<C> for Heap {
+        fn directional<M: Dae, T: Real, const S: usize>(
+            place: &mut AllocatedByType,
+        ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error> {
+            place.open()
+        }
+    }
+    impl<const C: usize> WithAdjoint<C> for Heap {
+        fn adjoint<M: Dae, T: Real, const S: usize>(
+            place: &mut AllocatedByType,
+        ) -> Result<&mut AdjointMemory<M, T, S, C>, Error> {
+            place.open()
+        }
+    }
+    impl WithHessian for Heap {
+        fn hessian<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
+            place.open()
+        }
+        fn hessian_tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
+            place.open(steps)
+        }
+    }
+}
