@@ -1,7 +1,7 @@
 //! Second order: `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with `D_i = d(ξ_i, u, p)/dw` from the
 //! forward sweep and `μ_i` from the adjoint.
 
-use super::step::{Point, Scheme, add, check};
+use super::step::{Point, Scheme, add, check, directions};
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
 use crate::scalar::Real;
@@ -48,21 +48,18 @@ impl<M: Ode, T: Real> Curvature<M, T> {
     ) -> Result<(), Error> {
         M::hessian(&point.v, mu, &mut self.entries);
         check(self.entries.as_ref(), Quantity::Hessian, at, |entry| M::STRUCTURE.hessian.at(entry).0)?;
-        self.multiply(dxi);
+        self.multiply(&scheme.curved, dxi);
         self.project(&scheme.curved, dxi);
         Ok(())
     }
 
     /// `product = ∇²(μᵀ f) D`
-    fn multiply(&mut self, dxi: &ArrayX<M, ArrayW<M, T>>) {
+    fn multiply(&mut self, curved: &ArrayW<M, bool>, dxi: &ArrayX<M, ArrayW<M, T>>) {
         let nx = M::Shape::NX;
-        let pattern = M::STRUCTURE.hessian;
-        for entry in 0..pattern.len() {
-            let (row, column) = pattern.at(entry);
-            self.product[row - nx].as_mut().fill(T::ZERO);
-            self.product[column - nx].as_mut().fill(T::ZERO);
+        for (row, _) in self.product.as_mut().iter_mut().zip(curved.as_ref()).filter(|(_, curved)| **curved) {
+            row.as_mut().fill(T::ZERO);
         }
-        // Variables x, u, p are numbered as the directions w: those of u and p move only themselves.
+        // Variables u and p move only in their own directions.
         let mut add_row = |row: usize, value: T, column: usize| {
             let sum = self.product[row].as_mut();
             if column < nx {
@@ -72,10 +69,11 @@ impl<M: Ode, T: Real> Curvature<M, T> {
             }
         };
         for (entry, &value) in self.entries.as_ref().iter().enumerate() {
-            let (row, column) = pattern.at(entry);
-            add_row(row - nx, value, column - nx);
-            if row != column {
-                add_row(column - nx, value, row - nx);
+            if let Some((row, column)) = directions::<M>(entry) {
+                add_row(row, value, column);
+                if row != column {
+                    add_row(column, value, row);
+                }
             }
         }
     }

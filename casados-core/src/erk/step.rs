@@ -33,9 +33,10 @@ impl<M: Ode, T: Real, const S: usize> Scheme<M, T, S> {
         }
         let mut curved = ArrayW::<M, bool>::from_fn(|_| false);
         for entry in 0..M::STRUCTURE.hessian.len() {
-            let (row, column) = M::STRUCTURE.hessian.at(entry);
-            curved[row - M::Shape::NX] = true;
-            curved[column - M::Shape::NX] = true;
+            if let Some((row, column)) = directions::<M>(entry) {
+                curved[row] = true;
+                curved[column] = true;
+            }
         }
         Self {
             a: tableau.a().map(|row| row.map(T::from_f64)),
@@ -45,6 +46,13 @@ impl<M: Ode, T: Real, const S: usize> Scheme<M, T, S> {
             curved,
         }
     }
+}
+
+/// The directions `w` of an entry of the Hessian: `x`, `u`, `p` are numbered alike among the variables and
+/// the directions. `None` for an entry of `ẋ`, which occurs linearly.
+pub(super) fn directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
+    let (row, column) = M::STRUCTURE.hessian.at(entry);
+    Some((row.checked_sub(M::Shape::NX)?, column.checked_sub(M::Shape::NX)?))
 }
 
 /// Equal steps from `start`.

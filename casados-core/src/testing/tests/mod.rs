@@ -1,6 +1,0 @@
-//! Tests of the checks themselves.
-
-mod example;
-mod integrators;
-mod models;
-mod scalars;

@@ -1,0 +1,186 @@
+//! Models by hand for tests of the integrators alone: derivatives are those of `num-dual`, dense.
+#![allow(dead_code)]
+
+use casados::model::{ArrayK, ArrayV};
+use casados::{Dae, Lanes, Shape};
+use num_dual::{Dual64, HyperDual64};
+
+/// A model whose residual is a function of any scalar.
+pub trait Equations: Dae {
+    /// `f(v)`
+    fn equations<S: casados::Scalar>(v: &[S], f: &mut [S]);
+}
+
+/// Number of variables of each block of the Jacobian, `(ẋ, x, z, u, p)`.
+pub const fn widths<D: Shape>() -> [usize; 5] {
+    [D::NX, D::NX, D::NZ, D::NU, D::NP]
+}
+
+/// Where each block of a dense Jacobian begins, and the end.
+pub const fn blocks<D: Shape>() -> [usize; 6] {
+    let (widths, mut begin, mut block) = (widths::<D>(), [0; 6], 0);
+    while block < 5 {
+        begin[block + 1] = begin[block] + D::NK * widths[block];
+        block += 1;
+    }
+    begin
+}
+
+/// Rows and columns of a dense Jacobian with `N` entries: by block, row, column.
+pub const fn dense<D: Shape, const N: usize>() -> [[u32; N]; 2] {
+    let (widths, mut positions, mut entry, mut first, mut block) = (widths::<D>(), [[0; N]; 2], 0, 0, 0);
+    while block < 5 {
+        let mut row = 0;
+        while row < D::NK {
+            let mut column = 0;
+            while column < widths[block] {
+                positions[0][entry] = row as u32;
+                positions[1][entry] = (first + column) as u32;
+                entry += 1;
+                column += 1;
+            }
+            row += 1;
+        }
+        first += widths[block];
+        block += 1;
+    }
+    positions
+}
+
+/// Rows and columns of the lower triangle of a dense symmetric matrix with `N` entries.
+pub const fn triangle<const N: usize>() -> [[u32; N]; 2] {
+    let (mut positions, mut entry, mut row) = ([[0; N]; 2], 0, 0);
+    while entry < N {
+        let mut column = 0;
+        while column <= row {
+            positions[0][entry] = row;
+            positions[1][entry] = column;
+            entry += 1;
+            column += 1;
+        }
+        row += 1;
+    }
+    positions
+}
+
+fn lane<S: Lanes>(values: &[S], lane: usize) -> Vec<f64> {
+    values.iter().map(|value| value.lane(lane)).collect()
+}
+
+pub fn residual<M: Equations, S: Lanes>(v: &ArrayV<M, S>, f: &mut ArrayK<M, S>) {
+    M::equations(v.as_ref(), f.as_mut());
+}
+
+pub fn jacobian<M: Equations, S: Lanes>(v: &ArrayV<M, S>, jacobian: &mut [S]) {
+    let pattern = M::STRUCTURE.jacobian;
+    for l in 0..S::LANES {
+        let v = lane(v.as_ref(), l);
+        for variable in 0..v.len() - 1 {
+            let v: Vec<_> = (0..v.len()).map(|i| Dual64::new(v[i], f64::from(i == variable))).collect();
+            let mut f = vec![Dual64::from(0.0); M::Shape::NK];
+            M::equations(&v, &mut f);
+            for (entry, value) in jacobian.iter_mut().enumerate() {
+                if pattern.at(entry).1 == variable {
+                    value.set_lane(l, f[pattern.at(entry).0].eps);
+                }
+            }
+        }
+    }
+}
+
+pub fn adjoint<M: Equations, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, gradient: &mut ArrayV<M, S>) {
+    let zero = S::from_f64(0.0);
+    let mut values = vec![zero; M::STRUCTURE.jacobian.len()];
+    jacobian::<M, S>(v, &mut values);
+    gradient.as_mut().fill(zero);
+    for (entry, &value) in values.iter().enumerate() {
+        let (row, column) = M::STRUCTURE.jacobian.at(entry);
+        gradient[column] = gradient[column] + mu[row] * value;
+    }
+}
+
+pub fn hessian<M: Equations, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, hessian: &mut [S]) {
+    for l in 0..S::LANES {
+        let (v, mu) = (lane(v.as_ref(), l), lane(mu.as_ref(), l));
+        for (entry, value) in hessian.iter_mut().enumerate() {
+            let (a, b) = M::STRUCTURE.hessian.at(entry);
+            let one = |i: usize, j: usize| f64::from(i == j);
+            let v: Vec<_> = (0..v.len()).map(|i| HyperDual64::new(v[i], one(i, a), one(i, b), 0.0)).collect();
+            let mut f = vec![HyperDual64::from(0.0); mu.len()];
+            M::equations(&v, &mut f);
+            value.set_lane(l, f.iter().zip(&mu).map(|(f, mu)| f.eps1eps2 * mu).sum());
+        }
+    }
+}
+
+/// `system!(Name [NX, NZ, NU, NP], |v, f| body)`: a model with the residual `f(v)`, where `body` may use the
+/// scalar type `S`.
+#[macro_export]
+macro_rules! system {
+    ($(#[$doc:meta])* $name:ident [$nx:literal, $nz:literal, $nu:literal, $np:literal] $s:ident |$v:ident, $f:ident| $body:block) => {
+        $(#[$doc])*
+        pub struct $name;
+        const _: () = {
+            use casados::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
+            const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
+            const JACOBIAN: usize = ($nx + $nz) * (NV - 1);
+            const HESSIAN: usize = NV * (NV - 1) / 2;
+            type D = casados::Dims<$nx, $nz, $nu, $np, { $nx + $nz }, NV, { $nx + $nu + $np }>;
+            static DENSE: [[u32; JACOBIAN]; 2] = $crate::systems::dense::<D, JACOBIAN>();
+            static TRIANGLE: [[u32; HESSIAN]; 2] = $crate::systems::triangle::<HESSIAN>();
+            impl casados::Dae for $name {
+                type Shape = D;
+                type Jacobian<T: casados::shape::Plain> = [T; JACOBIAN];
+                type Hessian<T: casados::shape::Plain> = [T; HESSIAN];
+                const STRUCTURE: Structure = Structure {
+                    name: stringify!($name),
+                    x: &["x"; $nx],
+                    z: &["z"; $nz],
+                    u: &["u"; $nu],
+                    p: &["p"; $np],
+                    jacobian: Pattern { rows: &DENSE[0], columns: &DENSE[1] },
+                    blocks: $crate::systems::blocks::<D>(),
+                    constant: &[false; JACOBIAN],
+                    hessian: Pattern { rows: &TRIANGLE[0], columns: &TRIANGLE[1] },
+                    linear: &[false; $nx + $nz],
+                    operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+                };
+                fn residual<S: casados::Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+                    $crate::systems::residual::<Self, S>(v, f);
+                }
+                fn jacobian_constants<S: casados::Lanes>(_: &mut Self::Jacobian<S>) {}
+                fn residual_jacobian<S: casados::Lanes>(
+                    v: &ArrayV<Self, S>,
+                    f: &mut ArrayK<Self, S>,
+                    jacobian: &mut Self::Jacobian<S>,
+                ) {
+                    $crate::systems::residual::<Self, S>(v, f);
+                    $crate::systems::jacobian::<Self, S>(v, jacobian);
+                }
+                fn adjoint<S: casados::Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, g: &mut ArrayV<Self, S>) {
+                    $crate::systems::adjoint::<Self, S>(v, mu, g);
+                }
+                fn hessian<S: casados::Lanes>(
+                    v: &ArrayV<Self, S>,
+                    mu: &ArrayK<Self, S>,
+                    hessian: &mut Self::Hessian<S>,
+                ) {
+                    $crate::systems::hessian::<Self, S>(v, mu, hessian);
+                }
+            }
+            impl $crate::systems::Equations for $name {
+                fn equations<$s: casados::Scalar>($v: &[$s], $f: &mut [$s]) $body
+            }
+        };
+    };
+}
+
+/// Says that `f = ẋ − g`, row by row.
+#[macro_export]
+macro_rules! explicit {
+    ($name:ident: $($row:literal)*) => {
+        impl casados::Ode for $name {
+            const ROWS: &'static [(u32, f64)] = &[$(($row, 1.0)),*];
+        }
+    };
+}
