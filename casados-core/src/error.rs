@@ -46,9 +46,11 @@ pub enum Error {
         /// Where.
         at: Place,
     },
-    /// The Newton matrix is singular to rounding: with this step size the unknown is not determined.
+    /// The Newton matrix is singular to rounding: with this step size the equations do not determine the
+    /// unknowns.
     Singular {
-        /// The unknown: the state whose derivative it is, or the algebraic state.
+        /// The unknown whose column depends on those of the unknowns before it: the state whose derivative
+        /// it is, or the algebraic state.
         unknown: &'static str,
         /// Where.
         at: Place,
@@ -66,11 +68,11 @@ pub enum Error {
         /// Where it ended.
         at: Place,
     },
-    /// A result is beyond the range of the number type, though every stage was computed.
+    /// An unknown of the stages, or a result, is beyond the range of the number type.
     Overflow {
         /// The step.
         step: usize,
-        /// The variable, or direction, that overflows.
+        /// The unknown `(ẋ, z)`, or the element of the result in column-major order.
         index: usize,
     },
     /// A time outside the interval of the last successful call.
@@ -214,7 +216,10 @@ impl fmt::Display for Error {
                  relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
             ),
             Error::Overflow { step, index } => {
-                write!(f, "element {index} of the result overflows in step {step}")
+                write!(
+                    f,
+                    "the numbers overflow in step {step}, at element {index} of the unknowns or of a result"
+                )
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")

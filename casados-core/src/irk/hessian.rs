@@ -9,7 +9,7 @@
 
 use super::adjoint::Backward;
 use super::forward::{ForwardMemory, Sweep};
-use super::record::{Coefficients, Linearization, Step, Work, copy};
+use super::record::{Coefficients, Linearization, Step, Work, assign, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::axpy;
@@ -50,8 +50,8 @@ copy!([M: Dae, T: Plain, const S: usize] HessianStep<M, T, S>);
 impl<M: Dae, T: Plain, const S: usize> HessianStep<M, T, S> {
     /// Remembers a step on the way forth.
     pub(crate) fn record(&mut self, work: &Work<M, T, S>, forward: &ForwardMemory<M, T, S>) {
-        self.linear = work.linear;
-        self.sweep = forward.sweep;
+        assign(&mut self.linear, &work.linear);
+        assign(&mut self.sweep, &forward.sweep);
     }
 }
 
@@ -146,7 +146,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     pub(crate) fn finish(&mut self, forward: &ForwardMemory<M, T, S>) -> Result<(), Error> {
         let (nx, nu, np) = (M::Shape::NX, M::Shape::NU, M::Shape::NP);
         let Self { result, backward, sum, .. } = self;
-        result.first.forward = forward.result.forward;
+        assign(&mut result.first.forward, &forward.result.forward);
         for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
             *to = *from;
         }

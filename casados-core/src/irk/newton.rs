@@ -49,7 +49,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         let full = options.jacobian == Jacobian::Full;
         let most = options.fixed_iterations.unwrap_or(options.max_iterations);
         let test = options.fixed_iterations.is_none();
-        let mut last = Increment { size: T::ZERO, unknown: 0, stage: 0 };
+        let mut last = Increment { size: T::ZERO, unknown: 0 };
         let mut iteration = 0;
         loop {
             self.place(coefficients, step, x, y);
@@ -87,13 +87,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             iteration += 1;
             statistics.iterations += 1;
             if !increment.size.is_finite() {
-                return Err(Error::NotConverged {
-                    residual: f64::INFINITY,
-                    equation: 0,
-                    unknown: unknown_name::<M>(increment.unknown),
-                    increment: increment.size.to_f64(),
-                    at: Place { step, stage: increment.stage, iteration },
-                });
+                return Err(Error::Overflow { step, index: increment.unknown });
             }
             if test {
                 if iteration > 1 {
@@ -122,20 +116,20 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     /// `y ← y − Δ` with `Δ` where the residual was; the largest increment relative to the unknown, of
     /// which the largest stage counts.
     fn update(&mut self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
-        let mut largest = Increment { size: T::ZERO, unknown: 0, stage: 0 };
+        let mut largest = Increment { size: T::ZERO, unknown: 0 };
         for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.residual.as_ref()).enumerate() {
-            let (mut size, mut change, mut at) = (T::ZERO, T::ZERO, 0);
-            for (stage, (y, [delta])) in y.iter_mut().zip(delta).enumerate() {
+            let (mut size, mut change) = (T::ZERO, T::ZERO);
+            for (y, [delta]) in y.iter_mut().zip(delta) {
                 *y = *y - *delta;
                 size = y.abs().max(size);
                 if !(delta.abs() <= change) {
-                    (change, at) = (delta.abs(), stage);
+                    change = delta.abs();
                 }
             }
             // No increment is none, also of zero; an unknown that became zero changed by all it was.
             let relative = if change == T::ZERO { T::ZERO } else { change / size.max(change) };
             if !(relative <= largest.size) {
-                largest = Increment { size: relative, unknown, stage: at };
+                largest = Increment { size: relative, unknown };
             }
         }
         largest
@@ -147,5 +141,4 @@ struct Increment<T> {
     /// Relative to the unknown.
     size: T,
     unknown: usize,
-    stage: usize,
 }

@@ -1,0 +1,311 @@
+//! Small models, written by hand.
+#![allow(dead_code)]
+
+use casados_core::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
+use casados_core::shape::Plain;
+use casados_core::{Dae, Dims, Lanes};
+
+/// No counts: these models are not generated.
+pub const NONE: Operations = Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 };
+
+/// `∇(μᵀ f)` from the Jacobian.
+pub fn adjoint_of_jacobian<M: Dae, S: Lanes>(
+    v: &ArrayV<M, S>,
+    mu: &ArrayK<M, S>,
+    gradient: &mut ArrayV<M, S>,
+    mut jacobian: M::Jacobian<S>,
+    mut f: ArrayK<M, S>,
+) {
+    M::jacobian_constants(&mut jacobian);
+    M::residual_jacobian(v, &mut f, &mut jacobian);
+    gradient.as_mut().fill(S::from_f64(0.0));
+    for (entry, value) in jacobian.as_ref().iter().enumerate() {
+        let (row, column) = M::STRUCTURE.jacobian.at(entry);
+        gradient[column] = gradient[column] + mu[row] * *value;
+    }
+}
+
+/// `μᵀ f` is differentiated by `adjoint_of_jacobian`, for a model with `[S; $k]` equations and `[S; $j]` entries.
+macro_rules! adjoint {
+    ($j:literal, $k:literal) => {
+        fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>) {
+            let zero = S::from_f64(0.0);
+            crate::models::adjoint_of_jacobian::<Self, S>(v, mu, gradient, [zero; $j], [zero; $k]);
+        }
+    };
+}
+
+/// A fully implicit, nonlinear model with everything: variables `(ẋ₀, ẋ₁, x₀, x₁, z, u, p, t)`,
+///
+/// ```text
+/// ẋ₀ (1 + x₀²) + ẋ₁ x₀ − x₁ z − u t = 0
+/// ẋ₁ − p sin x₀ + z = 0
+/// z + z³ − x₀ x₁ − u² − p = 0
+/// ```
+pub struct Nonlinear;
+
+impl Dae for Nonlinear {
+    type Shape = Dims<2, 1, 1, 1, 3, 8, 4>;
+    type Jacobian<T: Plain> = [T; 15];
+    type Hessian<T: Plain> = [T; 8];
+    const STRUCTURE: Structure = Structure {
+        name: "nonlinear",
+        x: &["x[0]", "x[1]"],
+        z: &["z"],
+        u: &["u"],
+        p: &["p"],
+        jacobian: Pattern {
+            rows: &[0, 0, 1, 0, 0, 1, 2, 2, 0, 1, 2, 0, 2, 1, 2],
+            columns: &[0, 1, 1, 2, 3, 2, 2, 3, 4, 4, 4, 5, 5, 6, 6],
+        },
+        blocks: [0, 3, 8, 11, 13, 15],
+        constant: &[false; 15],
+        hessian: Pattern { rows: &[2, 2, 2, 3, 4, 4, 5, 6], columns: &[0, 1, 2, 2, 3, 4, 5, 2] },
+        linear: &[false; 3],
+        operations: NONE,
+    };
+
+    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+        let [k0, k1, x0, x1, z, u, p, t] = *v;
+        let one = S::from_f64(1.0);
+        f[0] = k0 * (one + x0 * x0) + k1 * x0 - x1 * z - u * t;
+        f[1] = k1 - p * x0.sin() + z;
+        f[2] = z + z * z * z - x0 * x1 - u * u - p;
+    }
+    fn jacobian_constants<S: Lanes>(_: &mut [S; 15]) {}
+    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 15]) {
+        Self::residual(v, f);
+        let [k0, k1, x0, x1, z, u, p, t] = *v;
+        let n = S::from_f64;
+        *j = [
+            n(1.0) + x0 * x0,
+            x0,
+            n(1.0),
+            n(2.0) * k0 * x0 + k1,
+            -z,
+            -p * x0.cos(),
+            -x1,
+            -x0,
+            -x1,
+            n(1.0),
+            n(1.0) + n(3.0) * z * z,
+            -t,
+            n(-2.0) * u,
+            -x0.sin(),
+            n(-1.0),
+        ];
+    }
+    adjoint!(15, 3);
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 8]) {
+        let [k0, _, x0, _, z, _, p, _] = *v;
+        let n = S::from_f64;
+        *h = [
+            mu[0] * n(2.0) * x0,
+            mu[0],
+            mu[0] * n(2.0) * k0 + mu[1] * p * x0.sin(),
+            -mu[2],
+            -mu[0],
+            mu[2] * n(6.0) * z,
+            n(-2.0) * mu[2],
+            -mu[1] * x0.cos(),
+        ];
+    }
+}
+
+/// `ẋ = p x + u`, and `z = x`.
+pub struct Linear;
+
+impl Dae for Linear {
+    type Shape = Dims<1, 1, 1, 1, 2, 6, 3>;
+    type Jacobian<T: Plain> = [T; 6];
+    type Hessian<T: Plain> = [T; 1];
+    const STRUCTURE: Structure = Structure {
+        name: "linear",
+        x: &["x"],
+        z: &["z"],
+        u: &["u"],
+        p: &["p"],
+        jacobian: Pattern { rows: &[0, 0, 1, 1, 0, 0], columns: &[0, 1, 1, 2, 3, 4] },
+        blocks: [0, 1, 3, 4, 5, 6],
+        constant: &[true, false, true, true, true, false],
+        hessian: Pattern { rows: &[4], columns: &[1] },
+        linear: &[false, true],
+        operations: NONE,
+    };
+    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+        let [k, x, z, u, p, _] = *v;
+        *f = [k - p * x - u, z - x];
+    }
+    fn jacobian_constants<S: Lanes>(j: &mut [S; 6]) {
+        let one = S::from_f64(1.0);
+        (j[0], j[2], j[3], j[4]) = (one, -one, one, -one);
+    }
+    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 6]) {
+        Self::residual(v, f);
+        (j[1], j[5]) = (-v[4], -v[1]);
+    }
+    adjoint!(6, 2);
+    fn hessian<S: Lanes>(_: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 1]) {
+        *h = [-mu[0]];
+    }
+}
+
+/// `ẋ = √x − u` where the root is NaN below zero, and `u z = x`, singular at `u = 0`.
+pub struct Fragile;
+
+impl Dae for Fragile {
+    type Shape = Dims<1, 1, 1, 0, 2, 5, 2>;
+    type Jacobian<T: Plain> = [T; 6];
+    type Hessian<T: Plain> = [T; 2];
+    const STRUCTURE: Structure = Structure {
+        name: "fragile",
+        x: &["level"],
+        z: &["ratio"],
+        u: &["u"],
+        p: &[],
+        jacobian: Pattern { rows: &[0, 0, 1, 1, 0, 1], columns: &[0, 1, 1, 2, 3, 3] },
+        blocks: [0, 1, 3, 4, 6, 6],
+        constant: &[false; 6],
+        hessian: Pattern { rows: &[1, 3], columns: &[1, 2] },
+        linear: &[false; 2],
+        operations: NONE,
+    };
+    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+        let [k, x, z, u, _] = *v;
+        *f = [k - x.sqrt() + u, u * z - x];
+    }
+    fn jacobian_constants<S: Lanes>(_: &mut [S; 6]) {}
+    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 6]) {
+        Self::residual(v, f);
+        let [_, x, z, u, _] = *v;
+        let one = S::from_f64(1.0);
+        *j = [one, S::from_f64(-0.5) / x.sqrt(), -one, u, one, z];
+    }
+    adjoint!(6, 2);
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 2]) {
+        *h = [mu[0] * S::from_f64(0.25) / (v[1] * v[1].sqrt()), mu[1]];
+    }
+}
+
+/// No differential states: `z³ = u`.
+pub struct Algebraic;
+
+impl Dae for Algebraic {
+    type Shape = Dims<0, 1, 1, 0, 1, 3, 1>;
+    type Jacobian<T: Plain> = [T; 2];
+    type Hessian<T: Plain> = [T; 1];
+    const STRUCTURE: Structure = Structure {
+        name: "algebraic",
+        x: &[],
+        z: &["z"],
+        u: &["u"],
+        p: &[],
+        jacobian: Pattern { rows: &[0, 0], columns: &[0, 1] },
+        blocks: [0, 0, 0, 1, 2, 2],
+        constant: &[false, true],
+        hessian: Pattern { rows: &[0], columns: &[0] },
+        linear: &[false],
+        operations: NONE,
+    };
+    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+        let [z, u, _] = *v;
+        *f = [z * z * z - u];
+    }
+    fn jacobian_constants<S: Lanes>(j: &mut [S; 2]) {
+        j[1] = S::from_f64(-1.0);
+    }
+    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 2]) {
+        Self::residual(v, f);
+        j[0] = S::from_f64(3.0) * v[0] * v[0];
+    }
+    adjoint!(2, 1);
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 1]) {
+        *h = [mu[0] * S::from_f64(6.0) * v[0]];
+    }
+}
+
+/// A rod of `N` cells: `ẋ_i = x_{i−1} − 2 x_i + x_{i+1} − x_i³`, heated with `u` at its left end.
+pub struct Rod;
+
+/// Cells of the rod.
+pub const N: usize = 150;
+const ENTRIES: usize = 4 * N - 1;
+
+/// Non-zeros of the Jacobian: `f_ẋ` is the identity, `f_x` tridiagonal.
+const fn rod() -> ([u32; ENTRIES], [u32; ENTRIES]) {
+    let (mut rows, mut columns) = ([0; ENTRIES], [0; ENTRIES]);
+    let (mut i, mut e) = (0, N);
+    while i < N {
+        (rows[i], columns[i]) = (i as u32, i as u32);
+        let mut c = if i == 0 { 0 } else { i - 1 };
+        while c <= i + 1 && c < N {
+            (rows[e], columns[e]) = (i as u32, (N + c) as u32);
+            c += 1;
+            e += 1;
+        }
+        i += 1;
+    }
+    columns[e] = 2 * N as u32;
+    (rows, columns)
+}
+const fn diagonal() -> [u32; N] {
+    let (mut rows, mut i) = ([0; N], 0);
+    while i < N {
+        rows[i] = (N + i) as u32;
+        i += 1;
+    }
+    rows
+}
+static ROD: ([u32; ENTRIES], [u32; ENTRIES]) = rod();
+static ROD_HESSIAN: [u32; N] = diagonal();
+
+impl Dae for Rod {
+    type Shape = Dims<N, 0, 1, 0, N, { 2 * N + 2 }, { N + 1 }>;
+    type Jacobian<T: Plain> = [T; ENTRIES];
+    type Hessian<T: Plain> = [T; N];
+    const STRUCTURE: Structure = Structure {
+        name: "rod",
+        x: &["cell"; N],
+        z: &[],
+        u: &["u"],
+        p: &[],
+        jacobian: Pattern { rows: &ROD.0, columns: &ROD.1 },
+        blocks: [0, N, ENTRIES - 1, ENTRIES - 1, ENTRIES, ENTRIES],
+        constant: &[false; ENTRIES],
+        hessian: Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN },
+        linear: &[false; N],
+        operations: NONE,
+    };
+    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+        let zero = S::from_f64(0.0);
+        for i in 0..N {
+            let x = v[N + i];
+            let left = if i == 0 { v[2 * N] } else { v[N + i - 1] };
+            let right = if i + 1 == N { zero } else { v[N + i + 1] };
+            f[i] = v[i] - left - right + x + x + x * x * x;
+        }
+    }
+    fn jacobian_constants<S: Lanes>(_: &mut [S; ENTRIES]) {}
+    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; ENTRIES]) {
+        Self::residual(v, f);
+        for (e, j) in j.iter_mut().enumerate() {
+            let (r, c) = Self::STRUCTURE.jacobian.at(e);
+            *j = if c == r {
+                S::from_f64(1.0)
+            } else if c == N + r {
+                S::from_f64(2.0) + S::from_f64(3.0) * v[c] * v[c]
+            } else {
+                S::from_f64(-1.0)
+            };
+        }
+    }
+    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>) {
+        let zero = S::from_f64(0.0);
+        adjoint_of_jacobian::<Self, S>(v, mu, gradient, [zero; ENTRIES], [zero; N]);
+    }
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; N]) {
+        for i in 0..N {
+            h[i] = mu[i] * S::from_f64(6.0) * v[N + i];
+        }
+    }
+}
