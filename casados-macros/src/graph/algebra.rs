@@ -10,6 +10,9 @@ use super::{Binary, Graph, Node, Op, Unary};
 /// Selections deeper than this are multiplied from outside: work stays linear in their depth.
 const DEPTH: usize = 8;
 
+/// Sums of selections nested deeper than this are multiplied from outside.
+const SUMMANDS: usize = 3;
+
 /// A condition, and the branch in which a value is not zero.
 type Branch = (Node, bool);
 
@@ -105,8 +108,27 @@ impl Graph {
         self.plus(a, b)
     }
 
+    /// Whether a value is a sum of selections that are zero in some branch.
+    fn is_guarded(&self, a: Node, depth: usize) -> bool {
+        self.branch(a).is_some()
+            || match self.op(a) {
+                Op::Binary(Binary::Add | Binary::Sub, x, y) if depth > 0 => {
+                    self.is_guarded(x, depth - 1) && self.is_guarded(y, depth - 1)
+                }
+                _ => false,
+            }
+    }
+
     /// `a · b`
     pub(super) fn times(&mut self, a: Node, b: Node) -> Node {
+        for (sum, factor) in [(a, b), (b, a)] {
+            if let Op::Binary(function @ (Binary::Add | Binary::Sub), x, y) = self.op(sum)
+                && self.is_guarded(sum, SUMMANDS)
+            {
+                let (x, y) = (self.times(x, factor), self.times(y, factor));
+                return if function == Binary::Add { self.plus(x, y) } else { self.minus(x, y) };
+            }
+        }
         let mut branches = Vec::new();
         let (a, b) = (self.peel(a, &mut branches), self.peel(b, &mut branches));
         let product = self.product(a, b);

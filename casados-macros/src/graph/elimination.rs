@@ -88,8 +88,13 @@ impl Linearised {
                 let mut left = vec![true; self.into.len()];
                 while let Some(entry) = heap.pop() {
                     let Reverse((_, Reverse(v))) = entry;
-                    // An entry that is out of date has a successor in the heap.
-                    if !left[v as usize] || entry != key(self, v) {
+                    if !left[v as usize] {
+                        continue;
+                    }
+                    // The cost may have changed since.
+                    let now = key(self, v);
+                    if entry != now {
+                        heap.push(now);
                         continue;
                     }
                     left[v as usize] = false;

@@ -15,6 +15,7 @@ mod evaluate;
 mod hash;
 mod hessian;
 mod jacobian;
+#[cfg(test)]
 mod print;
 mod reverse;
 mod rules;
@@ -23,6 +24,7 @@ mod sparsity;
 #[cfg(test)]
 mod tests;
 
+#[cfg(test)]
 pub use evaluate::Point;
 pub use hessian::hessian;
 pub use jacobian::jacobian;

@@ -1,6 +1,9 @@
 //! Derivatives of every operation against closed values and differences.
 
 use super::expression::E;
+use crate::graph::elimination::Order;
+use crate::graph::hessian::hessian_in_order;
+use crate::graph::jacobian::jacobian_in_order;
 use crate::graph::{Binary, Graph, Node, Op, Point, Unary, gradient, hessian};
 use std::cell::RefCell;
 use std::f64::consts::{E as EULER, LN_2, LOG2_E, LOG10_E};
@@ -264,6 +267,30 @@ fn selection_differentiates_the_branch_taken() {
     });
     check_differences("√min(a b, a)", &minimum, 2.0, 0.7, 1.0 / 512.0);
     check_differences("√min(a b, a)", &minimum, 2.0, 1.7, 1.0 / 512.0);
+}
+
+/// The same, however a Jacobian is accumulated, and for a root that two conditions guard.
+#[test]
+fn the_branch_not_taken_is_singular() {
+    let graph = RefCell::new(Graph::default());
+    let v = E::variables(&graph, 2);
+    let (a, b) = (v[0], v[1]);
+    let (zero, small) = (a.of(0.0), a.of(0.01));
+    let root = a.sqrt();
+    let one = zero.if_less(a, b / root, b);
+    let both = zero.if_less(a, root, zero) - small.if_less(a, root * b, zero);
+    let f = [one.1, (3.0 * both * b).1];
+    let mut g = graph.into_inner();
+    let point = Point { variables: &[0.0, 2.0], seeds: &[1.0, 1.0], ..Point::default() };
+    for order in [Order::Reverse, Order::Forward, Order::Markowitz] {
+        let entries = jacobian_in_order(&mut g, &f, 2, order, usize::MAX).map_or(Vec::new(), |j| j.0);
+        let nodes: Vec<Node> = entries.iter().map(|entry| entry.2).collect();
+        assert_eq!(g.evaluate(&nodes, point), [0.0, 1.0, 0.0, 0.0], "{order:?}");
+        let seeds = [(f[0], g.seed(0)), (f[1], g.seed(1))];
+        let entries = hessian_in_order(&mut g, &seeds, 2, order, usize::MAX).map_or(Vec::new(), |h| h.0);
+        let nodes: Vec<Node> = entries.iter().map(|entry| entry.2).collect();
+        assert_eq!(g.evaluate(&nodes, point), [0.0; 3], "{order:?}");
+    }
 }
 
 /// A selection of constants has no derivative, and a condition none either.
