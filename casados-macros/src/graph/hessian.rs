@@ -3,12 +3,12 @@
 use super::elimination::{Linearised, Order};
 use super::jacobian::{Vertices, best};
 use super::reverse::adjoints;
-use super::{Graph, Node};
+use super::{Entry, Graph, Node};
 
 /// The structural non-zeros `(j, k, value)`, `j ≥ k`, of the Hessian of `Σ seed · output` with respect to
 /// the variables `0..variables`, by row, then column. Of two elimination orders the one with fewer
 /// operations.
-pub fn hessian(graph: &mut Graph, outputs: &[(Node, Node)], variables: u32) -> Vec<(u32, u32, Node)> {
+pub fn hessian(graph: &mut Graph, outputs: &[(Node, Node)], variables: u32) -> Vec<Entry> {
     best(graph, &[Order::Reverse, Order::Markowitz], &[], |graph, order, budget| {
         hessian_in_order(graph, outputs, variables, order, budget)
     })
@@ -24,7 +24,7 @@ pub fn hessian_in_order(
     variables: u32,
     order: Order,
     budget: usize,
-) -> Option<(Vec<(u32, u32, Node)>, usize)> {
+) -> Option<(Vec<Entry>, usize)> {
     let active = graph.active(outputs.iter().map(|output| output.0), variables);
     let adjoints = adjoints(graph, outputs, &active);
     let is_active = |node: Node| active[node.at()];

@@ -1,12 +1,12 @@
 //! The sparse Jacobian.
 
 use super::elimination::{Linearised, Order};
-use super::{Graph, Node, Op};
+use super::{Entry, Graph, Node, Op};
 
 /// The structural non-zeros `(output, variable, value)` of the Jacobian of outputs with respect to the
 /// variables `0..variables`, by output, then variable. Of several elimination orders the one with the
 /// fewest operations for outputs and Jacobian together.
-pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<(u32, u32, Node)> {
+pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<Entry> {
     best(graph, &[Order::Reverse, Order::Markowitz, Order::Forward], outputs, |graph, order, budget| {
         jacobian_in_order(graph, outputs, variables, order, budget)
     })
@@ -17,9 +17,9 @@ pub fn best(
     graph: &mut Graph,
     orders: &[Order],
     beside: &[Node],
-    derive: impl Fn(&mut Graph, Order, usize) -> Option<(Vec<(u32, u32, Node)>, usize)>,
-) -> Vec<(u32, u32, Node)> {
-    let mut best: Option<(u32, Graph, Vec<(u32, u32, Node)>)> = None;
+    derive: impl Fn(&mut Graph, Order, usize) -> Option<(Vec<Entry>, usize)>,
+) -> Vec<Entry> {
+    let mut best: Option<(u32, Graph, Vec<Entry>)> = None;
     let mut budget = usize::MAX;
     for &order in orders {
         let mut copy = graph.clone();
@@ -44,7 +44,7 @@ pub fn jacobian_in_order(
     variables: u32,
     order: Order,
     budget: usize,
-) -> Option<(Vec<(u32, u32, Node)>, usize)> {
+) -> Option<(Vec<Entry>, usize)> {
     let active = graph.active(outputs.iter().copied(), variables);
     let nodes: Vec<Node> = graph.reachable(outputs).into_iter().filter(|node| active[node.at()]).collect();
     let vertices = Vertices::new(graph, &nodes, variables, active.len());

@@ -1,12 +1,12 @@
 //! The structural index: is there a matching of equations to unknowns `(ẋ, z)`?
 
-use crate::graph::Node;
+use crate::graph::Entry;
 use crate::language::Model;
 
 /// An error if no matching of equations to unknowns exists in the pattern of `(f_ẋ, f_z)`: then
 /// `∂f/∂(ẋ, z)` is singular whatever the values, and the model is not of index 1. Names what is over- and
 /// underdetermined (the Dulmage-Mendelsohn decomposition).
-pub fn check(model: &Model, jacobian: &[(u32, u32, Node)], ends: [u32; 5]) -> syn::Result<()> {
+pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<()> {
     let nx = ends[0];
     let count = model.residual.len();
     let mut rows = vec![Vec::new(); count];

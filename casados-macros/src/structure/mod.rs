@@ -5,7 +5,7 @@ mod index;
 #[cfg(test)]
 mod tests;
 
-use crate::graph::{self, Degree, Node};
+use crate::graph::{self, Degree, Entry, Node};
 use crate::language::Model;
 
 /// A model with its derivatives and its structure.
@@ -13,7 +13,7 @@ pub struct Analysis {
     /// The model; its graph holds the derivatives too.
     pub model: Model,
     /// Non-zeros of the Jacobian `(equation, variable, value)`, by block (ẋ, x, z, u, p), row, column.
-    pub jacobian: Vec<(u32, u32, Node)>,
+    pub jacobian: Vec<Entry>,
     /// Where each block begins in `jacobian`, and its end.
     pub blocks: [usize; 6],
     /// Which entries of `jacobian` depend on no variable (on constants from outside they may).
@@ -21,7 +21,7 @@ pub struct Analysis {
     /// `∇(μᵀ f)` over `(ẋ, x, z, u, p)`.
     pub gradient: Vec<Node>,
     /// Non-zeros of the lower triangle of `∇²(μᵀ f)`, `(variable, variable, value)`.
-    pub hessian: Vec<(u32, u32, Node)>,
+    pub hessian: Vec<Entry>,
     /// Equations that are linear in `(ẋ, x, z, u, p)` jointly.
     pub linear: Vec<bool>,
     /// For an explicit model: for each state its row and coefficient.
@@ -115,7 +115,7 @@ fn check_length(model: &Model) -> syn::Result<()> {
 
 /// For each state its row and the constant coefficient of its derivative, if every row has exactly one
 /// derivative and there are no algebraic states.
-fn explicit(model: &Model, jacobian: &[(u32, u32, Node)], ends: [u32; 5]) -> Option<Vec<(u32, f64)>> {
+fn explicit(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> Option<Vec<(u32, f64)>> {
     let nx = ends[0];
     if ends[2] != ends[1] {
         return None;

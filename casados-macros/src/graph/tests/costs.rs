@@ -4,11 +4,11 @@ use super::expression::E;
 use super::models::{aircraft, chain};
 use crate::graph::elimination::Order;
 use crate::graph::jacobian::jacobian_in_order;
-use crate::graph::{Graph, Node, Unary, gradient, hessian, jacobian};
+use crate::graph::{Entry, Graph, Node, Unary, gradient, hessian, jacobian};
 use std::cell::RefCell;
 use std::time::{Duration, Instant};
 
-fn nodes(entries: &[(u32, u32, Node)]) -> Vec<Node> {
+fn nodes(entries: &[Entry]) -> Vec<Node> {
     entries.iter().map(|entry| entry.2).collect()
 }
 

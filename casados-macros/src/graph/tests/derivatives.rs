@@ -5,7 +5,7 @@ use super::models::{aircraft, chain};
 use crate::graph::elimination::Order;
 use crate::graph::hessian::hessian_in_order;
 use crate::graph::jacobian::jacobian_in_order;
-use crate::graph::{Binary, Degree, Graph, Node, Point, Unary, gradient, hessian, jacobian};
+use crate::graph::{Binary, Degree, Entry, Graph, Node, Point, Unary, gradient, hessian, jacobian};
 use std::cell::RefCell;
 
 const ORDERS: [Order; 3] = [Order::Reverse, Order::Forward, Order::Markowitz];
@@ -40,7 +40,7 @@ fn random_graph(random: &mut Random, variables: u32, size: usize, outputs: usize
     (graph.into_inner(), outputs)
 }
 
-fn dense(entries: &[(u32, u32, Node)], values: &[f64], rows: usize, columns: usize) -> Vec<Vec<f64>> {
+fn dense(entries: &[Entry], values: &[f64], rows: usize, columns: usize) -> Vec<Vec<f64>> {
     let mut matrix = vec![vec![0.0; columns]; rows];
     for (&(row, column, _), &value) in entries.iter().zip(values) {
         assert_eq!(matrix[row as usize][column as usize], 0.0, "an entry occurs once");
@@ -49,7 +49,7 @@ fn dense(entries: &[(u32, u32, Node)], values: &[f64], rows: usize, columns: usi
     matrix
 }
 
-fn values(graph: &Graph, entries: &[(u32, u32, Node)], point: Point) -> Vec<f64> {
+fn values(graph: &Graph, entries: &[Entry], point: Point) -> Vec<f64> {
     graph.evaluate(&entries.iter().map(|entry| entry.2).collect::<Vec<_>>(), point)
 }
 
@@ -105,7 +105,7 @@ fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Po
     // The Hessian is the Jacobian of the gradient.
     let rows = jacobian_in_order(&mut g, &gradient_nodes, variables, Order::Reverse, usize::MAX).unwrap().0;
     let rows = dense(&rows, &values(&g, &rows, point), n, n);
-    let check = |g: &Graph, entries: &[(u32, u32, Node)]| {
+    let check = |g: &Graph, entries: &[Entry]| {
         let mut matrix = dense(entries, &values(g, entries, point), n, n);
         for &(row, column, value) in entries {
             assert!(row >= column && !g.is_zero(value));

@@ -243,7 +243,7 @@ pub fn aircraft() -> (Graph, Vec<Node>, u32) {
     for i in 0..4 {
         cost = cost + wu[i] * u[i] * u[i];
     }
-    for i in 0..23 {
+    for (i, &rate) in dx.iter().enumerate() {
         let weight = match i {
             0..3 => 1.25e-11,
             3..6 => 1.25e-10,
@@ -253,7 +253,7 @@ pub fn aircraft() -> (Graph, Vec<Node>, u32) {
             21 => 1.25e-9,
             _ => 1.25e-10,
         };
-        cost = cost + weight * dx[i] * dx[i];
+        cost = cost + weight * rate * rate;
     }
     cost = cost + 0.2 * beta * beta;
     f.push(dx[22] - cost);
