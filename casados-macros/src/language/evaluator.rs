@@ -1,11 +1,16 @@
 //! The state of an evaluation, and what everything else asks of it.
 
-use super::place::{Place, Projection};
+pub use super::arithmetic::{Comparison, Operator};
+use super::environment::Scope;
+use super::items::{Implementation, Symbol};
+use super::place::Cell;
 use super::types::Type;
-use super::value::{Integer, Value};
+use super::value::{Calls, Integer, Value};
 use crate::graph::{Graph, Node};
 use proc_macro2::TokenStream;
 use quote::ToTokens;
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
 use syn::Result;
 
 /// The tokens an error points at.
@@ -27,6 +32,35 @@ pub fn unsupported(at: At, what: impl std::fmt::Display) -> syn::Error {
     )
 }
 
+/// Evaluation steps before a model is taken for one that does not end.
+pub const STEPS: usize = 10_000_000;
+/// Graph nodes before a model is taken for one that does not end.
+pub const NODES: usize = 4_000_000;
+/// Nested expressions and calls.
+pub const DEPTH: usize = 200;
+
+/// Why the evaluation of an expression did not end with its value.
+#[derive(Debug)]
+pub enum Flow {
+    /// An error.
+    Error(syn::Error),
+    /// `break 'label value`
+    Break(Option<syn::Lifetime>, Value),
+    /// `continue 'label`
+    Continue(Option<syn::Lifetime>),
+    /// `return value`
+    Return(Value),
+}
+
+impl From<syn::Error> for Flow {
+    fn from(error: syn::Error) -> Flow {
+        Flow::Error(error)
+    }
+}
+
+/// The result of an expression.
+pub type Evaluated<T = Value> = std::result::Result<T, Flow>;
+
 /// Executes functions symbolically.
 #[derive(Default)]
 pub struct Evaluator {
@@ -36,106 +70,200 @@ pub struct Evaluator {
     pub opaque: Vec<TokenStream>,
     /// `use` items in bodies, which the opaque constants may need.
     pub uses: Vec<syn::ItemUse>,
+    /// What the code that is being executed sees.
+    pub(super) scope: Rc<Scope>,
+    /// Numbers of names.
+    pub(super) symbols: HashMap<String, Symbol>,
+    /// All `impl` blocks that have been seen.
+    pub(super) implementations: Vec<Rc<Implementation>>,
+    /// Scopes of items, kept alive for the definitions in them.
+    pub(super) scopes: Vec<Rc<Scope>>,
+    /// The functions that are being executed.
+    pub(super) calls: Option<Rc<Calls>>,
+    /// Loops and labelled blocks around the code that is being executed, with the number of
+    /// branches on conditions at run time that are around them.
+    pub(super) targets: Vec<(Option<String>, Target, usize)>,
+    /// What the function that is being executed returns.
+    pub(super) returns: Type,
+    /// The number of branches around the function that is being executed.
+    pub(super) function_branches: usize,
+    /// What has been written to in the branches that are being executed.
+    journals: Vec<Journal>,
+    numbers: HashMap<String, u32>,
+    steps: usize,
+    depth: usize,
 }
 
-/// Binary operators that yield numbers.
+/// What a `break` can end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub enum Operator {
-    Add,
-    Sub,
-    Mul,
-    Div,
-    Rem,
-    BitXor,
-    BitAnd,
-    BitOr,
-    Shl,
-    Shr,
+pub enum Target {
+    /// A loop.
+    Loop,
+    /// A labelled block.
+    Block,
 }
 
-/// Comparisons.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub enum Comparison {
-    Eq,
-    Ne,
-    Lt,
-    Le,
-    Gt,
-    Ge,
+/// Variables that were written to, with their old values.
+#[derive(Default)]
+struct Journal {
+    entries: Vec<(Cell, Value)>,
+    seen: HashSet<*const std::cell::RefCell<Value>>,
 }
+
+/// What a branch has changed: variables and their new values.
+pub type Changes = Vec<(Cell, Value)>;
 
 impl Evaluator {
-    /// Calls a closure, a function or a constructor.
-    pub fn call(&mut self, _function: &Value, _arguments: Vec<Value>, _at: At) -> Result<Value> {
-        todo!()
+    /// Counts steps: loops in built-in functions call this once per element.
+    pub fn tick(&mut self, steps: usize, at: At) -> Result<()> {
+        self.steps = self.steps.saturating_add(steps);
+        if self.steps > STEPS {
+            return Err(error(
+                at,
+                format!("the model takes more than {STEPS} evaluation steps: does this loop end?"),
+            ));
+        }
+        if self.graph.len() > NODES {
+            return Err(error(at, format!("the model has more than {NODES} operations")));
+        }
+        Ok(())
+    }
+
+    /// Executes something one level deeper.
+    pub(super) fn deeper<T>(
+        &mut self,
+        at: At,
+        execute: impl FnOnce(&mut Self) -> Evaluated<T>,
+    ) -> Evaluated<T> {
+        self.tick(1, at)?;
+        if self.depth >= DEPTH {
+            return Err(error(at, format!("expressions and calls are nested more than {DEPTH} deep here: split them into statements")).into());
+        }
+        self.depth += 1;
+        let result = execute(self);
+        self.depth -= 1;
+        result
+    }
+
+    /// The result of something that cannot be left by `break`, `continue` or `return`.
+    pub(super) fn finished(&mut self, result: Evaluated, at: At) -> Result<Value> {
+        match result {
+            Ok(value) => Ok(value),
+            Err(Flow::Error(error)) => Err(error),
+            Err(_) => Err(error(at, "`break`, `continue` and `return` do not lead out of here")),
+        }
+    }
+
+    /// Notes the value of a variable before it is written to.
+    pub(super) fn remember(&mut self, cell: &Cell) {
+        if let Some(journal) = self.journals.last_mut()
+            && journal.seen.insert(Rc::as_ptr(cell))
+        {
+            let old = cell.borrow().clone();
+            journal.entries.push((cell.clone(), old));
+        }
+    }
+
+    /// The number of conditions at run time around what is being executed.
+    pub(super) fn branches(&self) -> usize {
+        self.journals.len()
+    }
+
+    /// Executes a branch that may be taken at run time: what it writes is undone, and returned.
+    pub(super) fn branch<T>(
+        &mut self,
+        execute: impl FnOnce(&mut Self) -> Evaluated<T>,
+    ) -> Evaluated<(T, Changes)> {
+        self.journals.push(Journal::default());
+        let result = execute(self);
+        let journal = self.journals.pop().unwrap_or_default();
+        let value = result?;
+        let mut changes = Vec::new();
+        for (cell, old) in journal.entries {
+            // Variables of the branch itself are gone.
+            if Rc::strong_count(&cell) > 1 {
+                let new = cell.replace(old);
+                changes.push((cell, new));
+            }
+        }
+        Ok((value, changes))
+    }
+
+    /// Makes the changes of two branches, of which the first is taken if the condition holds.
+    pub(super) fn merge(&mut self, condition: Node, a: Changes, b: Changes, at: At) -> Result<()> {
+        let position: HashMap<_, _> =
+            b.iter().enumerate().map(|(index, (cell, _))| (Rc::as_ptr(cell), index)).collect();
+        let mut merged = HashSet::new();
+        for (cell, then) in a {
+            merged.insert(Rc::as_ptr(&cell));
+            let otherwise = match position.get(&Rc::as_ptr(&cell)) {
+                Some(&index) => b[index].1.clone(),
+                None => cell.borrow().clone(),
+            };
+            let value = self.select(condition, &then, &otherwise, at)?;
+            self.remember(&cell);
+            cell.replace(value);
+        }
+        for (cell, otherwise) in b {
+            if !merged.contains(&Rc::as_ptr(&cell)) {
+                let then = cell.borrow().clone();
+                let value = self.select(condition, &then, &otherwise, at)?;
+                self.remember(&cell);
+                cell.replace(value);
+            }
+        }
+        Ok(())
     }
 
     /// The value as a number. Opaque constants become one here.
-    pub fn real(&mut self, _value: &Value, _at: At) -> Result<Node> {
-        todo!()
+    pub fn real(&mut self, value: &Value, at: At) -> Result<Node> {
+        match value {
+            Value::Real(node) => Ok(*node),
+            Value::Opaque(tokens) => {
+                let text = tokens.to_string();
+                let next = self.opaque.len() as u32;
+                let index = *self.numbers.entry(text).or_insert(next);
+                if index == next {
+                    self.opaque.push((**tokens).clone());
+                }
+                Ok(self.graph.opaque(index))
+            }
+            Value::Reference(place) => {
+                let value = self.read(place, at)?;
+                self.real(&value, at)
+            }
+            other => Err(error(at, format!("expected an `f64`, found {}", other.kind()))),
+        }
     }
 
     /// The value as a known integer.
-    pub fn integer(&mut self, _value: &Value, _at: At) -> Result<Integer> {
-        todo!()
+    pub fn integer(&mut self, value: &Value, at: At) -> Result<Integer> {
+        match value {
+            Value::Integer(integer) => Ok(*integer),
+            Value::Reference(place) => {
+                let value = self.read(place, at)?;
+                self.integer(&value, at)
+            }
+            Value::Opaque(_) => Err(opaque(at, "an integer")),
+            other => Err(error(at, format!("expected an integer, found {}", other.kind()))),
+        }
     }
 
     /// The value as a known index or length.
-    pub fn usize(&mut self, _value: &Value, _at: At) -> Result<usize> {
-        todo!()
+    pub fn usize(&mut self, value: &Value, at: At) -> Result<usize> {
+        let integer = self.integer(value, at)?;
+        usize::try_from(integer.value)
+            .map_err(|_| error(at, format!("this is {}, which is no `usize`", integer.value)))
     }
+}
 
-    /// `a ∘ b` of any two values that have it, elementwise and user-defined operators included.
-    pub fn binary(&mut self, _operator: Operator, _a: &Value, _b: &Value, _at: At) -> Result<Value> {
-        todo!()
-    }
-
-    /// `-a`
-    pub fn negate(&mut self, _a: &Value, _at: At) -> Result<Value> {
-        todo!()
-    }
-
-    /// A comparison: a `Bool` where it is known, a `Condition` where it is not.
-    pub fn compare(&mut self, _comparison: Comparison, _a: &Value, _b: &Value, _at: At) -> Result<Value> {
-        todo!()
-    }
-
-    /// `if condition { a } else { b }`, elementwise.
-    pub fn select(&mut self, _condition: Node, _a: &Value, _b: &Value, _at: At) -> Result<Value> {
-        todo!()
-    }
-
-    /// The value in a place.
-    pub fn read(&mut self, _place: &Place, _at: At) -> Result<Value> {
-        todo!()
-    }
-
-    /// Writes to a place.
-    pub fn write(&mut self, _place: &Place, _value: Value, _at: At) -> Result<()> {
-        todo!()
-    }
-
-    /// A part of a place; its bounds are checked. Slices of slices, and elements of slices and blocks, are resolved.
-    pub fn project(&mut self, _place: &Place, _projection: Projection, _at: At) -> Result<Place> {
-        todo!()
-    }
-
-    /// The value as one of the type: opaque constants are taken apart, integers get their type, `&mut`
-    /// is followed. An error if the shapes do not fit.
-    pub fn coerce(&mut self, _value: Value, _ty: &Type, _at: At) -> Result<Value> {
-        todo!()
-    }
-
-    /// A value of the type, whose numbers are made by `leaf` from their names (`name[3].position`).
-    pub fn instantiate(
-        &mut self,
-        _ty: &Type,
-        _name: String,
-        _leaf: &mut dyn FnMut(&mut Evaluator, String) -> Result<Node>,
-        _at: At,
-    ) -> Result<Value> {
-        todo!()
-    }
+/// An error about a constant of which the value is needed.
+pub fn opaque(at: At, what: &str) -> syn::Error {
+    error(
+        at,
+        format!(
+            "this constant is needed as {what}, but the macro does not see where it is defined: define it in \
+             the body, or put it beside the model in a `#[dae] mod`"
+        ),
+    )
 }

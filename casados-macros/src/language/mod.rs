@@ -1,9 +1,18 @@
 //! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes its body.
 
+mod arithmetic;
+mod call;
+mod closure;
 mod environment;
 mod evaluator;
+mod expression;
+mod items;
 mod methods;
+mod path;
+mod pattern;
 mod place;
+mod select;
+mod statement;
 mod types;
 mod value;
 

@@ -4,12 +4,14 @@
 //! Shared references are transparent: `&a` is the value of `a`. Only `&mut` is a value of its own.
 
 use super::environment::Scope;
+use super::items::Implementation;
 use super::methods::iterator::Iter;
 use super::place::Place;
 use super::types::Type;
 use crate::graph::Node;
 use proc_macro2::TokenStream;
-use std::rc::Rc;
+use std::cell::OnceCell;
+use std::rc::{Rc, Weak};
 
 /// The value of an expression.
 #[derive(Clone, Debug)]
@@ -234,8 +236,15 @@ pub struct Definition {
     pub variants: Vec<Variant>,
     /// Generic parameters.
     pub generics: syn::Generics,
-    /// Where it stands: what its field types refer to.
-    pub scope: Rc<Scope>,
+    /// Where it stands: what its field types refer to. The evaluator keeps it alive.
+    pub scope: OnceCell<Weak<Scope>>,
+}
+
+impl Definition {
+    /// Where it stands.
+    pub fn scope(&self) -> Rc<Scope> {
+        self.scope.get().and_then(Weak::upgrade).unwrap_or_default()
+    }
 }
 
 /// A variant of an enum, or the fields of a struct.
@@ -280,6 +289,17 @@ pub struct Closure {
     pub closure: Rc<syn::ExprClosure>,
     /// What it sees.
     pub scope: Rc<Scope>,
+    /// The functions that were being executed where it was written.
+    pub calls: Option<Rc<Calls>>,
+}
+
+/// The functions that are being executed, innermost first.
+#[derive(Debug)]
+pub struct Calls {
+    /// This one.
+    pub function: Rc<syn::ItemFn>,
+    /// Those that called it.
+    pub parent: Option<Rc<Calls>>,
 }
 
 /// A function that the macro sees.
@@ -292,7 +312,7 @@ pub struct Function {
     /// Generic arguments that were given.
     pub turbofish: Vec<Generic>,
     /// The `impl` block it belongs to, and the type it was named by.
-    pub owner: Option<(Rc<syn::ItemImpl>, Type)>,
+    pub owner: Option<(Rc<Implementation>, Type)>,
 }
 
 /// A function of the language that is named by path.

@@ -1,0 +1,302 @@
+//! The checks of integrators accept right answers and find wrong ones.
+
+use super::example::*;
+use crate::error::Error;
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::testing::{Exact, Integrator, Report, check_exact, check_sensitivities, convergence};
+use nalgebra::SVector;
+
+/// An integrator whose answers are those of `x = x₀ e^{uh} + p x₀²`, `z = p x₀`, `z₀ = u x₀`, with a fault on request.
+struct Closed<const FAULT: u8> {
+    p: f64,
+    calls: f64,
+    result: Hessian<Example<NO_FAULT>>,
+    adjoint: Adjoint<Example<NO_FAULT>>,
+}
+
+const GRADIENT: u8 = 1;
+const SECOND: u8 = 3;
+const FORWARD: u8 = 4;
+const REPEATED: u8 = 5;
+
+impl<const FAULT: u8> Closed<FAULT> {
+    fn new() -> Self {
+        Self {
+            p: f64::NAN,
+            calls: 0.0,
+            result: bytemuck::Zeroable::zeroed(),
+            adjoint: bytemuck::Zeroable::zeroed(),
+        }
+    }
+
+    fn evaluate(&mut self, x0: f64, u: f64, h: f64, lambda: f64) {
+        let (p, e) = (self.p, f64::exp(u * h));
+        let r = &mut self.result;
+        let f = &mut r.first.forward;
+        (f.nominal.x[0], f.nominal.z[0], f.nominal.z0[0]) = (x0 * e + p * x0 * x0, p * x0, u * x0);
+        (f.dx_dx0[0], f.dx_du[0], f.dx_dp[0]) = (e + 2.0 * p * x0, h * x0 * e, x0 * x0);
+        (f.dz_dx0[0], f.dz_du[0], f.dz_dp[0]) = (p, 0.0, x0);
+        (f.dz0_dx0[0], f.dz0_du[0], f.dz0_dp[0]) = (u, x0, 0.0);
+        (r.h_xx[0], r.h_xu[0], r.h_xp[0]) = (lambda * 2.0 * p, lambda * h * e, lambda * 2.0 * x0);
+        (r.h_uu[0], r.h_up[0], r.h_pp[0]) = (lambda * h * h * x0 * e, 0.0, 0.0);
+        let f = &mut r.first.forward;
+        match FAULT {
+            FORWARD => f.dz0_du[0] *= 1.0 + 1e-12,
+            SECOND => r.h_xu[0] *= 1.0 + 1e-8,
+            REPEATED => {
+                self.calls += 1.0;
+                f.nominal.x[0] *= 1.0 + f64::EPSILON * self.calls;
+            }
+            _ => {}
+        }
+        let (x, u, p) = (f.dx_dx0[0], f.dx_du[0], f.dx_dp[0]);
+        (r.first.grad_x0[0], r.first.grad_u[0], r.first.grad_p[0]) = (lambda * x, lambda * u, lambda * p);
+        if FAULT == GRADIENT {
+            r.first.grad_u[0] *= 1.0 + 1e-12;
+        }
+    }
+}
+
+impl<const FAULT: u8> Integrator<Example<NO_FAULT>> for Closed<FAULT> {
+    fn set_parameters(&mut self, p: &SVector<f64, 1>) -> Result<(), Error> {
+        self.p = p[0];
+        Ok(())
+    }
+    fn reset(&mut self) {}
+    fn solve(
+        &mut self,
+        x0: &SVector<f64, 1>,
+        u: &SVector<f64, 1>,
+        h: f64,
+    ) -> Result<&Nominal<Example<NO_FAULT>>, Error> {
+        self.evaluate(x0[0], u[0], h, 1.0);
+        Ok(&self.result)
+    }
+    fn forward(
+        &mut self,
+        x0: &SVector<f64, 1>,
+        u: &SVector<f64, 1>,
+        h: f64,
+    ) -> Result<&Forward<Example<NO_FAULT>>, Error> {
+        self.evaluate(x0[0], u[0], h, 1.0);
+        Ok(&self.result)
+    }
+    fn adjoint(
+        &mut self,
+        x0: &SVector<f64, 1>,
+        u: &SVector<f64, 1>,
+        h: f64,
+        lambda: &SVector<f64, 1>,
+    ) -> Result<&Adjoint<Example<NO_FAULT>>, Error> {
+        self.evaluate(x0[0], u[0], h, lambda[0]);
+        let first = self.result.first;
+        self.adjoint = Adjoint {
+            nominal: first.forward.nominal,
+            grad_x0: first.grad_x0,
+            grad_u: first.grad_u,
+            grad_p: first.grad_p,
+        };
+        Ok(&self.adjoint)
+    }
+    fn hessian(
+        &mut self,
+        x0: &SVector<f64, 1>,
+        u: &SVector<f64, 1>,
+        h: f64,
+        lambda: &SVector<f64, 1>,
+    ) -> Result<&Hessian<Example<NO_FAULT>>, Error> {
+        self.evaluate(x0[0], u[0], h, lambda[0]);
+        Ok(&self.result)
+    }
+}
+
+fn sensitivities<const FAULT: u8>() -> Report {
+    let v = SVector::<f64, 1>::new;
+    check_sensitivities::<Example<NO_FAULT>, _>(&mut Closed::<FAULT>::new(), &v(0.7), &v(-1.2), &v(0.4), 0.3)
+        .expect("a closed form does not fail")
+}
+
+#[test]
+fn right_sensitivities_pass_and_wrong_ones_are_named() {
+    let report = sensitivities::<NO_FAULT>();
+    report.assert();
+    for row in &report.rows {
+        assert!(row.difference <= 1e-10, "{report}");
+    }
+    let found = |report: Report, quantity: &str, entry: &str| {
+        assert!(
+            report.wrong.iter().any(|wrong| wrong.quantity == quantity && wrong.entry == entry),
+            "{report}"
+        );
+    };
+    found(sensitivities::<GRADIENT>(), "adjoint", "by torque");
+    found(sensitivities::<SECOND>(), "Hessian", "by angle at the start and torque");
+    found(sensitivities::<FORWARD>(), "forward", "force at the start by torque");
+    found(sensitivities::<REPEATED>(), "solve", "element 0");
+}
+
+#[test]
+fn exact_solution() {
+    let v = SVector::<f64, 1>::new;
+    let (x0, u, p, h) = (0.7, -1.2, 0.4, 0.3);
+    let e = f64::exp(u * h);
+    let mut exact = Exact {
+        states: std::vec![x0 * e + p * x0 * x0, p * x0],
+        first: std::vec![std::vec![e + 2.0 * p * x0, h * x0 * e, x0 * x0], std::vec![p, 0.0, x0]],
+        second: std::vec![std::vec![
+            std::vec![2.0 * p, h * e, 2.0 * x0],
+            std::vec![h * e, h * h * x0 * e, 0.0],
+            std::vec![2.0 * x0, 0.0, 0.0],
+        ]],
+    };
+    let run = |exact: &Exact| {
+        let (mut coarse, mut fine) = (Closed::<NO_FAULT>::new(), Closed::<NO_FAULT>::new());
+        check_exact::<Example<NO_FAULT>, _>(&mut coarse, &mut fine, &v(x0), &v(u), &v(p), h, exact)
+            .expect("a closed form does not fail")
+    };
+    run(&exact).assert();
+    exact.second[0][1][1] *= 1.0 + 1e-13;
+    assert!(!run(&exact).passed());
+}
+
+#[test]
+fn convergence_order() {
+    // The explicit Euler method on ẋ = −x: an order that is asked for and one that is not there.
+    let euler = |steps: usize| {
+        let h = 1.0 / steps as f64;
+        Ok::<_, Error>(std::vec![(0..steps).fold(1.0, |x, _| x - h * x)])
+    };
+    let report = convergence(&[16, 32, 64, 128, 256], &[f64::exp(-1.0)], 1e-15, euler);
+    report.assert_order(1.0);
+    assert!(std::panic::catch_unwind(|| report.assert_order(2.0)).is_err());
+    // Rounding says nothing about an order, and a failure is no result.
+    assert_eq!(convergence(&[1, 2], &[1.0], 1e-15, |_| Ok::<_, Error>(std::vec![1.0])).order(), None);
+    let failed = convergence(&[1, 2], &[1.0], 1e-15, |_| Err(Error::NoResult));
+    assert!(std::panic::catch_unwind(|| failed.assert_error(1.0)).is_err());
+}
+
+/// Real integrators with a model written by hand, against the closed form of its solution.
+mod logistic {
+    use super::*;
+    use crate::model::{ArrayK, ArrayV, Dae, Ode, Operations, Pattern, Structure};
+    use crate::options::Options;
+    use crate::scalar::Lanes;
+    use crate::shape::{Dims, Plain};
+    use crate::{DormandPrince8, Erk, Gauss, Irk};
+
+    /// `ẋ = u x (1 − x/K)`
+    struct Logistic;
+
+    impl Dae for Logistic {
+        type Shape = Dims<1, 0, 1, 1, 1, 5, 3>;
+        type Jacobian<T: Plain> = [T; 4];
+        type Hessian<T: Plain> = [T; 5];
+        const STRUCTURE: Structure = Structure {
+            name: "logistic",
+            x: &["population"],
+            z: &[],
+            u: &["rate"],
+            p: &["limit"],
+            jacobian: Pattern { rows: &[0, 0, 0, 0], columns: &[0, 1, 2, 3] },
+            blocks: [0, 1, 2, 2, 3, 4],
+            constant: &[true, false, false, false],
+            hessian: Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] },
+            linear: &[false],
+            operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+        };
+
+        fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+            let [xdot, x, u, limit, _] = *v;
+            f[0] = xdot - u * x * (S::from_f64(1.0) - x / limit);
+        }
+        fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S>) {
+            jacobian[0] = S::from_f64(1.0);
+        }
+        fn residual_jacobian<S: Lanes>(
+            v: &ArrayV<Self, S>,
+            f: &mut ArrayK<Self, S>,
+            jacobian: &mut Self::Jacobian<S>,
+        ) {
+            Self::residual(v, f);
+            let [_, x, u, limit, _] = *v;
+            let (one, r) = (S::from_f64(1.0), x / limit);
+            jacobian[1] = -u * (one - r - r);
+            jacobian[2] = -x * (one - r);
+            jacobian[3] = -u * r * r;
+        }
+        fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, g: &mut ArrayV<Self, S>) {
+            let (mut f, mut jacobian) = ([mu[0]; 1], [mu[0]; 4]);
+            Self::residual_jacobian(v, &mut f, &mut jacobian);
+            *g = [mu[0], mu[0] * jacobian[1], mu[0] * jacobian[2], mu[0] * jacobian[3], S::from_f64(0.0)];
+        }
+        fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, hessian: &mut Self::Hessian<S>) {
+            let [_, x, u, limit, _] = *v;
+            let (one, two, r) = (S::from_f64(1.0), S::from_f64(2.0), x / limit);
+            let mu = mu[0];
+            *hessian = [
+                mu * two * u / limit,
+                -mu * (one - r - r),
+                -mu * two * u * r / limit,
+                -mu * r * r,
+                mu * two * u * r * r / limit,
+            ];
+        }
+    }
+
+    impl Ode for Logistic {
+        const ROWS: &'static [(u32, f64)] = &[(0, 1.0)];
+    }
+
+    const AT: [f64; 3] = [0.1, 1.5, 2.0];
+    const T: f64 = 2.0;
+
+    /// `x = K x₀ e^{uT} / D` with `D = K + x₀ (e^{uT} − 1)`, and what can be written down of its derivatives.
+    fn exact() -> Exact {
+        let [x0, u, k] = AT;
+        let e = f64::exp(u * T);
+        let d = k + x0 * (e - 1.0);
+        let x = k * x0 * e / d;
+        let first = std::vec![k * k * e / (d * d), T * x * (1.0 - x / k), x / k - k * x0 * e / (d * d)];
+        Exact { states: std::vec![x], first: std::vec![first], second: std::vec![] }
+    }
+
+    fn options(steps: usize) -> Options {
+        Options { steps, ..Default::default() }
+    }
+
+    fn check<I: Integrator<Logistic>>(build: impl Fn(usize) -> Result<I, Error>, steps: usize) {
+        let v = SVector::<f64, 1>::new;
+        let [x0, u, p] = AT.map(v);
+        let integrate = |steps| build(steps).expect("options are valid");
+        check_sensitivities::<Logistic, _>(&mut integrate(2), &x0, &u, &p, 0.5)
+            .expect("the model can be integrated")
+            .assert();
+        let (mut coarse, mut fine) = (integrate(steps / 2), integrate(steps));
+        let report = check_exact::<Logistic, _>(&mut coarse, &mut fine, &x0, &u, &p, T, &exact())
+            .expect("the model can be integrated");
+        report.assert();
+        assert!(report.rows.iter().all(|row| row.tolerance < 1e-12), "{report}");
+    }
+
+    #[test]
+    fn implicit() {
+        check(|steps| Irk::<Logistic, Gauss<5>>::new(options(steps)), 32);
+    }
+
+    #[test]
+    fn explicit() {
+        check(|steps| Erk::<Logistic, DormandPrince8>::new(options(steps)), 64);
+    }
+
+    #[test]
+    fn order_of_convergence() {
+        let v = SVector::<f64, 1>::new;
+        let [x0, u, p] = AT.map(v);
+        let report = convergence(&[2, 4, 8, 16, 32], &exact().states, 1e-15, |steps| {
+            let mut irk = Irk::<Logistic, Gauss<2>>::new(options(steps))?;
+            irk.set_parameters(&p)?;
+            Ok::<_, Error>(std::vec![irk.solve(&x0, &u, T)?.x[0]])
+        });
+        report.assert_order(4.0);
+    }
+}

@@ -1,0 +1,6 @@
+//! Tests of the checks themselves.
+
+mod example;
+mod integrators;
+mod models;
+mod scalars;

@@ -1,0 +1,47 @@
+//! The checks of models accept a right one and find every kind of fault in a wrong one.
+
+use super::example::*;
+use crate::testing::{Points, Report, check_derivatives, check_pattern};
+use std::string::ToString;
+
+fn check<const FAULT: u8>() -> Report {
+    check_derivatives::<Example<FAULT>>(&Points::random(10).all(-2.0..=2.0))
+}
+
+#[test]
+fn right_model_passes() {
+    check::<NO_FAULT>().assert();
+    check_pattern::<Example<NO_FAULT>>(&Points::random(5)).assert();
+    let report = check::<NO_FAULT>();
+    // Nothing remains unsaid, and the largest difference is rounding.
+    for row in &report.rows {
+        assert_eq!(row.inconclusive, 0, "{report}");
+        assert!(row.difference < 1e-11, "{report}");
+    }
+}
+
+#[test]
+fn faults_are_found_and_named() {
+    let found = |report: Report, quantity: &str, entry: &str| {
+        assert!(!report.passed(), "{report}");
+        assert!(
+            report.wrong.iter().any(|wrong| wrong.quantity == quantity && wrong.entry == entry),
+            "{report}"
+        );
+        assert!(report.to_string().contains(entry));
+    };
+    found(check::<JACOBIAN_SIGN>(), "Jacobian", "of equation 0 by angle");
+    found(check::<ADJOINT_LAST_DIGITS>(), "adjoint", "by torque");
+    found(check::<HESSIAN_TERM>(), "Hessian", "by angle and angle");
+    found(check::<HESSIAN_PATTERN>(), "Hessian", "by force and angle");
+    found(check::<CONSTANT_FORGOTTEN>(), "Jacobian", "of equation 1 by level");
+    found(check::<LINEAR_DECLARED>(), "Hessian, linear rows", "of equation 1 by angle and angle");
+    let pattern = check_pattern::<Example<HESSIAN_PATTERN>>(&Points::random(5));
+    found(pattern, "Hessian outside", "by force and angle");
+}
+
+#[test]
+fn points_outside_of_the_domain_do_not_pass() {
+    let report = check_derivatives::<Example<NO_FAULT>>(&Points::random(3).all(1e4..=1e5));
+    assert!(!report.passed(), "{report}");
+}

@@ -1,0 +1,362 @@
+//! Items that the macro sees: functions, constants, types, `impl` blocks, `use`.
+
+use super::environment::{Names, Scope};
+use super::evaluator::{Evaluator, error, unsupported};
+use super::value::{Definition, Style, Value, Variant};
+use std::cell::{OnceCell, RefCell};
+use std::collections::HashMap;
+use std::rc::Rc;
+use syn::Result;
+
+/// An interned name.
+pub type Symbol = u32;
+
+/// The items of a block or module.
+#[derive(Debug, Default)]
+pub struct Items {
+    /// Functions and constants.
+    pub values: HashMap<Symbol, ValueItem>,
+    /// Structs, enums and aliases.
+    pub types: HashMap<Symbol, TypeItem>,
+    /// Modules in this one.
+    pub modules: HashMap<Symbol, Rc<Scope>>,
+    /// `use` of single names.
+    pub uses: HashMap<Symbol, Vec<String>>,
+    /// `use` of everything in a module.
+    pub globs: Vec<Vec<String>>,
+}
+
+/// What a name stands for as a value.
+#[derive(Clone, Debug)]
+pub enum ValueItem {
+    /// A function.
+    Function(Rc<syn::ItemFn>),
+    /// A `const` or `static`.
+    Constant(Rc<Constant>),
+}
+
+/// What a name stands for as a type.
+#[derive(Clone, Debug)]
+pub enum TypeItem {
+    /// A struct or enum.
+    Definition(Rc<Definition>),
+    /// A type alias.
+    Alias(Rc<syn::ItemType>),
+}
+
+/// A `const` or `static`, evaluated when it is used first.
+#[derive(Debug)]
+pub struct Constant {
+    /// Its name, for errors.
+    pub name: syn::Ident,
+    /// Its type.
+    pub ty: syn::Type,
+    /// Its expression.
+    pub expression: syn::Expr,
+    /// Its value.
+    pub state: RefCell<State>,
+}
+
+/// How far the evaluation of a constant is.
+#[derive(Clone, Debug)]
+pub enum State {
+    /// Not begun.
+    Written,
+    /// Begun: a use of it now is a cycle.
+    Begun,
+    /// Done.
+    Done(Value),
+}
+
+/// An `impl` block, or the defaults of a trait.
+#[derive(Debug)]
+pub struct Implementation {
+    /// Its generic parameters.
+    pub generics: syn::Generics,
+    /// The type it is for; `None` for the defaults of a trait.
+    pub self_type: Option<syn::Type>,
+    /// The trait and its generic arguments.
+    pub of: Option<syn::Path>,
+    /// Functions.
+    pub functions: HashMap<Symbol, Rc<syn::ItemFn>>,
+    /// Constants: of generic blocks their values depend on the type.
+    pub constants: HashMap<Symbol, Rc<Constant>>,
+    /// Where it stands.
+    pub scope: Rc<Scope>,
+}
+
+impl Evaluator {
+    /// The number of a name.
+    pub fn symbol(&mut self, name: &syn::Ident) -> Symbol {
+        self.symbol_of(&name.to_string())
+    }
+
+    /// The number of a name.
+    pub fn symbol_of(&mut self, name: &str) -> Symbol {
+        if let Some(&symbol) = self.symbols.get(name) {
+            return symbol;
+        }
+        let symbol = self.symbols.len() as Symbol;
+        self.symbols.insert(name.to_owned(), symbol);
+        symbol
+    }
+
+    /// A scope of items inside of another; `impl` blocks are known from now on.
+    pub fn items<'a>(
+        &mut self,
+        items: impl Iterator<Item = &'a syn::Item> + Clone,
+        parent: &Rc<Scope>,
+    ) -> Result<Rc<Scope>> {
+        let mut names = Items::default();
+        let mut definitions = Vec::new();
+        for item in items.clone() {
+            self.item(item, parent, &mut names, &mut definitions)?;
+        }
+        let scope = Scope::inside(parent, Names::Items(Box::new(names)));
+        for definition in definitions {
+            let _ = definition.scope.set(Rc::downgrade(&scope));
+        }
+        self.scopes.push(scope.clone());
+        for item in items {
+            match item {
+                syn::Item::Impl(item) => self.implementation(item, &scope),
+                syn::Item::Trait(item) => self.defaults(item, &scope),
+                _ => {}
+            }
+        }
+        Ok(scope)
+    }
+
+    fn item(
+        &mut self,
+        item: &syn::Item,
+        parent: &Rc<Scope>,
+        names: &mut Items,
+        definitions: &mut Vec<Rc<Definition>>,
+    ) -> Result<()> {
+        match item {
+            syn::Item::Fn(item) => {
+                let name = self.symbol(&item.sig.ident);
+                names.values.insert(name, ValueItem::Function(Rc::new(item.clone())));
+            }
+            syn::Item::Const(item) => {
+                let name = self.symbol(&item.ident);
+                let constant = constant(&item.ident, &item.ty, &item.expr);
+                names.values.insert(name, ValueItem::Constant(constant));
+            }
+            syn::Item::Static(item) => {
+                if let syn::StaticMutability::Mut(token) = &item.mutability {
+                    return Err(unsupported(token, "a mutable static"));
+                }
+                let name = self.symbol(&item.ident);
+                let constant = constant(&item.ident, &item.ty, &item.expr);
+                names.values.insert(name, ValueItem::Constant(constant));
+            }
+            syn::Item::Struct(item) => {
+                let name = item.ident.to_string();
+                let definition = Rc::new(Definition {
+                    name: name.clone(),
+                    is_enum: false,
+                    variants: vec![variant(name, &item.fields, None)],
+                    generics: item.generics.clone(),
+                    scope: OnceCell::new(),
+                });
+                definitions.push(definition.clone());
+                let name = self.symbol(&item.ident);
+                names.types.insert(name, TypeItem::Definition(definition));
+            }
+            syn::Item::Enum(item) => {
+                let variants = item.variants.iter().map(|entry| {
+                    let discriminant = entry.discriminant.as_ref().map(|(_, value)| value.clone());
+                    variant(entry.ident.to_string(), &entry.fields, discriminant)
+                });
+                let definition = Rc::new(Definition {
+                    name: item.ident.to_string(),
+                    is_enum: true,
+                    variants: variants.collect(),
+                    generics: item.generics.clone(),
+                    scope: OnceCell::new(),
+                });
+                definitions.push(definition.clone());
+                let name = self.symbol(&item.ident);
+                names.types.insert(name, TypeItem::Definition(definition));
+            }
+            syn::Item::Type(item) => {
+                let name = self.symbol(&item.ident);
+                names.types.insert(name, TypeItem::Alias(Rc::new(item.clone())));
+            }
+            syn::Item::Mod(item) => {
+                let Some((_, content)) = &item.content else {
+                    return Err(unsupported(item, "a module in another file"));
+                };
+                let scope = self.items(content.iter(), parent)?;
+                let name = self.symbol(&item.ident);
+                names.modules.insert(name, scope);
+            }
+            syn::Item::Use(item) => {
+                self.uses.push(item.clone());
+                self.use_tree(&item.tree, &mut Vec::new(), names);
+            }
+            syn::Item::Impl(_) | syn::Item::Trait(_) => {}
+            other => return Err(unsupported(other, "an item of this kind in a model")),
+        }
+        Ok(())
+    }
+
+    fn use_tree(&mut self, tree: &syn::UseTree, path: &mut Vec<String>, names: &mut Items) {
+        match tree {
+            syn::UseTree::Path(tree) => {
+                path.push(tree.ident.to_string());
+                self.use_tree(&tree.tree, path, names);
+                path.pop();
+            }
+            syn::UseTree::Name(tree) if tree.ident == "self" => {
+                if let Some(last) = path.last().cloned() {
+                    let symbol = self.symbol_of(&last);
+                    names.uses.insert(symbol, path.clone());
+                }
+            }
+            syn::UseTree::Name(tree) => {
+                let symbol = self.symbol(&tree.ident);
+                let full = path.iter().cloned().chain([tree.ident.to_string()]).collect();
+                names.uses.insert(symbol, full);
+            }
+            syn::UseTree::Rename(tree) => {
+                let symbol = self.symbol(&tree.rename);
+                let mut full = path.clone();
+                if tree.ident != "self" {
+                    full.push(tree.ident.to_string());
+                }
+                names.uses.insert(symbol, full);
+            }
+            syn::UseTree::Glob(_) => names.globs.push(path.clone()),
+            syn::UseTree::Group(tree) => {
+                for tree in &tree.items {
+                    self.use_tree(tree, path, names);
+                }
+            }
+        }
+    }
+
+    fn implementation(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {
+        let mut implementation = Implementation {
+            generics: item.generics.clone(),
+            self_type: Some((*item.self_ty).clone()),
+            of: item.trait_.as_ref().map(|(path, _)| path.clone()),
+            functions: HashMap::new(),
+            constants: HashMap::new(),
+            scope: scope.clone(),
+        };
+        for entry in &item.items {
+            match entry {
+                syn::ImplItem::Fn(function) => {
+                    let name = self.symbol(&function.sig.ident);
+                    let function = syn::ItemFn {
+                        attrs: Vec::new(),
+                        vis: syn::Visibility::Inherited,
+                        modifiers: function.modifiers.clone(),
+                        sig: function.sig.clone(),
+                        block: Box::new(function.block.clone()),
+                    };
+                    implementation.functions.insert(name, Rc::new(function));
+                }
+                syn::ImplItem::Const(item) => {
+                    let name = self.symbol(&item.ident);
+                    implementation.constants.insert(name, constant(&item.ident, &item.ty, &item.expr));
+                }
+                _ => {}
+            }
+        }
+        self.implementations.push(Rc::new(implementation));
+    }
+
+    fn defaults(&mut self, item: &syn::ItemTrait, scope: &Rc<Scope>) {
+        let mut implementation = Implementation {
+            generics: item.generics.clone(),
+            self_type: None,
+            of: Some(item.ident.clone().into()),
+            functions: HashMap::new(),
+            constants: HashMap::new(),
+            scope: scope.clone(),
+        };
+        for entry in &item.items {
+            match entry {
+                syn::TraitItem::Fn(function) => {
+                    let Some(block) = &function.default else { continue };
+                    let name = self.symbol(&function.sig.ident);
+                    let function = syn::ItemFn {
+                        attrs: Vec::new(),
+                        vis: syn::Visibility::Inherited,
+                        modifiers: function.modifiers.clone(),
+                        sig: function.sig.clone(),
+                        block: Box::new(block.clone()),
+                    };
+                    implementation.functions.insert(name, Rc::new(function));
+                }
+                syn::TraitItem::Const(item) => {
+                    let Some((_, expression)) = &item.default else { continue };
+                    let name = self.symbol(&item.ident);
+                    implementation.constants.insert(name, constant(&item.ident, &item.ty, expression));
+                }
+                _ => {}
+            }
+        }
+        self.implementations.push(Rc::new(implementation));
+    }
+
+    /// The value of a constant; its expression sees what the constant sees.
+    pub fn constant_value(&mut self, constant: &Constant, scope: &Rc<Scope>) -> Result<Value> {
+        let state = constant.state.borrow().clone();
+        match state {
+            State::Done(value) => return Ok(value),
+            State::Begun => {
+                return Err(error(&constant.name, "this constant is defined in terms of itself"));
+            }
+            State::Written => {}
+        }
+        *constant.state.borrow_mut() = State::Begun;
+        let value = self.constant_expression(&constant.expression, &constant.ty, scope);
+        *constant.state.borrow_mut() = match &value {
+            Ok(value) => State::Done(value.clone()),
+            Err(_) => State::Written,
+        };
+        value
+    }
+
+    /// A constant expression of a type, in a scope.
+    pub fn constant_expression(
+        &mut self,
+        expression: &syn::Expr,
+        ty: &syn::Type,
+        scope: &Rc<Scope>,
+    ) -> Result<Value> {
+        let ty = self.resolve(ty, scope)?;
+        let saved = std::mem::replace(&mut self.scope, scope.clone());
+        let value = self.expression(expression, &ty);
+        self.scope = saved;
+        let value = self.finished(value, expression)?;
+        self.coerce(value, &ty, expression)
+    }
+}
+
+fn constant(name: &syn::Ident, ty: &syn::Type, expression: &syn::Expr) -> Rc<Constant> {
+    Rc::new(Constant {
+        name: name.clone(),
+        ty: ty.clone(),
+        expression: expression.clone(),
+        state: RefCell::new(State::Written),
+    })
+}
+
+fn variant(name: String, fields: &syn::Fields, discriminant: Option<syn::Expr>) -> Variant {
+    let style = match fields {
+        syn::Fields::Named(_) => Style::Named,
+        syn::Fields::Unnamed(_) => Style::Tuple,
+        syn::Fields::Unit => Style::Unit,
+    };
+    let fields = fields.iter().enumerate().map(|(index, field)| {
+        let name = field.ident.as_ref().map_or_else(|| index.to_string(), ToString::to_string);
+        (name, field.ty.clone())
+    });
+    Variant { name, fields: fields.collect(), style, discriminant }
+}

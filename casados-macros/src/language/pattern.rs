@@ -1,0 +1,455 @@
+//! Patterns: what they match, and which variables they declare.
+
+use super::environment::{Names, Scope};
+use super::evaluator::{At, Evaluated, Evaluator, error, unsupported};
+use super::arithmetic::Comparison;
+use super::items::Symbol;
+use super::path::Named;
+use super::place::{Place, Projection};
+use super::types::Type;
+use super::value::{Struct, Value};
+use crate::graph::Node;
+use quote::ToTokens;
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// Whether something holds: known, or at run time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Truth {
+    /// Known while the model is compiled.
+    Known(bool),
+    /// When the condition holds.
+    When(Node),
+}
+
+/// What a pattern is matched against.
+#[derive(Clone, Debug)]
+pub enum Subject {
+    /// A value.
+    Value(Value),
+    /// A place, and whether plain names become references to its parts.
+    Place(Place, bool),
+}
+
+/// Variables that a pattern declares, with their values.
+pub type Bindings = Vec<(Symbol, Value)>;
+
+impl Evaluator {
+    /// Declares variables in a new scope.
+    pub(super) fn declare(&mut self, bindings: Bindings) {
+        if bindings.is_empty() {
+            return;
+        }
+        let variables =
+            bindings.into_iter().map(|(name, value)| (name, Rc::new(RefCell::new(value)))).collect();
+        self.scope = Scope::inside(&self.scope, Names::Variables(variables));
+    }
+
+    /// Matches a pattern that cannot fail.
+    pub(super) fn bind(&mut self, pattern: &syn::Pat, subject: Subject) -> Evaluated<Bindings> {
+        let mut bindings = Vec::new();
+        match self.matches(pattern, subject, &mut bindings)? {
+            Truth::Known(true) => Ok(bindings),
+            Truth::Known(false) => Err(error(pattern, "this pattern does not match the value").into()),
+            Truth::When(_) => Err(unsupported(
+                pattern,
+                "a pattern that matches or not depending on model quantities",
+            )
+            .into()),
+        }
+    }
+
+    /// The value of a subject.
+    pub(super) fn subject_value(&mut self, subject: &Subject, at: At) -> Evaluated {
+        match subject {
+            Subject::Value(value) => Ok(value.clone()),
+            Subject::Place(place, _) => Ok(self.read(place, at)?),
+        }
+    }
+
+    /// Whether a pattern matches, and the variables that it declares.
+    pub(super) fn matches(
+        &mut self,
+        pattern: &syn::Pat,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        self.deeper(pattern, |evaluator| evaluator.matches_within(pattern, subject, bindings))
+    }
+
+    fn matches_within(
+        &mut self,
+        pattern: &syn::Pat,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        // Patterns other than names look through references.
+        let subject = match (pattern, subject) {
+            (syn::Pat::Ident(_) | syn::Pat::Wild(_) | syn::Pat::Reference(_) | syn::Pat::Type(_), subject) => {
+                subject
+            }
+            (_, Subject::Value(Value::Reference(place))) => Subject::Place(self.follow(place, pattern)?, true),
+            (_, Subject::Place(place, by_reference)) => {
+                let target = self.follow(place.clone(), pattern)?;
+                let by_reference = by_reference || !target.same(&place);
+                Subject::Place(target, by_reference)
+            }
+            (_, subject) => subject,
+        };
+        match pattern {
+            syn::Pat::Wild(_) | syn::Pat::Rest(_) => Ok(Truth::Known(true)),
+            syn::Pat::Paren(inner) => self.matches(&inner.pat, subject, bindings),
+            syn::Pat::Ident(inner) => self.match_name(inner, subject, bindings),
+            syn::Pat::Type(inner) => {
+                let scope = self.scope.clone();
+                let ty = self.resolve(&inner.ty, &scope)?;
+                let subject = match subject {
+                    Subject::Value(value) => Subject::Value(self.coerce(value, &ty, pattern)?),
+                    place => place,
+                };
+                self.matches(&inner.pat, subject, bindings)
+            }
+            syn::Pat::Reference(inner) => {
+                let subject = match subject {
+                    Subject::Value(Value::Reference(place)) => Subject::Value(self.read(&place, pattern)?),
+                    Subject::Place(place, _) => {
+                        let value = self.read(&place, pattern)?;
+                        Subject::Value(self.load(value, pattern)?)
+                    }
+                    subject => subject,
+                };
+                self.matches(&inner.pat, subject, bindings)
+            }
+            syn::Pat::Tuple(tuple) => self.match_parts(&tuple.elems, pattern, subject, bindings),
+            syn::Pat::Slice(slice) => self.match_slice(slice, subject, bindings),
+            syn::Pat::Struct(inner) => self.match_struct(inner, subject, bindings),
+            syn::Pat::TupleStruct(inner) => {
+                let path = syn::ExprPath { attrs: Vec::new(), qself: inner.qself.clone(), path: inner.path.clone() };
+                let value = self.subject_value(&subject, pattern)?;
+                if let Value::Option(content) = &value {
+                    return match (path.path.segments.last(), content) {
+                        (Some(name), Some(_)) if name.ident == "Some" => {
+                            let inside = self.subject_part(&subject, Projection::Some, pattern)?;
+                            match inner.elems.first() {
+                                Some(pattern) => self.matches(pattern, inside, bindings),
+                                None => Ok(Truth::Known(true)),
+                            }
+                        }
+                        _ => Ok(Truth::Known(false)),
+                    };
+                }
+                match (self.named(&path)?, &value) {
+                    (Named::Value(Value::Constructor(_, variant)), Value::Struct(structure)) => {
+                        if structure.variant != variant {
+                            return Ok(Truth::Known(false));
+                        }
+                        self.match_parts(&inner.elems, pattern, subject, bindings)
+                    }
+                    _ => {
+                        Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into())
+                    }
+                }
+            }
+            syn::Pat::Path(path) => {
+                let value = self.subject_value(&subject, pattern)?;
+                let constant = self.path_value(path)?;
+                self.match_constant(&value, &constant, pattern)
+            }
+            syn::Pat::Lit(literal) => {
+                let value = self.subject_value(&subject, pattern)?;
+                let constant = self.literal(literal, &Type::Unknown)?;
+                self.match_constant(&value, &constant, pattern)
+            }
+            syn::Pat::Const(block) => {
+                let value = self.subject_value(&subject, pattern)?;
+                let constant = self.block(&block.block, &Type::Unknown)?;
+                self.match_constant(&value, &constant, pattern)
+            }
+            syn::Pat::Range(range) => {
+                let value = self.subject_value(&subject, pattern)?;
+                let mut truth = Truth::Known(true);
+                if let Some(start) = &range.start {
+                    let start = self.expression(start, &Type::Unknown)?;
+                    let above = self.compare(Comparison::Le, &start, &value, pattern)?;
+                    truth = self.both(truth, &above, pattern)?;
+                }
+                if let Some(end) = &range.end {
+                    let end = self.expression(end, &Type::Unknown)?;
+                    let comparison = match range.limits {
+                        syn::RangeLimits::HalfOpen(_) => Comparison::Lt,
+                        syn::RangeLimits::Closed(_) => Comparison::Le,
+                    };
+                    let below = self.compare(comparison, &value, &end, pattern)?;
+                    truth = self.both(truth, &below, pattern)?;
+                }
+                Ok(truth)
+            }
+            syn::Pat::Or(or) => {
+                let mut some: Option<Node> = None;
+                for case in &or.cases {
+                    let mut inner = Vec::new();
+                    match self.matches(case, subject.clone(), &mut inner)? {
+                        Truth::Known(false) => {}
+                        Truth::Known(true) if some.is_none() => {
+                            bindings.extend(inner);
+                            return Ok(Truth::Known(true));
+                        }
+                        _ if !inner.is_empty() => {
+                            return Err(unsupported(
+                                case,
+                                "a variable in one of several patterns that depend on model quantities",
+                            )
+                            .into());
+                        }
+                        Truth::Known(true) => return Ok(Truth::Known(true)),
+                        Truth::When(condition) => {
+                            some = Some(match some {
+                                Some(before) => self.graph.or(before, condition),
+                                None => condition,
+                            });
+                        }
+                    }
+                }
+                Ok(some.map_or(Truth::Known(false), Truth::When))
+            }
+            syn::Pat::Guard(guard) => {
+                let truth = self.matches(&guard.pat, subject, bindings)?;
+                if truth == Truth::Known(false) {
+                    return Ok(truth);
+                }
+                let saved = self.scope.clone();
+                self.declare(bindings.clone());
+                let value = self.expression(&guard.guard, &Type::Bool);
+                self.scope = saved;
+                let value = self.load(value?, pattern)?;
+                self.both(truth, &value, pattern)
+            }
+            _ => Err(unsupported(pattern, "this pattern").into()),
+        }
+    }
+
+    fn match_constant(&mut self, value: &Value, constant: &Value, at: At) -> Evaluated<Truth> {
+        let equal = self.compare(Comparison::Eq, value, constant, at)?;
+        self.truth(&equal, at)
+    }
+
+    /// Whether a `bool` holds.
+    pub(super) fn truth(&mut self, value: &Value, at: At) -> Evaluated<Truth> {
+        match self.load(value.clone(), at)? {
+            Value::Bool(value) => Ok(Truth::Known(value)),
+            Value::Condition(node) => Ok(Truth::When(node)),
+            Value::Opaque(_) => Err(super::evaluator::opaque(at, "a `bool`").into()),
+            other => Err(error(at, format!("expected a `bool`, found {}", other.kind())).into()),
+        }
+    }
+
+    fn both(&mut self, truth: Truth, value: &Value, at: At) -> Evaluated<Truth> {
+        Ok(match (truth, self.truth(value, at)?) {
+            (Truth::Known(false), _) | (_, Truth::Known(false)) => Truth::Known(false),
+            (Truth::Known(true), other) | (other, Truth::Known(true)) => other,
+            (Truth::When(a), Truth::When(b)) => Truth::When(self.graph.and(a, b)),
+        })
+    }
+
+    fn all(&mut self, truths: Vec<Truth>) -> Truth {
+        let mut result = Truth::Known(true);
+        for truth in truths {
+            result = match (result, truth) {
+                (Truth::Known(false), _) | (_, Truth::Known(false)) => return Truth::Known(false),
+                (Truth::Known(true), other) | (other, Truth::Known(true)) => other,
+                (Truth::When(a), Truth::When(b)) => Truth::When(self.graph.and(a, b)),
+            };
+        }
+        result
+    }
+
+    fn match_name(
+        &mut self,
+        pattern: &syn::PatIdent,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        let name = self.symbol(&pattern.ident);
+        if pattern.by_ref.is_none() && pattern.mutability.is_none() && pattern.subpat.is_none() {
+            // A constant or a unit struct of that name makes this a comparison.
+            let constant = self.pattern_constant(&pattern.ident)?;
+            if let Some(constant) = constant {
+                let value = self.subject_value(&subject, pattern)?;
+                return self.match_constant(&value, &constant, pattern);
+            }
+        }
+        let truth = match &pattern.subpat {
+            Some((_, inner)) => self.matches(inner, subject.clone(), bindings)?,
+            None => Truth::Known(true),
+        };
+        let by_ref_mut = pattern.by_ref.is_some() && pattern.mutability.is_some();
+        let value = match subject {
+            Subject::Value(value) if by_ref_mut => Value::Reference(Place::new(value)),
+            Subject::Value(value) => value,
+            Subject::Place(place, by_reference) => {
+                if by_ref_mut || by_reference && pattern.by_ref.is_none() {
+                    Value::Reference(place)
+                } else {
+                    self.read(&place, pattern)?
+                }
+            }
+        };
+        bindings.push((name, value));
+        Ok(truth)
+    }
+
+    /// The constant, unit struct or variant that a plain name in a pattern refers to.
+    fn pattern_constant(&mut self, ident: &syn::Ident) -> Evaluated<Option<Value>> {
+        if ident == "None" {
+            return Ok(Some(Value::Option(None)));
+        }
+        let name = self.symbol(ident);
+        if self.scope.variable(name).is_some() {
+            return Ok(None);
+        }
+        let path = syn::ExprPath { attrs: Vec::new(), qself: None, path: ident.clone().into() };
+        Ok(match self.named(&path)? {
+            Named::Value(Value::Function(_) | Value::Constructor(..)) => None,
+            Named::Value(value) => Some(value),
+            _ => None,
+        })
+    }
+
+    fn subject_part(&mut self, subject: &Subject, projection: Projection, at: At) -> Evaluated<Subject> {
+        Ok(match subject {
+            Subject::Value(Value::Option(Some(value))) if projection == Projection::Some => {
+                Subject::Value((**value).clone())
+            }
+            Subject::Value(value) => Subject::Value(self.part(value, projection, at)?),
+            Subject::Place(place, by_reference) => {
+                Subject::Place(self.project(place, projection, at)?, *by_reference)
+            }
+        })
+    }
+
+    /// Tuples and tuple structs.
+    fn match_parts(
+        &mut self,
+        patterns: &syn::punctuated::Punctuated<syn::Pat, syn::Token![,]>,
+        at: At,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        let length = match self.subject_value(&subject, at)? {
+            Value::Tuple(parts) => parts.len(),
+            Value::Struct(structure) => structure.fields.len(),
+            other => {
+                return Err(error(at, format!("this pattern does not match {}", other.kind())).into());
+            }
+        };
+        let rest = patterns.iter().position(|pattern| matches!(pattern, syn::Pat::Rest(_)));
+        let count = patterns.len() - usize::from(rest.is_some());
+        if count > length || rest.is_none() && count != length {
+            return Err(error(at, format!("this pattern has {count} parts, but the value has {length}")).into());
+        }
+        let mut truths = Vec::new();
+        for (index, pattern) in patterns.iter().enumerate() {
+            let index = match rest {
+                Some(rest) if index == rest => continue,
+                Some(rest) if index > rest => length - (patterns.len() - index),
+                _ => index,
+            };
+            let part = self.subject_part(&subject, Projection::Field(index), at)?;
+            truths.push(self.matches(pattern, part, bindings)?);
+        }
+        Ok(self.all(truths))
+    }
+
+    fn match_slice(
+        &mut self,
+        slice: &syn::PatSlice,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        let subject = match subject {
+            Subject::Value(value @ Value::Opaque(_)) => {
+                // `let [a, b] = CONSTANT;` tells the length.
+                let ty = Type::Array(Rc::new(Type::Real), Some(slice.elems.len()));
+                Subject::Value(self.coerce(value, &ty, slice)?)
+            }
+            subject => subject,
+        };
+        let length = match self.subject_value(&subject, slice)? {
+            Value::Array(elements) => elements.len(),
+            other => {
+                return Err(error(slice, format!("this pattern does not match {}", other.kind())).into());
+            }
+        };
+        let rest = slice.elems.iter().position(is_rest);
+        let count = slice.elems.len() - usize::from(rest.is_some());
+        if count > length || rest.is_none() && count != length {
+            return Ok(Truth::Known(false));
+        }
+        let mut truths = Vec::new();
+        for (index, pattern) in slice.elems.iter().enumerate() {
+            let part = match rest {
+                Some(rest) if index == rest => {
+                    if matches!(pattern, syn::Pat::Rest(_)) {
+                        continue;
+                    }
+                    let end = length - (slice.elems.len() - 1 - index);
+                    let part = self.subject_part(&subject, Projection::Slice(index, end), slice)?;
+                    let syn::Pat::Ident(name) = pattern else { continue };
+                    let plain = syn::Pat::Ident(syn::PatIdent { subpat: None, ..name.clone() });
+                    truths.push(self.matches(&plain, part, bindings)?);
+                    continue;
+                }
+                Some(rest) if index > rest => length - (slice.elems.len() - index),
+                _ => index,
+            };
+            let part = self.subject_part(&subject, Projection::Index(part), slice)?;
+            truths.push(self.matches(pattern, part, bindings)?);
+        }
+        Ok(self.all(truths))
+    }
+
+    fn match_struct(
+        &mut self,
+        pattern: &syn::PatStruct,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        let value = self.subject_value(&subject, pattern)?;
+        let Value::Struct(structure) = &value else {
+            return Err(error(pattern, format!("this pattern does not match {}", value.kind())).into());
+        };
+        if !is_variant(structure, &pattern.path) {
+            return Ok(Truth::Known(false));
+        }
+        let fields = &structure.definition.variants[structure.variant].fields;
+        let mut truths = Vec::new();
+        for field in &pattern.fields {
+            let name = field.member.to_token_stream().to_string();
+            let Some(index) = fields.iter().position(|(field, _)| *field == name) else {
+                return Err(error(field, format!("`{}` has no field `{name}`", structure.definition.name)).into());
+            };
+            let part = self.subject_part(&subject, Projection::Field(index), pattern)?;
+            truths.push(self.matches(&field.pat, part, bindings)?);
+        }
+        Ok(self.all(truths))
+    }
+}
+
+/// Whether a value of an enum is the variant that the path names; structs always are.
+fn is_variant(structure: &Struct, path: &syn::Path) -> bool {
+    !structure.definition.is_enum
+        || path
+            .segments
+            .last()
+            .is_some_and(|last| last.ident == structure.definition.variants[structure.variant].name)
+}
+
+fn is_rest(pattern: &syn::Pat) -> bool {
+    match pattern {
+        syn::Pat::Rest(_) => true,
+        syn::Pat::Ident(name) => {
+            name.subpat.as_ref().is_some_and(|(_, inner)| matches!(**inner, syn::Pat::Rest(_)))
+        }
+        _ => false,
+    }
+}
