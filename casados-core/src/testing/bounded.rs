@@ -16,13 +16,16 @@ const FUNCTION: f64 = 2.0 * U;
 
 /// A number and a bound of its rounding error.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-pub(super) struct Bounded {
+pub struct Bounded {
+    /// The number, as `f64` computes it.
     pub value: f64,
+    /// A bound of its rounding error, to first order.
     pub error: f64,
 }
 
 impl Bounded {
     /// A number that is exact.
+    #[must_use]
     pub const fn exact(value: f64) -> Self {
         Self { value, error: 0.0 }
     }

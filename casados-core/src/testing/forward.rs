@@ -7,8 +7,10 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number and its derivative in one direction.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Forward<S> {
+pub struct Forward<S> {
+    /// The number.
     pub re: S,
+    /// Its derivative.
     pub d: S,
 }
 

@@ -6,6 +6,9 @@
 //!   and against differences of its solution; [`check_exact`]: against a closed form.
 //! - [`convergence`]: an integrator against an exact solution, with the order that it reaches.
 //!
+//! - [`Bounded`] and [`Forward`]: scalars that carry a bound of their rounding error, or a derivative, through any code
+//!   that is generic over [`Scalar`](crate::Scalar).
+//!
 //! Every check returns a report that prints as a table and whose `assert` panics with it. Tolerances are not chosen:
 //! they are bounds of the rounding errors at the point in question, or estimates of truncation.
 
@@ -20,8 +23,10 @@ mod points;
 mod report;
 mod sensitivities;
 
+pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};
+pub use forward::Forward;
 pub use integrator::Integrator;
 pub use points::{Points, Random};
 pub use report::{Deviation, Report, Row};
