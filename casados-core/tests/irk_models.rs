@@ -137,7 +137,7 @@ fn memory_inside_the_integrator_gives_the_same_bits() {
 
     let error = InlineIrk::<mode::Nominal, 1>::inline(options).err();
     assert!(matches!(error, Some(Error::InvalidOption { option: "steps", .. })));
-    assert!(InlineIrk::<mode::Nominal, 1>::SIZE < InlineIrk::<mode::Forward, 1>::SIZE);
+    const { assert!(InlineIrk::<mode::Nominal, 1>::SIZE < InlineIrk::<mode::Forward, 1>::SIZE) };
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! Jᵀ μ = h (b ⊗ λ_{n+1}, 0)        λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i        λ_w −= Σ_i f_w,iᵀ μ_i
 //! ```
 
+use super::evaluate::entries;
 use super::record::{Coefficients, Linearization, Work, copy};
 use super::step::check;
 use crate::error::Error;
@@ -39,7 +40,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
 
     /// `λ_n` from `λ_{n+1}`.
     pub(crate) fn step(&mut self, linear: &Linearization<M, T, S>, coefficients: &Coefficients<T, S>, h: T) {
-        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::Shape::NX);
+        let (blocks, nx) = (M::STRUCTURE.blocks, M::Shape::NX);
         let shift = nx + M::Shape::NZ;
         let Self { lambda, gradient, mu } = self;
         mu.as_mut().fill([[T::ZERO; C]; S]);
@@ -50,14 +51,11 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
         }
         linear.factors.solve_transposed(mu);
         for (stage, jacobian) in linear.jacobian.iter().enumerate() {
-            let entries = jacobian.as_ref();
-            for e in blocks[1]..blocks[2] {
-                let (r, c) = pattern.at(e);
-                axpy(-entries[e], &mu[r][stage], &mut lambda[c - nx]);
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
+                axpy(-value, &mu[r][stage], &mut lambda[c - nx]);
             }
-            for e in blocks[3]..blocks[5] {
-                let (r, c) = pattern.at(e);
-                axpy(-entries[e], &mu[r][stage], &mut gradient[c - shift]);
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[3], blocks[5]) {
+                axpy(-value, &mu[r][stage], &mut gradient[c - shift]);
             }
         }
     }

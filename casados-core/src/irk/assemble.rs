@@ -1,5 +1,6 @@
 //! The Newton matrix: `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`, and its factors.
 
+use super::evaluate::entries;
 use super::record::{Coefficients, Linearization};
 use crate::error::{Error, Place};
 use crate::model::Dae;
@@ -19,21 +20,17 @@ impl<M: Dae, T: Real, const S: usize> Linearization<M, T, S> {
         iteration: usize,
     ) -> Result<(), Error> {
         let Self { jacobian, factors } = self;
-        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::Shape::NX);
+        let (blocks, nx) = (M::STRUCTURE.blocks, M::Shape::NX);
         factors.clear();
         for (stage, jacobian) in jacobian.iter().enumerate() {
-            let entries = jacobian.as_ref();
-            for e in blocks[0]..blocks[1] {
-                let (r, c) = pattern.at(e);
-                factors.add(r, c, stage, entries[e]);
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[0], blocks[1]) {
+                factors.add(r, c, stage, value);
             }
-            for e in blocks[1]..blocks[2] {
-                let (r, c) = pattern.at(e);
-                factors.add_row(r, c - nx, stage, h * entries[e], &coefficients.a[stage]);
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
+                factors.add_row(r, c - nx, stage, h * value, &coefficients.a[stage]);
             }
-            for e in blocks[2]..blocks[3] {
-                let (r, c) = pattern.at(e);
-                factors.add(r, c - nx, stage, entries[e]);
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[2], blocks[3]) {
+                factors.add(r, c - nx, stage, value);
             }
         }
         factors.factor().map_err(|(unknown, stage)| Error::Singular {

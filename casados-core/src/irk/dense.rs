@@ -39,7 +39,7 @@ impl<T: Real, const S: usize> Point<T, S> {
         if !tableau.is_collocation() {
             return Err(Error::NoInterpolation);
         }
-        let (start, end) = (inputs.t, inputs.t + inputs.interval);
+        let (start, end) = (inputs.time.start, inputs.time.start + inputs.time.interval);
         let inside = if start <= end { start <= t && t <= end } else { end <= t && t <= start };
         if !inside {
             return Err(Error::OutsideInterval { t: t.to_f64(), start: start.to_f64(), end: end.to_f64() });
@@ -49,7 +49,7 @@ impl<T: Real, const S: usize> Point<T, S> {
         } else if t == end {
             steps as f64
         } else {
-            (t - start).to_f64() / inputs.h.to_f64()
+            (t - start).to_f64() / inputs.time.step.to_f64()
         };
         // A cast saturates, so that no position is beyond the last step.
         let step = (position as usize).min(steps - 1);

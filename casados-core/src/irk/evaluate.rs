@@ -27,7 +27,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         x: &ArrayX<M, T>,
         y: &ArrayK<M, [T; S]>,
     ) {
-        let (nx, h) = (M::Shape::NX, self.inputs.h);
+        let (nx, h) = (M::Shape::NX, self.inputs.time.step);
         let start = T::from_f64(step as f64);
         for (i, point) in self.points.iter_mut().enumerate() {
             let (a, point) = (&coefficients.a[i], point.as_mut());
@@ -39,7 +39,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 *z = y[i];
             }
             if let Some(t) = point.last_mut() {
-                *t = self.inputs.t + h * (start + coefficients.c[i]);
+                *t = self.inputs.time.start + h * (start + coefficients.c[i]);
             }
         }
     }
@@ -104,13 +104,27 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 let [f] = residual[stage];
                 // A residual of zero is zero even where all terms are.
                 let relative = if f == T::ZERO { T::ZERO } else { f.abs() / *magnitude };
-                if !(relative <= largest.0) {
+                if relative > largest.0 || !relative.is_finite() {
                     largest = (relative, r, stage);
                 }
             }
         }
         largest
     }
+}
+
+/// The entries from `begin` to `end` of a Jacobian: row, column, value.
+#[inline(always)]
+pub(crate) fn entries<M: Dae, T: Real>(
+    jacobian: &M::Jacobian<T>,
+    begin: usize,
+    end: usize,
+) -> impl Iterator<Item = (usize, usize, T)> {
+    let Pattern { rows, columns } = M::STRUCTURE.jacobian;
+    let places = rows[begin..end].iter().zip(&columns[begin..end]);
+    places
+        .zip(&jacobian.as_ref()[begin..end])
+        .map(|((row, column), value)| (*row as usize, *column as usize, *value))
 }
 
 /// `Σ_j a_j b_j`

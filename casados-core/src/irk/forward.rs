@@ -6,6 +6,7 @@
 //!
 //! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
 
+use super::evaluate::entries;
 use super::record::{Coefficients, Work, copy};
 use super::step::check;
 use crate::error::Error;
@@ -72,7 +73,7 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
     where
         R: Array<T>,
     {
-        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::Shape::NX);
+        let (blocks, nx) = (M::STRUCTURE.blocks, M::Shape::NX);
         // Of the first variable that is a direction, `u_0`: columns of the Jacobian minus this are `w`.
         let shift = nx + M::Shape::NZ;
         let Self { v, dy } = self;
@@ -80,14 +81,11 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
             row.as_mut().fill(T::ZERO);
         }
         for (stage, jacobian) in work.linear.jacobian.iter().enumerate() {
-            let entries = jacobian.as_ref();
-            for e in blocks[1]..blocks[2] {
-                let (r, c) = pattern.at(e);
-                axpy(-entries[e], v[c - nx].as_ref(), dy[r][stage].as_mut());
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
+                axpy(-value, v[c - nx].as_ref(), dy[r][stage].as_mut());
             }
-            for e in blocks[3]..blocks[5] {
-                let (r, c) = pattern.at(e);
-                directions.add(c - shift, -entries[e], &mut dy[r][stage]);
+            for (r, c, value) in entries::<M, T>(jacobian, blocks[3], blocks[5]) {
+                directions.add(c - shift, -value, &mut dy[r][stage]);
             }
         }
         work.linear.factors.solve(dy);
@@ -151,7 +149,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         if n == 0 {
             self.sweep.start(&Identity);
         } else {
-            self.sweep.advance(coefficients, work.inputs.h);
+            self.sweep.advance(coefficients, work.inputs.time.step);
         }
         self.sweep.stages(work, &Identity);
         let Self { result, sweep, row, .. } = self;
@@ -168,7 +166,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
                 split(row.as_ref(), state, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
             }
             for state in 0..M::Shape::NX {
-                sweep.differential(state, work.inputs.h, &coefficients.b, row);
+                sweep.differential(state, work.inputs.time.step, &coefficients.b, row);
                 split(row.as_ref(), state, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
             }
         }
@@ -285,7 +283,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         if n == 0 {
             sweep.start(&directions);
         } else {
-            sweep.advance(coefficients, work.inputs.h);
+            sweep.advance(coefficients, work.inputs.time.step);
         }
         sweep.stages(work, &directions);
         let mut row = [T::ZERO; C];
@@ -301,7 +299,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         }
         if n + 1 == count {
             for state in 0..M::Shape::NX {
-                sweep.differential(state, work.inputs.h, &coefficients.b, &mut row);
+                sweep.differential(state, work.inputs.time.step, &coefficients.b, &mut row);
                 copy_row(&mut row.iter(), state, &mut result.dx);
             }
         }

@@ -73,7 +73,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
             row.as_mut().fill(T::ZERO);
         }
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            self.backward.step(&record.linear, coefficients, work.inputs.h);
+            self.backward.step(&record.linear, coefficients, work.inputs.time.step);
             work.place(coefficients, n, &step.x, &step.y);
             for stage in 0..S {
                 for (to, mu) in self.mu.as_mut().iter_mut().zip(self.backward.mu.as_ref()) {
@@ -88,7 +88,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                         at: Place { step: n, stage, iteration: 0 },
                     });
                 }
-                self.place_directions(&record.sweep, coefficients, work.inputs.h, stage);
+                self.place_directions(&record.sweep, coefficients, work.inputs.time.step, stage);
                 self.subtract();
             }
         }

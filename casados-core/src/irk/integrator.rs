@@ -185,7 +185,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let last = self.run.last()?;
         let work = last.work;
         let point = Point::new(t, &work.kept, last.steps.len(), &last.coefficients.tableau)?;
-        let h = work.kept.h;
+        let h = work.kept.time.step;
         if let Some(step) = last.steps.get(point.step) {
             point.evaluate(step, h, &mut work.dense)?;
         }
@@ -270,7 +270,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: WithForward> Integrator<M, B, S, T, 
             forward.step(parts.work, parts.coefficients, n, usize::MAX);
         }
         self.sweep = Some(point.step);
-        let h = parts.work.kept.h;
+        let h = parts.work.kept.time.step;
         if let Some(step) = parts.steps.get(point.step) {
             point.evaluate(step, h, &mut forward.dense.dense)?;
         }
@@ -389,7 +389,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
             }
-            memory.backward.step(&parts.work.linear, parts.coefficients, parts.work.inputs.h);
+            memory.backward.step(&parts.work.linear, parts.coefficients, parts.work.inputs.time.step);
         }
         memory.finish(parts.work)?;
         self.sweep = None;

@@ -80,7 +80,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             }
             if current {
                 statistics.factorizations += 1;
-                self.linear.factor(coefficients, self.inputs.h, step, iteration)?;
+                self.linear.factor(coefficients, self.inputs.time.step, step, iteration)?;
             }
             self.linear.factors.solve(&mut self.residual);
             let increment = self.update(y);
@@ -122,13 +122,13 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             for (y, [delta]) in y.iter_mut().zip(delta) {
                 *y = *y - *delta;
                 size = y.abs().max(size);
-                if !(delta.abs() <= change) {
+                if delta.abs() > change || !delta.is_finite() {
                     change = delta.abs();
                 }
             }
             // No increment is none, also of zero; an unknown that became zero changed by all it was.
             let relative = if change == T::ZERO { T::ZERO } else { change / size.max(change) };
-            if !(relative <= largest.size) {
+            if relative > largest.size || !relative.is_finite() {
                 largest = Increment { size: relative, unknown };
             }
         }

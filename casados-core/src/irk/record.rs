@@ -73,12 +73,18 @@ pub struct Step<M: Dae, T: Plain, const S: usize> {
 pub(crate) struct Inputs<M: Dae, T: Plain> {
     pub u: VectorU<M, T>,
     pub p: VectorP<M, T>,
-    /// Time at the start of the interval.
-    pub t: T,
-    /// Length of the interval.
+    pub time: Times<T>,
+}
+
+/// Where an interval is.
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Times<T> {
+    /// Its start.
+    pub start: T,
+    /// Its length.
     pub interval: T,
-    /// Length of a step.
-    pub h: T,
+    /// The length of one of its steps.
+    pub step: T,
 }
 
 /// The linearisation of the stages of a step.

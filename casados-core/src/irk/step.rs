@@ -49,7 +49,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 }
             }
             let current = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics)?;
-            let h = self.inputs.h;
+            let h = self.inputs.time.step;
             for (x, k) in self.x.as_mut().iter_mut().zip(step.y.as_ref()) {
                 *x = *x + h * dot(&coefficients.b, k);
             }
@@ -90,7 +90,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             self.evaluate_jacobian(n, 0)?;
         }
         statistics.factorizations += 1;
-        self.linear.factor(coefficients, self.inputs.h, n, 0)
+        self.linear.factor(coefficients, self.inputs.time.step, n, 0)
     }
 }
 
