@@ -113,19 +113,26 @@ impl Graph {
                 let product = self.times(c, reciprocal);
                 self.negative(product)
             }
-            (Binary::Powf, true) => {
-                let lower = self.minus(b, one);
-                let power = match self.value(lower) {
-                    Some(n) if n == n.trunc() && n.abs() <= 64.0 => self.powi(a, n as i32),
-                    _ => self.binary(Binary::Powf, a, lower),
-                };
-                self.times(b, power)
-            }
+            (Binary::Powf, true) => match self.value(b) {
+                Some(n) if is_small_integer(n) => {
+                    let power = self.powi(a, n as i32 - 1);
+                    self.times(b, power)
+                }
+                Some(n) => {
+                    let ratio = self.power_ratio(n, a, c);
+                    self.zero_at_zero(n > 1.0, a, ratio)
+                }
+                None => {
+                    let lower = self.minus(b, one);
+                    let power = self.binary(Binary::Powf, a, lower);
+                    self.times(b, power)
+                }
+            },
             // At a = 0 the function does not depend on b, but the logarithm is infinite.
             (Binary::Powf, false) => {
-                let (zero, ln) = (self.constant(0.0), self.unary(Unary::Ln, a));
-                let (product, at_zero) = (self.times(c, ln), self.compare(super::Compare::Eq, a, zero));
-                self.select(at_zero, zero, product)
+                let ln = self.unary(Unary::Ln, a);
+                let product = self.times(c, ln);
+                self.zero_at_zero(true, a, product)
             }
             (Binary::Atan2, _) => {
                 let (aa, bb) = (self.times(a, a), self.times(b, b));
@@ -136,6 +143,23 @@ impl Graph {
             (Binary::Hypot, true) => self.over(a, c),
             (Binary::Hypot, false) => self.over(b, c),
         }
+    }
+
+    /// `n aⁿ⁻¹` as `n c / a` with `c = aⁿ`: a division instead of another power, which costs ten times as
+    /// much. Not a number at `a = 0`, where the limit is zero or infinite.
+    fn power_ratio(&mut self, n: f64, a: Node, c: Node) -> Node {
+        let (n, ratio) = (self.constant(n), self.over(c, a));
+        self.times(n, ratio)
+    }
+
+    /// Zero at `a = 0`, if that is the limit.
+    fn zero_at_zero(&mut self, zero_is_limit: bool, a: Node, value: Node) -> Node {
+        if !zero_is_limit {
+            return value;
+        }
+        let zero = self.constant(0.0);
+        let at_zero = self.compare(super::Compare::Eq, a, zero);
+        self.select(at_zero, zero, value)
     }
 
     /// The operands of a node that satisfy a predicate, with the partial derivatives.
@@ -224,8 +248,25 @@ impl Graph {
                 let product = self.times(first, partial);
                 vec![(a, a, self.negative(product))]
             }
-            op => self.second_by_rules(op, w, active),
+            op => match op {
+                Op::Binary(Binary::Powf, a, b) => match self.value(b) {
+                    Some(n) if active(a) && !is_small_integer(n) => {
+                        vec![(a, a, self.second_of_power(n, a, node, w))]
+                    }
+                    _ => self.second_by_rules(op, w, active),
+                },
+                _ => self.second_by_rules(op, w, active),
+            },
         }
+    }
+
+    /// `w n (n − 1) aⁿ⁻²` of `c = aⁿ`.
+    fn second_of_power(&mut self, n: f64, a: Node, c: Node, w: Node) -> Node {
+        let ratio = self.power_ratio(n, a, c);
+        let (first, n_minus_one) = (self.times(w, ratio), self.constant(n - 1.0));
+        let factor = self.over(n_minus_one, a);
+        let second = self.times(first, factor);
+        self.zero_at_zero(n > 2.0, a, second)
     }
 
     /// The rules applied to the partial derivatives, on a graph of their own in which the operands are
@@ -317,4 +358,9 @@ impl Graph {
         }
         image[node.at()]
     }
+}
+
+/// Exponents that are better served by multiplications.
+fn is_small_integer(n: f64) -> bool {
+    n == n.trunc() && n.abs() <= 64.0
 }

@@ -181,8 +181,10 @@ impl Graph {
             Some(true) => a,
             Some(false) => b,
             None if a == b => a,
-            None => match self.op(condition) {
-                Op::Not(inner) => self.node(Op::Select(inner, b, a)),
+            None => match (self.op(condition), self.op(a), self.op(b)) {
+                (Op::Not(inner), ..) => self.select(inner, b, a),
+                (_, Op::Select(same, x, _), _) if same == condition => self.select(condition, x, b),
+                (_, _, Op::Select(same, _, y)) if same == condition => self.select(condition, a, y),
                 _ => self.node(Op::Select(condition, a, b)),
             },
         }

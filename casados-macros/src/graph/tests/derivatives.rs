@@ -103,7 +103,7 @@ fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Po
     assert_close(&[exact], &[product], ROUNDING * size(reference.iter().flatten()), "gradient");
 
     // The Hessian is the Jacobian of the gradient.
-    let rows = jacobian_in_order(&mut g, &gradient_nodes, variables, Order::Reverse, usize::MAX).unwrap().0;
+    let rows = jacobian_in_order(&mut g, &gradient_nodes, variables, Order::Markowitz, usize::MAX).unwrap().0;
     let rows = dense(&rows, &values(&g, &rows, point), n, n);
     let check = |g: &Graph, entries: &[Entry]| {
         let mut matrix = dense(entries, &values(g, entries, point), n, n);

@@ -225,7 +225,7 @@ fn powers() {
             check_differences(&format!("powi {n}"), &derivatives, a, 0.0, 1.0 / 512.0);
         }
     }
-    for exponent in [-1.5, -1.0, 0.15, 0.5, 1.0, 2.0, 3.0, 4.2561] {
+    for exponent in [-1.5, -1.0, 0.15, 0.5, 1.0, 1.5, 2.0, 3.0, 4.2561, 12.5] {
         for a in [0.6, 1.0, 2.0] {
             let derivatives = Function::new(|a, _| a.powf(exponent).1);
             check_differences(&format!("powf {exponent}"), &derivatives, a, 0.0, 1.0 / 512.0);
@@ -233,10 +233,14 @@ fn powers() {
     }
     // Finite derivatives at zero stay finite.
     assert_eq!(Function::new(|a, _| a.powf(2.5).1).at(0.0, 0.0), [0.0; 6]);
+    assert_eq!(Function::new(|a, _| a.powf(1.5).1).at(0.0, 0.0)[..2], [0.0; 2]);
     assert_eq!(Function::new(|a, _| a.powi(3).1).at(0.0, 0.0), [0.0; 6]);
     assert_eq!(Function::new(|a, _| a.powf(2.0).1).at(0.0, 0.0)[3], 2.0);
     let power = Function::new(|a, b| a.binary(Binary::Powf, b).1).at(0.0, 3.0);
     assert_eq!(power, [0.0; 6]);
+    // Where the derivative is infinite it is not finite.
+    assert!(!Function::new(|a, _| a.powf(0.5).1).at(0.0, 0.0)[1].is_finite());
+    assert!(!Function::new(|a, _| a.powf(1.5).1).at(0.0, 0.0)[3].is_finite());
     assert_eq!(Function::new(|a, _| a.powi(i32::MIN).1).at(1.0, 0.0)[1], f64::from(i32::MIN));
 }
 

@@ -133,7 +133,10 @@ fn conditions_are_folded() {
     assert_eq!(g.select(open, a, a), a);
     let not = g.not(open);
     assert_eq!(g.not(not), open);
-    assert_eq!(g.select(not, a, b), g.select(open, b, a));
+    let select = g.select(open, b, a);
+    assert_eq!(g.select(not, a, b), select);
+    assert_eq!(g.select(open, select, a), select);
+    assert_eq!(g.select(open, b, select), select);
 }
 
 #[test]
