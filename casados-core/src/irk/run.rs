@@ -136,11 +136,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
         let [first, second] = tapes;
         let (kept, running) = if self.kept == 0 { (first, second) } else { (second, first) };
+        // Both in the first call: later ones do not allocate.
         let steps = W::tape(running, options.steps)?;
+        let kept = W::tape(kept, options.steps)?;
         let from = match options.start {
             Start::Zero => From::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
-            Start::Warm if self.warm => From::Record(W::tape(kept, options.steps)?),
+            Start::Warm if self.warm => From::Record(kept),
             Start::Warm if !self.given => From::Zero,
             Start::Given | Start::Warm => From::Given,
         };
