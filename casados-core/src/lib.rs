@@ -19,6 +19,8 @@ compile_error!(
     "casados needs elementary functions: enable the feature `std`, or `libm` for targets without it"
 );
 
+#[cfg(feature = "num-dual")]
+pub mod dual;
 #[cfg(feature = "alloc")]
 pub mod erk;
 pub mod error;

@@ -1,0 +1,126 @@
+//! Models written over dual numbers: derivatives at run time, by the arithmetic of [`num_dual`].
+//!
+//! Such a model may be any Rust at all: branches on data, tables, other crates. First derivatives are
+//! forward duals, second ones hyper-duals. One evaluation yields the derivatives in the direction of several
+//! variables at once where no equation depends on two of them; see [`Passes`].
+//!
+//! The patterns of a dual model are dense: what it depends on is known only when it has run.
+
+mod passes;
+mod structure;
+mod tracked;
+
+pub use num_dual::{DualNum, DualNumCopy};
+pub use passes::Passes;
+pub use structure::{hessian_pattern, jacobian_pattern};
+pub use tracked::Tracked;
+
+use crate::model::{ArrayK, ArrayV, Dae};
+use crate::scalar::Lanes;
+use crate::shape::Shape;
+use num_dual::{Dual64, HyperDual64};
+use std::sync::OnceLock;
+use structure::{hessian_entry, jacobian_entry};
+
+/// A model over dual numbers: written by `#[dae]` and `#[ode]` on a function that is generic over `DualNum`.
+pub trait DualModel: Dae {
+    /// Evaluates the residual: reads variables by their index in `(ẋ, x, z, u, p, t)` and hands over the equations.
+    fn evaluate<T>(variable: impl Fn(usize) -> T, equation: impl FnMut(usize, T))
+    where
+        T: DualNum<Primitive = f64> + DualNumCopy;
+
+    /// Where the passes of this model are kept once they are known.
+    fn passes() -> &'static OnceLock<Passes>;
+}
+
+/// The passes of a model, found when it is first differentiated. Which point it is differentiated at does not matter:
+/// a model that looks at its variables gets dense passes.
+fn passes<M: DualModel>(point: impl Fn(usize) -> f64) -> &'static Passes {
+    M::passes().get_or_init(|| {
+        Passes::find(M::Shape::NV, M::Shape::NK, point, |variable, equation| {
+            M::evaluate::<Tracked>(variable, equation);
+        })
+    })
+}
+
+/// `f(v)`
+pub fn residual<M: DualModel, S: Lanes>(v: &ArrayV<M, S>, f: &mut ArrayK<M, S>) {
+    for lane in 0..S::LANES {
+        M::evaluate::<f64>(|i| v[i].lane(lane), |row, value| f[row].set_lane(lane, value));
+    }
+}
+
+/// `f(v)` and its Jacobian.
+pub fn residual_jacobian<M: DualModel, S: Lanes>(
+    v: &ArrayV<M, S>,
+    f: &mut ArrayK<M, S>,
+    jacobian: &mut M::Jacobian<S>,
+) {
+    residual::<M, S>(v, f);
+    for entry in jacobian.as_mut() {
+        *entry = S::from_f64(0.0);
+    }
+    for lane in 0..S::LANES {
+        first_order::<M>(
+            |i| v[i].lane(lane),
+            |row, column, value| {
+                jacobian[jacobian_entry::<M::Shape>(row, column)].set_lane(lane, value);
+            },
+        );
+    }
+}
+
+/// `∇(μᵀ f)`
+pub fn adjoint<M: DualModel, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, gradient: &mut ArrayV<M, S>) {
+    for element in gradient.as_mut() {
+        *element = S::from_f64(0.0);
+    }
+    for lane in 0..S::LANES {
+        first_order::<M>(
+            |i| v[i].lane(lane),
+            |row, column, value| {
+                let sum = gradient[column].lane(lane) + mu[row].lane(lane) * value;
+                gradient[column].set_lane(lane, sum);
+            },
+        );
+    }
+}
+
+/// The lower triangle of `∇²(μᵀ f)`.
+pub fn hessian<M: DualModel, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, hessian: &mut M::Hessian<S>) {
+    for entry in hessian.as_mut() {
+        *entry = S::from_f64(0.0);
+    }
+    for lane in 0..S::LANES {
+        let passes = passes::<M>(|i| v[i].lane(lane));
+        for &(first, second) in passes.pairs() {
+            M::evaluate::<HyperDual64>(
+                |i| {
+                    let seed = |colour| f64::from(passes.contains(colour, i));
+                    HyperDual64::new(v[i].lane(lane), seed(first), seed(second), 0.0)
+                },
+                |row, value| {
+                    if let (Some(a), Some(b)) = (passes.column(first, row), passes.column(second, row)) {
+                        let entry = &mut hessian[hessian_entry(a, b)];
+                        entry.set_lane(lane, entry.lane(lane) + mu[row].lane(lane) * value.eps1eps2);
+                    }
+                },
+            );
+        }
+    }
+}
+
+/// Every structural non-zero of the Jacobian at one point.
+fn first_order<M: DualModel>(point: impl Fn(usize) -> f64, mut entry: impl FnMut(usize, usize, f64)) {
+    let passes = passes::<M>(&point);
+    for colour in 0..passes.len() {
+        M::evaluate::<Dual64>(
+            |i| Dual64::new(point(i), f64::from(passes.contains(colour, i))),
+            |row, value| {
+                if let Some(column) = passes.column(colour, row) {
+                    entry(row, column, value.eps);
+                }
+            },
+        );
+    }
+}

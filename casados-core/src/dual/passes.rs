@@ -1,0 +1,108 @@
+//! Which variables are differentiated in one evaluation.
+
+use super::tracked::{Tape, Tracked};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A colouring of the variables: no equation depends on two variables of one colour, so one evaluation with all of them
+/// seeded gives each of these derivatives apart. Pairs of colours give second derivatives in the same way.
+///
+/// If the model looks at its variables (a comparison, a value taken out), what it depends on at one point need
+/// not be what it depends on at another. Then every variable has a colour of its own.
+#[derive(Debug)]
+pub struct Passes {
+    /// Colour of each variable; `t` has none.
+    colours: Vec<usize>,
+    /// For each colour and row, the variable of that colour that the row depends on.
+    columns: Vec<Vec<Option<usize>>>,
+    /// Pairs of colours with a second derivative.
+    pairs: Vec<(usize, usize)>,
+}
+
+impl Passes {
+    /// Runs the model on numbers that track what they depend on. `variables` counts `t`.
+    pub(super) fn find(
+        variables: usize,
+        equations: usize,
+        point: impl Fn(usize) -> f64,
+        model: impl FnOnce(&dyn Fn(usize) -> Tracked, &mut dyn FnMut(usize, Tracked)),
+    ) -> Self {
+        let columns = variables - 1;
+        let mut depends = vec![vec![false; columns]; equations];
+        let tape = Tape::record(variables, || {
+            model(&|i| Tracked::variable(point(i), i), &mut |row, value: Tracked| {
+                let depends_on = value.dependencies();
+                if let Some(row) = depends.get_mut(row) {
+                    row.iter_mut().enumerate().for_each(|(i, entry)| *entry = depends_on.contains(i));
+                }
+            });
+        });
+        if tape.looked() {
+            depends.iter_mut().for_each(|row| row.fill(true));
+        }
+        let interacts = |a: usize, b: usize| tape.looked() || tape.interacts(a, b);
+        Self::colour(columns, &depends, interacts)
+    }
+
+    /// Colours greedily: each variable takes the first colour that is free.
+    fn colour(variables: usize, depends: &[Vec<bool>], interacts: impl Fn(usize, usize) -> bool) -> Self {
+        let mut colours = Vec::with_capacity(variables);
+        let mut columns: Vec<Vec<Option<usize>>> = Vec::new();
+        for variable in 0..variables {
+            let free = |taken: &Vec<Option<usize>>| {
+                taken.iter().zip(depends).all(|(taken, row)| taken.is_none() || !row[variable])
+            };
+            let colour = columns.iter().position(free).unwrap_or(columns.len());
+            if colour == columns.len() {
+                columns.push(vec![None; depends.len()]);
+            }
+            if let Some(taken) = columns.get_mut(colour) {
+                for (taken, _) in taken.iter_mut().zip(depends).filter(|(_, row)| row[variable]) {
+                    *taken = Some(variable);
+                }
+            }
+            colours.push(colour);
+        }
+        let mut needed = vec![vec![false; columns.len()]; columns.len()];
+        for a in 0..variables {
+            for b in 0..variables {
+                if interacts(a, b) && depends.iter().any(|row| row[a] && row[b]) {
+                    needed[colours[a].min(colours[b])][colours[a].max(colours[b])] = true;
+                }
+            }
+        }
+        let pairs = (0..columns.len())
+            .flat_map(|a| (a..columns.len()).map(move |b| (a, b)))
+            .filter(|&(a, b)| needed[a][b])
+            .collect();
+        Self { colours, columns, pairs }
+    }
+
+    /// The number of evaluations that give the Jacobian.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Whether there is nothing to differentiate.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// The pairs of colours whose evaluations give the Hessian.
+    #[must_use]
+    pub fn pairs(&self) -> &[(usize, usize)] {
+        &self.pairs
+    }
+
+    /// Whether a variable is of a colour.
+    pub(super) fn contains(&self, colour: usize, variable: usize) -> bool {
+        self.colours.get(variable) == Some(&colour)
+    }
+
+    /// The variable of a colour that an equation depends on.
+    pub(super) fn column(&self, colour: usize, row: usize) -> Option<usize> {
+        *self.columns.get(colour)?.get(row)?
+    }
+}
