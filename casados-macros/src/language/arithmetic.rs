@@ -247,11 +247,8 @@ impl Evaluator {
             }
             (Value::Tuple(x), Value::Tuple(y)) | (Value::Array(x), Value::Array(y)) => {
                 // Lexicographic: the last elements decide if all before are equal.
-                let mut result = if x.len() == y.len() {
-                    Value::Bool(!strict)
-                } else {
-                    Value::Bool(x.len() < y.len())
-                };
+                let mut result =
+                    if x.len() == y.len() { Value::Bool(!strict) } else { Value::Bool(x.len() < y.len()) };
                 for (x, y) in x.iter().zip(y.iter()).rev() {
                     let less = self.compare(Comparison::Lt, x, y, at)?;
                     let equal = self.compare(Comparison::Eq, x, y, at)?;
@@ -349,7 +346,9 @@ pub fn integer_operator(operator: Operator, a: Integer, b: Integer) -> std::resu
         Operator::Add => x.checked_add(y),
         Operator::Sub => x.checked_sub(y),
         Operator::Mul => x.checked_mul(y),
-        Operator::Div | Operator::Rem if y == 0 => return Err(format!("{x} {} 0 has no value", operator.symbol())),
+        Operator::Div | Operator::Rem if y == 0 => {
+            return Err(format!("{x} {} 0 has no value", operator.symbol()));
+        }
         Operator::Div => x.checked_div(y),
         Operator::Rem => x.checked_rem(y),
         Operator::BitXor => Some(x ^ y),

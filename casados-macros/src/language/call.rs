@@ -26,9 +26,7 @@ impl Arguments<'_> {
     fn len(&self) -> usize {
         match self {
             Arguments::Values(values) => values.len(),
-            Arguments::Written(receiver, expressions) => {
-                usize::from(receiver.is_some()) + expressions.len()
-            }
+            Arguments::Written(receiver, expressions) => usize::from(receiver.is_some()) + expressions.len(),
         }
     }
 }
@@ -89,7 +87,9 @@ impl Evaluator {
                     _ => ty,
                 };
                 let types = match &ty {
-                    Type::Struct(definition, arguments) => self.field_types(definition, variant, arguments)?,
+                    Type::Struct(definition, arguments) => {
+                        self.field_types(definition, variant, arguments)?
+                    }
                     _ => Vec::new(),
                 };
                 let mut arguments = Vec::with_capacity(call.args.len());
@@ -221,7 +221,8 @@ impl Evaluator {
             (false, _) => value,
         };
         let scope = implementation.scope.clone();
-        let function = Function { item, scope, turbofish: turbofish.to_vec(), owner: Some((implementation, ty)) };
+        let function =
+            Function { item, scope, turbofish: turbofish.to_vec(), owner: Some((implementation, ty)) };
         Ok(Some((function, first)))
     }
 
@@ -238,7 +239,12 @@ impl Evaluator {
             None => Vec::new(),
         };
         if let Some((function, first)) = self.user_function(&receiver, &name, &turbofish, call)? {
-            return self.call_function(&function, Arguments::Written(Some(first), &call.args), expected, call);
+            return self.call_function(
+                &function,
+                Arguments::Written(Some(first), &call.args),
+                expected,
+                call,
+            );
         }
         // Numbers are copied before the arguments are executed.
         let receiver = match &receiver {
@@ -287,7 +293,9 @@ impl Evaluator {
             if Rc::ptr_eq(&calls.function, item) {
                 return Err(error(
                     at,
-                    format!("`{name}` calls itself, and a graph has no end then: write the recursion as a loop"),
+                    format!(
+                        "`{name}` calls itself, and a graph has no end then: write the recursion as a loop"
+                    ),
                 )
                 .into());
             }
@@ -295,7 +303,9 @@ impl Evaluator {
         }
         if item.sig.inputs.len() != arguments.len() {
             let (expected, found) = (item.sig.inputs.len(), arguments.len());
-            return Err(error(at, format!("`{name}` takes {expected} arguments, but {found} are given")).into());
+            return Err(
+                error(at, format!("`{name}` takes {expected} arguments, but {found} are given")).into()
+            );
         }
         // Generic parameters of the `impl` block and of the function.
         let mut around = function.scope.clone();
@@ -305,7 +315,8 @@ impl Evaluator {
             if let Some(pattern) = &implementation.self_type {
                 self.unify(pattern, owner, &generics);
             }
-            around = Scope::inside(&generics, Names::SelfType(owner.clone()));
+            around =
+                Scope::inside(&generics, Names::SelfType(owner.clone(), implementation.self_type.clone()));
             block_scope = Some(generics);
         }
         let generics = &item.sig.generics;
@@ -341,7 +352,9 @@ impl Evaluator {
                 syn::FnArg::Typed(input) => {
                     let value = match (&*input.ty, value) {
                         (syn::Type::Reference(ty), value) if ty.mutability.is_some() => value,
-                        (syn::Type::Path(_) | syn::Type::ImplTrait(_), value) if matches!(hint, Type::Unknown) => {
+                        (syn::Type::Path(_) | syn::Type::ImplTrait(_), value)
+                            if matches!(hint, Type::Unknown) =>
+                        {
                             value
                         }
                         (_, value) => self.load(value, at)?,
@@ -352,7 +365,11 @@ impl Evaluator {
                         if !self.unify(&input.ty, &ty, &scope) {
                             return Err(error(
                                 at,
-                                format!("argument {} of `{name}` is {}, which does not fit its type", index + 1, value.kind()),
+                                format!(
+                                    "argument {} of `{name}` is {}, which does not fit its type",
+                                    index + 1,
+                                    value.kind()
+                                ),
                             )
                             .into());
                         }
@@ -369,6 +386,10 @@ impl Evaluator {
             };
             values.push(value);
         }
+        self.check_known(generics, &scope, name, at)?;
+        if let (Some((implementation, _)), Some(around)) = (&function.owner, &block_scope) {
+            self.check_known(&implementation.generics, around, name, at)?;
+        }
         // Now all parameters are known that arguments can tell: `Self` is complete.
         let mut inside = scope;
         if let (Some((implementation, owner)), Some(generics)) = (&function.owner, &block_scope) {
@@ -376,7 +397,7 @@ impl Evaluator {
                 Some(pattern) => self.resolve(pattern, generics)?,
                 None => owner.clone(),
             };
-            inside = Scope::inside(&inside, Names::SelfType(own));
+            inside = Scope::inside(&inside, Names::SelfType(own, implementation.self_type.clone()));
         }
         let returns = match &item.sig.output {
             syn::ReturnType::Type(_, ty) => self.resolve(ty, &inside)?,
@@ -396,7 +417,9 @@ impl Evaluator {
         });
         let value = result?;
         let value = match &item.sig.output {
-            syn::ReturnType::Type(_, ty) if matches!(&**ty, syn::Type::Reference(ty) if ty.mutability.is_some()) => value,
+            syn::ReturnType::Type(_, ty) if matches!(&**ty, syn::Type::Reference(ty) if ty.mutability.is_some()) => {
+                value
+            }
             _ if matches!(returns, Type::Unknown) => value,
             _ => self.load(value, at)?,
         };
@@ -461,17 +484,21 @@ impl Evaluator {
         let other = arguments.first().map(|value| self.type_of(value)).unwrap_or_default();
         for implementation in self.implementations.clone().iter().rev() {
             let Some(item) = implementation.functions.get(&symbol) else { continue };
-            let Some(last) = implementation.of.as_ref().and_then(|path| path.segments.last()) else { continue };
+            let Some(last) = implementation.of.as_ref().and_then(|path| path.segments.last()) else {
+                continue;
+            };
             if last.ident != of && !(of == "Index" && last.ident == "IndexMut") {
                 continue;
             }
             let Some(scope) = self.fitting(implementation, &own) else { continue };
-            let scope = Scope::inside(&scope, Names::SelfType(own.clone()));
+            let scope = Scope::inside(&scope, Names::SelfType(own.clone(), implementation.self_type.clone()));
             let right = match &last.arguments {
-                syn::PathArguments::AngleBracketed(written) => written.args.iter().find_map(|argument| match argument {
-                    syn::GenericArgument::Type(ty) => Some(ty.clone()),
-                    _ => None,
-                }),
+                syn::PathArguments::AngleBracketed(written) => {
+                    written.args.iter().find_map(|argument| match argument {
+                        syn::GenericArgument::Type(ty) => Some(ty.clone()),
+                        _ => None,
+                    })
+                }
                 _ => None,
             };
             let right = right.or_else(|| implementation.self_type.clone());

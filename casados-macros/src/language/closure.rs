@@ -59,28 +59,26 @@ impl Evaluator {
         }
     }
 
-    pub(super) fn call_closure(
-        &mut self,
-        closure: &Rc<Closure>,
-        arguments: Vec<Value>,
-        at: At,
-    ) -> Evaluated {
+    pub(super) fn call_closure(&mut self, closure: &Rc<Closure>, arguments: Vec<Value>, at: At) -> Evaluated {
         let written = &closure.closure;
         if written.inputs.len() != arguments.len() {
             let (expected, found) = (written.inputs.len(), arguments.len());
-            return Err(error(at, format!("this closure takes {expected} arguments, but {found} are given")).into());
+            return Err(
+                error(at, format!("this closure takes {expected} arguments, but {found} are given")).into()
+            );
         }
         let returns = match &written.output {
             syn::ReturnType::Type(_, ty) => self.resolve(ty, &closure.scope)?,
             syn::ReturnType::Default => Type::Unknown,
         };
-        let value = self.execute(closure.scope.clone(), closure.calls.clone(), returns.clone(), |evaluator| {
-            for (pattern, value) in written.inputs.iter().zip(arguments) {
-                let bindings = evaluator.bind(pattern, Subject::Value(value))?;
-                evaluator.declare(bindings);
-            }
-            evaluator.expression(&written.body, &returns)
-        })?;
+        let value =
+            self.execute(closure.scope.clone(), closure.calls.clone(), returns.clone(), |evaluator| {
+                for (pattern, value) in written.inputs.iter().zip(arguments) {
+                    let bindings = evaluator.bind(pattern, Subject::Value(value))?;
+                    evaluator.declare(bindings);
+                }
+                evaluator.expression(&written.body, &returns)
+            })?;
         Ok(self.coerce(value, &returns, at)?)
     }
 }

@@ -28,8 +28,8 @@ pub enum Names {
     Variables(Vec<(Symbol, Cell)>),
     /// Type parameters, known as soon as an argument tells.
     Types(Vec<(Symbol, RefCell<Type>)>),
-    /// `Self`
-    SelfType(Type),
+    /// `Self`, and how the `impl` block writes it.
+    SelfType(Type, Option<syn::Type>),
     /// Items of a block or module.
     Items(Box<Items>),
 }

@@ -137,7 +137,13 @@ impl Evaluator {
     ) -> Evaluated<T> {
         self.tick(1, at)?;
         if self.depth >= DEPTH {
-            return Err(error(at, format!("expressions and calls are nested more than {DEPTH} deep here: split them into statements")).into());
+            return Err(error(
+                at,
+                format!(
+                    "expressions and calls are nested more than {DEPTH} deep here: split them into statements"
+                ),
+            )
+            .into());
         }
         self.depth += 1;
         let result = execute(self);

@@ -263,6 +263,13 @@ impl Evaluator {
                 }
             }
         }
+        if !matches!(ty, Type::Struct(..)) {
+            // A variant that a `use` has brought here.
+            let path = syn::ExprPath { attrs: Vec::new(), qself: None, path: literal.path.clone() };
+            if let Named::Value(Value::Constructor(owner, index)) = self.named(&path)? {
+                (ty, variant) = (owner, index);
+            }
+        }
         let Type::Struct(definition, mut arguments) = ty else {
             return Err(error(
                 &literal.path,
@@ -494,7 +501,9 @@ impl Evaluator {
                 Ok(Receiver::Value(self.part(&value, projection, field)?))
             }
             (Err(_), _) => match (&value, &field.member) {
-                (Value::Opaque(tokens), member) => Ok(Receiver::Value(Value::Opaque(Rc::new(quote!(#tokens.#member))))),
+                (Value::Opaque(tokens), member) => {
+                    Ok(Receiver::Value(Value::Opaque(Rc::new(quote!(#tokens.#member)))))
+                }
                 (Value::Range(range), syn::Member::Named(name)) => {
                     let part = if name == "start" { &range.start } else { &range.end };
                     match part {
@@ -642,8 +651,11 @@ impl Evaluator {
                 let Value::Struct(structure) = &value else {
                     return Err(error(left, format!("expected a struct, found {}", value.kind())).into());
                 };
-                let names: Vec<String> =
-                    structure.definition.variants[structure.variant].fields.iter().map(|f| f.0.clone()).collect();
+                let names: Vec<String> = structure.definition.variants[structure.variant]
+                    .fields
+                    .iter()
+                    .map(|f| f.0.clone())
+                    .collect();
                 for field in &literal.fields {
                     let member = field.member.to_token_stream().to_string();
                     match names.iter().position(|name| *name == member) {
@@ -666,14 +678,15 @@ impl Evaluator {
             Value::Struct(structure) => structure.fields.clone(),
             other => return Err(error(left, format!("{} has no such parts", other.kind())).into()),
         };
-        let is_rest = |part: &&Expr| {
-            matches!(part, Expr::Range(range) if range.start.is_none() && range.end.is_none())
-        };
+        let is_rest =
+            |part: &&Expr| matches!(part, Expr::Range(range) if range.start.is_none() && range.end.is_none());
         let rest = parts.iter().position(is_rest);
         let count = parts.len() - usize::from(rest.is_some());
         if count > values.len() || rest.is_none() && count != values.len() {
             let length = values.len();
-            return Err(error(left, format!("there are {count} parts on the left, but {length} values")).into());
+            return Err(
+                error(left, format!("there are {count} parts on the left, but {length} values")).into()
+            );
         }
         for (index, part) in parts.iter().enumerate() {
             let position = match rest {
@@ -702,7 +715,13 @@ impl Evaluator {
         let name = format!("{method}_assign");
         if matches!(before, Value::Struct(_))
             && self
-                .user_method(&format!("{of}Assign"), &name, &Value::Reference(place.clone()), vec![right.clone()], binary)?
+                .user_method(
+                    &format!("{of}Assign"),
+                    &name,
+                    &Value::Reference(place.clone()),
+                    vec![right.clone()],
+                    binary,
+                )?
                 .is_some()
         {
             return Ok(Value::unit());
@@ -742,7 +761,9 @@ impl Evaluator {
                 self.scope = saved;
                 let (then, then_changes) = then?;
                 let (otherwise, else_changes) = match &branch.else_branch {
-                    Some((_, otherwise)) => self.branch(|evaluator| evaluator.expression(otherwise, expected))?,
+                    Some((_, otherwise)) => {
+                        self.branch(|evaluator| evaluator.expression(otherwise, expected))?
+                    }
                     None => (Value::unit(), Vec::new()),
                 };
                 self.merge(node, then_changes, else_changes, &branch.cond)?;
@@ -774,13 +795,11 @@ impl Evaluator {
                 match self.condition(&binary.left)? {
                     Truth::Known(false) => Ok(Truth::Known(false)),
                     Truth::Known(true) => self.condition(&binary.right),
-                    Truth::When(left) => {
-                        Ok(match self.condition(&binary.right)? {
-                            Truth::Known(true) => Truth::When(left),
-                            Truth::Known(false) => Truth::Known(false),
-                            Truth::When(right) => Truth::When(self.graph.and(left, right)),
-                        })
-                    }
+                    Truth::When(left) => Ok(match self.condition(&binary.right)? {
+                        Truth::Known(true) => Truth::When(left),
+                        Truth::Known(false) => Truth::Known(false),
+                        Truth::When(right) => Truth::When(self.graph.and(left, right)),
+                    }),
                 }
             }
             _ => {
@@ -826,7 +845,8 @@ impl Evaluator {
                 self.scope = saved;
                 let (then, then_changes) = then?;
                 let (otherwise, else_changes) = self.branch(|evaluator| {
-                    evaluator.deeper(choice, |evaluator| evaluator.match_arms(choice, rest, subject, expected))
+                    evaluator
+                        .deeper(choice, |evaluator| evaluator.match_arms(choice, rest, subject, expected))
                 })?;
                 self.merge(node, then_changes, else_changes, arm)?;
                 return Ok(self.select(node, &then, &otherwise, arm)?);
@@ -895,7 +915,8 @@ fn field_projection(value: &Value, member: &syn::Member) -> std::result::Result<
         (Value::Matrix(matrix), syn::Member::Named(name)) => {
             let name = name.to_string();
             if matrix.rows == 1 || matrix.columns == 1 {
-                let index = ["x", "y", "z", "w", "a", "b"].iter().position(|field| *field == name).ok_or(())?;
+                let index =
+                    ["x", "y", "z", "w", "a", "b"].iter().position(|field| *field == name).ok_or(())?;
                 return Ok(if matrix.columns == 1 {
                     Projection::Element(index, 0)
                 } else {

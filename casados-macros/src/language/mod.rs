@@ -13,6 +13,8 @@ mod pattern;
 mod place;
 mod select;
 mod statement;
+#[cfg(test)]
+mod tests;
 mod types;
 mod value;
 

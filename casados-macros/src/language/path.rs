@@ -213,7 +213,7 @@ impl Evaluator {
         for implementation in self.implementations.clone().iter().rev() {
             let Some(constant) = implementation.constants.get(&name) else { continue };
             let Some(scope) = self.fitting(implementation, ty) else { continue };
-            let scope = Scope::inside(&scope, Names::SelfType(ty.clone()));
+            let scope = Scope::inside(&scope, Names::SelfType(ty.clone(), implementation.self_type.clone()));
             let value = if implementation.generics.params.is_empty() && implementation.self_type.is_some() {
                 self.constant_value(constant, &scope)
             } else {
@@ -238,10 +238,11 @@ impl Evaluator {
                 let implementors = self.implementations.clone();
                 let implemented = implementors.iter().any(|other| {
                     other.self_type.as_ref().is_some_and(|pattern| {
-                        other.of.as_ref().and_then(|path| path.segments.last()).is_some_and(|s| s.ident == of) && {
-                            let scope = self.generic_scope(&other.generics, &other.scope);
-                            self.unify(pattern, ty, &scope)
-                        }
+                        other.of.as_ref().and_then(|path| path.segments.last()).is_some_and(|s| s.ident == of)
+                            && {
+                                let scope = self.generic_scope(&other.generics, &other.scope);
+                                self.unify(pattern, ty, &scope)
+                            }
                     })
                 });
                 implemented.then_some(scope)

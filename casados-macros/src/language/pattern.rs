@@ -1,8 +1,8 @@
 //! Patterns: what they match, and which variables they declare.
 
+use super::arithmetic::Comparison;
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluated, Evaluator, error, unsupported};
-use super::arithmetic::Comparison;
 use super::items::Symbol;
 use super::path::Named;
 use super::place::{Place, Projection};
@@ -51,11 +51,10 @@ impl Evaluator {
         match self.matches(pattern, subject, &mut bindings)? {
             Truth::Known(true) => Ok(bindings),
             Truth::Known(false) => Err(error(pattern, "this pattern does not match the value").into()),
-            Truth::When(_) => Err(unsupported(
-                pattern,
-                "a pattern that matches or not depending on model quantities",
-            )
-            .into()),
+            Truth::When(_) => {
+                Err(unsupported(pattern, "a pattern that matches or not depending on model quantities")
+                    .into())
+            }
         }
     }
 
@@ -85,10 +84,13 @@ impl Evaluator {
     ) -> Evaluated<Truth> {
         // Patterns other than names look through references.
         let subject = match (pattern, subject) {
-            (syn::Pat::Ident(_) | syn::Pat::Wild(_) | syn::Pat::Reference(_) | syn::Pat::Type(_), subject) => {
-                subject
+            (
+                syn::Pat::Ident(_) | syn::Pat::Wild(_) | syn::Pat::Reference(_) | syn::Pat::Type(_),
+                subject,
+            ) => subject,
+            (_, Subject::Value(Value::Reference(place))) => {
+                Subject::Place(self.follow(place, pattern)?, true)
             }
-            (_, Subject::Value(Value::Reference(place))) => Subject::Place(self.follow(place, pattern)?, true),
             (_, Subject::Place(place, by_reference)) => {
                 let target = self.follow(place.clone(), pattern)?;
                 let by_reference = by_reference || !target.same(&place);
@@ -124,7 +126,8 @@ impl Evaluator {
             syn::Pat::Slice(slice) => self.match_slice(slice, subject, bindings),
             syn::Pat::Struct(inner) => self.match_struct(inner, subject, bindings),
             syn::Pat::TupleStruct(inner) => {
-                let path = syn::ExprPath { attrs: Vec::new(), qself: inner.qself.clone(), path: inner.path.clone() };
+                let path =
+                    syn::ExprPath { attrs: Vec::new(), qself: inner.qself.clone(), path: inner.path.clone() };
                 let value = self.subject_value(&subject, pattern)?;
                 if let Value::Option(content) = &value {
                     return match (path.path.segments.last(), content) {
@@ -145,9 +148,7 @@ impl Evaluator {
                         }
                         self.match_parts(&inner.elems, pattern, subject, bindings)
                     }
-                    _ => {
-                        Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into())
-                    }
+                    _ => Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into()),
                 }
             }
             syn::Pat::Path(path) => {
@@ -345,7 +346,9 @@ impl Evaluator {
         let rest = patterns.iter().position(|pattern| matches!(pattern, syn::Pat::Rest(_)));
         let count = patterns.len() - usize::from(rest.is_some());
         if count > length || rest.is_none() && count != length {
-            return Err(error(at, format!("this pattern has {count} parts, but the value has {length}")).into());
+            return Err(
+                error(at, format!("this pattern has {count} parts, but the value has {length}")).into()
+            );
         }
         let mut truths = Vec::new();
         for (index, pattern) in patterns.iter().enumerate() {
@@ -426,7 +429,9 @@ impl Evaluator {
         for field in &pattern.fields {
             let name = field.member.to_token_stream().to_string();
             let Some(index) = fields.iter().position(|(field, _)| *field == name) else {
-                return Err(error(field, format!("`{}` has no field `{name}`", structure.definition.name)).into());
+                return Err(
+                    error(field, format!("`{}` has no field `{name}`", structure.definition.name)).into()
+                );
             };
             let part = self.subject_part(&subject, Projection::Field(index), pattern)?;
             truths.push(self.matches(&field.pat, part, bindings)?);

@@ -89,11 +89,15 @@ impl Place {
         let mut value: &mut Value = &mut value;
         for step in &self.path {
             value = match (step, value) {
-                (Projection::Field(index), Value::Tuple(elements)) => Rc::make_mut(elements).get_mut(*index)?,
+                (Projection::Field(index), Value::Tuple(elements)) => {
+                    Rc::make_mut(elements).get_mut(*index)?
+                }
                 (Projection::Field(index), Value::Struct(structure)) => {
                     Rc::make_mut(structure).fields.get_mut(*index)?
                 }
-                (Projection::Index(index), Value::Array(elements)) => Rc::make_mut(elements).get_mut(*index)?,
+                (Projection::Index(index), Value::Array(elements)) => {
+                    Rc::make_mut(elements).get_mut(*index)?
+                }
                 (Projection::Slice(start, end), Value::Array(elements)) => {
                     let Value::Array(new) = new else { return None };
                     let part = Rc::make_mut(elements).get_mut(*start..*end)?;
@@ -194,7 +198,9 @@ impl Evaluator {
             }
             (projection, _) => {
                 match (projection, &value) {
-                    (Projection::Index(index), Some(Value::Array(elements))) => bound(index, elements.len(), at)?,
+                    (Projection::Index(index), Some(Value::Array(elements))) => {
+                        bound(index, elements.len(), at)?
+                    }
                     (Projection::Slice(first, last), Some(Value::Array(elements))) => {
                         slice(first, last, elements.len(), at)?;
                     }

@@ -33,7 +33,7 @@ impl Evaluator {
             value = match statement {
                 Stmt::Item(_) => continue,
                 Stmt::Local(local) => {
-                    self.local(local)?;
+                    self.local(local, &hint(block, local, expected))?;
                     Value::unit()
                 }
                 Stmt::Expr(expression, None) => self.expression(expression, expected)?,
@@ -51,7 +51,7 @@ impl Evaluator {
     }
 
     /// `let`
-    fn local(&mut self, local: &syn::Local) -> Evaluated<()> {
+    fn local(&mut self, local: &syn::Local, hint: &Type) -> Evaluated<()> {
         let (pattern, ty) = match &local.pat {
             syn::Pat::Type(pattern) => {
                 let scope = self.scope.clone();
@@ -59,6 +59,7 @@ impl Evaluator {
             }
             pattern => (pattern, Type::Unknown),
         };
+        let expected = if matches!(ty, Type::Unknown) { hint } else { &ty };
         let Some(init) = &local.init else {
             let bindings = self.bind(pattern, Subject::Value(Value::Uninitialised))?;
             self.declare(bindings);
@@ -70,7 +71,7 @@ impl Evaluator {
                 Receiver::Value(value) => Subject::Value(value),
             }
         } else {
-            let value = self.expression(&init.expr, &ty)?;
+            let value = self.expression(&init.expr, expected)?;
             Subject::Value(self.coerce(value, &ty, &init.expr)?)
         };
         let bindings = match &init.diverge {
@@ -281,6 +282,22 @@ impl Evaluator {
             }
             _ => Err(unsupported(call, format!("the macro `{name}!`")).into()),
         }
+    }
+}
+
+/// What the end of a block tells about a variable: `let mut r = zeros(); ...; r` has the type of the block.
+fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
+    let (syn::Pat::Ident(name), Some(Stmt::Expr(Expr::Path(tail), None))) = (&local.pat, block.stmts.last())
+    else {
+        return Type::Unknown;
+    };
+    let declarations = block.stmts.iter().filter(|statement| {
+        matches!(statement, Stmt::Local(syn::Local { pat: syn::Pat::Ident(other), .. }) if other.ident == name.ident)
+    });
+    if tail.path.is_ident(&name.ident) && declarations.count() == 1 {
+        expected.clone()
+    } else {
+        Type::Unknown
     }
 }
 

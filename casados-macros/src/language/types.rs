@@ -106,7 +106,9 @@ impl Evaluator {
             syn::Type::Reference(inner) => self.resolve_within(&inner.elem, scope, depth + 1)?,
             syn::Type::Paren(inner) => self.resolve_within(&inner.elem, scope, depth + 1)?,
             syn::Type::Group(inner) => self.resolve_within(&inner.elem, scope, depth + 1)?,
-            syn::Type::Path(path) if path.qself.is_none() => self.resolve_path(&path.path, scope, depth + 1)?,
+            syn::Type::Path(path) if path.qself.is_none() => {
+                self.resolve_path(&path.path, scope, depth + 1)?
+            }
             syn::Type::Ptr(_) => return Err(unsupported(&ty, "a raw pointer")),
             _ => Type::Unknown,
         })
@@ -134,7 +136,7 @@ impl Evaluator {
         let mut renamed = None;
         for around in scope.clone().chain() {
             match &around.names {
-                Names::SelfType(ty) if name == "Self" => return Ok(ty.clone()),
+                Names::SelfType(ty, _) if name == "Self" => return Ok(ty.clone()),
                 Names::Types(types) => {
                     if let Some((_, ty)) = types.iter().find(|(parameter, _)| *parameter == symbol) {
                         return Ok(ty.borrow().clone());
@@ -317,7 +319,9 @@ impl Evaluator {
             Value::Real(_) => Type::Real,
             Value::Integer(Integer { ty: Some(ty), .. }) => Type::Integer(*ty),
             Value::Bool(_) | Value::Condition(_) => Type::Bool,
-            Value::Tuple(parts) => Type::Tuple(Rc::new(parts.iter().map(|part| self.type_of(part)).collect())),
+            Value::Tuple(parts) => {
+                Type::Tuple(Rc::new(parts.iter().map(|part| self.type_of(part)).collect()))
+            }
             Value::Array(elements) => {
                 let element = elements.first().map(|element| self.type_of(element)).unwrap_or_default();
                 Type::Array(Rc::new(element), Some(elements.len()))
@@ -351,6 +355,31 @@ impl Evaluator {
             }
             _ => Type::Unknown,
         }
+    }
+
+    /// An error if there is a const parameter that nothing has told.
+    pub(super) fn check_known(
+        &mut self,
+        generics: &syn::Generics,
+        scope: &Rc<Scope>,
+        name: &syn::Ident,
+        at: At,
+    ) -> Result<()> {
+        for parameter in generics.const_params() {
+            let symbol = self.symbol(&parameter.ident);
+            if let Some(cell) = scope.variable(symbol)
+                && matches!(*cell.borrow(), Value::Uninitialised)
+            {
+                let parameter = &parameter.ident;
+                return Err(error(
+                    at,
+                    format!(
+                        "nothing before this tells `{parameter}`: write the type of the result, or `{name}::<...>(...)`"
+                    ),
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// What generic parameters are bound to.
@@ -394,9 +423,15 @@ impl Evaluator {
             (syn::Type::Slice(slice), Type::Array(element, _)) => self.unify(&slice.elem, element, scope),
             (syn::Type::Tuple(tuple), Type::Tuple(parts)) => {
                 tuple.elems.len() == parts.len()
-                    && tuple.elems.iter().zip(parts.iter()).all(|(pattern, part)| self.unify(pattern, part, scope))
+                    && tuple
+                        .elems
+                        .iter()
+                        .zip(parts.iter())
+                        .all(|(pattern, part)| self.unify(pattern, part, scope))
             }
-            (syn::Type::Path(path), _) if path.qself.is_none() => self.unify_path(pattern, &path.path, ty, scope),
+            (syn::Type::Path(path), _) if path.qself.is_none() => {
+                self.unify_path(pattern, &path.path, ty, scope)
+            }
             (syn::Type::Array(_) | syn::Type::Slice(_) | syn::Type::Tuple(_), _) => false,
             _ => true,
         }
@@ -404,6 +439,17 @@ impl Evaluator {
 
     fn unify_path(&mut self, pattern: &syn::Type, path: &syn::Path, ty: &Type, scope: &Rc<Scope>) -> bool {
         if let Some(name) = path.get_ident() {
+            if name == "Self" {
+                let written = scope.chain().find_map(|around| match &around.names {
+                    Names::SelfType(known, written) => Some((known.clone(), written.clone())),
+                    _ => None,
+                });
+                return match written {
+                    Some((_, Some(written))) => self.unify(&written, ty, scope),
+                    Some((known, None)) => fits(&known, ty),
+                    None => true,
+                };
+            }
             let name = self.symbol(name);
             if let Some(known) = parameter_type(scope, name) {
                 if matches!(known, Type::Unknown) {
@@ -458,16 +504,22 @@ impl Evaluator {
         skip: usize,
         scope: &Rc<Scope>,
     ) -> bool {
-        let written = written.args.iter().filter(|argument| !matches!(argument, syn::GenericArgument::Lifetime(_)));
+        let written =
+            written.args.iter().filter(|argument| !matches!(argument, syn::GenericArgument::Lifetime(_)));
         written.skip(skip).zip(arguments).all(|(written, argument)| match (written, argument) {
             (syn::GenericArgument::Type(pattern), Generic::Type(ty)) => self.unify(pattern, ty, scope),
             (syn::GenericArgument::Type(syn::Type::Path(path)), Generic::Const(integer)) => {
-                let expression =
-                    syn::Expr::Path(syn::ExprPath { attrs: Vec::new(), qself: None, path: path.path.clone() });
-                usize::try_from(integer.value).is_ok_and(|length| self.unify_length(&expression, length, scope))
+                let expression = syn::Expr::Path(syn::ExprPath {
+                    attrs: Vec::new(),
+                    qself: None,
+                    path: path.path.clone(),
+                });
+                usize::try_from(integer.value)
+                    .is_ok_and(|length| self.unify_length(&expression, length, scope))
             }
             (syn::GenericArgument::Const(expression), Generic::Const(integer)) => {
-                usize::try_from(integer.value).is_ok_and(|length| self.unify_length(expression, length, scope))
+                usize::try_from(integer.value)
+                    .is_ok_and(|length| self.unify_length(expression, length, scope))
             }
             _ => true,
         })
@@ -518,7 +570,10 @@ impl Evaluator {
             (Type::Bool, Value::Opaque(_)) => return Err(super::evaluator::opaque(at, "a `bool`")),
             (Type::Array(_, Some(length)), Value::Array(elements)) if *length != elements.len() => {
                 let found = elements.len();
-                return Err(error(at, format!("expected an array of {length} elements, found one of {found}")));
+                return Err(error(
+                    at,
+                    format!("expected an array of {length} elements, found one of {found}"),
+                ));
             }
             (Type::Array(element, _), Value::Array(elements)) => {
                 if elements.iter().all(|element| matches!(element, Value::Real(_))) {
@@ -542,7 +597,10 @@ impl Evaluator {
                     || columns.is_some_and(|columns| columns != matrix.columns)
                 {
                     let (r, c) = (matrix.rows, matrix.columns);
-                    return Err(error(at, format!("this matrix is {r}x{c}, which is not the expected shape")));
+                    return Err(error(
+                        at,
+                        format!("this matrix is {r}x{c}, which is not the expected shape"),
+                    ));
                 }
                 value
             }
@@ -568,7 +626,10 @@ impl Evaluator {
                     let index = proc_macro2::Literal::usize_unsuffixed(index);
                     quote!(#tokens[#index])
                 };
-                (0..*length).map(|index| self.take_apart(&part(index), element, at)).collect::<Result<_>>().map(Value::array)
+                (0..*length)
+                    .map(|index| self.take_apart(&part(index), element, at))
+                    .collect::<Result<_>>()
+                    .map(Value::array)
             }
             Type::Tuple(parts) => {
                 let part = |index: usize| {
@@ -576,7 +637,10 @@ impl Evaluator {
                     quote!(#tokens.#index)
                 };
                 let parts = parts.iter().enumerate();
-                parts.map(|(index, ty)| self.take_apart(&part(index), ty, at)).collect::<Result<_>>().map(Value::tuple)
+                parts
+                    .map(|(index, ty)| self.take_apart(&part(index), ty, at))
+                    .collect::<Result<_>>()
+                    .map(Value::tuple)
             }
             Type::Matrix(Some(rows), Some(columns)) => {
                 self.tick(rows.saturating_mul(*columns), at)?;
@@ -630,12 +694,11 @@ impl Evaluator {
         leaf: &mut dyn FnMut(&mut Evaluator, String) -> Result<Node>,
         at: At,
     ) -> Result<Value> {
-        self.deeper(at, |evaluator| evaluator.instantiate_within(ty, name, leaf, at).map_err(Flow::from)).map_err(
-            |flow| match flow {
+        self.deeper(at, |evaluator| evaluator.instantiate_within(ty, name, leaf, at).map_err(Flow::from))
+            .map_err(|flow| match flow {
                 Flow::Error(error) => error,
                 _ => error(at, "this type has no end"),
-            },
-        )
+            })
     }
 
     fn instantiate_within(
@@ -658,8 +721,11 @@ impl Evaluator {
                 let mut elements = Vec::new();
                 for column in 0..*columns {
                     for row in 0..*rows {
-                        let name =
-                            if *columns == 1 { format!("{name}[{row}]") } else { format!("{name}[({row}, {column})]") };
+                        let name = if *columns == 1 {
+                            format!("{name}[{row}]")
+                        } else {
+                            format!("{name}[({row}, {column})]")
+                        };
                         self.tick(1, at)?;
                         elements.push(Value::Real(leaf(self, name)?));
                     }

@@ -1,0 +1,106 @@
+//! The evaluator against rustc: each function is compiled, and executed symbolically from its own
+//! tokens; both must yield the same numbers, bit by bit.
+
+mod control;
+mod errors;
+mod functions;
+mod patterns;
+mod selection;
+mod values;
+
+use super::environment::Scope;
+use super::evaluator::Evaluator;
+use super::value::Value;
+use crate::graph::Node;
+use crate::graph::Point;
+use std::rc::Rc;
+
+/// Points at which snippets are compared: signs differ, some numbers are equal, some are 0.
+pub const POINTS: [[f64; 6]; 5] = [
+    [0.3, -1.7, 2.9, 0.11, -0.6, 5.3],
+    [-0.3, 1.7, -2.9, -0.11, 0.6, -5.3],
+    [1.0, 1.0, 2.0, 2.0, -3.0, -3.0],
+    [0.0, 0.5, 0.0, -0.5, 1.0, 1e-9],
+    [1e3, -1e-3, 7.25, -7.5, 0.125, 40.0],
+];
+
+/// Numbers in a result, in order.
+pub trait Numbers {
+    fn numbers(&self, list: &mut Vec<f64>);
+}
+
+impl Numbers for f64 {
+    fn numbers(&self, list: &mut Vec<f64>) {
+        list.push(*self);
+    }
+}
+
+impl<T: Numbers, const N: usize> Numbers for [T; N] {
+    fn numbers(&self, list: &mut Vec<f64>) {
+        self.iter().for_each(|element| element.numbers(list));
+    }
+}
+
+impl<A: Numbers, B: Numbers> Numbers for (A, B) {
+    fn numbers(&self, list: &mut Vec<f64>) {
+        self.0.numbers(list);
+        self.1.numbers(list);
+    }
+}
+
+/// The nodes of a result, in order.
+fn nodes(evaluator: &mut Evaluator, value: &Value, list: &mut Vec<Node>) {
+    match value {
+        Value::Tuple(parts) | Value::Array(parts) => {
+            parts.iter().for_each(|part| nodes(evaluator, part, list));
+        }
+        Value::Matrix(matrix) => matrix.elements.iter().for_each(|part| nodes(evaluator, part, list)),
+        Value::Struct(structure) => structure.fields.iter().for_each(|part| nodes(evaluator, part, list)),
+        other => list.push(evaluator.real(other, &"").unwrap()),
+    }
+}
+
+/// Executes `fn f(x: [f64; 6])` symbolically.
+pub fn evaluate(source: &str) -> syn::Result<(Evaluator, Vec<Node>)> {
+    let item = Rc::new(syn::parse_str::<syn::ItemFn>(source)?);
+    let mut evaluator = Evaluator::default();
+    let x = (0..6).map(|index| Value::Real(evaluator.graph.variable(index))).collect();
+    let value = evaluator.run(&item, &Rc::new(Scope::default()), Vec::new(), vec![Value::array(x)])?;
+    let mut list = Vec::new();
+    nodes(&mut evaluator, &value, &mut list);
+    Ok((evaluator, list))
+}
+
+/// Compares the compiled function with its symbolic execution.
+pub fn compare<R: Numbers>(name: &str, source: &str, compiled: impl Fn([f64; 6]) -> R) {
+    let (evaluator, list) = match evaluate(source) {
+        Ok(result) => result,
+        Err(error) => panic!("{name}: {error}"),
+    };
+    for point in POINTS {
+        let mut expected = Vec::new();
+        compiled(point).numbers(&mut expected);
+        let found = evaluator.graph.evaluate(&list, Point { variables: &point, ..Default::default() });
+        assert_eq!(expected.len(), found.len(), "{name}: number of results");
+        for (expected, found) in expected.iter().zip(&found) {
+            // Structural zeros have no sign.
+            let same = expected.to_bits() == found.to_bits()
+                || *expected == 0.0 && *found == 0.0
+                || expected.is_nan() && found.is_nan();
+            assert!(same, "{name} at {point:?}: {expected:e} compiled, {found:e} symbolically");
+        }
+    }
+}
+
+/// Functions that are compiled, and executed symbolically from their tokens.
+macro_rules! same {
+    ($($name:ident: $function:item)*) => {$(
+        #[test]
+        #[allow(warnings, clippy::all)]
+        fn $name() {
+            $function
+            $crate::language::tests::compare(stringify!($name), stringify!($function), f);
+        }
+    )*};
+}
+pub(crate) use same;
