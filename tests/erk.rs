@@ -1,5 +1,6 @@
 //! Explicit integrators against an independent implementation over dual numbers.
 
+use casados::memory::{Inline, mode};
 use casados::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
 use casados::tableau::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Method, Midpoint, Rk4};
 use casados::{Custom, Dae, Dims, Erk, Error, Lanes, Ode, Options, Tableau};
@@ -299,7 +300,7 @@ fn failures_are_values_and_leave_the_integrator_usable() {
 fn a_tableau_of_the_user() {
     let tableau = <Rk4 as Method<4>>::TABLEAU;
     let own = Tableau::new(*tableau.a(), *tableau.b(), *tableau.c()).unwrap();
-    let mut erk = Erk::<Oscillator, Custom<4>>::with_tableau(&own, Options::default()).unwrap();
+    let mut erk = Erk::<Oscillator, Custom<4>>::with_tableau(Options::default(), own).unwrap();
     let mut rk4 = Erk::<Oscillator, Rk4>::new(Options::default()).unwrap();
     erk.set_parameters(&vector![P]).unwrap();
     rk4.set_parameters(&vector![P]).unwrap();
@@ -308,8 +309,27 @@ fn a_tableau_of_the_user() {
 
     let implicit = Tableau::new([[0.5]], [1.0], [0.5]).unwrap();
     assert!(matches!(
-        Erk::<Oscillator, Custom<1>>::with_tableau(&implicit, Options::default()),
+        Erk::<Oscillator, Custom<1>>::with_tableau(Options::default(), implicit),
         Err(Error::NotExplicit { stage: 0 })
+    ));
+}
+
+#[test]
+fn memory_inside_the_integrator() {
+    let options = Options { steps: STEPS, ..Default::default() };
+    let mut heap = Erk::<Oscillator, Rk4>::new(options).unwrap();
+    let mut inline = Erk::<Oscillator, Rk4, f64, Inline<mode::Hessian, STEPS>>::inline(options).unwrap();
+    heap.set_parameters(&vector![P]).unwrap();
+    inline.set_parameters(&vector![P]).unwrap();
+    let (x0, u, lambda) = (SVector::from(X0), vector![U], vector![0.9, -1.7]);
+    assert_eq!(inline.hessian(&x0, &u, H, &lambda).unwrap(), heap.hessian(&x0, &u, H, &lambda).unwrap());
+    assert_eq!(inline.adjoint(&x0, &u, H, &lambda).unwrap(), heap.adjoint(&x0, &u, H, &lambda).unwrap());
+    assert_eq!(inline.forward(&x0, &u, H).unwrap(), heap.forward(&x0, &u, H).unwrap());
+
+    let more = Options { steps: STEPS + 1, ..Default::default() };
+    assert!(matches!(
+        Erk::<Oscillator, Rk4, f64, Inline<mode::Nominal, STEPS>>::inline(more),
+        Err(Error::InvalidOption { option: "steps", .. })
     ));
 }
 

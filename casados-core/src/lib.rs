@@ -21,7 +21,6 @@ compile_error!(
 
 #[cfg(feature = "num-dual")]
 pub mod dual;
-#[cfg(feature = "alloc")]
 pub mod erk;
 pub mod error;
 pub mod irk;
@@ -37,7 +36,6 @@ pub mod tableau;
 #[cfg(feature = "testing")]
 pub mod testing;
 
-#[cfg(feature = "alloc")]
 pub use erk::Erk;
 pub use error::Error;
 pub use irk::Irk;

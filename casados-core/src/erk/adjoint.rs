@@ -5,9 +5,10 @@
 //! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
 //! ```
 
+use super::forward::Variation;
 use super::step::{Grid, Point, Record, Scheme, add, check};
 use crate::error::{Error, Place, Quantity};
-use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
+use crate::model::{ArrayK, ArrayV, ArrayW, Ode};
 use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 use bytemuck::Zeroable;
@@ -17,22 +18,15 @@ use bytemuck::Zeroable;
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct Sweep<M: Ode, T: Real, R: Array<T>, const S: usize> {
-    pub jacobian: M::Jacobian<T>,
-    pub gradient: ArrayV<M, T>,
+    /// The memory of the forward sweep, which is never needed at the same time: `k̄_i` of the current stage is
+    /// in `dxi`, `ξ̄_i` in `dk`.
+    pub forward: Variation<M, T, R, S>,
+    gradient: ArrayV<M, T>,
     /// `(λ_n, λ_u, λ_p)`
     pub lambda: ArrayW<M, R>,
-    /// `k̄_i` of the current stage.
-    kbar: ArrayX<M, R>,
-    /// `ξ̄_i`
-    xibar: [ArrayX<M, R>; S],
 }
 
 impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
-    /// Fresh memory.
-    pub fn init(&mut self) {
-        M::jacobian_constants(&mut self.jacobian);
-    }
-
     /// Seeds: of each state the columns.
     pub fn seed(&mut self, columns: usize, seed: impl Fn(usize, usize) -> T) {
         for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
@@ -53,6 +47,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         columns: usize,
         mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
     ) -> Result<(), Error> {
+        M::jacobian_constants(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
             lambda.as_mut()[..columns].fill(T::ZERO);
         }
@@ -81,7 +76,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
             if columns == 1 {
                 let mu = ArrayK::<M, T>::from_fn(|equation| {
                     let row = scheme.rows[equation];
-                    row.factor * self.kbar[row.state].as_ref()[0]
+                    row.factor * self.forward.dxi[row.state].as_ref()[0]
                 });
                 self.pull_one(point, &mu, at)?;
                 self.keep(stage);
@@ -89,12 +84,12 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                     multipliers[stage] = mu;
                 }
             } else {
-                point.jacobian(&mut self.jacobian, at)?;
+                point.jacobian(&mut self.forward.jacobian, at)?;
                 self.pull_many(scheme, stage, columns);
             }
         }
         for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
-            for xibar in &self.xibar {
+            for xibar in &self.forward.dk {
                 add(T::ONE, &xibar[x].as_ref()[..columns], lambda.as_mut());
             }
         }
@@ -103,11 +98,11 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     /// `k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)`
     fn stage_seed(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
-        for (x, kbar) in self.kbar.as_mut().iter_mut().enumerate() {
+        for (x, kbar) in self.forward.dxi.as_mut().iter_mut().enumerate() {
             let kbar = &mut kbar.as_mut()[..columns];
             kbar.fill(T::ZERO);
             add(scheme.b[stage], self.lambda[x].as_ref(), kbar);
-            for (a, xibar) in scheme.a.iter().zip(&self.xibar).skip(stage + 1) {
+            for (a, xibar) in scheme.a.iter().zip(&self.forward.dk).skip(stage + 1) {
                 if a[stage] != T::ZERO {
                     add(a[stage], xibar[x].as_ref(), kbar);
                 }
@@ -127,7 +122,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// The gradient to where it belongs: `ξ̄_i` and `λ_w`.
     fn keep(&mut self, stage: usize) {
         let nx = M::Shape::NX;
-        for (x, xibar) in self.xibar[stage].as_mut().iter_mut().enumerate() {
+        for (x, xibar) in self.forward.dk[stage].as_mut().iter_mut().enumerate() {
             xibar.as_mut()[0] = self.gradient[nx + x];
         }
         for w in nx..M::Shape::NW {
@@ -139,17 +134,17 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// Products with the Jacobian, one evaluation for all seeds.
     fn pull_many(&mut self, scheme: &Scheme<M, T, S>, stage: usize, columns: usize) {
         let nx = M::Shape::NX;
-        let xibar = &mut self.xibar[stage];
+        let xibar = &mut self.forward.dk[stage];
         for row in xibar.as_mut() {
             row.as_mut()[..columns].fill(T::ZERO);
         }
         for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
             let row = scheme.rows[equation];
-            let coefficient = row.factor * self.jacobian[entry];
+            let coefficient = row.factor * self.forward.jacobian[entry];
             let w = variable - nx;
             let sum = if w < nx { xibar[w].as_mut() } else { self.lambda[w].as_mut() };
-            add(coefficient, &self.kbar[row.state].as_ref()[..columns], sum);
+            add(coefficient, &self.forward.dxi[row.state].as_ref()[..columns], sum);
         }
     }
 }

@@ -83,11 +83,6 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
 }
 
 impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
-    /// Fresh memory.
-    pub fn init(&mut self) {
-        M::jacobian_constants(&mut self.jacobian);
-    }
-
     /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage when `k_i` and `dξ_i`
     /// are known.
     pub fn run(
@@ -99,13 +94,14 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
         mut at_stage: impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let columns = directions.columns();
+        M::jacobian_constants(&mut self.jacobian);
         for (i, row) in self.dx.as_mut().iter_mut().enumerate() {
             let row = &mut row.as_mut()[..columns];
             row.fill(T::ZERO);
             directions.add(i, T::ONE, row);
         }
         for step in 0..grid.steps {
-            let Base { point, record, x } = &mut *base;
+            let Base { point, record, x, .. } = &mut *base;
             record.x = *x;
             self.stages(scheme, grid, point, record, step, directions, &mut at_stage)?;
             record.end(scheme, grid, step, x)?;

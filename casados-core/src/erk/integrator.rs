@@ -4,8 +4,10 @@ use super::adjoint::Sweep;
 use super::forward::{Seeded, Unit, Variation, write};
 use super::hessian::Curvature;
 use super::step::{Base, Counts, Grid, Record, Scheme};
-use super::storage::{List, Slot};
 use crate::error::{Argument, Error};
+#[cfg(feature = "alloc")]
+use crate::memory::Heap;
+use crate::memory::{Inline, Memory, WithForward, WithHessian};
 use crate::model::{ArrayK, ArrayW, MatrixXC, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
 use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Nominal, Seeds};
@@ -20,80 +22,133 @@ use core::ops::Range;
 /// An explicit Runge-Kutta integrator of model `M` with method `B`, which has `S` stages.
 ///
 /// An interval of length `h` is divided into [`Options::steps`] equal steps. Derivatives are those of
-/// the discrete map, exact to rounding. Memory of a mode is allocated in its first call.
+/// the discrete map, exact to rounding.
 ///
 /// ```text
 /// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
 /// let step = erk.forward(&x0, &u, 0.05)?;
 /// ```
-pub struct Integrator<M: Ode, B, T: Real, const S: usize> {
+pub struct Integrator<M: Ode, B, const S: usize, T: Real, W: Memory> {
     scheme: Scheme<M, T, S>,
     options: Options,
     start: T,
     parameters_set: bool,
-    base: Slot<Base<M, T, S>>,
-    trajectory: List<Record<M, T, S>>,
-    multipliers: List<[ArrayK<M, T>; S]>,
-    variation: Slot<Variation<M, T, ArrayW<M, T>, S>>,
-    sweep: Slot<Sweep<M, T, [T; 1], S>>,
-    sweeps: Slot<Sweep<M, T, ArrayW<M, T>, S>>,
-    curvature: Slot<Curvature<M, T>>,
-    nominal: Slot<Nominal<M, T>>,
-    forward: Slot<Forward<M, T>>,
-    adjoint: Slot<Adjoint<M, T>>,
-    forward_adjoint: Slot<ForwardAdjoint<M, T>>,
-    hessian: Slot<Hessian<M, T>>,
-    method: PhantomData<B>,
+    counts: Counts,
+    base: W::Nominal<Base<M, T, S>>,
+    adjoint: W::Nominal<AdjointMemory<M, T, S>>,
+    trajectory: W::Tape<Record<M, T, S>>,
+    forward: W::Forward<ForwardMemory<M, T, S>>,
+    hessian: W::Hessian<HessianMemory<M, T>>,
+    multipliers: W::HessianTape<[ArrayK<M, T>; S]>,
+    method: PhantomData<fn() -> B>,
 }
 
-impl<M: Ode, B: Method<S>, T: Real, const S: usize> Integrator<M, B, T, S> {
-    /// An integrator with the tableau of `B`.
+/// Memory of the adjoint of one seed.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct AdjointMemory<M: Ode, T: Real, const S: usize> {
+    sweep: Sweep<M, T, [T; 1], S>,
+    result: Adjoint<M, T>,
+}
+
+/// Memory of as many directions or seeds as there are directions `w`.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct ForwardMemory<M: Ode, T: Real, const S: usize> {
+    sweep: Sweep<M, T, ArrayW<M, T>, S>,
+    result: ForwardAdjoint<M, T>,
+}
+
+/// Memory of the second order, besides that of the first.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct HessianMemory<M: Ode, T: Real> {
+    curvature: Curvature<M, T>,
+    result: Hessian<M, T>,
+}
+
+#[cfg(feature = "alloc")]
+impl<M: Ode, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T, Heap> {
+    /// An integrator with its memory on the heap.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`] if `options.steps` is zero; [`Error::OutOfMemory`].
+    /// [`Error::InvalidOption`]
     pub fn new(options: Options) -> Result<Self, Error> {
         const { assert!(B::TABLEAU.is_explicit(), "the tableau of this method is not explicit") };
-        Self::build(&B::TABLEAU, options)
+        Self::build(options, &B::TABLEAU)
     }
 }
 
-impl<M: Ode, T: Real, const S: usize> Integrator<M, Custom<S>, T, S> {
-    /// An integrator with a tableau of the user's own.
+#[cfg(feature = "alloc")]
+impl<M: Ode, const S: usize, T: Real> Integrator<M, Custom<S>, S, T, Heap> {
+    /// An integrator for a tableau of the user's own, with its memory on the heap.
     ///
     /// # Errors
-    /// [`Error::NotExplicit`] if it is implicit; as `new` otherwise.
-    pub fn with_tableau(tableau: &Tableau<S>, options: Options) -> Result<Self, Error> {
-        match tableau.first_implicit_stage() {
-            None => Self::build(tableau, options),
-            Some(stage) => Err(Error::NotExplicit { stage }),
-        }
+    /// [`Error::InvalidOption`]; [`Error::NotExplicit`] if the tableau is implicit.
+    pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        Self::build(options, &tableau)
     }
 }
 
-impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
-    fn build(tableau: &Tableau<S>, options: Options) -> Result<Self, Error> {
+impl<M: Ode, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: usize>
+    Integrator<M, B, S, T, Inline<Mode, STEPS>>
+where
+    Inline<Mode, STEPS>: Memory,
+{
+    /// An integrator that is its own memory, for at most `STEPS` steps.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`]
+    pub fn inline(options: Options) -> Result<Self, Error> {
+        const { assert!(B::TABLEAU.is_explicit(), "the tableau of this method is not explicit") };
+        Self::build(options, &B::TABLEAU)
+    }
+}
+
+impl<M: Ode, const S: usize, T: Real, Mode: 'static, const STEPS: usize>
+    Integrator<M, Custom<S>, S, T, Inline<Mode, STEPS>>
+where
+    Inline<Mode, STEPS>: Memory,
+{
+    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS` steps.
+    ///
+    /// # Errors
+    /// As `with_tableau`.
+    pub fn inline_with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        Self::build(options, &tableau)
+    }
+}
+
+impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
+    pub const SIZE: usize = size_of::<Self>();
+
+    fn build(options: Options, tableau: &Tableau<S>) -> Result<Self, Error> {
         options.check()?;
-        let mut integrator = Self {
+        if let Some(stage) = tableau.first_implicit_stage() {
+            return Err(Error::NotExplicit { stage });
+        }
+        if options.steps > W::STEPS {
+            return Err(Error::InvalidOption {
+                option: "steps",
+                value: options.steps as f64,
+                reason: "the memory of the integrator has fewer",
+            });
+        }
+        Ok(Self {
             scheme: Scheme::new(tableau),
             options,
             start: T::ZERO,
             parameters_set: M::Shape::NP == 0,
-            base: Slot::empty(),
-            trajectory: List::empty(),
-            multipliers: List::empty(),
-            variation: Slot::empty(),
-            sweep: Slot::empty(),
-            sweeps: Slot::empty(),
-            curvature: Slot::empty(),
-            nominal: Slot::empty(),
-            forward: Slot::empty(),
-            adjoint: Slot::empty(),
-            forward_adjoint: Slot::empty(),
-            hessian: Slot::empty(),
+            counts: Counts::default(),
+            base: Default::default(),
+            adjoint: Default::default(),
+            trajectory: Default::default(),
+            forward: Default::default(),
+            hessian: Default::default(),
+            multipliers: Default::default(),
             method: PhantomData,
-        };
-        integrator.base.get(|_| ())?;
-        Ok(integrator)
+        })
     }
 
     /// The options it was made with.
@@ -105,11 +160,10 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
     /// What the last call did.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
-        let counts = self.base.peek().map_or_else(Counts::default, |base| base.point.counts);
         Statistics {
-            steps: counts.steps,
-            residuals: counts.residuals,
-            jacobians: counts.jacobians,
+            steps: self.counts.steps,
+            residuals: self.counts.residuals,
+            jacobians: self.counts.jacobians,
             ..Statistics::default()
         }
     }
@@ -120,7 +174,7 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
     /// [`Error::NonFiniteInput`]; the parameters are as before.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
         finite(p.as_slice(), Argument::P)?;
-        let base = self.base.get(|_| ())?;
+        let base = W::nominal(&mut self.base)?;
         let first = 2 * M::Shape::NX + M::Shape::NU;
         base.point.v.as_mut()[first..first + M::Shape::NP].copy_from_slice(p.as_slice());
         self.parameters_set = true;
@@ -144,10 +198,12 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
     /// first call of a mode [`Error::OutOfMemory`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
         let grid = self.begin(x0, u, h)?;
-        let base = self.base.get(|_| ())?;
-        base.run(&self.scheme, grid)?;
-        let result = self.nominal.get(|_| ())?;
-        write_state(base, result);
+        let base = W::nominal(&mut self.base)?;
+        let run = base.run(&self.scheme, grid);
+        self.counts = base.point.counts;
+        run?;
+        let Base { x, result, .. } = base;
+        result.x.as_mut_slice().copy_from_slice(x.as_ref());
         Ok(result)
     }
 
@@ -155,13 +211,18 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
     ///
     /// # Errors
     /// As [`Integrator::solve`].
-    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error> {
+    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
         let grid = self.begin(x0, u, h)?;
-        let (base, variation) = (self.base.get(|_| ())?, self.variation.get(Variation::init)?);
-        let result = self.forward.get(|_| ())?;
-        variation.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()))?;
-        write_forward(grid, base, variation, result)?;
-        Ok(result)
+        let base = W::nominal(&mut self.base)?;
+        let ForwardMemory { sweep, result } = W::forward(&mut self.forward)?;
+        let run = sweep.forward.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()));
+        self.counts = base.point.counts;
+        run?;
+        write_forward(grid, base, &sweep.forward, &mut result.forward)?;
+        Ok(&result.forward)
     }
 
     /// The state at the end and its derivatives in the directions of `C` seeds.
@@ -174,12 +235,16 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
         u: &VectorU<M, T>,
         h: T,
         seeds: &Seeds<M, T, C>,
-    ) -> Result<Directional<M, T, C>, Error> {
+    ) -> Result<Directional<M, T, C>, Error>
+    where
+        W: WithForward,
+    {
         finite(seeds.x0.as_slice(), Argument::SeedX)?;
         finite(seeds.u.as_slice(), Argument::SeedU)?;
         finite(seeds.p.as_slice(), Argument::SeedP)?;
         let grid = self.begin(x0, u, h)?;
-        let (base, variation) = (self.base.get(|_| ())?, self.variation.get(Variation::init)?);
+        let base = W::nominal(&mut self.base)?;
+        let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
         let mut result = Directional::zeroed();
         // As many columns at once as the memory of `forward` holds.
         let most = M::Shape::NW.max(1);
@@ -187,7 +252,10 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
         for first in (0..C.max(1)).step_by(most) {
             let columns = most.min(C - first);
             base.x = start;
-            variation.run(&self.scheme, grid, base, Seeded { seeds, first, columns }, |_, _, _| Ok(()))?;
+            let directions = Seeded { seeds, first, columns };
+            let run = variation.run(&self.scheme, grid, base, directions, |_, _, _| Ok(()));
+            self.counts = base.point.counts;
+            run?;
             write(variation.dx.as_ref(), 0..columns, &mut result.dx, first, grid.steps - 1)?;
         }
         write_state(base, &mut result.nominal);
@@ -207,12 +275,15 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
     ) -> Result<&Adjoint<M, T>, Error> {
         finite(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        let (base, sweep) = (self.base.get(|_| ())?, self.sweep.get(Sweep::init)?);
-        let records = self.trajectory.get(grid.steps)?;
-        let result = self.adjoint.get(|_| ())?;
-        base.record(&self.scheme, grid, records)?;
+        let base = W::nominal(&mut self.base)?;
+        let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
+        let records = W::tape(&mut self.trajectory, grid.steps)?;
         sweep.seed(1, |x, _| lambda.as_slice()[x]);
-        sweep.run(&self.scheme, grid, &mut base.point, records, 1, None)?;
+        let run = base
+            .record(&self.scheme, grid, records)
+            .and_then(|()| sweep.run(&self.scheme, grid, &mut base.point, records, 1, None));
+        self.counts = base.point.counts;
+        run?;
         write_gradient(sweep, 0..1, result, 0)?;
         write_state(base, &mut result.nominal);
         Ok(result)
@@ -228,19 +299,27 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
         u: &VectorU<M, T>,
         h: T,
         lambdas: &MatrixXC<M, T, C>,
-    ) -> Result<Adjoint<M, T, C>, Error> {
+    ) -> Result<Adjoint<M, T, C>, Error>
+    where
+        W: WithForward,
+    {
         finite(lambdas.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        let (base, sweep) = (self.base.get(|_| ())?, self.sweeps.get(Sweep::init)?);
-        let records = self.trajectory.get(grid.steps)?;
+        let base = W::nominal(&mut self.base)?;
+        let sweep = &mut W::forward(&mut self.forward)?.sweep;
+        let records = W::tape(&mut self.trajectory, grid.steps)?;
         let mut result = Adjoint::zeroed();
-        base.record(&self.scheme, grid, records)?;
+        let run = base.record(&self.scheme, grid, records);
+        self.counts = base.point.counts;
+        run?;
         // As many seeds at once as the memory holds: one row of directions.
         let most = M::Shape::NW.max(1);
         for first in (0..C).step_by(most) {
             let columns = most.min(C - first);
             sweep.seed(columns, |x, column| lambdas[(x, first + column)]);
-            sweep.run(&self.scheme, grid, &mut base.point, records, columns, None)?;
+            let run = sweep.run(&self.scheme, grid, &mut base.point, records, columns, None);
+            self.counts = base.point.counts;
+            run?;
             write_gradient(sweep, 0..columns, &mut result, first)?;
         }
         write_state(base, &mut result.nominal);
@@ -257,19 +336,24 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&ForwardAdjoint<M, T>, Error> {
+    ) -> Result<&ForwardAdjoint<M, T>, Error>
+    where
+        W: WithForward,
+    {
         finite(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        let (base, variation) = (self.base.get(|_| ())?, self.variation.get(Variation::init)?);
-        let result = self.forward_adjoint.get(|_| ())?;
-        variation.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()))?;
-        write_forward(grid, base, variation, &mut result.forward)?;
+        let base = W::nominal(&mut self.base)?;
+        let ForwardMemory { sweep, result } = W::forward(&mut self.forward)?;
+        let run = sweep.forward.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()));
+        self.counts = base.point.counts;
+        run?;
+        write_forward(grid, base, &sweep.forward, &mut result.forward)?;
         // With the Jacobian at hand the gradient is a product.
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         for w in 0..M::Shape::NW {
             let mut sum = T::ZERO;
             for (x, &lambda) in lambda.as_slice().iter().enumerate() {
-                sum = sum + lambda * variation.dx[x][w];
+                sum = sum + lambda * sweep.forward.dx[x][w];
             }
             if !sum.is_finite() {
                 return Err(Error::Overflow { step: grid.steps - 1, index: w });
@@ -289,26 +373,37 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Hessian<M, T>, Error> {
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
         finite(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        let (base, sweep) = (self.base.get(|_| ())?, self.sweep.get(Sweep::init)?);
-        let (variation, curvature) = (self.variation.get(Variation::init)?, self.curvature.get(|_| ())?);
-        let (records, multipliers) = (self.trajectory.get(grid.steps)?, self.multipliers.get(grid.steps)?);
-        let result = self.hessian.get(|_| ())?;
+        let base = W::nominal(&mut self.base)?;
+        let sweep = &mut W::nominal(&mut self.adjoint)?.sweep;
+        let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
+        let HessianMemory { curvature, result } = W::hessian(&mut self.hessian)?;
+        let records = W::tape(&mut self.trajectory, grid.steps)?;
+        let multipliers = W::hessian_tape(&mut self.multipliers, grid.steps)?;
+        let scheme = &self.scheme;
 
         // The adjoint first: then the forward sweep meets each stage with its multipliers known, and no
         // derivative of a stage has to be kept.
         let start = base.x;
-        base.record(&self.scheme, grid, records)?;
         sweep.seed(1, |x, _| lambda.as_slice()[x]);
-        sweep.run(&self.scheme, grid, &mut base.point, records, 1, Some(multipliers))?;
         curvature.start();
-        base.x = start;
-        base.point.counts.steps = 0;
-        variation.run(&self.scheme, grid, base, Unit, |point, dxi, at| {
-            curvature.add(&self.scheme, point, &multipliers[at.step][at.stage], dxi, at)
-        })?;
+        let mut run = || {
+            base.record(scheme, grid, records)?;
+            sweep.run(scheme, grid, &mut base.point, records, 1, Some(multipliers))?;
+            base.x = start;
+            base.point.counts.steps = 0;
+            variation.run(scheme, grid, base, Unit, |point, dxi, at| {
+                curvature.add(scheme, point, &multipliers[at.step][at.stage], dxi, at)
+            })
+        };
+        let run = run();
+        self.counts = base.point.counts;
+        run?;
 
         write_forward(grid, base, variation, &mut result.first.forward)?;
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
@@ -325,8 +420,9 @@ impl<M: Ode, B, T: Real, const S: usize> Integrator<M, B, T, S> {
 
     /// Checks the input, and goes to the start of the interval.
     fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Grid<T>, Error> {
-        let base = self.base.get(|_| ())?;
+        let base = W::nominal(&mut self.base)?;
         base.point.counts = Counts::default();
+        self.counts = Counts::default();
         if !self.parameters_set {
             return Err(Error::ParametersNotSet);
         }

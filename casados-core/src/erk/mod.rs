@@ -13,10 +13,10 @@ mod forward;
 mod hessian;
 mod integrator;
 mod step;
-mod storage;
 
 pub use integrator::Integrator;
 
+use crate::memory::Memory;
 use crate::model::Ode;
 use crate::scalar::Real;
 use crate::tableau::{Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Heun, Midpoint, Rk4};
@@ -29,21 +29,30 @@ use crate::tableau::{Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, He
 )]
 pub trait Explicit: 'static {
     /// The integrator with this method.
-    type Integrator<M: Ode, T: Real>;
+    type Integrator<M: Ode, T: Real, W: Memory>;
 }
 
 macro_rules! explicit {
     ($($method:ty: $stages:literal),* $(,)?) => {
         $(impl Explicit for $method {
-            type Integrator<M: Ode, T: Real> = Integrator<M, $method, T, $stages>;
+            type Integrator<M: Ode, T: Real, W: Memory> = Integrator<M, $method, $stages, T, W>;
         })*
     };
 }
 explicit!(Euler: 1, Midpoint: 2, Heun: 2, Rk4: 4, DormandPrince5: 6, Butcher6: 7, DormandPrince8: 12);
 
 impl<const S: usize> Explicit for Custom<S> {
-    type Integrator<M: Ode, T: Real> = Integrator<M, Self, T, S>;
+    type Integrator<M: Ode, T: Real, W: Memory> = Integrator<M, Self, S, T, W>;
 }
 
-/// The integrator of model `M` with the explicit method `B`, in the number type `T`.
-pub type Erk<M, B, T = f64> = <B as Explicit>::Integrator<M, T>;
+/// The explicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
+///
+/// ```ignore
+/// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// let step = erk.forward(&x0, &u, 0.05)?;
+/// ```
+#[cfg(feature = "alloc")]
+pub type Erk<M, B, T = f64, W = crate::memory::Heap> = <B as Explicit>::Integrator<M, T, W>;
+/// The explicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
+#[cfg(not(feature = "alloc"))]
+pub type Erk<M, B, T, W> = <B as Explicit>::Integrator<M, T, W>;

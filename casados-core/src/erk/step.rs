@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
+use crate::result::Nominal;
 use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 use crate::tableau::Tableau;
@@ -206,6 +207,7 @@ pub(super) struct Base<M: Ode, T: Real, const S: usize> {
     pub record: Record<M, T, S>,
     /// The state at the end of the step.
     pub x: ArrayX<M, T>,
+    pub result: Nominal<M, T>,
 }
 
 impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {

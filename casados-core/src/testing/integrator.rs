@@ -220,7 +220,11 @@ macro_rules! integrator {
 }
 
 // An explicit method has no warm start.
-integrator!([M: Ode, B: 'static, const S: usize] M, crate::erk::Integrator<M, B, f64, S>, |_| {});
+integrator!(
+    [M: Ode, B, const S: usize] M,
+    crate::erk::Integrator<M, B, S, f64, crate::memory::Heap>,
+    |_| {}
+);
 integrator!(
     [M: Dae, B, const S: usize] M,
     crate::irk::Integrator<M, B, S, f64, crate::memory::Heap>,
