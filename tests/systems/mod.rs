@@ -119,7 +119,7 @@ pub fn hessian<M: Equations, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, hess
 macro_rules! system {
     ($(#[$doc:meta])* $name:ident [$nx:literal, $nz:literal, $nu:literal, $np:literal] $s:ident |$v:ident, $f:ident| $body:block) => {
         $(#[$doc])*
-        pub struct $name;
+        struct $name;
         const _: () = {
             use casados::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
             const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
