@@ -1,6 +1,8 @@
 //! Small models, written by hand.
 #![allow(dead_code)]
 
+pub mod pendulum;
+
 use casados_core::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
