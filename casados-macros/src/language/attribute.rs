@@ -1,0 +1,230 @@
+//! What stands in the brackets of `#[dae(...)]` and `#[ode(...)]`.
+//!
+//! - `NX = [9, 15]`, `NX = 1..=5`, `NX = 9`: the values of a const parameter to make models of;
+//! - `(M, N) = [(1, 2), (3, 4)]`: of several together;
+//! - `name = Ident`: another name for the model's type;
+//! - `crate = path`: where casados is found.
+
+use super::Instance;
+use proc_macro2::{Ident, Span, TokenStream};
+use syn::parse::{Parse, ParseStream, Parser};
+use syn::spanned::Spanned;
+use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
+
+/// What an attribute can say.
+const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
+    `(M, N) = [(1, 2), (3, 4)]`), `name = Type` and `crate = path`";
+
+/// More models than this in one attribute are taken for a mistake.
+const MAX_INSTANCES: usize = 1000;
+
+/// The arguments of an attribute.
+pub struct Arguments {
+    /// Path of the crate.
+    pub krate: syn::Path,
+    /// Another name for the model's type.
+    pub name: Option<Ident>,
+    /// Groups of const parameters with the values that they take together.
+    values: Vec<Values>,
+}
+
+/// Const parameters and the values that they take together.
+struct Values {
+    names: Vec<Ident>,
+    rows: Vec<Vec<u64>>,
+}
+
+impl Arguments {
+    /// Reads the tokens in the brackets.
+    pub fn read(tokens: TokenStream) -> Result<Self> {
+        let mut arguments = Self { krate: syn::parse_quote!(::casados), name: None, values: Vec::new() };
+        let entries =
+            syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
+        let mut krate = false;
+        for entry in entries {
+            match entry {
+                Entry::Crate(span, path) => {
+                    if std::mem::replace(&mut krate, true) {
+                        return Err(Error::new(span, "`crate` is given twice"));
+                    }
+                    arguments.krate = path;
+                }
+                Entry::Name(span, name) => {
+                    if arguments.name.replace(name).is_some() {
+                        return Err(Error::new(span, "`name` is given twice"));
+                    }
+                }
+                Entry::Values(values) => {
+                    for name in &values.names {
+                        if arguments.values.iter().any(|other| other.names.contains(name)) {
+                            return Err(Error::new(name.span(), format!("`{name}` is given twice")));
+                        }
+                    }
+                    arguments.values.push(values);
+                }
+            }
+        }
+        Ok(arguments)
+    }
+
+    /// The models to make: every combination of the values of the const parameters of `generics`.
+    /// One without any for a function that has none.
+    pub fn instances(&self, generics: &Generics) -> Result<Vec<Vec<Instance>>> {
+        let mut parameters = Vec::new();
+        for parameter in &generics.params {
+            match parameter {
+                GenericParam::Const(parameter) => parameters.push(parameter),
+                GenericParam::Lifetime(_) => {}
+                GenericParam::Type(parameter) => {
+                    return Err(Error::new_spanned(
+                        parameter,
+                        "a graph model is written with `f64` and has no type parameters; a dual model has exactly one, \
+                         `T: DualNum + Copy`",
+                    ));
+                }
+            }
+        }
+        for values in &self.values {
+            for name in &values.names {
+                if !parameters.iter().any(|parameter| parameter.ident == *name) {
+                    return Err(Error::new(
+                        name.span(),
+                        format!("the model has no const parameter `{name}`; {POSSIBLE}"),
+                    ));
+                }
+            }
+        }
+        if let Some(missing) = parameters
+            .iter()
+            .find(|parameter| !self.values.iter().any(|values| values.names.contains(&parameter.ident)))
+        {
+            return Err(Error::new_spanned(
+                missing,
+                format!("no values for `{0}`: list them in the attribute, as in `{0} = [1, 2]`", missing.ident),
+            ));
+        }
+        let mut combinations: Vec<Vec<(&Ident, u64)>> = vec![Vec::new()];
+        for values in &self.values {
+            if combinations.len().saturating_mul(values.rows.len()) > MAX_INSTANCES {
+                return Err(Error::new(
+                    values.names[0].span(),
+                    format!("these are more than {MAX_INSTANCES} models; list fewer values"),
+                ));
+            }
+            combinations = combinations
+                .iter()
+                .flat_map(|prefix| {
+                    values.rows.iter().map(move |row| {
+                        let mut combination = prefix.clone();
+                        combination.extend(values.names.iter().zip(row.iter().copied()));
+                        combination
+                    })
+                })
+                .collect();
+        }
+        Ok(combinations
+            .into_iter()
+            .map(|combination| {
+                parameters
+                    .iter()
+                    .filter_map(|parameter| {
+                        let (_, value) = combination.iter().find(|(name, _)| **name == parameter.ident)?;
+                        Some(Instance {
+                            name: parameter.ident.clone(),
+                            ty: parameter.ty.clone(),
+                            value: *value,
+                        })
+                    })
+                    .collect()
+            })
+            .collect())
+    }
+}
+
+/// One argument.
+enum Entry {
+    Crate(Span, syn::Path),
+    Name(Span, Ident),
+    Values(Values),
+}
+
+impl Parse for Entry {
+    fn parse(input: ParseStream) -> Result<Self> {
+        let span = input.span();
+        if input.peek(Token![crate]) {
+            input.parse::<Token![crate]>()?;
+            input.parse::<Token![=]>()?;
+            return Ok(Self::Crate(span, input.call(syn::Path::parse_mod_style)?));
+        }
+        let names = if input.peek(syn::token::Paren) {
+            let content;
+            syn::parenthesized!(content in input);
+            content.parse_terminated(Ident::parse, Token![,])?.into_iter().collect()
+        } else {
+            vec![input.parse::<Ident>().map_err(|_| Error::new(span, POSSIBLE))?]
+        };
+        if names.is_empty() {
+            return Err(Error::new(span, POSSIBLE));
+        }
+        if !input.peek(Token![=]) {
+            return Err(Error::new(span, POSSIBLE));
+        }
+        input.parse::<Token![=]>()?;
+        if names.len() == 1 && names[0] == "name" {
+            return Ok(Self::Name(span, input.parse()?));
+        }
+        let rows = rows(&input.parse()?, names.len())?;
+        if rows.is_empty() {
+            return Err(Error::new(span, "the list of values is empty: no model would be made"));
+        }
+        for (i, row) in rows.iter().enumerate() {
+            if rows[..i].contains(row) {
+                let row = row.iter().map(u64::to_string).collect::<Vec<_>>().join(", ");
+                return Err(Error::new(span, format!("the value {row} is listed twice")));
+            }
+        }
+        Ok(Self::Values(Values { names, rows }))
+    }
+}
+
+/// The values in a list or a range; each row has `width` of them.
+fn rows(values: &Expr, width: usize) -> Result<Vec<Vec<u64>>> {
+    match values {
+        Expr::Array(list) => list.elems.iter().map(|row| self::row(row, width)).collect(),
+        Expr::Range(range) if width == 1 => {
+            let (Some(start), Some(end)) = (&range.start, &range.end) else {
+                return Err(Error::new_spanned(range, "a range of values needs a start and an end"));
+            };
+            let (start, end) = (integer(start)?, integer(end)?);
+            let end = match range.limits {
+                syn::RangeLimits::HalfOpen(_) => end,
+                syn::RangeLimits::Closed(_) => end.saturating_add(1),
+            };
+            if end.saturating_sub(start) > MAX_INSTANCES as u64 {
+                return Err(Error::new_spanned(
+                    range,
+                    format!("these are more than {MAX_INSTANCES} models; list fewer values"),
+                ));
+            }
+            Ok((start..end).map(|value| vec![value]).collect())
+        }
+        single => Ok(vec![row(single, width)?]),
+    }
+}
+
+fn row(values: &Expr, width: usize) -> Result<Vec<u64>> {
+    match values {
+        Expr::Tuple(tuple) if width > 1 && tuple.elems.len() == width => tuple.elems.iter().map(integer).collect(),
+        single if width == 1 => Ok(vec![integer(single)?]),
+        other => Err(Error::new(other.span(), format!("expected a tuple of {width} integers"))),
+    }
+}
+
+fn integer(value: &Expr) -> Result<u64> {
+    if let Expr::Lit(literal) = value
+        && let Lit::Int(literal) = &literal.lit
+    {
+        return literal.base10_parse();
+    }
+    Err(Error::new(value.span(), format!("expected an integer literal; {POSSIBLE}")))
+}
