@@ -1,17 +1,22 @@
 //! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes its body.
 
 mod arithmetic;
+mod attribute;
 mod call;
 mod closure;
 mod environment;
 mod evaluator;
 mod expression;
+mod flatten;
 mod items;
 mod methods;
+mod model;
+mod module;
 mod path;
 mod pattern;
 mod place;
 mod select;
+mod signature;
 mod statement;
 #[cfg(test)]
 mod tests;
@@ -19,7 +24,10 @@ mod types;
 mod value;
 
 use crate::graph::{Graph, Node};
+use attribute::Arguments;
+use model::Template;
 use proc_macro2::{Span, TokenStream};
+use quote::ToTokens;
 
 /// Which attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +109,52 @@ pub struct Variables {
 }
 
 /// Reads an item.
-pub fn read(_form: Form, _attribute: TokenStream, item: TokenStream) -> syn::Result<Source> {
-    Err(syn::Error::new_spanned(item, "not written yet"))
+pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Result<Source> {
+    let arguments = Arguments::read(attribute)?;
+    match syn::parse2(item)? {
+        syn::Item::Fn(function) => {
+            let template = Template {
+                form,
+                function: &function,
+                items: &[],
+                name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&function.sig.ident)),
+                visibility: function.vis.clone(),
+                documentation: documentation(&function.attrs),
+                krate: arguments.krate.clone(),
+            };
+            let models = models(&arguments, &template)?;
+            Ok(Source { item: function.to_token_stream(), place: Place::Beside, models })
+        }
+        syn::Item::Mod(mut module) => {
+            let index = module::model_function(form, &mut module)?;
+            let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
+            let Some(syn::Item::Fn(function)) = items.get(index) else {
+                return Err(syn::Error::new_spanned(&module, "no model in this module"));
+            };
+            let template = Template {
+                form,
+                function,
+                items,
+                name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&module.ident)),
+                visibility: module.vis.clone(),
+                documentation: documentation(&module.attrs),
+                krate: arguments.krate.clone(),
+            };
+            let models = models(&arguments, &template)?;
+            Ok(Source { item: module.to_token_stream(), place: Place::Inside, models })
+        }
+        other => Err(syn::Error::new_spanned(
+            other,
+            "a model is a function, or a module with a function in it",
+        )),
+    }
+}
+
+fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>> {
+    let instances = arguments.instances(&template.function.sig.generics)?;
+    instances.into_iter().map(|instance| template.model(instance)).collect()
+}
+
+fn documentation(attributes: &[syn::Attribute]) -> Vec<syn::Attribute> {
+    attributes.iter().filter(|attribute| attribute.path().is_ident("doc")).cloned().collect()
 }

@@ -1,7 +1,6 @@
-//! The signature of a model: arguments by name, their types, and what follows for the variables.
+//! The signature of a model: its arguments, recognised by name.
 
-use super::flatten::{Layout, Length, Types};
-use super::{Form, Variables};
+use super::Form;
 use proc_macro2::Ident;
 use syn::spanned::Spanned;
 use syn::{Error, FnArg, ItemFn, Pat, Result};
@@ -52,104 +51,61 @@ impl Role {
 }
 
 /// An argument of a model.
-#[derive(Debug)]
 pub struct Argument {
     /// What it is.
     pub role: Role,
-    /// Its pattern: the name, perhaps `mut`.
-    pub pattern: Pat,
-    /// Its type as a tree of numbers.
-    pub layout: Layout,
     /// Its type as written.
     pub ty: syn::Type,
 }
 
-/// A signature, understood.
-#[derive(Debug)]
-pub struct Signature {
-    /// Arguments in the order of the function.
-    pub arguments: Vec<Argument>,
-    /// Names of the variables; their numbers are the dimensions.
-    pub variables: Variables,
+/// The arguments of a model function, in its order.
+pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
+    check_qualifiers(function)?;
+    let mut arguments = Vec::<Argument>::new();
+    for input in &function.sig.inputs {
+        let FnArg::Typed(input) = input else {
+            return Err(Error::new_spanned(input, "a model is a function without `self`"));
+        };
+        let role = role(form, &input.pat)?;
+        if arguments.iter().any(|argument| argument.role == role) {
+            return Err(Error::new_spanned(&input.pat, format!("the argument `{}` is given twice", role.name())));
+        }
+        check_type(&input.ty)?;
+        arguments.push(Argument { role, ty: (*input.ty).clone() });
+    }
+    let has = |role: Role| arguments.iter().any(|argument| argument.role == role);
+    if form == Form::Dae && !has(Role::Xdot) {
+        return Err(Error::new(
+            function.sig.ident.span(),
+            "a `#[dae]` has an argument `xdot`, of the type of `x`; a function that returns `xdot` is an `#[ode]`",
+        ));
+    }
+    if form == Form::Ode && !has(Role::X) {
+        return Err(Error::new(function.sig.ident.span(), "a model has differential states: an argument `x`"));
+    }
+    Ok(arguments)
 }
 
-impl Signature {
-    /// The argument of a role.
-    pub fn argument(&self, role: Role) -> Option<&Argument> {
-        self.arguments.iter().find(|argument| argument.role == role)
+/// What is wrong with a type whatever the items in sight.
+fn check_type(ty: &syn::Type) -> Result<()> {
+    let syn::Type::Reference(reference) = ty else { return Ok(()) };
+    if reference.mutability.is_some() {
+        return Err(Error::new_spanned(
+            reference,
+            "a model does not change its arguments: take them by value or by `&`",
+        ));
     }
-
-    /// Where the numbers of a role begin among the variables `(ẋ, x, z, u, p, t)`.
-    pub fn offset(&self, role: Role) -> usize {
-        let Variables { x, z, u, p } = &self.variables;
-        match role {
-            Role::Xdot => 0,
-            Role::X => x.len(),
-            Role::Z => 2 * x.len(),
-            Role::U => 2 * x.len() + z.len(),
-            Role::P => 2 * x.len() + z.len() + u.len(),
-            Role::T => 2 * x.len() + z.len() + u.len() + p.len(),
-        }
+    if let syn::Type::Slice(slice) = &*reference.elem {
+        return Err(Error::new_spanned(
+            slice,
+            "the length of a slice is not known at compile time: write an array, as in `&[f64; 4]`",
+        ));
     }
-
-    /// Reads the signature of a model function.
-    pub fn read(form: Form, function: &ItemFn, types: &Types, length: &mut Length) -> Result<Self> {
-        check_qualifiers(function)?;
-        let mut arguments = Vec::<Argument>::new();
-        for input in &function.sig.inputs {
-            let FnArg::Typed(input) = input else {
-                return Err(Error::new_spanned(input, "a model is a function without `self`"));
-            };
-            let (role, pattern) = role(form, &input.pat)?;
-            if arguments.iter().any(|argument| argument.role == role) {
-                return Err(Error::new_spanned(&input.pat, format!("`{}` is given twice", role.name())));
-            }
-            let layout = types.layout(&input.ty, length)?;
-            if role == Role::T && layout != Layout::Number {
-                return Err(Error::new_spanned(&input.ty, "the time `t` is one number: `t: f64`"));
-            }
-            arguments.push(Argument { role, pattern, layout, ty: (*input.ty).clone() });
-        }
-        let of = |role: Role| arguments.iter().find(|argument| argument.role == role);
-        let Some(x) = of(Role::X).or_else(|| of(Role::Xdot)) else {
-            return Err(Error::new(
-                function.sig.ident.span(),
-                "a model has differential states: an argument `x`, and `xdot` of the same type in a `#[dae]`",
-            ));
-        };
-        if form == Form::Dae {
-            let Some(xdot) = of(Role::Xdot) else {
-                return Err(Error::new(
-                    function.sig.ident.span(),
-                    "a `#[dae]` has an argument `xdot`, of the type of `x`; a function that returns `xdot` is an `#[ode]`",
-                ));
-            };
-            if xdot.layout != x.layout {
-                return Err(Error::new_spanned(
-                    &xdot.ty,
-                    format!("`xdot` must have the type of `x` ({} numbers in the same order)", x.layout.len()),
-                ));
-            }
-        }
-        if x.layout.len() == 0 {
-            return Err(Error::new_spanned(&x.ty, "a model has at least one differential state"));
-        }
-        let names = |role: Role| match of(role) {
-            Some(argument) => argument.layout.names(role.name()),
-            None => Vec::new(),
-        };
-        let variables = Variables {
-            x: x.layout.names(Role::X.name()),
-            z: names(Role::Z),
-            u: names(Role::U),
-            p: names(Role::P),
-        };
-        Ok(Self { arguments, variables })
-    }
+    check_type(&reference.elem)
 }
 
 /// The role of an argument, from its name.
-fn role(form: Form, pattern: &Pat) -> Result<(Role, Pat)> {
+fn role(form: Form, pattern: &Pat) -> Result<Role> {
     let arguments = match form {
         Form::Dae => "`xdot`, `x`, `z`, `u`, `p` and `t`",
         Form::Ode => "`x`, `u`, `p` and `t`",
@@ -169,7 +125,7 @@ fn role(form: Form, pattern: &Pat) -> Result<(Role, Pat)> {
             &identifier.ident,
             "an `#[ode]` has no algebraic states; write the model as a `#[dae]` with an equation for each of them",
         )),
-        (Some(role), _) => Ok((role, pattern.clone())),
+        (Some(role), _) => Ok(role),
         (None, _) => Err(Error::new_spanned(
             &identifier.ident,
             format!("unknown argument `{}`: the arguments of a model are {arguments}", identifier.ident),

@@ -1,8 +1,16 @@
 //! Methods and functions that belong to the language: those of `f64`, integers, arrays, iterators, nalgebra.
 
+mod array;
+mod construction;
+mod consume;
+mod float;
+mod function;
+mod integer;
 pub mod iterator;
+pub mod matrix;
+mod option;
 
-use super::evaluator::{At, Evaluator};
+use super::evaluator::{At, Evaluator, error};
 use super::place::Place;
 use super::types::Type;
 use super::value::{Builtin, Generic, Value};
@@ -42,29 +50,117 @@ pub struct Call<'a> {
     pub at: At<'a>,
 }
 
+impl Call<'_> {
+    /// Checks the number of arguments.
+    fn expect(&self, arguments: usize) -> Result<()> {
+        if self.arguments.len() == arguments {
+            return Ok(());
+        }
+        Err(error(
+            self.at,
+            format!("`{}` takes {arguments} arguments, but {} are given", self.name, self.arguments.len()),
+        ))
+    }
+
+    /// The argument of a call that has one.
+    fn only(&self) -> Result<&Value> {
+        self.expect(1)?;
+        Ok(&self.arguments[0])
+    }
+
+    /// The length that a const argument gives: `from_fn::<_, 3, _>`.
+    fn constant(&self) -> Option<i128> {
+        self.turbofish.iter().find_map(|generic| match generic {
+            Generic::Const(value) => Some(value.value),
+            Generic::Type(_) => None,
+        })
+    }
+}
+
 /// A method call. `None` if there is no such method.
-pub fn method(_evaluator: &mut Evaluator, _receiver: &Receiver, _call: &Call) -> Result<Option<Value>> {
-    Ok(None)
+pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Result<Option<Value>> {
+    let value = receiver.value(evaluator, call.at)?;
+    let value = evaluator.load(value, call.at)?;
+    let special = match &value {
+        Value::Real(node) => float::method(evaluator, *node, call)?,
+        Value::Opaque(_) if is_common(call.name) => None,
+        Value::Opaque(_) => {
+            let node = evaluator.real(&value, call.at)?;
+            float::method(evaluator, node, call)?
+        }
+        Value::Integer(integer) => integer::method(evaluator, *integer, call)?,
+        Value::Array(_) => array::method(evaluator, receiver, &value, call)?,
+        Value::Range(_) | Value::Iterator(_) => iterator::method(evaluator, receiver, &value, call)?,
+        Value::Matrix(_) => matrix::method(evaluator, receiver, &value, call)?,
+        Value::Option(content) => option::method(evaluator, receiver, content.as_deref(), call)?,
+        Value::Bool(known) => option::bool_method(evaluator, *known, call)?,
+        _ => None,
+    };
+    if special.is_some() {
+        return Ok(special);
+    }
+    common(evaluator, value, call)
+}
+
+/// Whether a method is one that every value has.
+fn is_common(name: &str) -> bool {
+    matches!(name, "clone" | "to_owned" | "borrow" | "as_ref" | "into" | "try_into")
+}
+
+/// Methods that every value has.
+fn common(evaluator: &mut Evaluator, value: Value, call: &Call) -> Result<Option<Value>> {
+    if !is_common(call.name) {
+        return Ok(None);
+    }
+    call.expect(0)?;
+    Ok(Some(match call.name {
+        "into" => convert(evaluator, value, call.expected, call.at)?,
+        "try_into" => {
+            let ty = match call.expected {
+                Type::Option(ty) => (**ty).clone(),
+                _ => Type::Unknown,
+            };
+            Value::some(convert(evaluator, value, &ty, call.at)?)
+        }
+        _ => value,
+    }))
+}
+
+/// `From` and `Into` between numbers, arrays and matrices; to an unknown type the value itself.
+pub fn convert(evaluator: &mut Evaluator, value: Value, ty: &Type, at: At) -> Result<Value> {
+    match (&value, ty) {
+        (Value::Integer(integer), Type::Real) => {
+            Ok(Value::Real(evaluator.graph.constant(integer.value as f64)))
+        }
+        (Value::Array(elements), Type::Matrix(rows, columns)) => {
+            matrix::from_arrays(evaluator, elements, *rows, *columns, at)
+        }
+        (Value::Matrix(matrix), Type::Array(element, _)) => {
+            let nested = matches!(**element, Type::Array(..));
+            Ok(matrix::to_arrays(matrix, nested))
+        }
+        _ => Ok(value),
+    }
 }
 
 /// A call of a function that is named by path: `core::array::from_fn`, `Vector3::new`, `f64::from`.
 /// `None` if there is no such function. `f64::sqrt(x)` is tried as `x.sqrt()` after that.
-pub fn function(_evaluator: &mut Evaluator, _function: &Builtin, _call: &Call) -> Result<Option<Value>> {
-    Ok(None)
+pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Result<Option<Value>> {
+    function::call(evaluator, function, call)
 }
 
 /// A constant that is named by path: `core::f64::consts::PI`, `f64::EPSILON`. `None` if there is no such constant.
-pub fn constant(_evaluator: &mut Evaluator, _path: &Builtin) -> Option<Value> {
-    None
+pub fn constant(evaluator: &mut Evaluator, path: &Builtin) -> Option<Value> {
+    function::constant(evaluator, path)
 }
 
 /// An operator of which one side is a matrix. `None` if there is no such operator.
 pub fn matrix_operator(
-    _evaluator: &mut Evaluator,
-    _operator: super::evaluator::Operator,
-    _a: &Value,
-    _b: &Value,
-    _at: At,
+    evaluator: &mut Evaluator,
+    operator: super::arithmetic::Operator,
+    a: &Value,
+    b: &Value,
+    at: At,
 ) -> Result<Option<Value>> {
-    Ok(None)
+    matrix::operator(evaluator, operator, a, b, at)
 }

@@ -1,0 +1,190 @@
+//! Functions and constants of the language that are named by path.
+
+use super::iterator::{self, Iter};
+use super::{Call, float, integer, matrix};
+use crate::language::evaluator::{At, Evaluator, error, unsupported};
+use crate::language::place::Place;
+use crate::language::types::Type;
+use crate::language::value::{Builtin, Integer, IntegerType, Value};
+use syn::Result;
+
+/// A call of a function by path. `None` if there is no such function.
+pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Result<Option<Value>> {
+    let Some(name) = function.path.last().map(String::as_str) else { return Ok(None) };
+    let before = function.path.iter().rev().nth(1).map_or("", String::as_str);
+    let at = call.at;
+    if let Some(value) = matrix::function(evaluator, function, call)? {
+        return Ok(Some(value));
+    }
+    let value = match (before, name) {
+        ("array", "from_fn") => from_fn(evaluator, call)?,
+        ("array", "from_ref") | ("convert", "identity") => call.only()?.clone(),
+        ("array", "repeat") => {
+            let length = array_length(call)?;
+            Value::array(vec![call.only()?.clone(); length])
+        }
+        ("iter", "repeat") => Value::iterator(Iter::Repeat(call.only()?.clone())),
+        ("iter", "repeat_n") => {
+            call.expect(2)?;
+            let n = evaluator.usize(&call.arguments[1], at)?;
+            Value::iterator(Iter::Take(Box::new(Iter::Repeat(call.arguments[0].clone())), n))
+        }
+        ("iter", "from_fn") => Value::iterator(Iter::FromFn(call.only()?.clone())),
+        ("iter", "once") => Value::iterator(Iter::of(vec![call.only()?.clone()])),
+        ("iter", "empty") => Value::iterator(Iter::of(Vec::new())),
+        ("iter", "successors") => {
+            call.expect(2)?;
+            match &call.arguments[0] {
+                Value::Option(first) => {
+                    Value::iterator(Iter::Successors(first.clone(), call.arguments[1].clone()))
+                }
+                other => return Err(error(at, format!("expected an `Option`, found {}", other.kind()))),
+            }
+        }
+        ("iter", "zip") => {
+            call.expect(2)?;
+            let a = iterator::into_iter(evaluator, call.arguments[0].clone(), at)?;
+            let b = iterator::into_iter(evaluator, call.arguments[1].clone(), at)?;
+            Value::iterator(Iter::Zip(Box::new(a), Box::new(b)))
+        }
+        ("mem", "swap") => {
+            call.expect(2)?;
+            let (a, b) = (reference(&call.arguments[0], at)?, reference(&call.arguments[1], at)?);
+            let (x, y) = (evaluator.read(&a, at)?, evaluator.read(&b, at)?);
+            evaluator.write(&a, y, at)?;
+            evaluator.write(&b, x, at)?;
+            Value::unit()
+        }
+        ("mem", "replace") => {
+            call.expect(2)?;
+            let place = reference(&call.arguments[0], at)?;
+            let old = evaluator.read(&place, at)?;
+            let new = evaluator.load(call.arguments[1].clone(), at)?;
+            evaluator.write(&place, new, at)?;
+            old
+        }
+        ("cmp", "min" | "max") => {
+            call.expect(2)?;
+            let a = evaluator.integer(&call.arguments[0], at)?;
+            let inner = Call {
+                name,
+                turbofish: &[],
+                arguments: vec![call.arguments[1].clone()],
+                expected: call.expected,
+                at,
+            };
+            return integer::method(evaluator, a, &inner);
+        }
+        ("mem" | "", "drop") => Value::unit(),
+        ("", "Some" | "Ok") | ("Option", "Some") | ("Result", "Ok") => Value::some(call.only()?.clone()),
+        ("f64", "from") => match evaluator.load(call.only()?.clone(), at)? {
+            Value::Integer(integer) => Value::Real(evaluator.graph.constant(integer.value as f64)),
+            Value::Bool(known) => Value::Real(evaluator.graph.constant(f64::from(u8::from(known)))),
+            other => Value::Real(evaluator.real(&other, at)?),
+        },
+        (_, "default") if call.arguments.is_empty() => {
+            let ty = function.owner.clone().unwrap_or_default();
+            let ty = if matches!(ty, Type::Unknown) { call.expected.clone() } else { ty };
+            return match ty {
+                Type::Unknown | Type::Struct(..) => Ok(None),
+                ty => default(evaluator, &ty, at).map(Some),
+            };
+        }
+        (ty, "from" | "try_from") if IntegerType::named(ty).is_some() => {
+            let integer = match evaluator.load(call.only()?.clone(), at)? {
+                Value::Bool(known) => Integer { value: i128::from(known), ty: None },
+                value => evaluator.integer(&value, at)?,
+            };
+            let ty = IntegerType::named(ty);
+            let fitted = crate::language::arithmetic::fit(Some(integer.value), ty).map(Value::Integer);
+            match (name, fitted) {
+                ("try_from", fitted) => Value::Option(fitted.map(Box::new)),
+                (_, Some(value)) => value,
+                (_, None) => return Err(error(at, format!("{} does not fit", integer.value))),
+            }
+        }
+        ("Vec" | "Box" | "String" | "Rc" | "Arc" | "VecDeque" | "HashMap" | "BTreeMap", _) => {
+            return Err(unsupported(at, format!("`{before}`, which is on the heap (arrays of fixed length are not),")));
+        }
+        _ => return Ok(None),
+    };
+    Ok(Some(value))
+}
+
+/// `core::array::from_fn`
+fn from_fn(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
+    let length = array_length(call)?;
+    let closure = call.only()?;
+    let mut elements = Vec::with_capacity(length.min(1 << 16));
+    for index in 0..length {
+        evaluator.tick(1, call.at)?;
+        elements.push(evaluator.call(closure, vec![Value::usize(index)], call.at)?);
+    }
+    Ok(Value::array(elements))
+}
+
+/// The length that the context or a const argument gives.
+fn array_length(call: &Call) -> Result<usize> {
+    let given = call.constant().and_then(|length| usize::try_from(length).ok());
+    let expected = match call.expected {
+        Type::Array(_, length) => *length,
+        _ => None,
+    };
+    given.or(expected).ok_or_else(|| {
+        error(
+            call.at,
+            format!("the length of this array is not known here: write `{}::<_, 3, _>(..)` or `let a: [f64; 3] = ..`", call.name),
+        )
+    })
+}
+
+/// The place behind a `&mut`.
+fn reference(value: &Value, at: At) -> Result<Place> {
+    match value {
+        Value::Reference(place) => Ok(place.clone()),
+        other => Err(error(at, format!("expected a mutable reference, found {}", other.kind()))),
+    }
+}
+
+/// Zero, and what is made of zeros.
+pub fn default(evaluator: &mut Evaluator, ty: &Type, at: At) -> Result<Value> {
+    Ok(match ty {
+        Type::Integer(ty) => Value::Integer(Integer { value: 0, ty: Some(*ty) }),
+        Type::Bool => Value::Bool(false),
+        Type::Option(_) => Value::Option(None),
+        Type::Tuple(parts) => {
+            let parts: Result<Vec<_>> = parts.iter().map(|part| default(evaluator, part, at)).collect();
+            Value::tuple(parts?)
+        }
+        Type::Array(element, Some(length)) => {
+            let element = default(evaluator, element, at)?;
+            Value::array(vec![element; *length])
+        }
+        Type::Matrix(Some(rows), Some(columns)) => {
+            let zero = Value::Real(evaluator.graph.constant(0.0));
+            Value::matrix(*rows, *columns, vec![zero; rows * columns])
+        }
+        Type::Real | Type::Unknown => Value::Real(evaluator.graph.constant(0.0)),
+        _ => return Err(error(at, "the default value of this type is not known here")),
+    })
+}
+
+/// A constant by path. `None` if there is no such constant.
+pub fn constant(evaluator: &mut Evaluator, path: &Builtin) -> Option<Value> {
+    let mut last = path.path.iter().rev();
+    let (name, module) = (last.next()?, last.next().map_or("", String::as_str));
+    if (module, name.as_str()) == ("", "None") || (module, name.as_str()) == ("Option", "None") {
+        return Some(Value::Option(None));
+    }
+    if let Some(value) = float::constant(module, name) {
+        return Some(Value::Real(evaluator.graph.constant(value)));
+    }
+    let ty = match &path.owner {
+        Some(Type::Integer(ty)) => Some(*ty),
+        Some(Type::Real) => {
+            return float::constant("f64", name).map(|value| Value::Real(evaluator.graph.constant(value)));
+        }
+        _ => IntegerType::named(module),
+    };
+    integer::constant(ty?, name)
+}

@@ -1,0 +1,226 @@
+//! From a model function, and the items around it, to a graph: the variables are made, the function is
+//! called with them, and the numbers that it returns are the residual.
+
+use super::environment::{Names, Scope};
+use super::evaluator::{Evaluator, error};
+use super::flatten;
+use super::place::Place;
+use super::signature::{self, Argument, Role};
+use super::value::{Function, Generic, Integer, IntegerType, Value};
+use super::{Form, Instance, Model, Variables};
+use crate::graph::{Binary, Node};
+use std::rc::Rc;
+use syn::{Error, Item, ItemFn, Result};
+
+/// What is the same for all instances of a model.
+pub struct Template<'a> {
+    /// Which attribute.
+    pub form: Form,
+    /// The model function.
+    pub function: &'a ItemFn,
+    /// The items around it, itself included; none if it stands alone.
+    pub items: &'a [Item],
+    /// Name of the type.
+    pub name: syn::Ident,
+    /// Visibility of the type.
+    pub visibility: syn::Visibility,
+    /// Documentation of the type.
+    pub documentation: Vec<syn::Attribute>,
+    /// Path of the crate.
+    pub krate: syn::Path,
+}
+
+impl Template<'_> {
+    /// The model with these values of the const parameters.
+    pub fn model(&self, instance: Vec<Instance>) -> Result<Model> {
+        let arguments = signature::arguments(self.form, self.function)?;
+        let mut evaluator = Evaluator::default();
+        let items = evaluator.items(self.items.iter(), &Rc::new(Scope::default()))?;
+        let turbofish = instance.iter().map(integer).collect::<Result<Vec<_>>>()?;
+        let parameters = instance
+            .iter()
+            .zip(&turbofish)
+            .map(|(parameter, value)| {
+                (evaluator.symbol(&parameter.name), Place::new(Value::Integer(*value)).cell)
+            })
+            .collect();
+        let scope = Scope::inside(&items, Names::Variables(parameters));
+        let (variables, values) = self.variables(&arguments, &mut evaluator, &scope)?;
+        let function = Value::Function(Rc::new(Function {
+            item: Rc::new(self.function.clone()),
+            scope: items,
+            turbofish: turbofish.into_iter().map(Generic::Const).collect(),
+            owner: None,
+        }));
+        let value = evaluator.call(&function, values, &self.function.sig.ident)?;
+        let numbers = evaluator.flatten(&value, &self.function.sig.output)?;
+        self.check_length(&numbers, &variables)?;
+        let spans = flatten::spans(&self.function.block, &value);
+        let residual = match self.form {
+            Form::Dae => numbers,
+            Form::Ode => (0u32..)
+                .zip(numbers)
+                .map(|(state, rate)| {
+                    let xdot = evaluator.graph.variable(state);
+                    evaluator.graph.binary(Binary::Sub, xdot, rate)
+                })
+                .collect(),
+        };
+        Ok(Model {
+            name: self.name.clone(),
+            visibility: self.visibility.clone(),
+            documentation: self.documentation.clone(),
+            instance,
+            variables,
+            graph: evaluator.graph,
+            residual,
+            spans,
+            opaque: evaluator.opaque,
+            uses: evaluator.uses,
+            krate: self.krate.clone(),
+        })
+    }
+
+    /// The variables of the model, and the values of the arguments in the order of the function.
+    fn variables(
+        &self,
+        arguments: &[Argument],
+        evaluator: &mut Evaluator,
+        scope: &Rc<Scope>,
+    ) -> Result<(Variables, Vec<Value>)> {
+        let mut types = Vec::new();
+        let mut names = Vec::new();
+        for argument in arguments {
+            let ty = evaluator.resolve(&argument.ty, scope)?;
+            // A dry run: names first, since the position of a variable depends on all dimensions.
+            let mut list = Vec::new();
+            evaluator.instantiate(
+                &ty,
+                argument.role.name().to_owned(),
+                &mut |evaluator, name| {
+                    list.push(name);
+                    Ok(evaluator.graph.variable(0))
+                },
+                &argument.ty,
+            )?;
+            types.push(ty);
+            names.push(list);
+        }
+        let names_of = |role: Role| {
+            let position = arguments.iter().position(|argument| argument.role == role);
+            position.map_or_else(Vec::new, |position| names[position].clone())
+        };
+        let mut variables = Variables {
+            x: names_of(Role::X),
+            z: names_of(Role::Z),
+            u: names_of(Role::U),
+            p: names_of(Role::P),
+        };
+        for (argument, list) in arguments.iter().zip(&names) {
+            let after = |names: &[String], prefix: &str| -> Vec<String> {
+                names.iter().map(|name| name[prefix.len()..].to_owned()).collect()
+            };
+            match argument.role {
+                Role::T if list.len() != 1 || list[0] != "t" => {
+                    return Err(Error::new_spanned(&argument.ty, "the time `t` is one number: `t: f64`"));
+                }
+                Role::Xdot if variables.x.is_empty() => {
+                    variables.x = after(list, "xdot").into_iter().map(|name| format!("x{name}")).collect();
+                }
+                Role::Xdot if after(list, "xdot") != after(&variables.x, "x") => {
+                    return Err(Error::new_spanned(
+                        &argument.ty,
+                        format!(
+                            "`xdot` has {} and `x` has {}: they must have the same type",
+                            numbers(list.len()),
+                            numbers(variables.x.len())
+                        ),
+                    ));
+                }
+                _ => {}
+            }
+        }
+        if variables.x.is_empty() {
+            return Err(Error::new_spanned(
+                &self.function.sig.inputs,
+                "a model has at least one differential state: an argument `x`",
+            ));
+        }
+        let mut values = Vec::new();
+        for (argument, ty) in arguments.iter().zip(&types) {
+            let mut next = offset(&variables, argument.role);
+            values.push(evaluator.instantiate(
+                ty,
+                argument.role.name().to_owned(),
+                &mut |evaluator, _| {
+                    let node = evaluator.graph.variable(next);
+                    next += 1;
+                    Ok(node)
+                },
+                &argument.ty,
+            )?);
+        }
+        Ok((variables, values))
+    }
+
+    fn check_length(&self, residual: &[Node], variables: &Variables) -> Result<()> {
+        let (nx, nz) = (variables.x.len(), variables.z.len());
+        let expected = match self.form {
+            Form::Dae => nx + nz,
+            Form::Ode => nx,
+        };
+        if residual.len() == expected {
+            return Ok(());
+        }
+        let message = match self.form {
+            Form::Dae if nz == 0 => format!(
+                "the residual has {}, but `x` has {nx}: return one equation for each state",
+                numbers(residual.len())
+            ),
+            Form::Dae => format!(
+                "the residual has {}, but `x` and `z` have {nx} + {nz}: return one equation for each state",
+                numbers(residual.len())
+            ),
+            Form::Ode => {
+                format!("`x` has {}, but {} of `xdot` are returned", numbers(nx), residual.len())
+            }
+        };
+        match &self.function.sig.output {
+            syn::ReturnType::Type(_, ty) => Err(error(ty, message)),
+            syn::ReturnType::Default => Err(Error::new(self.function.sig.ident.span(), message)),
+        }
+    }
+}
+
+fn numbers(n: usize) -> String {
+    if n == 1 { "1 number".to_owned() } else { format!("{n} numbers") }
+}
+
+/// Where the numbers of a role begin among the variables `(ẋ, x, z, u, p, t)`.
+fn offset(Variables { x, z, u, p }: &Variables, role: Role) -> u32 {
+    let offset = match role {
+        Role::Xdot => 0,
+        Role::X => x.len(),
+        Role::Z => 2 * x.len(),
+        Role::U => 2 * x.len() + z.len(),
+        Role::P => 2 * x.len() + z.len() + u.len(),
+        Role::T => 2 * x.len() + z.len() + u.len() + p.len(),
+    };
+    offset as u32
+}
+
+/// The value of a const parameter, as an integer of its type.
+fn integer(parameter: &Instance) -> Result<Integer> {
+    let ty = match &parameter.ty {
+        syn::Type::Path(path) => path.path.get_ident().and_then(|name| IntegerType::named(&name.to_string())),
+        _ => None,
+    };
+    let Some(ty) = ty else {
+        return Err(Error::new_spanned(&parameter.ty, "a const parameter of a model is an integer"));
+    };
+    let value = i128::from(parameter.value);
+    if value > ty.max() {
+        return Err(Error::new(parameter.name.span(), format!("{value} is out of range for `{}`", ty.name())));
+    }
+    Ok(Integer { value, ty: Some(ty) })
+}

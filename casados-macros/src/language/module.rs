@@ -1,0 +1,69 @@
+//! `#[dae] mod name { .. }`: which of the functions is the model.
+
+use super::Form;
+use super::signature::Role;
+use syn::{Error, FnArg, Item, ItemFn, ItemMod, Pat, Result};
+
+/// Takes the mark `#[model]` off the function that bears it, and returns the index of the model
+/// function among the items: the marked one; or the only one whose arguments are those of a model;
+/// or, of several, the one that is named like the module.
+pub fn model_function(form: Form, module: &mut ItemMod) -> Result<usize> {
+    let name = module.ident.clone();
+    let Some((_, items)) = &mut module.content else {
+        return Err(Error::new_spanned(
+            &*module,
+            "the attribute must see the module's content: write `mod name { .. }` here",
+        ));
+    };
+    let mut marked = None;
+    for (index, item) in items.iter_mut().enumerate() {
+        let Item::Fn(function) = item else { continue };
+        let before = function.attrs.len();
+        function.attrs.retain(|attribute| !attribute.path().is_ident("model"));
+        if function.attrs.len() < before && marked.replace(index).is_some() {
+            return Err(Error::new(function.sig.ident.span(), "only one function of a module is its `#[model]`"));
+        }
+    }
+    if let Some(index) = marked {
+        return Ok(index);
+    }
+    let needed = if form == Form::Dae { Role::Xdot } else { Role::X };
+    let functions = || {
+        items.iter().enumerate().filter_map(|(index, item)| match item {
+            Item::Fn(function) if roles(function).any(|role| role == Some(needed)) => Some((index, function)),
+            _ => None,
+        })
+    };
+    let models: Vec<_> = functions().filter(|(_, function)| roles(function).all(|role| role.is_some())).collect();
+    // If none fits in all arguments, the error is about those of the nearest one.
+    let candidates = if models.is_empty() { functions().collect() } else { models };
+    match candidates.as_slice() {
+        [] => Err(Error::new(
+            name.span(),
+            format!("no model in this module: a function with an argument `{}` is expected", needed.name()),
+        )),
+        [(index, _)] => Ok(*index),
+        several => match several.iter().find(|(_, function)| function.sig.ident == name) {
+            Some((index, _)) => Ok(*index),
+            None => {
+                let names: Vec<_> =
+                    several.iter().map(|(_, function)| format!("`{}`", function.sig.ident)).collect();
+                Err(Error::new(
+                    name.span(),
+                    format!("{} could each be the model: mark one with `#[model]`", names.join(", ")),
+                ))
+            }
+        },
+    }
+}
+
+/// What each argument of a function would be in a model.
+fn roles(function: &ItemFn) -> impl Iterator<Item = Option<Role>> {
+    function.sig.inputs.iter().map(|input| match input {
+        FnArg::Typed(input) => match &*input.pat {
+            Pat::Ident(pattern) => Role::of(&pattern.ident),
+            _ => None,
+        },
+        FnArg::Receiver(_) => None,
+    })
+}
