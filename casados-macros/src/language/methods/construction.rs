@@ -117,7 +117,8 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         "from_row_slice" | "from_column_slice" | "from_array_storage" | "from_slice" | "from_vec"
         | "from_row_iterator" | "from_column_iterator" | "from_iterator" => {
             let mut elements = Vec::new();
-            let mut iter = super::iterator::into_iter(evaluator, evaluator_load(evaluator, call)?, at)?;
+            let source = evaluator.load(call.only()?.clone(), at)?;
+            let mut iter = super::iterator::into_iter(evaluator, source, at)?;
             let limit = match (rows, columns) {
                 (Some(rows), Some(columns)) => rows * columns,
                 _ => usize::MAX,
@@ -127,7 +128,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
                 elements.push(Value::Real(evaluator.real(&value, at)?));
             }
             let (rows, columns) = match (rows, columns) {
-                (Some(rows), Some(1)) | (None, Some(1)) if rows.is_none() => (elements.len(), 1),
+                (None, Some(1)) => (elements.len(), 1),
                 _ => size()?,
             };
             fits(elements.len(), rows, columns, at)?;
@@ -182,11 +183,6 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         }
         _ => return Ok(None),
     }))
-}
-
-/// The only argument, with `&mut` followed.
-fn evaluator_load(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
-    evaluator.load(call.only()?.clone(), call.at)
 }
 
 fn reals(evaluator: &mut Evaluator, values: &[Value], at: At) -> Result<Vec<Value>> {
