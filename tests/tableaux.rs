@@ -217,9 +217,8 @@ fn weights_at_the_nodes_are_the_tableau() {
                 assert_eq!(lagrange[j], f64::from(i == j), "{}", t.name());
             }
         }
-        let end = t.weights(1.0);
-        for j in 0..s {
-            assert!((end[j] - t.b()[j]).abs() <= tolerance, "{}: b_{j}(1)", t.name());
+        for (j, (end, b)) in t.weights(1.0).iter().zip(t.b()).enumerate() {
+            assert!((end - b).abs() <= tolerance, "{}: b_{j}(1)", t.name());
         }
         assert_eq!(t.weights(0.0), [0.0; _], "{}", t.name());
     });
