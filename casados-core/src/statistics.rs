@@ -13,7 +13,8 @@ pub struct Statistics {
     pub jacobians: usize,
     /// Factorisations of the Newton matrix.
     pub factorizations: usize,
-    /// The residual of an equation relative to the magnitude of its terms, as it was last computed,
-    /// the largest of all steps.
+    /// The residual of an equation relative to the magnitude of its terms, the largest of all steps; of each
+    /// step as it was evaluated last. With sensitivities this is at the solution. Without, it is one
+    /// iteration before if that one was expected to be enough, and zero with a fixed number of iterations.
     pub residual: f64,
 }

@@ -102,8 +102,14 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             }
             for (r, (residual, magnitude)) in self.residual.as_ref().iter().zip(magnitude).enumerate() {
                 let [f] = residual[stage];
-                // A residual of zero is zero even where all terms are.
-                let relative = if f == T::ZERO { T::ZERO } else { f.abs() / *magnitude };
+                // A residual of zero is zero even where all terms are. Terms that overflow say nothing.
+                let relative = if f == T::ZERO {
+                    T::ZERO
+                } else if magnitude.is_finite() {
+                    f.abs() / *magnitude
+                } else {
+                    T::ONE
+                };
                 if relative > largest.0 || !relative.is_finite() {
                     largest = (relative, r, stage);
                 }

@@ -12,8 +12,8 @@
 //!   frozen Jacobian (Hairer and Wanner, Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since
 //!   then `θ` squares too.
 //!
-//! Where rounding errors of the model are larger than expected the increments stop shrinking. Then it
-//! has converged too if they are small: more cannot be known.
+//! Where rounding errors of the model are larger than expected, residual and increments stop shrinking. Then
+//! it has converged too if either is small: more cannot be known.
 
 use super::assemble::unknown_name;
 use super::record::{Coefficients, Work};
@@ -25,8 +25,8 @@ use crate::statistics::Statistics;
 
 /// Residuals below this many ε of their terms are rounding errors.
 const ROUNDING: f64 = 4.0;
-/// Increments that no longer shrink are rounding errors of the model below this many ε.
-const NOISE: f64 = 1e5;
+/// Residuals that no longer shrink are rounding errors of the model below this many ε of their terms.
+const NOISE: f64 = 256.0;
 
 impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     /// Solves the stages of a step from the start values in `y`; whether the Jacobian that is stored is
@@ -45,6 +45,8 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     ) -> Result<bool, Error> {
         let rounding = T::EPSILON * T::from_f64(ROUNDING);
         let noise = T::EPSILON * T::from_f64(NOISE);
+        // Increments that no longer shrink are rounding errors below this, ε^(2/3).
+        let small = T::EPSILON.cbrt() * T::EPSILON.cbrt();
         let tolerance = T::from_f64(options.tolerance).max(rounding);
         let full = options.jacobian == Jacobian::Full;
         let most = options.fixed_iterations.unwrap_or(options.max_iterations);
@@ -62,13 +64,14 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 self.evaluate_residual(step, iteration)?;
             }
             if test {
-                let (residual, equation, stage) = self.relative_residual();
-                let stuck = iteration == most;
-                if residual <= rounding || stuck && last.size <= noise && residual <= noise {
-                    statistics.residual = residual.to_f64().max(statistics.residual);
+                let before = self.relative.0;
+                self.relative = self.relative_residual();
+                let (residual, equation, stage) = self.relative;
+                let stuck = iteration > 1 && residual >= before;
+                if residual <= rounding || stuck && residual <= noise {
                     return Ok(current);
                 }
-                if stuck {
+                if iteration == most {
                     return Err(Error::NotConverged {
                         residual: residual.to_f64(),
                         equation,
@@ -99,7 +102,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                     };
                     // A rate near one says nothing about the next increment.
                     let shrinks = rate + rate < T::ONE;
-                    if shrinks && next <= tolerance || !shrinks && increment.size <= noise {
+                    if shrinks && next <= tolerance || !shrinks && increment.size <= small {
                         return Ok(false);
                     }
                 }

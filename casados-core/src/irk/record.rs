@@ -123,6 +123,8 @@ pub struct Work<M: Dae, T: Plain, const S: usize> {
     pub(crate) magnitude: ArrayK<M, T>,
     /// The residual at all stages, then the increment.
     pub(crate) residual: ArrayK<M, [[T; 1]; S]>,
+    /// The largest residual relative to its terms where it was computed last, its equation and stage.
+    pub(crate) relative: (T, usize, usize),
     pub(crate) linear: Linearization<M, T, S>,
     /// Whether the constant entries of the Jacobian are there.
     pub(crate) ready: bool,

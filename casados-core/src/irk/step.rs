@@ -48,6 +48,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                     }
                 }
             }
+            self.relative = (T::ZERO, 0, 0);
             let current = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics)?;
             let h = self.inputs.time.step;
             for (x, k) in self.x.as_mut().iter_mut().zip(step.y.as_ref()) {
@@ -64,6 +65,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             }
             after(self, n, step, current, statistics)?;
             statistics.steps += 1;
+            statistics.residual = statistics.residual.max(self.relative.0.to_f64());
         }
         self.result.x.as_mut_slice().copy_from_slice(self.x.as_ref());
         for z in [self.result.z0.as_slice(), self.result.z.as_slice()] {
@@ -88,6 +90,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             self.place(coefficients, n, &step.x, &step.y);
             statistics.jacobians += 1;
             self.evaluate_jacobian(n, 0)?;
+            self.relative = self.relative_residual();
         }
         statistics.factorizations += 1;
         self.linear.factor(coefficients, self.inputs.time.step, n, 0)
