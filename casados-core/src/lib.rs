@@ -24,7 +24,7 @@ pub mod dual;
 pub mod erk;
 pub mod error;
 pub mod irk;
-pub mod linalg;
+mod linalg;
 pub mod memory;
 pub mod model;
 pub mod options;

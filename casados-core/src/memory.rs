@@ -3,7 +3,27 @@
 //! - [`Heap`] (feature `alloc`): the memory of a mode (forward, adjoint, ...) is allocated, zeroed, by the first
 //!   call of that mode or when it is reserved; no later call allocates. Large models never touch the stack.
 //! - [`Inline`]: everything is inside the integrator itself, for one mode that is part of the type and at
-//!   most `STEPS` steps. A call that the mode has no memory for does not compile.
+//!   most `STEPS` steps. A call that the mode has no memory for does not compile:
+//!
+//! ```
+//! # use casados_core::{Dae, Error, Gauss, Inline, Irk, mode, model::{VectorU, VectorX}};
+//! type Small<M, Mode> = Irk<M, Gauss<2>, f64, Inline<Mode>>;
+//! fn f<M: Dae>(irk: &mut Small<M, mode::Forward>, x: &VectorX<M, f64>, u: &VectorU<M, f64>) -> Result<(), Error> {
+//!     irk.solve(x, u, 0.1)?;
+//!     irk.forward(x, u, 0.1)?;
+//!     Ok(())
+//! }
+//! ```
+//!
+//! ```compile_fail,E0277
+//! # use casados_core::{Dae, Error, Gauss, Inline, Irk, mode, model::{VectorU, VectorX}};
+//! type Small<M, Mode> = Irk<M, Gauss<2>, f64, Inline<Mode>>;
+//! fn f<M: Dae>(irk: &mut Small<M, mode::Nominal>, x: &VectorX<M, f64>, u: &VectorU<M, f64>) -> Result<(), Error> {
+//!     irk.solve(x, u, 0.1)?;
+//!     irk.forward(x, u, 0.1)?; // no memory for sensitivities
+//!     Ok(())
+//! }
+//! ```
 
 use crate::error::Error;
 use crate::irk::{AdjointMemory, DirectionalMemory};

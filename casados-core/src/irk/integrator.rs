@@ -193,12 +193,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real, W: WithForward> Integrator<M, B, S, T, W> {
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Allocates what `forward` needs, so that no call of it will.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn reserve_forward(&mut self) -> Result<(), Error> {
+    pub fn reserve_forward(&mut self) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
         W::forward(&mut self.forward)?;
         self.run.reserve()
     }
@@ -207,7 +210,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: WithForward> Integrator<M, B, S, T, 
     ///
     /// # Errors
     /// See [`Integrator`].
-    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error> {
+    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
         Ok(&self.differentiate(&Arguments { x0, u, h }, None)?.forward)
     }
 
@@ -221,7 +227,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: WithForward> Integrator<M, B, S, T, 
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&ForwardAdjoint<M, T>, Error> {
+    ) -> Result<&ForwardAdjoint<M, T>, Error>
+    where
+        W: WithForward,
+    {
         check(Argument::Lambda, lambda.as_slice())?;
         self.differentiate(&Arguments { x0, u, h }, Some(lambda.as_slice()))
     }
@@ -230,7 +239,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: WithForward> Integrator<M, B, S, T, 
         &mut self,
         arguments: &Arguments<'_, M, T>,
         lambda: Option<&[T]>,
-    ) -> Result<&ForwardAdjoint<M, T>, Error> {
+    ) -> Result<&ForwardAdjoint<M, T>, Error>
+    where
+        W: WithForward,
+    {
         self.sweep = None;
         let forward = W::forward(&mut self.forward)?;
         let count = self.run.options.steps;
@@ -256,7 +268,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: WithForward> Integrator<M, B, S, T, 
     ///
     /// # Errors
     /// Those of [`Integrator::dense`], and of [`Integrator::forward`].
-    pub fn dense_forward(&mut self, t: T) -> Result<&DenseForward<M, T>, Error> {
+    pub fn dense_forward(&mut self, t: T) -> Result<&DenseForward<M, T>, Error>
+    where
+        W: WithForward,
+    {
         let forward = W::forward(&mut self.forward)?;
         let last = self.run.last()?;
         let point = Point::new(t, &last.work.kept, last.steps.len(), &last.coefficients.tableau)?;
@@ -398,12 +413,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real, W: WithHessian> Integrator<M, B, S, T, W> {
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Allocates what `hessian` needs, so that no call of it will.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    pub fn reserve_hessian(&mut self) -> Result<(), Error> {
+    pub fn reserve_hessian(&mut self) -> Result<(), Error>
+    where
+        W: WithHessian,
+    {
         W::hessian(&mut self.hessian)?;
         W::hessian_tape(&mut self.hessian_tape, self.run.options.steps)?;
         self.reserve_forward()
@@ -419,7 +437,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: WithHessian> Integrator<M, B, S, T, 
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Hessian<M, T>, Error> {
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
         check(Argument::Lambda, lambda.as_slice())?;
         self.sweep = None;
         let count = self.run.options.steps;
