@@ -4,3 +4,9 @@
 
 pub use casados_core::*;
 pub use casados_macros::{dae, ode};
+
+/// What most programs need: `use casados::prelude::*;`
+pub mod prelude {
+    pub use casados_core::prelude::*;
+    pub use casados_macros::{dae, ode};
+}

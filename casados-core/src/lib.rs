@@ -51,3 +51,16 @@ pub use tableau::{
     Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4,
     Tableau, TableauError,
 };
+
+/// What most programs need: `use casados::prelude::*;`
+pub mod prelude {
+    #[cfg(feature = "alloc")]
+    pub use crate::memory::Heap;
+    pub use crate::options::{Jacobian, Newton, Options, Start};
+    pub use crate::result::Seeds;
+    pub use crate::tableau::{
+        Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Midpoint, RadauIIA, Rk4,
+        Tableau,
+    };
+    pub use crate::{Dae, Erk, Error, Inline, Irk, Ode};
+}
