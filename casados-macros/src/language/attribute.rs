@@ -38,8 +38,7 @@ impl Arguments {
     /// Reads the tokens in the brackets.
     pub fn read(tokens: TokenStream) -> Result<Self> {
         let mut arguments = Self { krate: syn::parse_quote!(::casados), name: None, values: Vec::new() };
-        let entries =
-            syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
+        let entries = syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
         let mut krate = false;
         for entry in entries {
             match entry {
@@ -100,7 +99,10 @@ impl Arguments {
         {
             return Err(Error::new_spanned(
                 missing,
-                format!("no values for `{0}`: list them in the attribute, as in `{0} = [1, 2]`", missing.ident),
+                format!(
+                    "no values for `{0}`: list them in the attribute, as in `{0} = [1, 2]`",
+                    missing.ident
+                ),
             ));
         }
         let mut combinations: Vec<Vec<(&Ident, u64)>> = vec![Vec::new()];
@@ -214,7 +216,9 @@ fn rows(values: &Expr, width: usize) -> Result<Vec<Vec<u64>>> {
 
 fn row(values: &Expr, width: usize) -> Result<Vec<u64>> {
     match values {
-        Expr::Tuple(tuple) if width > 1 && tuple.elems.len() == width => tuple.elems.iter().map(integer).collect(),
+        Expr::Tuple(tuple) if width > 1 && tuple.elems.len() == width => {
+            tuple.elems.iter().map(integer).collect()
+        }
         single if width == 1 => Ok(vec![integer(single)?]),
         other => Err(Error::new(other.span(), format!("expected a tuple of {width} integers"))),
     }

@@ -34,14 +34,24 @@ impl Arguments<'_> {
 impl Evaluator {
     /// Calls a closure, a function or a constructor.
     pub fn call(&mut self, function: &Value, arguments: Vec<Value>, at: At) -> Result<Value> {
-        let result =
-            self.deeper(at, |evaluator| evaluator.call_value(function, arguments, &Type::Unknown, at));
+        self.call_expecting(function, arguments, &Type::Unknown, at)
+    }
+
+    /// Calls something of which the context expects a type.
+    pub fn call_expecting(
+        &mut self,
+        function: &Value,
+        arguments: Vec<Value>,
+        expected: &Type,
+        at: At,
+    ) -> Result<Value> {
+        let result = self.deeper(at, |evaluator| evaluator.call_value(function, arguments, expected, at));
         self.finished(result, at)
     }
 
     fn call_value(&mut self, function: &Value, arguments: Vec<Value>, expected: &Type, at: At) -> Evaluated {
         match function {
-            Value::Closure(closure) => self.call_closure(closure, arguments, at),
+            Value::Closure(closure) => self.call_closure(closure, arguments, expected, at),
             Value::Function(function) => {
                 self.call_function(function, Arguments::Values(arguments), expected, at)
             }
@@ -108,7 +118,7 @@ impl Evaluator {
                     };
                     arguments.push(self.expression(argument, &hint)?);
                 }
-                self.call_closure(&closure, arguments, call)
+                self.call_closure(&closure, arguments, expected, call)
             }
             callee => {
                 let mut arguments = Vec::with_capacity(call.args.len());

@@ -59,7 +59,13 @@ impl Evaluator {
         }
     }
 
-    pub(super) fn call_closure(&mut self, closure: &Rc<Closure>, arguments: Vec<Value>, at: At) -> Evaluated {
+    pub(super) fn call_closure(
+        &mut self,
+        closure: &Rc<Closure>,
+        arguments: Vec<Value>,
+        expected: &Type,
+        at: At,
+    ) -> Evaluated {
         let written = &closure.closure;
         if written.inputs.len() != arguments.len() {
             let (expected, found) = (written.inputs.len(), arguments.len());
@@ -69,7 +75,7 @@ impl Evaluator {
         }
         let returns = match &written.output {
             syn::ReturnType::Type(_, ty) => self.resolve(ty, &closure.scope)?,
-            syn::ReturnType::Default => Type::Unknown,
+            syn::ReturnType::Default => expected.clone(),
         };
         let value =
             self.execute(closure.scope.clone(), closure.calls.clone(), returns.clone(), |evaluator| {

@@ -27,7 +27,7 @@ pub fn unsupported(at: At, what: impl std::fmt::Display) -> syn::Error {
         at,
         format!(
             "{what} is outside of what a graph model can express: rewrite it, or make the model generic, \
-             `fn f<T: DualNum<f64> + Copy>(...)`, where any Rust is allowed"
+             `fn f<T: DualNum + Copy>(...)`, where any Rust is allowed"
         ),
     )
 }

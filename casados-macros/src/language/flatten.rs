@@ -67,10 +67,18 @@ fn push_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
             }
         }
         (Expr::Array(array), Value::Array(values)) if array.elems.len() == values.len() => {
-            array.elems.iter().zip(values.iter()).for_each(|(element, value)| push_spans(element, value, spans));
+            array
+                .elems
+                .iter()
+                .zip(values.iter())
+                .for_each(|(element, value)| push_spans(element, value, spans));
         }
         (Expr::Tuple(tuple), Value::Tuple(values)) if tuple.elems.len() == values.len() => {
-            tuple.elems.iter().zip(values.iter()).for_each(|(element, value)| push_spans(element, value, spans));
+            tuple
+                .elems
+                .iter()
+                .zip(values.iter())
+                .for_each(|(element, value)| push_spans(element, value, spans));
         }
         (Expr::Struct(literal), Value::Struct(structure)) => {
             let declared = structure.definition.variants.get(structure.variant);
@@ -87,7 +95,9 @@ fn push_spans(expression: &Expr, value: &Value, spans: &mut Vec<Span>) {
                 }
             }
         }
-        (Expr::Call(call), Value::Matrix(matrix)) if call.args.len() == matrix.elements.len() && matrix.columns == 1 => {
+        (Expr::Call(call), Value::Matrix(matrix))
+            if call.args.len() == matrix.elements.len() && matrix.columns == 1 =>
+        {
             spans.extend(call.args.iter().map(Spanned::span));
         }
         _ => push_all(expression.span(), value, spans),

@@ -220,7 +220,10 @@ fn integer(parameter: &Instance) -> Result<Integer> {
     };
     let value = i128::from(parameter.value);
     if value > ty.max() {
-        return Err(Error::new(parameter.name.span(), format!("{value} is out of range for `{}`", ty.name())));
+        return Err(Error::new(
+            parameter.name.span(),
+            format!("{value} is out of range for `{}`", ty.name()),
+        ));
     }
     Ok(Integer { value, ty: Some(ty) })
 }

@@ -21,7 +21,10 @@ pub fn model_function(form: Form, module: &mut ItemMod) -> Result<usize> {
         let before = function.attrs.len();
         function.attrs.retain(|attribute| !attribute.path().is_ident("model"));
         if function.attrs.len() < before && marked.replace(index).is_some() {
-            return Err(Error::new(function.sig.ident.span(), "only one function of a module is its `#[model]`"));
+            return Err(Error::new(
+                function.sig.ident.span(),
+                "only one function of a module is its `#[model]`",
+            ));
         }
     }
     if let Some(index) = marked {
@@ -34,7 +37,8 @@ pub fn model_function(form: Form, module: &mut ItemMod) -> Result<usize> {
             _ => None,
         })
     };
-    let models: Vec<_> = functions().filter(|(_, function)| roles(function).all(|role| role.is_some())).collect();
+    let models: Vec<_> =
+        functions().filter(|(_, function)| roles(function).all(|role| role.is_some())).collect();
     // If none fits in all arguments, the error is about those of the nearest one.
     let candidates = if models.is_empty() { functions().collect() } else { models };
     match candidates.as_slice() {

@@ -68,7 +68,10 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
         };
         let role = role(form, &input.pat)?;
         if arguments.iter().any(|argument| argument.role == role) {
-            return Err(Error::new_spanned(&input.pat, format!("the argument `{}` is given twice", role.name())));
+            return Err(Error::new_spanned(
+                &input.pat,
+                format!("the argument `{}` is given twice", role.name()),
+            ));
         }
         check_type(&input.ty)?;
         arguments.push(Argument { role, ty: (*input.ty).clone() });
@@ -81,7 +84,10 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
         ));
     }
     if form == Form::Ode && !has(Role::X) {
-        return Err(Error::new(function.sig.ident.span(), "a model has differential states: an argument `x`"));
+        return Err(Error::new(
+            function.sig.ident.span(),
+            "a model has differential states: an argument `x`",
+        ));
     }
     Ok(arguments)
 }
@@ -113,7 +119,9 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
     let Pat::Ident(identifier) = pattern else {
         return Err(Error::new(
             pattern.span(),
-            format!("arguments of a model are recognised by their names, {arguments}; take this one apart in the body"),
+            format!(
+                "arguments of a model are recognised by their names, {arguments}; take this one apart in the body"
+            ),
         ));
     };
     match (Role::of(&identifier.ident), form) {
@@ -162,9 +170,9 @@ pub fn is_dual(function: &ItemFn) -> bool {
     };
     let generics = &function.sig.generics;
     generics.type_params().any(|parameter| has(&parameter.bounds))
-        || generics.where_clause.iter().flat_map(|clause| &clause.predicates).any(|predicate| {
-            matches!(predicate, syn::WherePredicate::Type(predicate) if has(&predicate.bounds))
-        })
+        || generics.where_clause.iter().flat_map(|clause| &clause.predicates).any(
+            |predicate| matches!(predicate, syn::WherePredicate::Type(predicate) if has(&predicate.bounds)),
+        )
 }
 
 /// `pendulum_on_cart` in upper camel case: `PendulumOnCart`.

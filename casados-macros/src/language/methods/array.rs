@@ -52,9 +52,10 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
         },
         "map" => {
             let closure = call.only()?;
+            let expected = call.expected.element();
             let mut mapped = Vec::with_capacity(length);
             for element in elements.iter() {
-                mapped.push(evaluator.call(closure, vec![element.clone()], at)?);
+                mapped.push(evaluator.call_expecting(closure, vec![element.clone()], &expected, at)?);
             }
             Value::array(mapped)
         }
@@ -63,7 +64,9 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
             for element in elements.iter() {
                 match evaluator.load(element.clone(), at)? {
                     Value::Array(inner) => all.extend(inner.iter().cloned()),
-                    other => return Err(error(at, format!("`{}` of arrays, not of {}", call.name, other.kind()))),
+                    other => {
+                        return Err(error(at, format!("`{}` of arrays, not of {}", call.name, other.kind())));
+                    }
                 }
             }
             Value::array(all)
@@ -77,11 +80,15 @@ fn read(evaluator: &mut Evaluator, elements: &Rc<Vec<Value>>, call: &Call) -> Re
             }
             result
         }
-        "windows" | "chunks" | "chunks_exact" | "rchunks" | "array_windows" | "as_chunks" | "array_chunks" => {
+        "windows" | "chunks" | "chunks_exact" | "rchunks" | "array_windows" | "as_chunks"
+        | "array_chunks" => {
             return slices(evaluator, elements, call).map(Some);
         }
         "sum" | "product" | "fold" | "zip" | "enumerate" | "rev" => {
-            return Err(error(at, format!("an array has no method `{0}`: write `.iter().{0}(..)`", call.name)));
+            return Err(error(
+                at,
+                format!("an array has no method `{0}`: write `.iter().{0}(..)`", call.name),
+            ));
         }
         "to_vec" | "into_vec" | "repeat" | "join" => {
             return Err(unsupported(
@@ -99,7 +106,9 @@ fn slices(evaluator: &mut Evaluator, elements: &[Value], call: &Call) -> Result<
     let of_const = matches!(call.name, "array_windows" | "as_chunks" | "array_chunks");
     let size = match (of_const, call.constant()) {
         (true, Some(size)) => usize::try_from(size).unwrap_or(0),
-        (true, None) => return Err(error(call.at, format!("write the length, as in `{}::<2>()`", call.name))),
+        (true, None) => {
+            return Err(error(call.at, format!("write the length, as in `{}::<2>()`", call.name)));
+        }
         (false, _) => evaluator.usize(call.only()?, call.at)?,
     };
     if size == 0 {
@@ -132,7 +141,9 @@ fn parts(
     // A part: a reference to it, or its value.
     let part = |evaluator: &mut Evaluator, projection: Projection| -> Result<Value> {
         match receiver {
-            Receiver::Place(place) if mutable => Ok(Value::Reference(evaluator.project(place, projection, at)?)),
+            Receiver::Place(place) if mutable => {
+                Ok(Value::Reference(evaluator.project(place, projection, at)?))
+            }
             _ => evaluator.part(&Value::Array(elements.clone()), projection, at),
         }
     };
@@ -143,7 +154,8 @@ fn parts(
             }
             Receiver::Place(place) if call.name == "as_mut_slice" => Value::Reference(place.clone()),
             Receiver::Place(_) => {
-                let all: Result<Vec<_>> = (0..length).map(|i| part(evaluator, Projection::Index(i))).collect();
+                let all: Result<Vec<_>> =
+                    (0..length).map(|i| part(evaluator, Projection::Index(i))).collect();
                 Value::array(all?)
             }
             Receiver::Value(value) => Value::iterator(iterator::into_iter(evaluator, value.clone(), at)?),
@@ -226,10 +238,12 @@ fn change(
         }
         "swap" => {
             call.expect(2)?;
-            let (a, b) =
-                (evaluator.usize(&call.arguments[0], at)?, evaluator.usize(&call.arguments[1], at)?);
+            let (a, b) = (evaluator.usize(&call.arguments[0], at)?, evaluator.usize(&call.arguments[1], at)?);
             if let Some(out) = [a, b].into_iter().find(|&index| index >= length) {
-                return Err(error(at, format!("index out of range: the length is {length} but the index is {out}")));
+                return Err(error(
+                    at,
+                    format!("index out of range: the length is {length} but the index is {out}"),
+                ));
             }
             new.swap(a, b);
         }
@@ -246,7 +260,11 @@ fn change(
             Value::Array(source) => {
                 return Err(error(
                     at,
-                    format!("`{}` of {} elements into {length}: the lengths must be equal", call.name, source.len()),
+                    format!(
+                        "`{}` of {} elements into {length}: the lengths must be equal",
+                        call.name,
+                        source.len()
+                    ),
                 ));
             }
             other => return Err(error(at, format!("expected a slice, found {}", other.kind()))),

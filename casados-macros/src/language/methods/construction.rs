@@ -33,7 +33,8 @@ pub fn from_arrays(
         None if rows == Some(1) => (1, elements.len()),
         None => (elements.len(), 1),
     };
-    if rows.is_some_and(|rows| rows != found_rows) || columns.is_some_and(|columns| columns != found_columns) {
+    if rows.is_some_and(|rows| rows != found_rows) || columns.is_some_and(|columns| columns != found_columns)
+    {
         return Err(error(at, format!("this array makes a {found_rows} x {found_columns} matrix")));
     }
     Ok(Value::matrix(found_rows, found_columns, all))
@@ -75,7 +76,9 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         (Some(rows), Some(columns)) => Ok((rows, columns)),
         _ => Err(error(
             at,
-            format!("the size of this matrix is not known here: write `SMatrix::<f64, 2, 3>::{name}(..)` or name its type in a `let`"),
+            format!(
+                "the size of this matrix is not known here: write `SMatrix::<f64, 2, 3>::{name}(..)` or name its type in a `let`"
+            ),
         )),
     };
     let constant = |evaluator: &mut Evaluator, value: f64| Value::Real(evaluator.graph.constant(value));
@@ -114,8 +117,14 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
             fits(elements.len(), rows, columns, at)?;
             from_fn(rows, columns, |r, c| Ok(elements[r * columns + c].clone()))?
         }
-        "from_row_slice" | "from_column_slice" | "from_array_storage" | "from_slice" | "from_vec"
-        | "from_row_iterator" | "from_column_iterator" | "from_iterator" => {
+        "from_row_slice"
+        | "from_column_slice"
+        | "from_array_storage"
+        | "from_slice"
+        | "from_vec"
+        | "from_row_iterator"
+        | "from_column_iterator"
+        | "from_iterator" => {
             let mut elements = Vec::new();
             let source = evaluator.load(call.only()?.clone(), at)?;
             let mut iter = super::iterator::into_iter(evaluator, source, at)?;
@@ -158,8 +167,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
                 return Err(error(at, "the vectors have different lengths"));
             }
             let by_columns = name == "from_columns";
-            let (height, width) =
-                if by_columns { (length, vectors.len()) } else { (vectors.len(), length) };
+            let (height, width) = if by_columns { (length, vectors.len()) } else { (vectors.len(), length) };
             if rows.is_some_and(|rows| rows != height) || columns.is_some_and(|columns| columns != width) {
                 return Err(error(at, format!("these vectors make a {height} x {width} matrix")));
             }
@@ -193,7 +201,10 @@ fn fits(found: usize, rows: usize, columns: usize, at: At) -> Result<()> {
     if found == rows * columns {
         return Ok(());
     }
-    Err(error(at, format!("a {rows} x {columns} matrix has {} elements, but {found} are given", rows * columns)))
+    Err(error(
+        at,
+        format!("a {rows} x {columns} matrix has {} elements, but {found} are given", rows * columns),
+    ))
 }
 
 fn from_fn(

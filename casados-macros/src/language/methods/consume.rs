@@ -139,7 +139,10 @@ fn extreme(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Val
                     _ => {
                         return Err(error(
                             at,
-                            format!("`{}` of model quantities: use `fold` with `f64::max` or `f64::min`", call.name),
+                            format!(
+                                "`{}` of model quantities: use `fold` with `f64::max` or `f64::min`",
+                                call.name
+                            ),
                         ));
                     }
                 }

@@ -104,7 +104,10 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
             }
         }
         ("Vec" | "Box" | "String" | "Rc" | "Arc" | "VecDeque" | "HashMap" | "BTreeMap", _) => {
-            return Err(unsupported(at, format!("`{before}`, which is on the heap (arrays of fixed length are not),")));
+            return Err(unsupported(
+                at,
+                format!("`{before}`, which is on the heap (arrays of fixed length are not),"),
+            ));
         }
         _ => return Ok(None),
     };
@@ -115,10 +118,11 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
 fn from_fn(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     let length = array_length(call)?;
     let closure = call.only()?;
+    let element = call.expected.element();
     let mut elements = Vec::with_capacity(length.min(1 << 16));
     for index in 0..length {
         evaluator.tick(1, call.at)?;
-        elements.push(evaluator.call(closure, vec![Value::usize(index)], call.at)?);
+        elements.push(evaluator.call_expecting(closure, vec![Value::usize(index)], &element, call.at)?);
     }
     Ok(Value::array(elements))
 }

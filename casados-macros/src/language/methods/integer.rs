@@ -20,10 +20,28 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
     let mut others = Vec::new();
     if matches!(
         call.name,
-        "pow" | "min" | "max" | "clamp" | "abs_diff" | "rem_euclid" | "div_euclid" | "div_ceil" | "is_multiple_of"
-            | "next_multiple_of" | "saturating_sub" | "saturating_add" | "saturating_mul" | "wrapping_add"
-            | "wrapping_sub" | "wrapping_mul" | "checked_add" | "checked_sub" | "checked_mul" | "checked_div"
-            | "checked_pow" | "ilog"
+        "pow"
+            | "min"
+            | "max"
+            | "clamp"
+            | "abs_diff"
+            | "rem_euclid"
+            | "div_euclid"
+            | "div_ceil"
+            | "is_multiple_of"
+            | "next_multiple_of"
+            | "saturating_sub"
+            | "saturating_add"
+            | "saturating_mul"
+            | "wrapping_add"
+            | "wrapping_sub"
+            | "wrapping_mul"
+            | "checked_add"
+            | "checked_sub"
+            | "checked_mul"
+            | "checked_div"
+            | "checked_pow"
+            | "ilog"
     ) {
         call.expect(if call.name == "clamp" { 2 } else { 1 })?;
         for argument in &call.arguments {
@@ -44,9 +62,8 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         let value = ty.map_or(value, |ty| value.clamp(ty.min(), ty.max()));
         Ok(Some(Value::Integer(Integer { value, ty })))
     };
-    let wrapped = |value: i128| {
-        Ok(Some(Value::Integer(ty.map_or(Integer { value, ty }, |ty| wrap(value, ty)))))
-    };
+    let wrapped =
+        |value: i128| Ok(Some(Value::Integer(ty.map_or(Integer { value, ty }, |ty| wrap(value, ty)))));
     match call.name {
         "pow" => whole(u32::try_from(y).ok().and_then(|n| x.checked_pow(n))),
         "min" => whole(Some(x.min(y))),
@@ -63,7 +80,9 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         "signum" => whole(Some(x.signum())),
         "rem_euclid" => whole(x.checked_rem_euclid(y)),
         "div_euclid" => whole(x.checked_div_euclid(y)),
-        "div_ceil" => whole(x.checked_div_euclid(y).and_then(|q| q.checked_add(i128::from(x.rem_euclid(y) != 0)))),
+        "div_ceil" => {
+            whole(x.checked_div_euclid(y).and_then(|q| q.checked_add(i128::from(x.rem_euclid(y) != 0))))
+        }
         "next_multiple_of" => {
             whole(x.checked_rem_euclid(y).and_then(|r| if r == 0 { Some(x) } else { x.checked_add(y - r) }))
         }
@@ -84,7 +103,9 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         "checked_div" => checked(x.checked_div(y)),
         "checked_pow" => checked(u32::try_from(y).ok().and_then(|n| x.checked_pow(n))),
         "count_ones" => Ok(Some(bits(x.count_ones()))),
-        "trailing_zeros" => Ok(Some(bits(if x == 0 { ty.map_or(32, IntegerType::bits) } else { x.trailing_zeros() }))),
+        "trailing_zeros" => {
+            Ok(Some(bits(if x == 0 { ty.map_or(32, IntegerType::bits) } else { x.trailing_zeros() })))
+        }
         "ilog2" => match x.checked_ilog2() {
             Some(log) => Ok(Some(bits(log))),
             None => whole(None),

@@ -305,7 +305,11 @@ impl Iter {
                 inner.next_back(evaluator, at)?
             }
             Iter::Skip(inner, left) => {
-                if inner.length(evaluator, at)? <= *left { None } else { inner.next_back(evaluator, at)? }
+                if inner.length(evaluator, at)? <= *left {
+                    None
+                } else {
+                    inner.next_back(evaluator, at)?
+                }
             }
             Iter::StepBy { inner, step, begun } => {
                 let length = inner.length(evaluator, at)?;
@@ -360,7 +364,9 @@ impl Iter {
     /// How many elements are left. An error if that is known only after they are read.
     pub fn length(&self, evaluator: &mut Evaluator, at: At) -> Result<usize> {
         Ok(match self {
-            Iter::Elements { front, back, .. } | Iter::Places { front, back, .. } => back.saturating_sub(*front),
+            Iter::Elements { front, back, .. } | Iter::Places { front, back, .. } => {
+                back.saturating_sub(*front)
+            }
             Iter::Range { front, back, .. } => usize::try_from((*back - *front).max(0)).unwrap_or(usize::MAX),
             Iter::ByRef(place) => match evaluator.read(place, at)? {
                 Value::Iterator(inner) => inner.length(evaluator, at)?,
@@ -416,7 +422,9 @@ fn known_option(value: Value, at: At) -> Result<Option<Value>> {
 fn holds(evaluator: &mut Evaluator, closure: &Value, value: Value, method: &str, at: At) -> Result<bool> {
     match evaluator.call(closure, vec![value], at)? {
         Value::Bool(known) => Ok(known),
-        Value::Condition(_) => Err(unsupported(at, format!("`{method}` by a comparison of model quantities"))),
+        Value::Condition(_) => {
+            Err(unsupported(at, format!("`{method}` by a comparison of model quantities")))
+        }
         other => Err(error(at, format!("expected a `bool`, found {}", other.kind()))),
     }
 }
@@ -480,7 +488,10 @@ pub fn method(
                 };
                 let below = match &range.end {
                     Some(end) => {
-                        item < evaluator.integer(end, call.at)?.value.saturating_add(i128::from(range.inclusive))
+                        item < evaluator
+                            .integer(end, call.at)?
+                            .value
+                            .saturating_add(i128::from(range.inclusive))
                     }
                     None => true,
                 };
@@ -561,7 +572,11 @@ fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Val
             let mut result = Value::Bool(!any);
             while let Some(value) = iter.next(evaluator, at)? {
                 let holds = evaluator.call(closure, vec![value], at)?;
-                result = if any { evaluator.or(&result, &holds, at)? } else { evaluator.and(&result, &holds, at)? };
+                result = if any {
+                    evaluator.or(&result, &holds, at)?
+                } else {
+                    evaluator.and(&result, &holds, at)?
+                };
                 if matches!(result, Value::Bool(known) if known == any) {
                     break;
                 }
@@ -615,7 +630,11 @@ fn adapt(evaluator: &mut Evaluator, iter: Iter, call: &Call) -> Result<Option<It
         "map_while" => Iter::MapWhile(Some(inner), call.only()?.clone()),
         "scan" => {
             call.expect(2)?;
-            Iter::Scan { inner, state: Place::new(call.arguments[0].clone()), closure: call.arguments[1].clone() }
+            Iter::Scan {
+                inner,
+                state: Place::new(call.arguments[0].clone()),
+                closure: call.arguments[1].clone(),
+            }
         }
         "rev" => Iter::Rev(inner),
         "take" => Iter::Take(inner, evaluator.usize(call.only()?, at)?),

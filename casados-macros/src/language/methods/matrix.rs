@@ -15,7 +15,7 @@ use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
 use syn::Result;
 
-pub use construction::{function, from_arrays};
+pub use construction::{from_arrays, function, matrix, vector};
 
 /// Row and column of a named element: `x`, `y`, `z`, `w`, `a`, `b`; `m23`.
 pub fn field(name: &str, rows: usize, columns: usize) -> Option<(usize, usize)> {
@@ -56,10 +56,29 @@ pub fn method(
 fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     let real = |node: Node| Ok(Some(Value::Real(node)));
-    if matches!(call.name, "row_sum" | "column_sum" | "row_mean" | "column_mean" | "lu" | "qr" | "cholesky"
-        | "svd" | "try_inverse" | "symmetric_eigen" | "exp" | "pinv" | "solve_lower_triangular"
-        | "solve_upper_triangular" | "simd_max" | "imax" | "imin" | "amax" | "amin" | "camax")
-    {
+    if matches!(
+        call.name,
+        "row_sum"
+            | "column_sum"
+            | "row_mean"
+            | "column_mean"
+            | "lu"
+            | "qr"
+            | "cholesky"
+            | "svd"
+            | "try_inverse"
+            | "symmetric_eigen"
+            | "exp"
+            | "pinv"
+            | "solve_lower_triangular"
+            | "solve_upper_triangular"
+            | "simd_max"
+            | "imax"
+            | "imin"
+            | "amax"
+            | "amin"
+            | "camax"
+    ) {
         return Err(unsupported(at, format!("`{}` of a matrix", call.name)));
     }
     match call.name {
@@ -142,7 +161,8 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
             } else {
                 all
             };
-            let (operation, start) = if call.name == "product" { (Binary::Mul, 1.0) } else { (Binary::Add, 0.0) };
+            let (operation, start) =
+                if call.name == "product" { (Binary::Mul, 1.0) } else { (Binary::Add, 0.0) };
             let start = evaluator.graph.constant(start);
             let count = terms.len();
             let sum = terms.into_iter().fold(start, |sum, term| evaluator.graph.binary(operation, sum, term));
@@ -172,10 +192,8 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
             let mut elements = Vec::new();
             for (j1, j2) in pairs(matrix.columns, other.columns) {
                 for (i1, i2) in pairs(matrix.rows, other.rows) {
-                    let (a, b) = (
-                        &matrix.elements[i1 + j1 * matrix.rows],
-                        &other.elements[i2 + j2 * other.rows],
-                    );
+                    let (a, b) =
+                        (&matrix.elements[i1 + j1 * matrix.rows], &other.elements[i2 + j2 * other.rows]);
                     elements.push(evaluator.binary(Operator::Mul, a, b, at)?);
                 }
             }
@@ -221,9 +239,9 @@ fn shape(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<
         "is_square" => Value::Bool(rows == columns),
         "iter" | "into_iter" => Value::iterator(Iter::of(matrix.elements.clone())),
         "as_slice" | "data" => Value::array(matrix.elements.clone()),
-        "column_iter" => {
-            Value::iterator(Iter::of((0..columns).map(|c| Value::Matrix(Rc::new(column(matrix, c)))).collect()))
-        }
+        "column_iter" => Value::iterator(Iter::of(
+            (0..columns).map(|c| Value::Matrix(Rc::new(column(matrix, c)))).collect(),
+        )),
         "row_iter" => {
             Value::iterator(Iter::of((0..rows).map(|r| Value::Matrix(Rc::new(row(matrix, r)))).collect()))
         }
@@ -260,8 +278,7 @@ fn shape(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<
             call.expect(2)?;
             let mut accumulated = call.arguments[0].clone();
             for element in &matrix.elements {
-                accumulated =
-                    evaluator.call(&call.arguments[1], vec![accumulated, element.clone()], at)?;
+                accumulated = evaluator.call(&call.arguments[1], vec![accumulated, element.clone()], at)?;
             }
             accumulated
         }
@@ -360,7 +377,10 @@ fn change(
                 return Ok(Some(Value::iterator(Iter::of(matrix.elements.clone()))));
             };
             if call.name == "as_mut_slice" {
-                return Err(unsupported(at, "`as_mut_slice` of a matrix (`iter_mut` and indexing do the same)"));
+                return Err(unsupported(
+                    at,
+                    "`as_mut_slice` of a matrix (`iter_mut` and indexing do the same)",
+                ));
             }
             let iter = super::iterator::into_iter(evaluator, Value::Reference(place.clone()), at)?;
             return Ok(Some(Value::iterator(iter)));
@@ -387,8 +407,11 @@ fn change(
             if index >= limit || source.elements.len() != length {
                 return Err(error(
                     at,
-                    format!("`{}` of {index} with {} elements does not fit a matrix of {rows} rows and {columns} columns",
-                        call.name, source.elements.len()),
+                    format!(
+                        "`{}` of {index} with {} elements does not fit a matrix of {rows} rows and {columns} columns",
+                        call.name,
+                        source.elements.len()
+                    ),
                 ));
             }
             for (i, element) in source.elements.iter().enumerate() {
@@ -405,8 +428,20 @@ fn change(
                 new.elements[i + i * rows] = element.clone();
             }
         }
-        "swap_rows" | "swap_columns" | "scale_mut" | "unscale_mut" | "normalize_mut" | "neg_mut" | "apply"
-        | "axpy" | "gemm" | "gemv" | "ger" | "component_mul_assign" | "component_div_assign" | "add_assign" => {
+        "swap_rows"
+        | "swap_columns"
+        | "scale_mut"
+        | "unscale_mut"
+        | "normalize_mut"
+        | "neg_mut"
+        | "apply"
+        | "axpy"
+        | "gemm"
+        | "gemv"
+        | "ger"
+        | "component_mul_assign"
+        | "component_div_assign"
+        | "add_assign" => {
             return Err(unsupported(
                 at,
                 format!("`{}` (the operators and methods that return a new matrix do the same)", call.name),
@@ -454,10 +489,7 @@ pub fn operator(
 }
 
 fn shapes(symbol: &str, a: &Matrix, b: &Matrix) -> String {
-    format!(
-        "there is no `{symbol}` of a {} x {} and a {} x {} matrix",
-        a.rows, a.columns, b.rows, b.columns
-    )
+    format!("there is no `{symbol}` of a {} x {} and a {} x {} matrix", a.rows, a.columns, b.rows, b.columns)
 }
 
 /// `Σₖ a_ik b_kj`, from the first `k` to the last.
