@@ -175,7 +175,7 @@ impl Evaluator {
                 Ok(Truth::When(_)) => Err(error(
                     &inner.cond,
                     "how often this loop runs depends on model quantities: let it run a fixed number of times, \
-                     or make the model generic, `fn f<T: DualNum<f64> + Copy>(...)`",
+                     or make the model generic, `fn f<T: DualNum + Copy>(...)`",
                 )
                 .into()),
                 Err(flow) => Err(flow),
@@ -317,7 +317,7 @@ fn runtime_assertion(call: &syn::Macro) -> syn::Error {
     error(
         call,
         "this assertion is about model quantities, which are not known at compile time: remove it, or make the \
-         model generic, `fn f<T: DualNum<f64> + Copy>(...)`",
+         model generic, `fn f<T: DualNum + Copy>(...)`",
     )
 }
 
