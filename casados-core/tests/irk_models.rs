@@ -56,6 +56,24 @@ fn algebraic_states_at_the_end_solve_their_equation() {
     assert!((r.dz_dp[0] - r.dx_dp[0]).abs() < 8.0 * f64::EPSILON);
 }
 
+/// From x = 1 to the equilibrium −u/p within a step of 10⁴ … 10¹² time constants.
+#[test]
+fn stiff_models_need_no_more_iterations() {
+    let mut irk = Irk::<Linear, RadauIIA<3>>::new(Options::default()).unwrap();
+    for p in [-1e4, -1e6, -1e8, -1e10, -1e12] {
+        irk.set_parameters(&vector![p]).unwrap();
+        let r = irk.forward(&vector![1.0], &vector![-p], 1.0).unwrap();
+        // At the equilibrium; rounding errors of k are ε|p|, and h b_i k_i is of order one.
+        assert!((r.x[0] - 1.0).abs() < 10.0 * f64::EPSILON);
+        // The Padé approximant (2, 3) of the exponential function.
+        let stability = (1.0 + p * (0.4 + p / 20.0)) / (1.0 - p * (0.6 - p * (0.15 - p / 60.0)));
+        assert!((r.dx_dx0[0] - stability).abs() < 10.0 * f64::EPSILON);
+        assert!(irk.statistics().iterations <= 2, "{p} {:?}", irk.statistics());
+        irk.solve(&vector![2.0], &vector![-p], 1.0).unwrap();
+        assert!(irk.statistics().iterations <= 2, "{p} {:?}", irk.statistics());
+    }
+}
+
 /// Scaling a linear problem by a power of two scales every result, to the last bit.
 #[test]
 fn powers_of_two_scale_through() {
