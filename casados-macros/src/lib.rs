@@ -30,7 +30,15 @@ fn expand(
     attribute: proc_macro2::TokenStream,
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
-    let models = language::read(form, attribute, item.clone()).and_then(|source| {
+    match language::dual::read(form, attribute.clone(), item.clone()) {
+        Ok(None) => {}
+        Ok(Some(source)) => {
+            return emit::expand_dual(source)
+                .unwrap_or_else(|error| emit::with_errors(attribute, item, &error));
+        }
+        Err(error) => return emit::with_errors(attribute, item, &error),
+    }
+    let models = language::read(form, attribute.clone(), item.clone()).and_then(|source| {
         let mut models = Vec::new();
         let mut errors: Option<syn::Error> = None;
         for model in source.models {
@@ -47,5 +55,5 @@ fn expand(
             None => emit::expand(source.item, source.place, &models),
         }
     });
-    models.unwrap_or_else(|error| emit::with_errors(item, &error))
+    models.unwrap_or_else(|error| emit::with_errors(attribute, item, &error))
 }

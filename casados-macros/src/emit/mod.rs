@@ -2,6 +2,7 @@
 
 mod chunk;
 mod documentation;
+mod dual;
 mod model;
 mod routine;
 mod schedule;
@@ -9,7 +10,7 @@ mod structure;
 #[cfg(test)]
 mod tests;
 
-use crate::language::Place;
+use crate::language::{self, Instance, Model, Place};
 use crate::structure::Analysis;
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
@@ -22,10 +23,39 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
     let original = original(&item).map(|(name, _)| name).unwrap_or_else(|| first.model.name.clone());
     let implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
 
-    let name = &first.model.name;
-    let visibility = &first.model.visibility;
     let documentation = documentation::of_type(&original, models);
-    let generics = generics(first.model.instance.iter().map(|instance| (&instance.name, &instance.ty)));
+    let Model { name, visibility, instance, .. } = &first.model;
+    assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+}
+
+/// The same for dual models.
+pub fn expand_dual(source: language::dual::Source) -> syn::Result<TokenStream> {
+    let language::dual::Source { item, place, models } = source;
+    let Some(language::dual::Model { name, visibility, instance, .. }) = models.first() else {
+        return Ok(item);
+    };
+    let documentation = models.first().map(dual::documentation).unwrap_or_default();
+    let implementations = models.iter().map(dual::write).collect();
+    assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+}
+
+/// The type of a model.
+struct Type<'a> {
+    name: &'a syn::Ident,
+    visibility: &'a syn::Visibility,
+    documentation: TokenStream,
+    instance: &'a [Instance],
+}
+
+/// The item, the type and its implementations, where they belong.
+fn assemble(
+    item: TokenStream,
+    place: Place,
+    ty: Type,
+    implementations: TokenStream,
+) -> syn::Result<TokenStream> {
+    let Type { name, visibility, documentation, instance } = ty;
+    let generics = generics(instance.iter().map(|instance| (&instance.name, &instance.ty)));
     let declaration = quote! {
         #documentation
         #[derive(Clone, Copy, Debug)]
@@ -63,7 +93,7 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
 
 /// The item as it was written beside its errors, and the type alone: without it, every use of the
 /// model would be an error more.
-pub fn with_errors(item: TokenStream, error: &syn::Error) -> TokenStream {
+pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error) -> TokenStream {
     let error = error.to_compile_error();
     let stub = original(&item).map(|(name, item)| {
         let (visibility, parameters) = match &item {
@@ -73,7 +103,7 @@ pub fn with_errors(item: TokenStream, error: &syn::Error) -> TokenStream {
         };
         let generics =
             generics(parameters.into_iter().flat_map(syn::Generics::const_params).map(|c| (&c.ident, &c.ty)));
-        let name = type_name(&name);
+        let name = language::model_name(attribute, &name);
         quote! {
             #[doc(hidden)]
             #[allow(dead_code)]
@@ -92,22 +122,6 @@ fn original(item: &TokenStream) -> Option<(syn::Ident, syn::Item)> {
         _ => return None,
     };
     Some((name, item))
-}
-
-/// `chain_of_masses` as `ChainOfMasses`.
-fn type_name(function: &syn::Ident) -> syn::Ident {
-    let name: String = syn::ext::IdentExt::unraw(function)
-        .to_string()
-        .split('_')
-        .flat_map(|word| {
-            let mut letters = word.chars();
-            letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect::<Vec<_>>()
-        })
-        .collect();
-    syn::parse_str(&name).map_or_else(
-        |_| function.clone(),
-        |name: syn::Ident| syn::Ident::new(&name.to_string(), function.span()),
-    )
 }
 
 /// `<const NX: usize>`, or nothing.

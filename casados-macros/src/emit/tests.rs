@@ -159,6 +159,6 @@ fn beside_errors_stands_the_type() {
         pub(crate) fn chain_of_masses<const N: usize>(x: [f64; N]) {}
     );
     let error = syn::Error::new(Span::call_site(), "what is wrong");
-    let file: syn::File = syn::parse2(super::with_errors(item, &error)).unwrap();
+    let file: syn::File = syn::parse2(super::with_errors(quote!(N = 3), item, &error)).unwrap();
     insta::assert_snapshot!(prettyplease::unparse(&file));
 }

@@ -4,6 +4,7 @@ mod arithmetic;
 mod attribute;
 mod call;
 mod closure;
+pub mod dual;
 mod environment;
 mod evaluator;
 mod expression;
@@ -16,7 +17,7 @@ mod path;
 mod pattern;
 mod place;
 mod select;
-mod signature;
+pub mod signature;
 mod statement;
 #[cfg(test)]
 mod tests;
@@ -153,6 +154,12 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
 fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>> {
     let instances = arguments.instances(&template.function.sig.generics)?;
     instances.into_iter().map(|instance| template.model(instance)).collect()
+}
+
+/// The name of the type of a model, as far as its attribute can be read.
+pub fn model_name(attribute: TokenStream, item: &syn::Ident) -> syn::Ident {
+    let named = Arguments::read(attribute).ok().and_then(|arguments| arguments.name);
+    named.unwrap_or_else(|| signature::type_name(item))
 }
 
 fn documentation(attributes: &[syn::Attribute]) -> Vec<syn::Attribute> {

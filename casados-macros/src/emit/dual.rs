@@ -1,0 +1,180 @@
+//! Dual models: `Dae` by the arithmetic of dual numbers at run time.
+
+use crate::language::Form;
+use crate::language::dual::{Argument, Model};
+use crate::language::signature::Role;
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+
+/// What rustdoc says about the model.
+pub fn documentation(model: &Model) -> TokenStream {
+    let Model { documentation, function, variables, .. } = model;
+    let separator = (!documentation.is_empty()).then(|| quote!(#[doc = ""]));
+    let text = format!(
+        " The model of `{function}`, over dual numbers: {} differential states, {} algebraic states, {} controls, {} \
+         parameters.",
+        variables.x.len(),
+        variables.z.len(),
+        variables.u.len(),
+        variables.p.len(),
+    );
+    // Dimensions of an instance do not speak for all of them.
+    let text = if model.instance.is_empty() {
+        text
+    } else {
+        format!(" The model of `{function}`, over dual numbers.")
+    };
+    quote!(#(#documentation)* #separator #[doc = #text])
+}
+
+/// Writes the implementations for one model.
+pub fn write(model: &Model) -> TokenStream {
+    let Model { form, name, function, instance, variables, krate, generics, .. } = model;
+    let [nx, nz, nu, np] = [&variables.x, &variables.z, &variables.u, &variables.p].map(Vec::len);
+    let (nk, nv, nw) = (nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np);
+    let (nj, nh) = (nk * (nv - 1), (nv - 1) * nv / 2);
+    let mut begin = 0;
+    let blocks = [nx, nx, nz, nu, np, 0].map(|width| {
+        let block = Literal::usize_unsuffixed(begin);
+        begin += nk * width;
+        block
+    });
+    let starts = [0, nx, 2 * nx, 2 * nx + nz, 2 * nx + nz + nu, nv - 1];
+    let arguments = model.arguments.iter().map(|argument| self::argument(argument, starts));
+    let [lx, lz, lu, lp, lk, lv, lw, lj, lh] =
+        [nx, nz, nu, np, nk, nv, nw, nj, nh].map(Literal::usize_unsuffixed);
+    let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
+    let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
+    let text = name.to_string();
+    let crate::language::Variables { x, z, u, p } = variables;
+
+    let call = quote!(#function::<#(#generics),*>(#(#arguments),*));
+    let returned = if model.scalar { quote!([#call]) } else { quote!(::core::convert::Into::into(#call)) };
+    let value = match form {
+        Form::Dae => quote!(casados_value),
+        Form::Ode => quote!(casados_variable(casados_row) - casados_value),
+    };
+    let ode = (*form == Form::Ode).then(|| {
+        let rows = (0..nx).map(Literal::usize_unsuffixed);
+        quote! {
+            #[automatically_derived]
+            impl #krate::Ode for #ty {
+                const ROWS: &'static [(u32, f64)] = &[#((#rows, 1.0)),*];
+            }
+        }
+    });
+    let equations = Literal::usize_unsuffixed(model.equations);
+    quote! {
+        const _: () = {
+            #[automatically_derived]
+            impl #krate::dual::DualModel for #ty {
+                fn evaluate<CasadosT>(
+                    casados_variable: impl Fn(usize) -> CasadosT,
+                    mut casados_equation: impl FnMut(usize, CasadosT),
+                )
+                where
+                    CasadosT: #krate::dual::DualNum<Primitive = f64> + #krate::dual::DualNumCopy,
+                {
+                    let casados_residual: [CasadosT; #equations] = #returned;
+                    for (casados_row, casados_value) in casados_residual.into_iter().enumerate() {
+                        casados_equation(casados_row, #value);
+                    }
+                }
+
+                fn passes() -> &'static ::std::sync::OnceLock<#krate::dual::Passes> {
+                    static PASSES: ::std::sync::OnceLock<#krate::dual::Passes> = ::std::sync::OnceLock::new();
+                    &PASSES
+                }
+            }
+
+            #[automatically_derived]
+            impl #krate::Dae for #ty {
+                type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
+                type Jacobian<T: #krate::shape::Plain> = [T; #lj];
+                type Hessian<T: #krate::shape::Plain> = [T; #lh];
+                const STRUCTURE: #krate::model::Structure = {
+                    const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::dual::jacobian_pattern::<
+                        #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>,
+                        #lj,
+                    >();
+                    const HESSIAN: ([u32; #lh], [u32; #lh]) = #krate::dual::hessian_pattern();
+                    #krate::model::Structure {
+                        name: #text,
+                        x: &[#(#x),*],
+                        z: &[#(#z),*],
+                        u: &[#(#u),*],
+                        p: &[#(#p),*],
+                        jacobian: #krate::model::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
+                        blocks: [#(#blocks),*],
+                        constant: &[false; #lj],
+                        hessian: #krate::model::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
+                        linear: &[false; #lk],
+                        operations: #krate::model::Operations {
+                            residual: 0,
+                            residual_jacobian: 0,
+                            adjoint: 0,
+                            hessian: 0,
+                        },
+                    }
+                };
+
+                fn residual<CasadosS: #krate::Lanes>(variables: &[CasadosS; #lv], residual: &mut [CasadosS; #lk]) {
+                    #krate::dual::residual::<Self, CasadosS>(variables, residual);
+                }
+
+                fn jacobian_constants<CasadosS: #krate::Lanes>(_: &mut [CasadosS; #lj]) {}
+
+                fn residual_jacobian<CasadosS: #krate::Lanes>(
+                    variables: &[CasadosS; #lv],
+                    residual: &mut [CasadosS; #lk],
+                    jacobian: &mut [CasadosS; #lj],
+                ) {
+                    #krate::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
+                }
+
+                fn adjoint<CasadosS: #krate::Lanes>(
+                    variables: &[CasadosS; #lv],
+                    seeds: &[CasadosS; #lk],
+                    gradient: &mut [CasadosS; #lv],
+                ) {
+                    #krate::dual::adjoint::<Self, CasadosS>(variables, seeds, gradient);
+                }
+
+                fn hessian<CasadosS: #krate::Lanes>(
+                    variables: &[CasadosS; #lv],
+                    seeds: &[CasadosS; #lk],
+                    hessian: &mut [CasadosS; #lh],
+                ) {
+                    #krate::dual::hessian::<Self, CasadosS>(variables, seeds, hessian);
+                }
+            }
+
+            #ode
+        };
+    }
+}
+
+/// An argument of the call: an array of its variables, or what is made of it.
+fn argument(argument: &Argument, starts: [usize; 6]) -> TokenStream {
+    let start = match argument.role {
+        Role::Xdot => starts[0],
+        Role::X => starts[1],
+        Role::Z => starts[2],
+        Role::U => starts[3],
+        Role::P => starts[4],
+        Role::T => starts[5],
+    };
+    let start = Literal::usize_unsuffixed(start);
+    let value = match argument.length {
+        None => quote!(casados_variable(#start)),
+        Some(length) => {
+            let length = Literal::usize_unsuffixed(length);
+            quote! {
+                ::core::convert::Into::into(::core::array::from_fn::<CasadosT, #length, _>(|casados_index| {
+                    casados_variable(#start + casados_index)
+                }))
+            }
+        }
+    };
+    if argument.reference { quote!(&#value) } else { value }
+}

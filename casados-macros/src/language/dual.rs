@@ -1,0 +1,307 @@
+//! Dual models: functions that are generic over `DualNum`. Their bodies are not read, only their signatures.
+
+use super::attribute::Arguments;
+use super::signature::{self, Role};
+use super::{Form, Instance, Place, Variables, module};
+use proc_macro2::{Ident, TokenStream};
+use quote::ToTokens;
+use syn::{Error, Expr, GenericParam, Item, ItemFn, Result, Type};
+
+/// What an attribute stands on, if it is a dual model.
+pub struct Source {
+    /// The item as it was written, less attributes that are ours.
+    pub item: TokenStream,
+    /// Where the generated items go.
+    pub place: Place,
+    /// One model; several where the attribute lists values of const generics.
+    pub models: Vec<Model>,
+}
+
+/// A dual model.
+pub struct Model {
+    /// Which attribute.
+    pub form: Form,
+    /// Name of the type.
+    pub name: Ident,
+    /// Name of the function.
+    pub function: Ident,
+    /// Visibility of the function or module.
+    pub visibility: syn::Visibility,
+    /// Documentation attributes of the item.
+    pub documentation: Vec<syn::Attribute>,
+    /// Values of the const parameters.
+    pub instance: Vec<Instance>,
+    /// Names of the variables.
+    pub variables: Variables,
+    /// The arguments of the function, in its order.
+    pub arguments: Vec<Argument>,
+    /// Its generic arguments, in its order: the type is `CasadosT`.
+    pub generics: Vec<TokenStream>,
+    /// How many equations it returns.
+    pub equations: usize,
+    /// Whether it returns a number rather than an array of one.
+    pub scalar: bool,
+    /// Path of the crate.
+    pub krate: syn::Path,
+}
+
+/// An argument of a dual model.
+pub struct Argument {
+    /// What it is.
+    pub role: Role,
+    /// Its length; `None` for a number.
+    pub length: Option<usize>,
+    /// Whether it is taken by reference.
+    pub reference: bool,
+}
+
+/// Reads an item if it is a dual model.
+pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Option<Source>> {
+    let (item, place, function, items, name, visibility, attributes) = match syn::parse2(item)? {
+        Item::Fn(function) => {
+            let (name, visibility) = (function.sig.ident.clone(), function.vis.clone());
+            let attributes = function.attrs.clone();
+            (function.to_token_stream(), Place::Beside, function, Vec::new(), name, visibility, attributes)
+        }
+        Item::Mod(mut module) => {
+            let Ok(index) = module::model_function(form, &mut module) else { return Ok(None) };
+            let items = module.content.as_ref().map(|(_, items)| items.clone()).unwrap_or_default();
+            let Some(Item::Fn(function)) = items.get(index).cloned() else { return Ok(None) };
+            let (name, visibility) = (module.ident.clone(), module.vis.clone());
+            let attributes = module.attrs.clone();
+            (module.to_token_stream(), Place::Inside, function, items, name, visibility, attributes)
+        }
+        _ => return Ok(None),
+    };
+    if !signature::is_dual(&function) {
+        return Ok(None);
+    }
+    if cfg!(not(feature = "num-dual")) {
+        return Err(Error::new_spanned(
+            &function.sig.generics,
+            "a model over `DualNum` needs the feature `num-dual` of casados: enable it in Cargo.toml, or write the \
+             model with `f64` and without type parameters, so that its derivatives are found at compile time",
+        ));
+    }
+    let arguments = Arguments::read(attribute)?;
+    let mut consts = function.sig.generics.clone();
+    consts.params =
+        consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();
+    let models = arguments
+        .instances(&consts)?
+        .into_iter()
+        .map(|instance| {
+            let signature =
+                Signature::read(form, &function, &Lengths { instance: &instance, items: &items })?;
+            Ok(Model {
+                form,
+                name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&name)),
+                function: function.sig.ident.clone(),
+                visibility: visibility.clone(),
+                documentation: super::documentation(&attributes),
+                generics: generics(&function, &instance)?,
+                instance,
+                variables: signature.variables,
+                arguments: signature.arguments,
+                equations: signature.equations,
+                scalar: signature.scalar,
+                krate: arguments.krate.clone(),
+            })
+        })
+        .collect::<Result<_>>()?;
+    Ok(Some(Source { item, place, models }))
+}
+
+/// The generic arguments of a call.
+fn generics(function: &ItemFn, instance: &[Instance]) -> Result<Vec<TokenStream>> {
+    let mut types = 0;
+    let mut arguments = Vec::new();
+    for parameter in &function.sig.generics.params {
+        match parameter {
+            GenericParam::Lifetime(_) => {}
+            GenericParam::Type(parameter) => {
+                types += 1;
+                if types > 1 {
+                    return Err(Error::new_spanned(
+                        parameter,
+                        "a dual model has one type parameter: `T: DualNum + Copy`",
+                    ));
+                }
+                arguments.push(quote::quote!(CasadosT));
+            }
+            GenericParam::Const(parameter) => {
+                let value = instance.iter().find(|instance| instance.name == parameter.ident);
+                let value = value.map(|instance| proc_macro2::Literal::u64_unsuffixed(instance.value));
+                arguments.push(value.to_token_stream());
+            }
+        }
+    }
+    Ok(arguments)
+}
+
+/// What a signature says.
+struct Signature {
+    variables: Variables,
+    arguments: Vec<Argument>,
+    equations: usize,
+    scalar: bool,
+}
+
+impl Signature {
+    fn read(form: Form, function: &ItemFn, lengths: &Lengths) -> Result<Self> {
+        let (mut variables, mut arguments) = (Variables::default(), Vec::new());
+        let mut xdot = None;
+        for argument in signature::arguments(form, function)? {
+            let (ty, reference) = match &argument.ty {
+                Type::Reference(reference) => (&*reference.elem, true),
+                ty => (ty, false),
+            };
+            let length = lengths.of_type(function, ty)?;
+            let role = argument.role;
+            if role == Role::T && length.is_some() {
+                return Err(Error::new_spanned(ty, "the time `t` is a number"));
+            }
+            let names = names(role.name(), length);
+            match role {
+                Role::Xdot => xdot = Some((ty.clone(), names.len())),
+                Role::X => variables.x = names,
+                Role::Z => variables.z = names,
+                Role::U => variables.u = names,
+                Role::P => variables.p = names,
+                Role::T => {}
+            }
+            arguments.push(Argument { role, length, reference });
+        }
+        if let Some((ty, length)) = xdot
+            && length != variables.x.len()
+        {
+            if !variables.x.is_empty() {
+                return Err(Error::new_spanned(ty, "`xdot` and `x` have different lengths"));
+            }
+            variables.x = names("x", Some(length));
+        }
+        let syn::ReturnType::Type(_, ty) = &function.sig.output else {
+            return Err(Error::new_spanned(&function.sig, "a model returns numbers"));
+        };
+        let length = lengths.of_type(function, ty)?;
+        let equations = length.unwrap_or(1);
+        let expected = variables.x.len() + variables.z.len();
+        if equations != expected {
+            return Err(Error::new_spanned(
+                ty,
+                format!(
+                    "{equations} numbers are returned where the model has {expected} unknowns: one for each \
+                     differential and algebraic state"
+                ),
+            ));
+        }
+        Ok(Self { variables, arguments, equations, scalar: length.is_none() })
+    }
+}
+
+/// `x[0]`, `x[1]`, ...; of a number, its name.
+fn names(name: &str, length: Option<usize>) -> Vec<String> {
+    match length {
+        None => vec![name.to_string()],
+        Some(length) => (0..length).map(|index| format!("{name}[{index}]")).collect(),
+    }
+}
+
+/// Evaluates the lengths of arrays.
+struct Lengths<'a> {
+    instance: &'a [Instance],
+    items: &'a [Item],
+}
+
+impl Lengths<'_> {
+    /// The length of `[T; n]` or of a nalgebra vector; `None` for `T`.
+    fn of_type(&self, function: &ItemFn, ty: &Type) -> Result<Option<usize>> {
+        let is_number = |ty: &Type| {
+            let Type::Path(path) = ty else { return false };
+            function.sig.generics.type_params().any(|parameter| path.path.is_ident(&parameter.ident))
+        };
+        match ty {
+            ty if is_number(ty) => return Ok(None),
+            Type::Array(array) if is_number(&array.elem) => return self.of(&array.len, 0).map(Some),
+            Type::Paren(inner) => return self.of_type(function, &inner.elem),
+            Type::Path(path) => {
+                if let Some(last) = path.path.segments.last()
+                    && let syn::PathArguments::AngleBracketed(arguments) = &last.arguments
+                {
+                    let name = last.ident.to_string();
+                    let mut arguments = arguments.args.iter();
+                    let element =
+                        matches!(arguments.next(), Some(syn::GenericArgument::Type(ty)) if is_number(ty));
+                    let length = match (name.strip_prefix("Vector").map(str::parse), arguments.next()) {
+                        (Some(Ok(length)), None) => Some(length),
+                        (None, Some(syn::GenericArgument::Const(length))) if name == "SVector" => {
+                            Some(self.of(length, 0)?)
+                        }
+                        (None, Some(syn::GenericArgument::Type(Type::Path(length)))) if name == "SVector" => {
+                            let path =
+                                syn::ExprPath { attrs: Vec::new(), qself: None, path: length.path.clone() };
+                            Some(self.of(&Expr::Path(path), 0)?)
+                        }
+                        _ => None,
+                    };
+                    if let (true, Some(length)) = (element, length) {
+                        return Ok(Some(length));
+                    }
+                }
+            }
+            _ => {}
+        }
+        Err(Error::new_spanned(
+            ty,
+            "arguments and result of a dual model are numbers `T`, arrays `[T; n]` or vectors `SVector<T, n>`; \
+             structs are for models written with `f64`",
+        ))
+    }
+
+    /// The value of a length.
+    fn of(&self, length: &Expr, depth: usize) -> Result<usize> {
+        let unknown = || {
+            Error::new_spanned(
+                length,
+                "the length must be known here: write an integer, a const parameter, or a const of the same module",
+            )
+        };
+        if depth > 64 {
+            return Err(unknown());
+        }
+        let value = match length {
+            Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(literal), .. }) => Some(literal.base10_parse()?),
+            Expr::Paren(inner) => Some(self.of(&inner.expr, depth + 1)?),
+            Expr::Group(inner) => Some(self.of(&inner.expr, depth + 1)?),
+            Expr::Block(block) => match block.block.stmts.as_slice() {
+                [syn::Stmt::Expr(inner, None)] => Some(self.of(inner, depth + 1)?),
+                _ => None,
+            },
+            Expr::Binary(binary) => {
+                let (a, b) = (self.of(&binary.left, depth + 1)?, self.of(&binary.right, depth + 1)?);
+                match binary.op {
+                    syn::BinOp::Add(_) => a.checked_add(b),
+                    syn::BinOp::Sub(_) => a.checked_sub(b),
+                    syn::BinOp::Mul(_) => a.checked_mul(b),
+                    syn::BinOp::Div(_) => a.checked_div(b),
+                    _ => None,
+                }
+            }
+            Expr::Path(path) => {
+                let instance = self.instance.iter().find(|instance| path.path.is_ident(&instance.name));
+                let item = self.items.iter().find_map(|item| match item {
+                    Item::Const(item) if path.path.is_ident(&item.ident) => Some(&item.expr),
+                    _ => None,
+                });
+                match (instance, item) {
+                    (Some(instance), _) => usize::try_from(instance.value).ok(),
+                    (None, Some(expression)) => Some(self.of(expression, depth + 1)?),
+                    (None, None) => None,
+                }
+            }
+            _ => None,
+        };
+        // The pattern of a dual model is dense: its tables must be sane.
+        value.filter(|&value| value <= 10_000).ok_or_else(unknown)
+    }
+}
