@@ -63,6 +63,10 @@ pub(super) fn derivative(
             (now.value, latest)
         });
         last = changes.collect();
+        // Smaller steps would only lose digits.
+        if last.iter().zip(&estimate).all(|(last, now)| last.1 <= now.error) {
+            break;
+        }
     }
     best
 }

@@ -111,38 +111,25 @@ pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
     let scale = largest(all.hessian.as_slice());
     report.compare("Hessian", "its transpose", 0, scale, entries.enumerate(), second_name::<M>);
 
-    for j in 0..M::Shape::NW {
+    for direction in directions::<M>(&interval) {
         let moved = |value: Bounded| Interval {
-            w: interval.w.iter().enumerate().map(|(i, &w)| if i == j { value.value } else { w }).collect(),
+            w: interval.w.iter().zip(&direction.seed).map(|(w, d)| w + value.value * d).collect(),
             h,
         };
-        let by_solve = differences::derivative(interval.w[j], solved.len(), |value| {
+        let by_solve = differences::derivative(0.0, solved.len(), |value| {
             attach(moved(value).solve(integrator).ok(), &noise.states)
         });
-        let column = derivatives.column(j);
-        let bounds = noise.derivatives.column(j);
-        against_differences(
-            &mut report,
-            "forward",
-            "differences",
-            column.as_slice(),
-            &by_solve,
-            bounds.as_slice(),
-            |i| format!("{} by {}", state_name::<M>(i), direction_name::<M>(j)),
-        );
-        let by_adjoint = differences::derivative(interval.w[j], M::Shape::NW, |value| {
-            let gradient = moved(value).adjoint(integrator, &lambda).ok().map(|a| a.1);
-            attach(gradient, &noise.gradient)
+        let (own, bounds) = direction.of(&derivatives, &noise.derivatives);
+        against_differences(&mut report, "forward", &own, &by_solve, &bounds, |i| {
+            format!("{} by {}", state_name::<M>(i), direction.name)
         });
-        against_differences(
-            &mut report,
-            "Hessian",
-            "differences",
-            all.hessian.column(j).as_slice(),
-            &by_adjoint,
-            noise.hessian.column(j).as_slice(),
-            |i| format!("by {} and {}", direction_name::<M>(i), direction_name::<M>(j)),
-        );
+        let by_adjoint = differences::derivative(0.0, M::Shape::NW, |value| {
+            attach(moved(value).adjoint(integrator, &lambda).ok().map(|a| a.1), &noise.gradient)
+        });
+        let (own, bounds) = direction.of(&all.hessian, &noise.hessian);
+        against_differences(&mut report, "Hessian", &own, &by_adjoint, &bounds, |i| {
+            format!("by {} and {}", direction_name::<M>(i), direction.name)
+        });
     }
     Ok(report)
 }
@@ -222,6 +209,54 @@ pub fn check_exact<M: Dae, I: Integrator<M>>(
     Ok(report)
 }
 
+/// A direction in the space of `w`, in which differences are taken.
+struct Direction {
+    name: String,
+    seed: Vec<f64>,
+}
+
+/// The unit vectors, if they are few; for large models random directions, in which every entry takes part.
+fn directions<M: Dae>(interval: &Interval) -> Vec<Direction> {
+    const UNITS: usize = 12;
+    const RANDOM: usize = 4;
+    let size = |w: f64| w.abs().max(1.0);
+    if M::Shape::NW <= UNITS {
+        return (0..M::Shape::NW)
+            .map(|j| Direction {
+                name: direction_name::<M>(j),
+                seed: (0..M::Shape::NW).map(|i| f64::from(u8::from(i == j))).collect(),
+            })
+            .collect();
+    }
+    let mut random = Random::new(11);
+    (0..RANDOM)
+        .map(|number| Direction {
+            name: format!("random direction {number}"),
+            seed: interval.w.iter().map(|&w| random.symmetric() * size(w)).collect(),
+        })
+        .collect()
+}
+
+impl Direction {
+    /// The derivatives in this direction, and their noise: that of the entries and that of the sum.
+    fn of(&self, matrix: &DMatrix<f64>, noise: &DMatrix<f64>) -> (Vec<f64>, Vec<f64>) {
+        let n = self.seed.len() as f64;
+        let sum = |term: &dyn Fn(usize, f64) -> f64| -> f64 {
+            self.seed.iter().enumerate().map(|(j, &d)| term(j, d)).sum()
+        };
+        (0..matrix.nrows())
+            .map(|i| {
+                let value = sum(&|j, d| matrix[(i, j)] * d);
+                let bound = sum(&|j, d| {
+                    let rounding = n * f64::EPSILON * (matrix[(i, j)] * d).abs() / DEVIATIONS;
+                    noise[(i, j)] * d.abs() + rounding
+                });
+                (value, bound)
+            })
+            .unzip()
+    }
+}
+
 /// The largest deviation of each entry over samples.
 fn noise<M: Dae>(
     integrator: &mut impl Integrator<M>,
@@ -274,7 +309,6 @@ fn agree(
 fn against_differences(
     report: &mut Report,
     quantity: &'static str,
-    reference: &'static str,
     values: &[f64],
     differences: &[Bounded],
     noise: &[f64],
@@ -285,7 +319,7 @@ fn against_differences(
         expected: d.value,
         tolerance: d.error + DEVIATIONS * noise + 4.0 * f64::EPSILON * value.abs(),
     });
-    report.compare(quantity, reference, 0, largest(values), entries.enumerate(), name);
+    report.compare(quantity, "differences", 0, largest(values), entries.enumerate(), name);
 }
 
 /// Values with their noise; NaN where the integrator failed, which differences leave out.
