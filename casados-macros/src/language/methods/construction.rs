@@ -1,4 +1,4 @@
-//! Construction of nalgebra matrices: `Vector3::new`, `SMatrix::from_row_slice`, `vector![]`, ..
+//! Construction of nalgebra matrices: `Vector3::new`, `SMatrix::from_row_slice`, ..
 
 use super::Call;
 use crate::language::evaluator::{At, Evaluator, error};
@@ -38,29 +38,6 @@ pub fn from_arrays(
         return Err(error(at, format!("this array makes a {found_rows} x {found_columns} matrix")));
     }
     Ok(Value::matrix(found_rows, found_columns, all))
-}
-
-/// `vector![a, b]`
-pub fn vector(evaluator: &mut Evaluator, elements: &[Value], at: At) -> Result<Value> {
-    let elements: Result<Vec<_>> =
-        elements.iter().map(|element| evaluator.real(element, at).map(Value::Real)).collect();
-    let elements = elements?;
-    Ok(Value::matrix(elements.len(), 1, elements))
-}
-
-/// `matrix![a, b; c, d]`
-pub fn matrix(evaluator: &mut Evaluator, rows: &[Vec<Value>], at: At) -> Result<Value> {
-    let columns = rows.first().map_or(0, Vec::len);
-    if rows.iter().any(|row| row.len() != columns) {
-        return Err(error(at, "the rows have different lengths"));
-    }
-    let mut elements = Vec::with_capacity(rows.len() * columns);
-    for column in 0..columns {
-        for row in rows {
-            elements.push(Value::Real(evaluator.real(&row[column], at)?));
-        }
-    }
-    Ok(Value::matrix(rows.len(), columns, elements))
 }
 
 /// A constructor by path. `None` if there is no such function.

@@ -15,7 +15,7 @@ use crate::language::value::{Matrix, Value};
 use std::rc::Rc;
 use syn::Result;
 
-pub use construction::{from_arrays, function, matrix, vector};
+pub use construction::{from_arrays, function};
 
 /// Row and column of a named element: `x`, `y`, `z`, `w`, `a`, `b`; `m23`.
 pub fn field(name: &str, rows: usize, columns: usize) -> Option<(usize, usize)> {

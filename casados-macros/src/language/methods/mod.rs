@@ -7,7 +7,7 @@ mod float;
 mod function;
 mod integer;
 pub mod iterator;
-pub mod matrix;
+mod matrix;
 mod option;
 
 use super::evaluator::{At, Evaluator, error};

@@ -4,7 +4,6 @@ use super::iterator::Iter;
 use super::{Call, Receiver};
 use crate::language::evaluator::{Evaluator, error};
 use crate::language::place::{Place, Projection};
-use crate::language::types::Type;
 use crate::language::value::Value;
 use syn::Result;
 
@@ -93,13 +92,5 @@ pub fn update(evaluator: &mut Evaluator, receiver: &Receiver, value: Value, call
             evaluator.write(&place, value, call.at)
         }
         Receiver::Value(_) => Ok(()),
-    }
-}
-
-/// The type inside of an expected option.
-pub fn inner(expected: &Type) -> Type {
-    match expected {
-        Type::Option(inner) => (**inner).clone(),
-        _ => Type::Unknown,
     }
 }
