@@ -1,0 +1,127 @@
+//! Identities that hold to rounding whatever the model: adjoint and forward sensitivities are transposes of each other,
+//! Hessians are symmetric and derivatives of gradients, calls repeat their bits, Gauss methods keep quadratic invariants.
+
+use casados::testing::{Integrator, check_sensitivities};
+use casados::{Dae, Erk, Gauss, Irk, Options, RadauIIA, Rk4, Shape, dae, ode};
+use nalgebra::SVector;
+
+/// All checks of one interval; of the comparisons with differences at most a tenth may be unable to tell.
+fn check<M, I, const NX: usize, const NU: usize, const NP: usize>(
+    mut integrator: I,
+    x0: &SVector<f64, NX>,
+    u: &SVector<f64, NU>,
+    p: &SVector<f64, NP>,
+    h: f64,
+) where
+    M: Dae,
+    M::Shape: Shape<
+            VectorX<f64> = SVector<f64, NX>,
+            VectorU<f64> = SVector<f64, NU>,
+            VectorP<f64> = SVector<f64, NP>,
+        >,
+    I: Integrator<M>,
+{
+    let report =
+        check_sensitivities::<M, I>(&mut integrator, x0, u, p, h).expect("the interval can be integrated");
+    println!("{report}");
+    report.assert();
+    for row in &report.rows {
+        assert!(row.inconclusive * 10 <= row.entries, "{report}");
+    }
+}
+
+fn options(steps: usize) -> Options {
+    Options { steps, ..Default::default() }
+}
+
+/// A fully implicit model with every kind of variable: `z` and parameters that enter nonlinearly, time, a state-dependent
+/// mass matrix.
+#[dae]
+fn everything(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 2], t: f64) -> [f64; 3] {
+    let [stiffness, mass] = p;
+    [
+        (mass + x[0] * x[0]) * xdot[0] + 0.1 * xdot[1].sin() - x[1] * z[0],
+        xdot[1] + stiffness * x[0].sinh() - u[0] * (1.0 + 0.2 * t).ln() * z[0],
+        z[0] + 0.3 * z[0].powi(3) - (x[0] - 0.4 * xdot[0] * u[0]).cos() - p[1] * t,
+    ]
+}
+
+#[test]
+fn implicit_model_with_everything() {
+    let (x0, u, p) = (SVector::from([0.4, -0.7]), SVector::from([0.6]), SVector::from([1.3, 2.1]));
+    check::<Everything, _, 2, 1, 2>(
+        Irk::<Everything, Gauss<3>>::new(options(2)).expect("valid"),
+        &x0,
+        &u,
+        &p,
+        0.3,
+    );
+    check::<Everything, _, 2, 1, 2>(
+        Irk::<Everything, Gauss<1>>::new(options(1)).expect("valid"),
+        &x0,
+        &u,
+        &p,
+        0.3,
+    );
+    check::<Everything, _, 2, 1, 2>(
+        Irk::<Everything, RadauIIA<1>>::new(options(3)).expect("valid"),
+        &x0,
+        &u,
+        &p,
+        0.3,
+    );
+    check::<Everything, _, 2, 1, 2>(
+        Irk::<Everything, RadauIIA<5>>::new(options(1)).expect("valid"),
+        &x0,
+        &u,
+        &p,
+        0.3,
+    );
+}
+
+/// A rigid body without torque (Euler): kinetic energy and the square of the angular momentum are quadratic invariants.
+#[ode]
+fn rigid_body(x: [f64; 3]) -> [f64; 3] {
+    const INERTIA: [f64; 3] = [1.0, 2.0, 3.5];
+    let [a, b, c] = INERTIA;
+    let [p, q, r] = x;
+    [(b - c) / a * q * r, (c - a) / b * r * p, (a - b) / c * p * q]
+}
+
+fn invariants(x: &SVector<f64, 3>) -> [f64; 2] {
+    let inertia = SVector::from([1.0, 2.0, 3.5]);
+    let momentum = x.component_mul(&inertia);
+    [x.dot(&momentum), momentum.norm_squared()]
+}
+
+/// The largest relative drift of the invariants over many steps.
+fn drift<I>(mut integrator: I, intervals: usize) -> f64
+where
+    I: Integrator<RigidBody>,
+{
+    let mut x = SVector::from([0.9, 0.4, -1.1]);
+    let start = invariants(&x);
+    let mut worst = 0.0_f64;
+    for _ in 0..intervals {
+        x = integrator.solve(&x, &SVector::zeros(), 0.5).expect("the body can be integrated").x;
+        for (now, start) in invariants(&x).iter().zip(start) {
+            worst = worst.max(((now - start) / start).abs());
+        }
+    }
+    worst
+}
+
+/// Gauss methods keep quadratic invariants (Cooper 1987), with steps that are far from accurate too. Each step rounds the
+/// update of a state and the residual of its stages: a few epsilon of the invariant, with random sign;
+/// here all of them are granted the same sign.
+#[test]
+fn gauss_keeps_quadratic_invariants() {
+    const INTERVALS: usize = 200;
+    let bound = 8.0 * f64::EPSILON * INTERVALS as f64;
+    assert!(drift(Irk::<RigidBody, Gauss<1>>::new(options(1)).expect("valid"), INTERVALS) <= bound);
+    assert!(drift(Irk::<RigidBody, Gauss<2>>::new(options(1)).expect("valid"), INTERVALS) <= bound);
+    assert!(drift(Irk::<RigidBody, Gauss<4>>::new(options(1)).expect("valid"), INTERVALS) <= bound);
+    // Other methods do not, or the test would say nothing.
+    assert!(drift(Irk::<RigidBody, RadauIIA<2>>::new(options(1)).expect("valid"), INTERVALS) > 1e6 * bound);
+    assert!(drift(Erk::<RigidBody, Rk4>::new(options(1)).expect("valid"), INTERVALS) > 1e6 * bound);
+}
