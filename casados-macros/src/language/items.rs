@@ -113,6 +113,14 @@ impl Evaluator {
             self.item(item, parent, &mut names, &mut definitions)?;
         }
         let scope = Scope::inside(parent, Names::Items(Box::new(names)));
+        for item in items.clone() {
+            if let syn::Item::Use(item) = item
+                && !self.is_local(&item.tree, &scope)
+                && !self.uses.contains(item)
+            {
+                self.uses.push(item.clone());
+            }
+        }
         for definition in definitions {
             let _ = definition.scope.set(Rc::downgrade(&scope));
         }
@@ -194,7 +202,6 @@ impl Evaluator {
                 names.modules.insert(name, scope);
             }
             syn::Item::Use(item) => {
-                self.uses.push(item.clone());
                 self.use_tree(&item.tree, &mut Vec::new(), names);
             }
             syn::Item::Impl(_) | syn::Item::Trait(_) => {}
@@ -236,6 +243,16 @@ impl Evaluator {
                 }
             }
         }
+    }
+
+    /// Whether a `use` names something that the macro sees: generated code does not need it.
+    fn is_local(&mut self, tree: &syn::UseTree, scope: &Rc<Scope>) -> bool {
+        let syn::UseTree::Path(tree) = tree else { return false };
+        let first = self.symbol(&tree.ident);
+        scope.chain().any(|scope| match &scope.names {
+            Names::Items(items) => items.types.contains_key(&first) || items.modules.contains_key(&first),
+            _ => false,
+        })
     }
 
     fn implementation(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {

@@ -305,6 +305,17 @@ impl Evaluator {
         }
         match builtin.path.last() {
             Some(name) if name == "None" => Value::Option(None),
+            // A name of the surrounding module: as a value it is more often a constant than a function.
+            Some(_)
+                if builtin.owner.is_none()
+                    && (builtin.path.len() == 1
+                        || builtin.path[0] == "crate"
+                        || builtin.path[0] == "super")
+                    && builtin.path.last().is_some_and(|name| !name.starts_with(char::is_uppercase))
+                    && builtin.path.last().is_some_and(|name| name != "from_fn" && name != "identity") =>
+            {
+                Value::Opaque(Rc::new(path.to_token_stream()))
+            }
             // By convention functions and methods are in snake case, constants are not.
             Some(name) if name.chars().any(char::is_lowercase) => Value::Builtin(Rc::new(builtin)),
             _ => Value::Opaque(Rc::new(path.to_token_stream())),

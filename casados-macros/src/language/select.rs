@@ -70,6 +70,8 @@ impl Evaluator {
             (Value::Option(Some(x)), Value::Option(Some(y))) => {
                 Value::some(self.select(condition, x, y, at)?)
             }
+            (Value::Range(x), Value::Range(y)) if Rc::ptr_eq(x, y) => a.clone(),
+            (Value::Builtin(x), Value::Builtin(y)) if Rc::ptr_eq(x, y) => a.clone(),
             (Value::Closure(x), Value::Closure(y)) if Rc::ptr_eq(x, y) => a.clone(),
             (Value::Function(x), Value::Function(y)) if Rc::ptr_eq(&x.item, &y.item) => a.clone(),
             _ => {

@@ -33,6 +33,9 @@ impl Evaluator {
             value = match statement {
                 Stmt::Item(_) => continue,
                 Stmt::Local(local) => {
+                    if let Some(cfg) = local.attrs.iter().find(|attribute| attribute.path().is_ident("cfg")) {
+                        return Err(unsupported(cfg, "a statement under a condition of the compiler").into());
+                    }
                     self.local(local, &hint(block, local, expected))?;
                     Value::unit()
                 }

@@ -62,13 +62,21 @@ fn nesting_is_bounded() {
 fn constants_from_outside() {
     let source = "fn f(x: [f64; 6]) -> f64 {
         let [a, b] = crate::PAIR; let t: [f64; 3] = TABLE;
-        MASS * x[0] + crate::params::TABLE[1 + 1] * PARAMS.mass + MASS + (COUNT as f64) + a * b + t[1] }";
+        use crate::params::*; let g = || { use crate::params::*; gravity }; let k = g() + g();
+        MASS * x[0] + k + crate::params::TABLE[1 + 1] * PARAMS.mass + MASS + (COUNT as f64) + a * b + t[1] }";
     let (evaluator, _) = evaluate(source).unwrap();
     let names: Vec<String> =
         evaluator.opaque.iter().map(|tokens| tokens.to_string().replace(' ', "")).collect();
-    for name in
-        ["MASS", "crate::params::TABLE[2]", "PARAMS.mass", "(COUNTasf64)", "crate::PAIR[0]", "TABLE[1]"]
-    {
+    for name in [
+        "MASS",
+        "crate::params::TABLE[2]",
+        "PARAMS.mass",
+        "(COUNTasf64)",
+        "crate::PAIR[0]",
+        "TABLE[1]",
+        "gravity",
+    ] {
         assert_eq!(names.iter().filter(|known| *known == name).count(), 1, "{name} in {names:?}");
     }
+    assert_eq!(evaluator.uses.len(), 1);
 }

@@ -4,6 +4,7 @@
 mod control;
 mod errors;
 mod functions;
+mod models;
 mod patterns;
 mod selection;
 mod values;

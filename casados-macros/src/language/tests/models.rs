@@ -1,0 +1,49 @@
+//! Whole models: size, time, nesting.
+
+use super::super::{Form, read};
+use quote::quote;
+
+fn function(source: &str, name: &str) -> proc_macro2::TokenStream {
+    let file = syn::parse_file(source).unwrap();
+    let item = file.items.into_iter().find(|item| matches!(item, syn::Item::Fn(item) if item.sig.ident == name));
+    quote!(#item)
+}
+
+#[test]
+fn a_chain_of_any_length_is_linear_in_size() {
+    let chain = function(include_str!("../../../../examples/models/chain.rs"), "chain");
+    let operations = |nx: usize| {
+        let nx = proc_macro2::Literal::usize_unsuffixed(nx);
+        let start = std::time::Instant::now();
+        let source = read(Form::Dae, quote!(NX = [#nx]), chain.clone()).unwrap_or_else(|error| panic!("{error}"));
+        let model = &source.models[0];
+        println!("nx = {nx}: {:?}", start.elapsed());
+        model.graph.operations(&model.residual)
+    };
+    // Every further mass costs the same: one spring, one row of accelerations and of velocities.
+    let (a, b, c) = (operations(45), operations(51), operations(189));
+    assert_eq!(c - b, 23 * (b - a));
+}
+
+#[test]
+fn nesting_of_every_kind_is_bounded() {
+    let wrap = |before: &str, after: &str, n: usize| {
+        let body = format!("{}x[0]{}", before.repeat(n), after.repeat(n));
+        format!("fn f(x: [f64; 6]) -> f64 {{ fn g(a: f64) -> f64 {{ a }} {body} }}")
+    };
+    for (before, after) in [
+        ("{ if true { ", " } else { 0.0 } }"),
+        ("g(", ")"),
+        ("{ let a = ", "; a }"),
+        ("(|a: f64| a)(", ")"),
+        ("match 1 { 1 => ", ", _ => 0.0 }"),
+        ("{ if x[1] > 0.0 { ", " } else { 0.0 } }"),
+        ("f64::max(", ", 1.0)"),
+        ("-", ""),
+        ("[", "][0]"),
+    ] {
+        assert!(super::evaluate(&wrap(before, after, 20)).is_ok(), "{before}");
+        let error = super::evaluate(&wrap(before, after, 205)).err().map(|error| error.to_string());
+        assert!(error.is_some_and(|error| error.contains("nested more than")), "{before}");
+    }
+}
