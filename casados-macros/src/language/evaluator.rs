@@ -1,6 +1,6 @@
 //! The state of an evaluation, and what everything else asks of it.
 
-pub use super::arithmetic::{Comparison, Operator};
+pub use super::arithmetic::Operator;
 use super::environment::Scope;
 use super::items::{Implementation, Symbol};
 use super::place::Cell;

@@ -27,6 +27,12 @@ fn a_chain_of_any_length_is_linear_in_size() {
 
 #[test]
 fn nesting_of_every_kind_is_bounded() {
+    // Macros run on threads of the compiler, whose stacks have 8 MiB.
+    let thread = std::thread::Builder::new().stack_size(8 << 20).spawn(nest).unwrap();
+    thread.join().unwrap();
+}
+
+fn nest() {
     let wrap = |before: &str, after: &str, n: usize| {
         let body = format!("{}x[0]{}", before.repeat(n), after.repeat(n));
         format!("fn f(x: [f64; 6]) -> f64 {{ fn g(a: f64) -> f64 {{ a }} {body} }}")
