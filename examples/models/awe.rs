@@ -8,10 +8,12 @@
 //! The benchmark of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation for use
 //! in CasADi": aircraft after Malz et al. (2019), turbines after Zanon et al. (2013).
 
-use nalgebra::{Matrix3, Vector3};
+use casados::dae;
+use nalgebra::{Matrix3, SVector, Vector3};
 
 /// SI units, but for the turbines and the tether: [`TURBINE_SCALE`](awe::TURBINE_SCALE),
 /// [`TETHER_SCALE`](awe::TETHER_SCALE).
+#[dae]
 pub mod awe {
     use nalgebra::{Matrix3, Vector3};
 
@@ -268,30 +270,31 @@ pub mod awe {
     }
 }
 
-impl From<[f64; 23]> for awe::State {
-    fn from(x: [f64; 23]) -> Self {
+impl From<SVector<f64, 23>> for awe::State {
+    fn from(x: SVector<f64, 23>) -> Self {
+        let vector = |i: usize| Vector3::new(x[i], x[i + 1], x[i + 2]);
         Self {
-            q: Vector3::from_column_slice(&x[0..3]),
-            dq: Vector3::from_column_slice(&x[3..6]),
-            omega: Vector3::from_column_slice(&x[6..9]),
-            r: Matrix3::from_column_slice(&x[9..18]),
-            delta: Vector3::from_column_slice(&x[18..21]),
+            q: vector(0),
+            dq: vector(3),
+            omega: vector(6),
+            r: Matrix3::from_columns(&[vector(9), vector(12), vector(15)]),
+            delta: vector(18),
             kappa: x[21],
             cost: x[22],
         }
     }
 }
 
-impl From<[f64; 4]> for awe::Control {
-    fn from([aileron, elevator, rudder, kappa]: [f64; 4]) -> Self {
-        Self { delta: Vector3::new(aileron, elevator, rudder), kappa }
+impl From<SVector<f64, 4>> for awe::Control {
+    fn from(u: SVector<f64, 4>) -> Self {
+        Self { delta: Vector3::new(u[0], u[1], u[2]), kappa: u[3] }
     }
 }
 
-impl From<awe::Residual> for [f64; 24] {
+impl From<awe::Residual> for SVector<f64, 24> {
     fn from(f: awe::Residual) -> Self {
         let numbers = f.force.iter().chain(&f.moment).chain(&f.rotation).chain(&f.delta).chain([&f.kappa]);
         let mut numbers = numbers.chain(&f.velocity).chain([&f.tether, &f.cost]);
-        core::array::from_fn(|_| numbers.next().copied().unwrap_or(f64::NAN))
+        SVector::from_fn(|_, _| numbers.next().copied().unwrap_or(f64::NAN))
     }
 }

@@ -1,11 +1,13 @@
 //! A chain of masses on springs: the first hangs at the wall, the velocity of the last is controlled.
 
+use casados::dae;
 use nalgebra::{SVector, Vector3};
 
 /// The chain with `(NX - 3) / 6` free masses between the wall and the controlled end.
 ///
 /// x = [positions of the free masses and of the end m, velocities of the free masses m/s],
 /// u = [velocity of the end m/s].
+#[dae(NX = [9, 15, 21, 27, 33, 45, 69])]
 pub fn chain<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 3]) -> [f64; NX] {
     const MASS: f64 = 0.033; // kg
     const STIFFNESS: f64 = 1.0; // N/m

@@ -1,8 +1,11 @@
 //! A pendulum on a cart, pushed by a force.
 
+use casados::dae;
+
 /// Angle zero is upright. The ball is at (position − length sin(angle), length cos(angle)).
 ///
 /// x = [position m, angle rad, velocity m/s, angular velocity rad/s], u = [force N].
+#[dae]
 pub fn pendulum(xdot: [f64; 4], x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
     const CART: f64 = 1.0; // kg
     const BALL: f64 = 0.1; // kg

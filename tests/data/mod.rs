@@ -2,6 +2,8 @@
 //!
 //! The parser may be off by one unit in the last place of a double, which is far below every tolerance.
 
+#![allow(dead_code)] // Each program that includes it takes a part.
+
 use nalgebra::{SMatrix, SVector};
 use serde_json::Value;
 use std::path::Path;
@@ -28,11 +30,6 @@ impl Record {
     /// A number.
     pub fn number(&self, key: &str) -> Result<f64, String> {
         self.0[key].as_f64().ok_or_else(|| format!("`{key}` is not a number"))
-    }
-
-    /// A list of numbers.
-    pub fn array<const N: usize>(&self, key: &str) -> Result<[f64; N], String> {
-        Ok(self.vector::<N>(key)?.into())
     }
 
     /// A list of numbers.

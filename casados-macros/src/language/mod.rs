@@ -144,10 +144,9 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
             let models = models(&arguments, &template)?;
             Ok(Source { item: module.to_token_stream(), place: Place::Inside, models })
         }
-        other => Err(syn::Error::new_spanned(
-            other,
-            "a model is a function, or a module with a function in it",
-        )),
+        other => {
+            Err(syn::Error::new_spanned(other, "a model is a function, or a module with a function in it"))
+        }
     }
 }
 

@@ -1,0 +1,166 @@
+//! An aircraft that harvests wind energy on a tether: the 40 intervals of its optimal orbit, integrated
+//! with all sensitivities, compared with an independent implementation, timed and drawn.
+//!
+//! ```text
+//! cargo run --release --example awe [PICTURE.svg]
+//! ```
+
+#[path = "../models/awe.rs"]
+mod awe;
+#[path = "../../tests/data/mod.rs"]
+mod data;
+mod plot;
+
+use awe::Awe;
+use awe::awe::State;
+use casados::prelude::*;
+use casados::result::Hessian;
+use data::Record;
+use nalgebra::{SMatrix, SVector};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+const USAGE: &str = "usage: cargo run --release --example awe [PICTURE.svg]";
+
+fn main() -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    let picture = match &arguments[..] {
+        [] => PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/plots/awe.svg")),
+        [path] if path.as_encoded_bytes().ends_with(b".svg") => PathBuf::from(path),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::FAILURE;
+        }
+    };
+    match run(&picture) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("awe: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One interval of the orbit: what goes into the integrator, and what must come out.
+struct Interval {
+    x0: SVector<f64, 23>,
+    u: SVector<f64, 4>,
+    x: SVector<f64, 23>,
+    forward: SMatrix<f64, 23, 27>,
+    adjoint: SVector<f64, 27>,
+    hessian: SMatrix<f64, 27, 27>,
+}
+
+fn run(picture: &Path) -> Result<(), Box<dyn Error>> {
+    let reference = Record::load("awe/intervals.json")?;
+    let h = reference.number("T")?;
+    let lambda = reference.vector("lambda")?;
+    let intervals =
+        reference.records("intervals")?.iter().map(Interval::read).collect::<Result<Vec<_>, _>>()?;
+
+    let mut irk = Irk::<Awe, RadauIIA<4>>::new(Options { start: Start::Zero, ..Default::default() })?;
+
+    let mut orbit = plot::Orbit::default();
+    for (k, interval) in intervals.iter().enumerate() {
+        let start = k as f64 * h;
+        let step = irk.hessian(&interval.x0, &interval.u, h, &lambda)?;
+        orbit.errors.push((start, interval.errors(step)));
+        orbit.wings.push(State::from(interval.x0));
+        for i in 0..=20 {
+            let t = h * f64::from(i) / 20.0;
+            let dense = irk.dense(t)?;
+            orbit.curve.push((start + t, State::from(dense.x), dense.z[0]));
+        }
+    }
+
+    let times = [
+        median(&intervals, |i| irk.solve(&i.x0, &i.u, h).map(drop))?,
+        median(&intervals, |i| irk.forward(&i.x0, &i.u, h).map(drop))?,
+        median(&intervals, |i| irk.adjoint(&i.x0, &i.u, h, &lambda).map(drop))?,
+        median(&intervals, |i| irk.hessian(&i.x0, &i.u, h, &lambda).map(drop))?,
+    ];
+
+    println!(
+        "The optimal orbit of an aircraft on a tether: {} intervals of {:.1} ms,",
+        intervals.len(),
+        1e3 * h
+    );
+    println!("nx = 23, nz = 1, nu = 4; Radau IIA with 4 stages, one step per interval.\n");
+    println!("                             largest error   ms per interval");
+    for (i, (name, time)) in QUANTITIES.iter().zip(times).enumerate() {
+        let error = orbit.errors.iter().map(|(_, errors)| errors[i]).fold(0.0, f64::max);
+        println!("{name:<30} {error:>11.1e}   {:>15.4}", 1e3 * time.as_secs_f64());
+    }
+    println!("\nErrors are relative to the largest element of the reference. Each time is that of one call");
+    println!("from start values of zero: the Jacobian includes the simulation, the Hessian everything.");
+
+    orbit.draw(picture)?;
+    println!("The orbit is drawn in {}", picture.display());
+    Ok(())
+}
+
+/// What is compared and timed, in this order everywhere.
+const QUANTITIES: [&str; 4] = [
+    "simulation  x(h)",
+    "Jacobian    dx(h)/d(x0, u)",
+    "adjoint     λ' dx(h)/d(x0, u)",
+    "Hessian     of λ' x(h)",
+];
+
+impl Interval {
+    fn read(record: &Record) -> Result<Self, String> {
+        Ok(Self {
+            x0: record.vector("x0")?,
+            u: record.vector("u")?,
+            x: record.vector("x_next")?,
+            forward: record.matrix("forward")?,
+            adjoint: record.vector("adjoint")?,
+            hessian: record.symmetric("hessian")?,
+        })
+    }
+
+    fn errors(&self, step: &Hessian<Awe>) -> [f64; 4] {
+        let mut forward = SMatrix::<f64, 23, 27>::zeros();
+        forward.fixed_view_mut::<23, 23>(0, 0).copy_from(&step.dx_dx0);
+        forward.fixed_view_mut::<23, 4>(0, 23).copy_from(&step.dx_du);
+        let mut adjoint = SVector::<f64, 27>::zeros();
+        adjoint.fixed_rows_mut::<23>(0).copy_from(&step.grad_x0);
+        adjoint.fixed_rows_mut::<4>(23).copy_from(&step.grad_u);
+        let mut hessian = SMatrix::<f64, 27, 27>::zeros();
+        hessian.fixed_view_mut::<23, 23>(0, 0).copy_from(&step.h_xx);
+        hessian.fixed_view_mut::<23, 4>(0, 23).copy_from(&step.h_xu);
+        hessian.fixed_view_mut::<4, 23>(23, 0).copy_from(&step.h_xu.transpose());
+        hessian.fixed_view_mut::<4, 4>(23, 23).copy_from(&step.h_uu);
+        [
+            error(&step.x, &self.x),
+            error(&forward, &self.forward),
+            error(&adjoint, &self.adjoint),
+            error(&hessian, &self.hessian),
+        ]
+    }
+}
+
+/// The largest error relative to the largest element of the reference.
+fn error<const R: usize, const C: usize>(a: &SMatrix<f64, R, C>, reference: &SMatrix<f64, R, C>) -> f64 {
+    (a - reference).amax() / reference.amax()
+}
+
+/// Time of a call: the mean of a pass over all intervals, and of many passes the median.
+fn median<E>(
+    intervals: &[Interval],
+    mut call: impl FnMut(&Interval) -> Result<(), E>,
+) -> Result<Duration, E> {
+    let mut times = Vec::new();
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_millis(500) {
+        let start = Instant::now();
+        for interval in intervals {
+            call(std::hint::black_box(interval))?;
+        }
+        times.push(start.elapsed() / intervals.len() as u32);
+    }
+    times.sort_unstable();
+    Ok(times[times.len() / 2])
+}
