@@ -1,0 +1,8 @@
+use casados::dae;
+
+#[dae]
+struct Model {
+    x: f64,
+}
+
+fn main() {}

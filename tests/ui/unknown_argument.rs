@@ -1,0 +1,8 @@
+use casados::dae;
+
+#[dae]
+fn model(xdot: [f64; 2], x: [f64; 2], control: [f64; 1]) -> [f64; 2] {
+    [xdot[0] - x[1], xdot[1] - control[0]]
+}
+
+fn main() {}

@@ -1,0 +1,8 @@
+use casados::dae;
+
+#[dae(fast)]
+fn model(xdot: [f64; 1], x: [f64; 1]) -> [f64; 1] {
+    [xdot[0] - x[0]]
+}
+
+fn main() {}
