@@ -51,7 +51,8 @@ impl Record {
         }))
     }
 
-    fn numbers(&self, key: &str, length: usize) -> Result<Vec<f64>, String> {
+    /// Numbers, nested lists flattened.
+    pub fn numbers(&self, key: &str, length: usize) -> Result<Vec<f64>, String> {
         fn collect(value: &Value, numbers: &mut Vec<f64>) {
             match value {
                 Value::Array(list) => list.iter().for_each(|value| collect(value, numbers)),
