@@ -8,6 +8,8 @@
 //! The benchmark of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation for use
 //! in CasADi": aircraft after Malz et al. (2019), turbines after Zanon et al. (2013).
 
+#![allow(clippy::module_inception)] // The file is named like the model.
+
 use casados::dae;
 use nalgebra::{Matrix3, SVector, Vector3};
 
