@@ -1,7 +1,7 @@
 //! Explicit integrators against an independent implementation over dual numbers.
 
 use casados::memory::{Inline, mode};
-use casados::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
+use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure};
 use casados::tableau::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Method, Midpoint, Rk4};
 use casados::{Custom, Dae, Dims, Erk, Error, Lanes, Ode, Options, Tableau};
 use nalgebra::{SMatrix, SVector, vector};
@@ -20,6 +20,7 @@ impl Dae for Oscillator {
     type Shape = Dims<2, 0, 1, 1, 2, 7, 4>;
     type Jacobian<T: casados::shape::Plain> = [T; 8];
     type Hessian<T: casados::shape::Plain> = [T; 5];
+    type Factors<B: casados::shape::Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "oscillator",
         x: &VARIABLES,
@@ -32,6 +33,7 @@ impl Dae for Oscillator {
         hessian: Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
         linear: &[false, true],
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+        elimination: Elimination::NONE,
     };
 
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {

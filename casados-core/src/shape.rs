@@ -37,6 +37,12 @@ macro_rules! plain {
 }
 pub(crate) use plain;
 
+/// `to = from` without a copy on the stack, which an assignment makes where nothing is optimised.
+#[inline(always)]
+pub(crate) fn assign<V: Copy>(to: &mut V, from: &V) {
+    core::slice::from_mut(to).copy_from_slice(core::slice::from_ref(from));
+}
+
 /// `[T; N]` of a length that the model knows.
 pub trait Array<T>: Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[T]> + AsMut<[T]> {
     /// The number of elements.

@@ -121,7 +121,7 @@ macro_rules! system {
         $(#[$doc])*
         struct $name;
         const _: () = {
-            use casados::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
+            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure};
             const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
             const JACOBIAN: usize = ($nx + $nz) * (NV - 1);
             const HESSIAN: usize = NV * (NV - 1) / 2;
@@ -132,6 +132,7 @@ macro_rules! system {
                 type Shape = D;
                 type Jacobian<T: casados::shape::Plain> = [T; JACOBIAN];
                 type Hessian<T: casados::shape::Plain> = [T; HESSIAN];
+                type Factors<B: casados::shape::Plain> = [B; 0];
                 const STRUCTURE: Structure = Structure {
                     name: stringify!($name),
                     x: &["x"; $nx],
@@ -144,6 +145,7 @@ macro_rules! system {
                     hessian: Pattern { rows: &TRIANGLE[0], columns: &TRIANGLE[1] },
                     linear: &[false; $nx + $nz],
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+                    elimination: Elimination::NONE,
                 };
                 fn residual<S: casados::Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
                     $crate::systems::residual::<Self, S>(v, f);

@@ -8,7 +8,7 @@ use super::evaluate::entries;
 use super::record::{Coefficients, Linearization, Work, copy};
 use super::step::check;
 use crate::error::Error;
-use crate::linalg::axpy;
+use crate::linalg::{axpy, slot};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::Adjoint;
 use crate::scalar::Real;
@@ -23,7 +23,7 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) lambda: ArrayX<M, [T; C]>,
     /// `λ_w`; the first `NX` rows stay zero.
     pub(crate) gradient: ArrayW<M, [T; C]>,
-    /// `μ`, one row per equation and stage.
+    /// `μ`, one row per slot and stage.
     pub(crate) mu: ArrayK<M, [[T; C]; S]>,
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] Backward<M, T, S, C>);
@@ -52,10 +52,10 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
         linear.factors.solve_transposed(mu);
         for (stage, jacobian) in linear.jacobian.iter().enumerate() {
             for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
-                axpy(-value, &mu[r][stage], &mut lambda[c - nx]);
+                axpy(-value, &mu[slot::<M>(r)][stage], &mut lambda[c - nx]);
             }
             for (r, c, value) in entries::<M, T>(jacobian, blocks[3], blocks[5]) {
-                axpy(-value, &mu[r][stage], &mut gradient[c - shift]);
+                axpy(-value, &mu[slot::<M>(r)][stage], &mut gradient[c - shift]);
             }
         }
     }

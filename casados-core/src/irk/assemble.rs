@@ -1,11 +1,11 @@
 //! The Newton matrix: `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`, and its factors.
 
-use super::evaluate::entries;
 use super::record::{Coefficients, Linearization};
 use crate::error::{Error, Place};
 use crate::model::Dae;
 use crate::scalar::Real;
-use crate::shape::Shape;
+use crate::shape::assign;
+use crate::statistics::Statistics;
 
 impl<M: Dae, T: Real, const S: usize> Linearization<M, T, S> {
     /// Factors of the Newton matrix of the Jacobian that is stored.
@@ -18,25 +18,23 @@ impl<M: Dae, T: Real, const S: usize> Linearization<M, T, S> {
         h: T,
         step: usize,
         iteration: usize,
+        statistics: &mut Statistics,
     ) -> Result<(), Error> {
         let Self { jacobian, factors } = self;
-        let (blocks, nx) = (M::STRUCTURE.blocks, M::Shape::NX);
-        factors.clear();
-        for (stage, jacobian) in jacobian.iter().enumerate() {
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[0], blocks[1]) {
-                factors.add(r, c, stage, value);
-            }
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
-                factors.add_row(r, c - nx, stage, h * value, &coefficients.a[stage]);
-            }
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[2], blocks[3]) {
-                factors.add(r, c - nx, stage, value);
-            }
-        }
-        factors.factor().map_err(|(unknown, stage)| Error::Singular {
+        let planned = factors.factor(jacobian, &coefficients.a, h);
+        let planned = planned.map_err(|(unknown, stage)| Error::Singular {
             unknown: unknown_name::<M>(unknown),
             at: Place { step, stage, iteration },
-        })
+        })?;
+        statistics.factorizations += 1;
+        statistics.dense += usize::from(!planned);
+        Ok(())
+    }
+
+    /// Copies what holds.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        assign(&mut self.jacobian, &other.jacobian);
+        self.factors.copy_from(&other.factors);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::record::{Coefficients, Work};
 use crate::error::{Error, Place, Quantity};
+use crate::linalg::slot;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -80,8 +81,8 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         if let Some((equation, value)) = not_finite(self.f.as_ref()) {
             return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });
         }
-        for (row, f) in self.residual.as_mut().iter_mut().zip(self.f.as_ref()) {
-            row[at.stage] = [*f];
+        for (equation, f) in self.f.as_ref().iter().enumerate() {
+            self.residual[slot::<M>(equation)][at.stage] = [*f];
         }
         Ok(())
     }
@@ -100,8 +101,8 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 let term = (*entry * point[*column as usize]).abs();
                 magnitude[*row as usize] = magnitude[*row as usize] + term;
             }
-            for (r, (residual, magnitude)) in self.residual.as_ref().iter().zip(magnitude).enumerate() {
-                let [f] = residual[stage];
+            for (r, magnitude) in magnitude.iter().enumerate() {
+                let [f] = self.residual[slot::<M>(r)][stage];
                 // A residual of zero is zero even where all terms are. Terms that overflow say nothing.
                 let relative = if f == T::ZERO {
                     T::ZERO

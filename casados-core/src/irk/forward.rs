@@ -10,7 +10,7 @@ use super::evaluate::entries;
 use super::record::{Coefficients, Work, copy};
 use super::step::check;
 use crate::error::Error;
-use crate::linalg::axpy;
+use crate::linalg::{axpy, slot};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::{DenseForward, Directional, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
@@ -82,10 +82,10 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
         }
         for (stage, jacobian) in work.linear.jacobian.iter().enumerate() {
             for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
-                axpy(-value, v[c - nx].as_ref(), dy[r][stage].as_mut());
+                axpy(-value, v[c - nx].as_ref(), dy[slot::<M>(r)][stage].as_mut());
             }
             for (r, c, value) in entries::<M, T>(jacobian, blocks[3], blocks[5]) {
-                directions.add(c - shift, -value, &mut dy[r][stage]);
+                directions.add(c - shift, -value, &mut dy[slot::<M>(r)][stage]);
             }
         }
         work.linear.factors.solve(dy);

@@ -9,10 +9,11 @@
 
 use super::adjoint::Backward;
 use super::forward::{ForwardMemory, Sweep};
-use super::record::{Coefficients, Linearization, Step, Work, assign, copy};
+use super::record::{Coefficients, Linearization, Step, Work, copy};
+use crate::shape::assign;
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::axpy;
+use crate::linalg::{axpy, slot};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::Real;
@@ -47,10 +48,10 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize] HessianStep<M, T, S>);
 
-impl<M: Dae, T: Plain, const S: usize> HessianStep<M, T, S> {
+impl<M: Dae, T: Real, const S: usize> HessianStep<M, T, S> {
     /// Remembers a step on the way forth.
     pub(crate) fn record(&mut self, work: &Work<M, T, S>, forward: &ForwardMemory<M, T, S>) {
-        assign(&mut self.linear, &work.linear);
+        self.linear.copy_from(&work.linear);
         assign(&mut self.sweep, &forward.sweep);
     }
 }
@@ -76,8 +77,8 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
             self.backward.step(&record.linear, coefficients, work.inputs.time.step);
             work.place(coefficients, n, &step.x, &step.y);
             for stage in 0..S {
-                for (to, mu) in self.mu.as_mut().iter_mut().zip(self.backward.mu.as_ref()) {
-                    [*to] = mu[stage];
+                for (equation, to) in self.mu.as_mut().iter_mut().enumerate() {
+                    [*to] = self.backward.mu[slot::<M>(equation)][stage];
                 }
                 M::hessian(&work.points[stage], &self.mu, &mut self.entries);
                 if let Some((entry, value)) = super::evaluate::not_finite(self.entries.as_ref()) {

@@ -82,8 +82,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 }
             }
             if current {
-                statistics.factorizations += 1;
-                self.linear.factor(coefficients, self.inputs.time.step, step, iteration)?;
+                self.linear.factor(coefficients, self.inputs.time.step, step, iteration, statistics)?;
             }
             self.linear.factors.solve(&mut self.residual);
             let increment = self.update(y);

@@ -21,12 +21,6 @@ macro_rules! copy {
 }
 pub(crate) use copy;
 
-/// `to = from` without a copy on the stack, which an assignment makes where nothing is optimised.
-#[inline(always)]
-pub(crate) fn assign<V: Copy>(to: &mut V, from: &V) {
-    core::slice::from_mut(to).copy_from_slice(core::slice::from_ref(from));
-}
-
 /// The coefficients of a tableau in the number type of the integrator.
 pub(crate) struct Coefficients<T, const S: usize> {
     pub a: [[T; S]; S],

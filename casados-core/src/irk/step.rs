@@ -92,8 +92,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             self.evaluate_jacobian(n, 0)?;
             self.relative = self.relative_residual();
         }
-        statistics.factorizations += 1;
-        self.linear.factor(coefficients, self.inputs.time.step, n, 0)
+        self.linear.factor(coefficients, self.inputs.time.step, n, 0, statistics)
     }
 }
 

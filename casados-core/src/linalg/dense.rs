@@ -1,4 +1,4 @@
-//! `P A = L U` of the whole matrix, with partial pivoting.
+//! `P A = L U` of the whole matrix, with partial pivoting: the way that needs no plan.
 
 use super::kernels::{axpy, divide};
 use crate::model::{ArrayK, Dae};
@@ -6,10 +6,10 @@ use crate::scalar::Real;
 use crate::shape::{Array, Plain};
 use bytemuck::Zeroable;
 
-/// A matrix over the unknowns of all stages, and after [`Factors::factor`] its factors.
+/// A matrix over the unknowns of all stages, and after [`Dense::factor`] its factors.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Factors<M: Dae, T: Plain, const S: usize> {
+pub struct Dense<M: Dae, T: Plain, const S: usize> {
     /// Rows of `A`, then of `L` (its diagonal is one and not stored) and `U`.
     rows: ArrayK<M, [ArrayK<M, [T; S]>; S]>,
     /// The row that was exchanged with row `k` in step `k`.
@@ -18,14 +18,14 @@ pub struct Factors<M: Dae, T: Plain, const S: usize> {
     scales: ArrayK<M, [T; S]>,
 }
 
-impl<M: Dae, T: Plain, const S: usize> Clone for Factors<M, T, S> {
+impl<M: Dae, T: Plain, const S: usize> Clone for Dense<M, T, S> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Dae, T: Plain, const S: usize> Copy for Factors<M, T, S> {}
+impl<M: Dae, T: Plain, const S: usize> Copy for Dense<M, T, S> {}
 
-impl<M: Dae, T: Real, const S: usize> Factors<M, T, S> {
+impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
     /// `A = 0`
     pub fn clear(&mut self) {
         for row in self.rows.as_mut().as_flattened_mut() {

@@ -2,12 +2,16 @@
 //!
 //! Unknowns are ordered by variable, stages innermost: `(k₀₁ … k₀ₛ, k₁₁ … k₁ₛ, …)`. The Newton matrix
 //! then is a matrix of `S × S` blocks with the pattern of the model. Right-hand sides have one row per
-//! unknown, all columns side by side.
+//! slot, all columns side by side; [`slot`] tells where the row of an equation is.
 //!
-//! [`Factors`] is everything that the rest of the library knows: clear, add, factor, solve, solve transposed.
+//! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
+//! by the plan of the model (`sparse`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
 
+mod block;
 mod dense;
+mod factors;
 mod kernels;
+mod sparse;
 
-pub use dense::Factors;
+pub use factors::{Factors, slot};
 pub(crate) use kernels::axpy;

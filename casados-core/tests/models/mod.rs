@@ -3,7 +3,7 @@
 
 pub mod pendulum;
 
-use casados_core::model::{ArrayK, ArrayV, Operations, Pattern, Structure};
+use casados_core::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
 
@@ -50,6 +50,7 @@ impl Dae for Nonlinear {
     type Shape = Dims<2, 1, 1, 1, 3, 8, 4>;
     type Jacobian<T: Plain> = [T; 15];
     type Hessian<T: Plain> = [T; 8];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "nonlinear",
         x: &["x[0]", "x[1]"],
@@ -65,6 +66,7 @@ impl Dae for Nonlinear {
         hessian: Pattern { rows: &[2, 2, 2, 3, 4, 4, 5, 6], columns: &[0, 1, 2, 2, 3, 4, 5, 2] },
         linear: &[false; 3],
         operations: NONE,
+        elimination: Elimination::NONE,
     };
 
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
@@ -121,6 +123,7 @@ impl Dae for Linear {
     type Shape = Dims<1, 1, 1, 1, 2, 6, 3>;
     type Jacobian<T: Plain> = [T; 6];
     type Hessian<T: Plain> = [T; 1];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "linear",
         x: &["x"],
@@ -133,6 +136,7 @@ impl Dae for Linear {
         hessian: Pattern { rows: &[4], columns: &[1] },
         linear: &[false, true],
         operations: NONE,
+        elimination: Elimination::NONE,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
         let [k, x, z, u, p, _] = *v;
@@ -159,6 +163,7 @@ impl Dae for Fragile {
     type Shape = Dims<1, 1, 1, 0, 2, 5, 2>;
     type Jacobian<T: Plain> = [T; 6];
     type Hessian<T: Plain> = [T; 2];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "fragile",
         x: &["level"],
@@ -171,6 +176,7 @@ impl Dae for Fragile {
         hessian: Pattern { rows: &[1, 3], columns: &[1, 2] },
         linear: &[false; 2],
         operations: NONE,
+        elimination: Elimination::NONE,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
         let [k, x, z, u, _] = *v;
@@ -196,6 +202,7 @@ impl Dae for Algebraic {
     type Shape = Dims<0, 1, 1, 0, 1, 3, 1>;
     type Jacobian<T: Plain> = [T; 2];
     type Hessian<T: Plain> = [T; 1];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "algebraic",
         x: &[],
@@ -208,6 +215,7 @@ impl Dae for Algebraic {
         hessian: Pattern { rows: &[0], columns: &[0] },
         linear: &[false],
         operations: NONE,
+        elimination: Elimination::NONE,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
         let [z, u, _] = *v;
@@ -265,6 +273,7 @@ impl Dae for Rod {
     type Shape = Dims<N, 0, 1, 0, N, { 2 * N + 2 }, { N + 1 }>;
     type Jacobian<T: Plain> = [T; ENTRIES];
     type Hessian<T: Plain> = [T; N];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "rod",
         x: &["cell"; N],
@@ -277,6 +286,7 @@ impl Dae for Rod {
         hessian: Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN },
         linear: &[false; N],
         operations: NONE,
+        elimination: Elimination::NONE,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
         let zero = S::from_f64(0.0);

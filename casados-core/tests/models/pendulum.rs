@@ -87,6 +87,7 @@ impl Dae for Pendulum {
     type Shape = Dims<4, 0, 1, 0, 4, 10, 5>;
     type Jacobian<T: Plain> = [T; 12];
     type Hessian<T: Plain> = [T; 6];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "pendulum",
         x: &["position", "angle", "velocity", "rate"],
@@ -102,6 +103,7 @@ impl Dae for Pendulum {
         hessian: Pattern { rows: &[5, 7, 7, 8, 8, 8], columns: &[5, 5, 7, 5, 7, 8] },
         linear: &[true, true, false, false],
         operations: NONE,
+        elimination: Elimination::NONE,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
         let [cart, ball] = accelerations([v[5], v[7], v[8]].map(Hyper::of));

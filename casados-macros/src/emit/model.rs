@@ -15,13 +15,13 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let [nk, nv, nw] = dimensions(variables);
-    let (nj, nh) = (jacobian.len(), hessian.len());
+    let (nj, nh, nb) = (jacobian.len(), hessian.len(), analysis.elimination.plan.blocks.len());
     let code: TokenStream = code(analysis).parse()?;
 
     let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
     let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
-    let [lx, lz, lu, lp, lk, lv, lw, lj, lh, time] =
-        [nx, nz, nu, np, nk, nv, nw, nj, nh, nv - 1].map(Literal::usize_unsuffixed);
+    let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
+        [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let structure = structure::write(analysis);
     // Constants from outside are an argument: the module of the code sees no name of the user's.
     let c = (!opaque.is_empty()).then(|| quote!(&C,));
@@ -51,6 +51,7 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
             type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
             type Jacobian<T: #krate::shape::Plain> = [T; #lj];
             type Hessian<T: #krate::shape::Plain> = [T; #lh];
+            type Factors<B: #krate::shape::Plain> = [B; #lb];
             const STRUCTURE: #krate::model::Structure = #structure;
 
             #[inline]

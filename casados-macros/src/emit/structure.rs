@@ -2,9 +2,10 @@
 
 use crate::graph::Node;
 use crate::language::Variables;
-use crate::structure::{Analysis, Operations};
+use crate::structure::{Analysis, Elimination, Operations};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
+use std::collections::HashMap;
 
 /// The value of `Dae::STRUCTURE`.
 pub fn write(analysis: &Analysis) -> TokenStream {
@@ -17,6 +18,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let &Operations { residual, residual_jacobian, adjoint, hessian: second } = operations;
     let [residual, residual_jacobian, adjoint, second] =
         [residual, residual_jacobian, adjoint, second].map(Literal::u32_unsuffixed);
+    let elimination = elimination(analysis);
     quote! {
         #krate::model::Structure {
             name: #name,
@@ -35,8 +37,58 @@ pub fn write(analysis: &Analysis) -> TokenStream {
                 adjoint: #adjoint,
                 hessian: #second,
             },
+            elimination: #elimination,
         }
     }
+}
+
+/// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that is its pivot.
+fn elimination(analysis: &Analysis) -> TokenStream {
+    let krate = &analysis.model.krate;
+    let Elimination { plan, positions, identity } = &analysis.elimination;
+    let mut slot_of_equation = vec![0; plan.pivots.len()];
+    for &(row, column) in &plan.pivots {
+        slot_of_equation[row as usize] = column;
+    }
+    let number: HashMap<_, _> = plan.blocks.iter().zip(0u32..).collect();
+    let slots: Vec<u32> = plan
+        .ranges
+        .iter()
+        .flat_map(|&[block, upper, end]| (block..end).map(move |index| (index, index < upper)))
+        .map(|(index, lower)| {
+            let (row, column) = plan.blocks[index as usize];
+            if lower { slot_of_equation[row as usize] } else { column }
+        })
+        .collect();
+    let pivots = plan.pivots.iter().zip(&plan.ranges).zip(identity).map(|((pivot, range), identity)| {
+        let [slot, block, upper, end] =
+            [pivot.1, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
+        quote!(pivot(#slot, #block, #upper, #end, #identity))
+    });
+    let assembly = positions.iter().map(|position| {
+        let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
+        let block = Literal::u32_unsuffixed(number[&(position.row, position.column)]);
+        let (direct, state) = (entry(position.direct), entry(position.state));
+        quote!(assembly(#block, #direct, #state))
+    });
+    let [slots, updates, slot_of_equation] = [&slots, &plan.updates, &slot_of_equation]
+        .map(|table| table.iter().map(|&index| Literal::u32_unsuffixed(index)).collect::<Vec<_>>());
+    quote! {{
+        use #krate::model::{Assembly, Pivot};
+        const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool) -> Pivot {
+            Pivot { slot, block, upper, end, identity }
+        }
+        const fn assembly(block: u32, direct: u32, state: u32) -> Assembly {
+            Assembly { block, direct, state }
+        }
+        #krate::model::Elimination {
+            pivots: &const { [#(#pivots),*] },
+            slots: &[#(#slots),*],
+            updates: &[#(#updates),*],
+            assembly: &const { [#(#assembly),*] },
+            slot_of_equation: &[#(#slot_of_equation),*],
+        }
+    }}
 }
 
 fn pattern(krate: &syn::Path, entries: &[(u32, u32, Node)]) -> TokenStream {

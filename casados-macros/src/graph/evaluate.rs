@@ -1,11 +1,8 @@
 //! The interpreter: values of nodes in `f64`.
 
-use super::{Binary, Compare, Unary};
-#[cfg(test)]
-use super::{Graph, Node, Op};
+use super::{Binary, Compare, Graph, Node, Op, Unary};
 
 /// Values of everything that a graph depends on. What is missing is NaN.
-#[cfg(test)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Point<'a> {
     /// `(ẋ, x, z, u, p, t)`
@@ -16,7 +13,6 @@ pub struct Point<'a> {
     pub seeds: &'a [f64],
 }
 
-#[cfg(test)]
 impl Graph {
     /// Values of nodes at a point. Conditions are 1 or 0.
     pub fn evaluate(&self, nodes: &[Node], point: Point) -> Vec<f64> {

@@ -24,7 +24,6 @@ mod sparsity;
 #[cfg(test)]
 mod tests;
 
-#[cfg(test)]
 pub use evaluate::Point;
 pub use hessian::hessian;
 pub use jacobian::jacobian;

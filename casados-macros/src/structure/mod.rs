@@ -1,12 +1,17 @@
 //! What can be known about a model before it runs: structural index, explicit form, linear rows, and the
 //! derivatives that the engine will ask for, as graphs.
 
+mod elimination;
 mod index;
+mod samples;
 #[cfg(test)]
 mod tests;
 
 use crate::graph::{self, Degree, Entry, Node};
-use crate::language::Model;
+use crate::language::{Model, Variables};
+pub use elimination::Plan;
+pub use samples::Position;
+use std::collections::HashSet;
 
 /// A model with its derivatives and its structure.
 pub struct Analysis {
@@ -28,6 +33,18 @@ pub struct Analysis {
     pub explicit: Option<Vec<(u32, f64)>>,
     /// Numbers of operations.
     pub operations: Operations,
+    /// How the Newton matrix is eliminated.
+    pub elimination: Elimination,
+}
+
+/// The order in which the Newton matrix is eliminated, and what its blocks are made of.
+pub struct Elimination {
+    /// The pivots in order, with the places of all blocks.
+    pub plan: Plan,
+    /// The structural non-zeros of the Newton matrix.
+    pub positions: Vec<Position>,
+    /// Pivots that are the identity, whatever the step size and the point.
+    pub identity: Vec<bool>,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -90,7 +107,40 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
         hessian: graph.operations(&hessian.iter().map(|entry| entry.2).collect::<Vec<_>>()),
     };
     let explicit = explicit(&model, &jacobian, ends);
-    Ok(Analysis { model, jacobian, blocks, constant, gradient, hessian, linear, explicit, operations })
+    let elimination = elimination(&model, &jacobian, blocks);
+    Ok(Analysis {
+        model,
+        jacobian,
+        blocks,
+        constant,
+        gradient,
+        hessian,
+        linear,
+        explicit,
+        operations,
+        elimination,
+    })
+}
+
+/// Plans the elimination of the Newton matrix.
+fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6]) -> Elimination {
+    let Variables { x, z, u, p } = &model.variables;
+    let positions = samples::pattern(jacobian, blocks, x.len() as u32);
+    let variables = 2 * x.len() + z.len() + u.len() + p.len() + 1;
+    let entries = samples::sample(&model.graph, jacobian, &positions, variables, model.opaque.len());
+    let plan = elimination::plan(model.residual.len(), &entries);
+    let updated: HashSet<u32> = plan.updates.iter().copied().collect();
+    let identity = plan
+        .pivots
+        .iter()
+        .zip(&plan.ranges)
+        .map(|(&(row, column), &[block, ..])| {
+            let position = positions.iter().find(|p| (p.row, p.column) == (row, column));
+            !updated.contains(&block)
+                && position.is_some_and(|p| samples::is_identity(&model.graph, jacobian, p))
+        })
+        .collect();
+    Elimination { plan, positions, identity }
 }
 
 /// As many equations as unknowns.

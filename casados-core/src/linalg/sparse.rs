@@ -1,0 +1,235 @@
+//! Block elimination by a plan that was made before the program runs.
+//!
+//! The Newton matrix `M` has one s×s block for each structural non-zero. In the order of the plan
+//!
+//! ```text
+//! M = (I + L) (P + U)        L_ik = B_ik P_k⁻¹,   B_ij ← B_ij − L_ik B_kj
+//! ```
+//!
+//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above. Everything is
+//! indexed by *slots*: a slot is an unknown, and also the equation that determines it in the plan. So right-hand side
+//! and solution share one array, and no permutation is ever applied.
+//!
+//! The compiler does not look into the tables of the plan; elements are fetched with `get`, whose
+//! never-taken exit costs nothing beside a block and leaves no panic in the program.
+
+use super::block::{Block, inverse, product, subtract_product};
+use crate::model::Elimination;
+use crate::scalar::Scalar;
+use crate::shape::{Array, Plain};
+
+/// Calls a function for all columns, eight, four, two and one at a time.
+macro_rules! packets {
+    ($columns:expr, $function:ident($plan:ident, $blocks:ident, $rows:ident)) => {{
+        let mut column = 0;
+        while column + 8 <= $columns {
+            $function::<E, R, S, 8>($plan, $blocks, $rows, column);
+            column += 8;
+        }
+        if column + 4 <= $columns {
+            $function::<E, R, S, 4>($plan, $blocks, $rows, column);
+            column += 4;
+        }
+        if column + 2 <= $columns {
+            $function::<E, R, S, 2>($plan, $blocks, $rows, column);
+            column += 2;
+        }
+        if column < $columns {
+            $function::<E, R, S, 1>($plan, $blocks, $rows, column);
+        }
+    }};
+}
+
+/// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`.
+///
+/// The largest `|L|` is returned: growth that tells how far the static order can be trusted.
+#[inline(always)]
+pub fn factor<E: Scalar, const S: usize>(plan: &Elimination, blocks: &mut [Block<E, S>]) -> E {
+    let mut growth = E::from_f64(0.0);
+    let mut updates = plan.updates.iter();
+    for pivot in plan.pivots {
+        if !pivot.identity {
+            let Some(block) = blocks.get_mut(pivot.block as usize) else { continue };
+            let inverse = inverse(block);
+            *block = inverse;
+            for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
+                *block = product(block, &inverse);
+            }
+        }
+        for lower in pivot.lower() {
+            let Some(&lower) = blocks.get(lower) else { continue };
+            for value in lower.iter().flatten() {
+                let value = value.abs();
+                growth = E::select(growth.lt(value), value, growth);
+            }
+            for (upper, &target) in pivot.upper().zip(&mut updates) {
+                let Some(&upper) = blocks.get(upper) else { continue };
+                let Some(target) = blocks.get_mut(target as usize) else { continue };
+                *target = subtract_product(target, &lower, &upper);
+            }
+        }
+    }
+    growth
+}
+
+/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all columns.
+///
+/// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
+/// rows stays in the nearest cache.
+#[inline(always)]
+pub fn solve<E: Scalar + Plain, R: Array<E>, const S: usize>(
+    plan: &Elimination,
+    blocks: &[Block<E, S>],
+    rows: &mut [[R; S]],
+) {
+    packets!(R::LEN, solve_packet(plan, blocks, rows));
+}
+
+/// Solves `Mᵀ X = R` in place.
+#[inline(always)]
+pub fn solve_transposed<E: Scalar + Plain, R: Array<E>, const S: usize>(
+    plan: &Elimination,
+    blocks: &[Block<E, S>],
+    rows: &mut [[R; S]],
+) {
+    packets!(R::LEN, solve_packet_transposed(plan, blocks, rows));
+}
+
+/// `s` stages of a slot, `W` columns each.
+type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
+
+fn solve_packet<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+    plan: &Elimination,
+    blocks: &[Block<E, S>],
+    rows: &mut [[R; S]],
+    column: usize,
+) {
+    for pivot in plan.pivots {
+        let packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+        for (block, other) in beside(plan, blocks, pivot.lower()) {
+            let mut target = load(rows, other, column);
+            subtract(&mut target, block, &packet);
+            store(rows, other, column, &target);
+        }
+    }
+    for pivot in plan.pivots.iter().rev() {
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+        for (block, other) in beside(plan, blocks, pivot.upper()) {
+            subtract(&mut packet, block, &load(rows, other, column));
+        }
+        if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
+            packet = multiply(inverse, &packet);
+        }
+        store(rows, pivot.slot as usize, column, &packet);
+    }
+}
+
+fn solve_packet_transposed<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+    plan: &Elimination,
+    blocks: &[Block<E, S>],
+    rows: &mut [[R; S]],
+    column: usize,
+) {
+    for pivot in plan.pivots {
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+        if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
+            packet = multiply(&transposed(inverse), &packet);
+            store(rows, pivot.slot as usize, column, &packet);
+        }
+        for (block, other) in beside(plan, blocks, pivot.upper()) {
+            let mut target = load(rows, other, column);
+            subtract(&mut target, &transposed(block), &packet);
+            store(rows, other, column, &target);
+        }
+    }
+    for pivot in plan.pivots.iter().rev() {
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+        for (block, other) in beside(plan, blocks, pivot.lower()) {
+            subtract(&mut packet, &transposed(block), &load(rows, other, column));
+        }
+        store(rows, pivot.slot as usize, column, &packet);
+    }
+}
+
+/// The blocks of a range, each with the slot at its other end.
+#[inline(always)]
+fn beside<'a, E, const S: usize>(
+    plan: &'a Elimination,
+    blocks: &'a [Block<E, S>],
+    range: core::ops::Range<usize>,
+) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
+    let slots = plan.slots.get(range.clone()).unwrap_or_default();
+    blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
+}
+
+#[inline(always)]
+fn load<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &[[R; S]],
+    slot: usize,
+    column: usize,
+) -> Packet<E, S, W> {
+    let mut packet = [[E::from_f64(0.0); W]; S];
+    if let Some(row) = rows.get(slot) {
+        for (packet, row) in packet.iter_mut().zip(row) {
+            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
+                *packet = *columns;
+            }
+        }
+    }
+    packet
+}
+
+#[inline(always)]
+fn store<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &mut [[R; S]],
+    slot: usize,
+    column: usize,
+    packet: &Packet<E, S, W>,
+) {
+    if let Some(row) = rows.get_mut(slot) {
+        for (packet, row) in packet.iter().zip(row) {
+            let columns = row.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut());
+            if let Some(columns) = columns {
+                *columns = *packet;
+            }
+        }
+    }
+}
+
+/// `packet − block · other`
+#[inline(always)]
+fn subtract<E: Scalar, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    block: &Block<E, S>,
+    other: &Packet<E, S, W>,
+) {
+    for i in 0..S {
+        for k in 0..S {
+            for w in 0..W {
+                packet[i][w] = packet[i][w] - block[i][k] * other[k][w];
+            }
+        }
+    }
+}
+
+/// `block · packet`
+#[inline(always)]
+fn multiply<E: Scalar, const S: usize, const W: usize>(
+    block: &Block<E, S>,
+    packet: &Packet<E, S, W>,
+) -> Packet<E, S, W> {
+    let mut product = [[E::from_f64(0.0); W]; S];
+    for i in 0..S {
+        for k in 0..S {
+            for w in 0..W {
+                product[i][w] = product[i][w] + block[i][k] * packet[k][w];
+            }
+        }
+    }
+    product
+}
+
+#[inline(always)]
+fn transposed<E: Copy, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
+    core::array::from_fn(|i| core::array::from_fn(|j| block[j][i]))
+}

@@ -1,0 +1,209 @@
+//! The elimination order of the Newton matrix, found before the program runs.
+//!
+//! Ordered by variable, the Newton matrix of any Runge-Kutta method has the pattern of `f_ẋ ∪ f_x ∪ f_z`, with
+//! s×s blocks as entries. Where the stages share one Jacobian, block elimination decouples in the eigenbasis of A:
+//! it is the scalar elimination of `f_ẋ + hμ f_x` for every eigenvalue `μ` of A. So pivots are judged on such
+//! complex matrices, at many points of the model and many `hμ` at once: a pivot is taken only if it is
+//! acceptable at all of them. Among the acceptable ones the Markowitz cost decides.
+
+use std::collections::{BTreeMap, HashMap};
+
+/// A structural non-zero of the Newton matrix with its values at the samples.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    pub row: u32,
+    pub column: u32,
+    pub values: Vec<Complex>,
+    /// The block is a constant multiple of the identity, so that it costs nothing as a pivot.
+    pub trivial: bool,
+}
+
+/// Where the elimination puts what: the tables of `casados_core::model::Elimination`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Plan {
+    /// Row and column of each pivot, in order.
+    pub pivots: Vec<(u32, u32)>,
+    /// Where the blocks of each pivot begin: the pivot itself (`L` follows it), `U`, and the end.
+    pub ranges: Vec<[u32; 3]>,
+    /// Row and column of each block of the factors, fill included.
+    pub blocks: Vec<(u32, u32)>,
+    /// For every pivot, for every block of `L`, for every block of `U`: the block that is updated.
+    pub updates: Vec<u32>,
+}
+
+/// A complex number, as the samples need it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Complex {
+    pub re: f64,
+    pub im: f64,
+}
+
+impl Complex {
+    pub fn abs(self) -> f64 {
+        self.re.hypot(self.im)
+    }
+    fn times(self, b: Self) -> Self {
+        Self { re: self.re * b.re - self.im * b.im, im: self.re * b.im + self.im * b.re }
+    }
+    fn minus(self, b: Self) -> Self {
+        Self { re: self.re - b.re, im: self.im - b.im }
+    }
+    fn over(self, b: Self) -> Self {
+        let d = b.re * b.re + b.im * b.im;
+        Self { re: (self.re * b.re + self.im * b.im) / d, im: (self.im * b.re - self.re * b.im) / d }
+    }
+}
+
+/// A pivot is acceptable if at every sample it is at least this fraction of the largest entry of its column
+/// (rows scaled to a largest entry of one).
+const THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
+
+/// The matrix during elimination.
+struct Active {
+    /// By row, by column: values at the samples, and whether the block is trivial.
+    rows: Vec<BTreeMap<u32, (Vec<Complex>, bool)>>,
+    /// Rows that have an entry in the column.
+    columns: Vec<Vec<u32>>,
+    done_rows: Vec<bool>,
+    done_columns: Vec<bool>,
+    /// 1 / largest entry of each row at each sample, at the beginning.
+    scales: Vec<Vec<f64>>,
+}
+
+impl Active {
+    fn new(size: usize, entries: &[Entry]) -> Self {
+        let samples = entries.first().map_or(0, |e| e.values.len());
+        let mut active = Self {
+            rows: vec![BTreeMap::new(); size],
+            columns: vec![Vec::new(); size],
+            done_rows: vec![false; size],
+            done_columns: vec![false; size],
+            scales: vec![vec![0.0; samples]; size],
+        };
+        for entry in entries {
+            active.rows[entry.row as usize].insert(entry.column, (entry.values.clone(), entry.trivial));
+            active.columns[entry.column as usize].push(entry.row);
+            for (scale, value) in active.scales[entry.row as usize].iter_mut().zip(&entry.values) {
+                *scale = scale.max(value.abs());
+            }
+        }
+        for scale in active.scales.iter_mut().flatten() {
+            *scale = if *scale > 0.0 { 1.0 / *scale } else { 1.0 };
+        }
+        active
+    }
+
+    /// The worst ratio over the samples of an entry to the largest of its column.
+    fn quality(&self, row: usize, column: u32) -> f64 {
+        let (values, _) = &self.rows[row][&column];
+        let mut worst = f64::INFINITY;
+        for (k, value) in values.iter().enumerate() {
+            let own = value.abs() * self.scales[row][k];
+            let largest = self.columns[column as usize]
+                .iter()
+                .map(|&r| self.rows[r as usize][&column].0[k].abs() * self.scales[r as usize][k])
+                .fold(0.0, f64::max);
+            // A column that vanishes, or an entry that is tiny in its own row, is no pivot either.
+            let ratio = if largest > 0.0 { own / largest } else { 0.0 };
+            worst = worst.min(ratio.min(own * 1e3));
+            if !worst.is_finite() {
+                return 0.0;
+            }
+        }
+        worst
+    }
+
+    /// Cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the first in order.
+    fn choose(&self) -> Option<(u32, u32)> {
+        let mut candidates: Vec<(u64, bool, u32, u32)> = Vec::new();
+        for (row, entries) in self.rows.iter().enumerate().filter(|(row, _)| !self.done_rows[*row]) {
+            for (&column, (_, trivial)) in entries {
+                let cost = (entries.len() as u64 - 1) * (self.columns[column as usize].len() as u64 - 1);
+                candidates.push((cost, !trivial, row as u32, column));
+            }
+        }
+        candidates.sort_unstable();
+        for threshold in THRESHOLDS {
+            // Any pivot that is merely not zero, if nothing better is left: the best of them.
+            if threshold == 0.0 {
+                return candidates
+                    .iter()
+                    .map(|&(_, _, r, c)| (self.quality(r as usize, c), r, c))
+                    .max_by(|a, b| a.0.total_cmp(&b.0))
+                    .map(|(_, r, c)| (r, c));
+            }
+            let good = candidates.iter().find(|&&(_, _, r, c)| self.quality(r as usize, c) >= threshold);
+            if let Some(&(_, _, row, column)) = good {
+                return Some((row, column));
+            }
+        }
+        None
+    }
+
+    /// Eliminates with a pivot; gives the rows of its column (L) and the columns of its row (U).
+    fn eliminate(&mut self, row: u32, column: u32) -> (Vec<u32>, Vec<u32>) {
+        let pivot_row = std::mem::take(&mut self.rows[row as usize]);
+        let pivot = pivot_row[&column].0.clone();
+        let mut lower: Vec<u32> =
+            self.columns[column as usize].iter().copied().filter(|&r| r != row).collect();
+        lower.sort_unstable();
+        let upper: Vec<u32> = pivot_row.keys().copied().filter(|&c| c != column).collect();
+        for &r in &lower {
+            let Some((factor, _)) = self.rows[r as usize].remove(&column) else { continue };
+            for &c in &upper {
+                let samples = pivot.len();
+                let target = self.rows[r as usize].entry(c).or_insert_with(|| {
+                    self.columns[c as usize].push(r);
+                    (vec![Complex::default(); samples], false)
+                });
+                target.1 = false;
+                for k in 0..samples {
+                    let change = factor[k].over(pivot[k]).times(pivot_row[&c].0[k]);
+                    target.0[k] = target.0[k].minus(change);
+                }
+            }
+        }
+        for &c in &upper {
+            self.columns[c as usize].retain(|&r| r != row);
+        }
+        self.columns[column as usize].clear();
+        self.done_rows[row as usize] = true;
+        self.done_columns[column as usize] = true;
+        (lower, upper)
+    }
+}
+
+/// The plan for a matrix of `size` equations and unknowns.
+pub fn plan(size: usize, entries: &[Entry]) -> Plan {
+    let mut active = Active::new(size, entries);
+    let mut steps = Vec::with_capacity(size);
+    for _ in 0..size {
+        let Some((row, column)) = active.choose() else { break };
+        let (lower, upper) = active.eliminate(row, column);
+        steps.push((row, column, lower, upper));
+    }
+    schedule(&steps)
+}
+
+type Step = (u32, u32, Vec<u32>, Vec<u32>);
+
+/// Numbers the blocks pivot by pivot, and looks up every update.
+fn schedule(steps: &[Step]) -> Plan {
+    let mut plan = Plan::default();
+    for (row, column, lower, upper) in steps {
+        let begin = plan.blocks.len() as u32;
+        plan.pivots.push((*row, *column));
+        plan.blocks.push((*row, *column));
+        plan.blocks.extend(lower.iter().map(|&r| (r, *column)));
+        let middle = plan.blocks.len() as u32;
+        plan.blocks.extend(upper.iter().map(|&c| (*row, c)));
+        plan.ranges.push([begin, middle, plan.blocks.len() as u32]);
+    }
+    let number: HashMap<_, _> = plan.blocks.iter().zip(0..).map(|(&position, k)| (position, k)).collect();
+    plan.updates = steps
+        .iter()
+        .flat_map(|(_, _, lower, upper)| lower.iter().flat_map(|&r| upper.iter().map(move |&c| (r, c))))
+        .map(|position| number[&position])
+        .collect();
+    plan
+}

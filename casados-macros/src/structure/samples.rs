@@ -1,0 +1,107 @@
+//! The Newton matrix of a model at sample points: what an elimination order is judged by.
+
+use super::elimination::{Complex, Entry};
+use crate::graph::{Graph, Node, Point};
+use std::collections::BTreeMap;
+
+/// Sample points that are wanted, and how many may be drawn to get them: at some the model has no finite value.
+const POINTS: usize = 12;
+const DRAWS: usize = 200;
+
+/// A structural non-zero of the Newton matrix, by its entries of the Jacobian.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Position {
+    pub row: u32,
+    pub column: u32,
+    /// The entry of `f_ẋ` or `f_z`.
+    pub direct: Option<u32>,
+    /// The entry of `f_x`.
+    pub state: Option<u32>,
+}
+
+/// The pattern `f_ẋ ∪ f_x ∪ f_z`, by row, then by column.
+pub fn pattern(jacobian: &[(u32, u32, Node)], blocks: [usize; 6], nx: u32) -> Vec<Position> {
+    let mut positions: BTreeMap<(u32, u32), Position> = BTreeMap::new();
+    for (entry, &(row, variable, _)) in jacobian.iter().enumerate().take(blocks[3]) {
+        // Variables are (ẋ, x, z, ...), unknowns are (k, z).
+        let column = if variable < nx { variable } else { variable - nx };
+        let position = positions.entry((row, column)).or_default();
+        (position.row, position.column) = (row, column);
+        let state = entry >= blocks[1] && entry < blocks[2];
+        *(if state { &mut position.state } else { &mut position.direct }) = Some(entry as u32);
+    }
+    positions.into_values().collect()
+}
+
+/// The non-zeros with their values `f_ẋ + hμ f_x` at sample points and sample values of `hμ`.
+pub fn sample(
+    graph: &Graph,
+    jacobian: &[(u32, u32, Node)],
+    positions: &[Position],
+    variables: usize,
+    opaque: usize,
+) -> Vec<Entry> {
+    let nodes: Vec<Node> = jacobian.iter().map(|entry| entry.2).collect();
+    let mut random = Random(0x9e37_79b9_7f4a_7c15);
+    let constants: Vec<f64> = (0..opaque).map(|_| random.between(0.5, 2.0)).collect();
+    let mut entries: Vec<Entry> = positions
+        .iter()
+        .map(|position| Entry {
+            row: position.row,
+            column: position.column,
+            values: Vec::new(),
+            trivial: is_identity(graph, jacobian, position),
+        })
+        .collect();
+    let mut found = 0;
+    for draw in 0..DRAWS {
+        if found == POINTS {
+            break;
+        }
+        let point: Vec<f64> = (0..variables).map(|_| coordinate(&mut random, draw)).collect();
+        let values = graph.evaluate(&nodes, Point { variables: &point, opaque: &constants, seeds: &[] });
+        let used = positions.iter().flat_map(|p| [p.direct, p.state]).flatten();
+        if used.clone().all(|entry| values[entry as usize].is_finite()) {
+            found += 1;
+            for _ in 0..2 {
+                // Eigenvalues of A lie in the right half-plane; the step size may be anything.
+                let size = 10f64.powf(random.between(-4.0, 0.0));
+                let angle = random.between(-1.4, 1.4);
+                let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
+                for (entry, position) in entries.iter_mut().zip(positions) {
+                    let value = |index: Option<u32>| index.map_or(0.0, |index| values[index as usize]);
+                    let (direct, state) = (value(position.direct), value(position.state));
+                    entry.values.push(Complex { re: direct + state * hmu.re, im: state * hmu.im });
+                }
+            }
+        }
+    }
+    entries
+}
+
+/// The block is the identity, whatever the step size and the point.
+pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &Position) -> bool {
+    let direct = position.direct.and_then(|entry| graph.value(jacobian[entry as usize].2));
+    position.state.is_none() && direct == Some(1.0)
+}
+
+/// Points of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any magnitude.
+fn coordinate(random: &mut Random, draw: usize) -> f64 {
+    let value = random.between(-1.0, 1.0);
+    match draw % 4 {
+        0 => value,
+        1 => value.abs() + 0.1,
+        2 => value * f64::from(u8::from(random.between(0.0, 1.0) < 0.5)),
+        _ => value * 10f64.powf(random.between(-1.0, 2.0)),
+    }
+}
+
+/// A linear congruential generator: the same points in every build.
+struct Random(u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * ((self.0 >> 11) as f64 / (1u64 << 53) as f64)
+    }
+}
