@@ -1,6 +1,6 @@
 //! A model written by hand, with a fault on request.
 
-use crate::model::{ArrayK, ArrayV, Dae, GraphDae, Operations, Pattern, Structure};
+use crate::model::{ArrayK, ArrayV, Dae, Elimination, GraphDae, Operations, Pattern, Structure};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Dims, Plain};
 
@@ -38,6 +38,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
     type Shape = Dims<1, 1, 1, 1, 2, 6, 3>;
     type Jacobian<T: Plain> = [T; 7];
     type Hessian<T: Plain> = [T; 3];
+    type Factors<B: Plain> = [B; 0];
     const STRUCTURE: Structure = Structure {
         name: "example",
         x: &["angle"],
@@ -54,6 +55,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         },
         linear: if FAULT == LINEAR_DECLARED { &[false, true] } else { &[false, false] },
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+        elimination: Elimination::NONE,
     };
 
     fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {

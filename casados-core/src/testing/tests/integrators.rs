@@ -178,7 +178,7 @@ fn convergence_order() {
 /// Real integrators with a model written by hand, against the closed form of its solution.
 mod logistic {
     use super::*;
-    use crate::model::{ArrayK, ArrayV, Dae, Ode, Operations, Pattern, Structure};
+    use crate::model::{ArrayK, ArrayV, Dae, Elimination, Ode, Operations, Pattern, Structure};
     use crate::options::Options;
     use crate::scalar::Lanes;
     use crate::shape::{Dims, Plain};
@@ -191,6 +191,7 @@ mod logistic {
         type Shape = Dims<1, 0, 1, 1, 1, 5, 3>;
         type Jacobian<T: Plain> = [T; 4];
         type Hessian<T: Plain> = [T; 5];
+        type Factors<B: Plain> = [B; 0];
         const STRUCTURE: Structure = Structure {
             name: "logistic",
             x: &["population"],
@@ -203,6 +204,7 @@ mod logistic {
             hessian: Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] },
             linear: &[false],
             operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
+            elimination: Elimination::NONE,
         };
 
         fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
