@@ -1,7 +1,7 @@
 //! A pendulum on a cart, differentiated with numbers `a + b ε₁ + c ε₂ + d ε₁ε₂`, `ε₁² = ε₂² = 0`.
 
 use super::{NONE, adjoint_of_jacobian};
-use casados_core::model::{ArrayK, ArrayV, Pattern, Structure};
+use casados_core::model::{ArrayK, ArrayV, Elimination, Pattern, Structure};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
 use std::ops::{Add, Div, Mul, Sub};
