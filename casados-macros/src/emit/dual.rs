@@ -92,6 +92,7 @@ pub fn write(model: &Model) -> TokenStream {
                 type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
                 type Jacobian<T: #krate::shape::Plain> = [T; #lj];
                 type Hessian<T: #krate::shape::Plain> = [T; #lh];
+                type Factors<B: #krate::shape::Plain> = [B; 0];
                 const STRUCTURE: #krate::model::Structure = {
                     const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::dual::jacobian_pattern::<
                         #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>,
@@ -115,6 +116,7 @@ pub fn write(model: &Model) -> TokenStream {
                             adjoint: 0,
                             hessian: 0,
                         },
+                        elimination: #krate::model::Elimination::NONE,
                     }
                 };
 
