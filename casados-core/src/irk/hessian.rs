@@ -10,13 +10,13 @@
 use super::adjoint::Backward;
 use super::forward::{ForwardMemory, Sweep};
 use super::record::{Coefficients, Linearization, Step, Work, copy};
-use crate::shape::assign;
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{axpy, slot};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::Real;
+use crate::shape::assign;
 use crate::shape::{Array, Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 

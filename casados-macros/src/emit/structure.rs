@@ -61,8 +61,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         })
         .collect();
     let pivots = plan.pivots.iter().zip(&plan.ranges).zip(identity).map(|((pivot, range), identity)| {
-        let [slot, block, upper, end] =
-            [pivot.1, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
+        let [slot, block, upper, end] = [pivot.1, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
         quote!(pivot(#slot, #block, #upper, #end, #identity))
     });
     let assembly = positions.iter().map(|position| {

@@ -5,7 +5,8 @@ use quote::quote;
 
 fn function(source: &str, name: &str) -> proc_macro2::TokenStream {
     let file = syn::parse_file(source).unwrap();
-    let item = file.items.into_iter().find(|item| matches!(item, syn::Item::Fn(item) if item.sig.ident == name));
+    let item =
+        file.items.into_iter().find(|item| matches!(item, syn::Item::Fn(item) if item.sig.ident == name));
     quote!(#item)
 }
 
@@ -15,7 +16,8 @@ fn a_chain_of_any_length_is_linear_in_size() {
     let operations = |nx: usize| {
         let nx = proc_macro2::Literal::usize_unsuffixed(nx);
         let start = std::time::Instant::now();
-        let source = read(Form::Dae, quote!(NX = [#nx]), chain.clone()).unwrap_or_else(|error| panic!("{error}"));
+        let source =
+            read(Form::Dae, quote!(NX = [#nx]), chain.clone()).unwrap_or_else(|error| panic!("{error}"));
         let model = &source.models[0];
         println!("nx = {nx}: {:?}", start.elapsed());
         model.graph.operations(&model.residual)
