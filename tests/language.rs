@@ -4,6 +4,16 @@
 //! Bits, not numbers: the emitted code does the same operations in the same order. The places where it
 //! does not (`mul_add`) are compared with a tolerance, said there.
 
+#![allow(
+    clippy::manual_clamp,
+    clippy::manual_repeat_n,
+    clippy::needless_late_init,
+    clippy::needless_range_loop,
+    clippy::neg_cmp_op_on_partial_ord,
+    clippy::redundant_guards,
+    reason = "models may be written in these ways, and are understood"
+)]
+
 #[path = "language/elementary.rs"]
 mod elementary;
 #[path = "language/forms.rs"]

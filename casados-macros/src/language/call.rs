@@ -1,21 +1,16 @@
 //! Calls: closures, functions that the macro sees, methods of the user's types, built-in functions.
 
-use super::arithmetic::Operator;
-use super::closure::Body;
-use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluated, Evaluator, Flow, error, opaque, unsupported};
+use super::evaluator::{At, Evaluated, Evaluator, error, opaque, unsupported};
 use super::methods::{self, Call, Receiver};
 use super::path::Named;
-use super::pattern::Subject;
-use super::place::Place;
 use super::types::Type;
-use super::value::{Builtin, Calls, Function, Generic, Struct, Value};
+use super::value::{Builtin, Generic, Struct, Value};
 use std::rc::Rc;
 use syn::punctuated::Punctuated;
 use syn::{Expr, Result, Token};
 
 /// Arguments of a call.
-enum Arguments<'a> {
+pub(super) enum Arguments<'a> {
     /// Values.
     Values(Vec<Value>),
     /// The receiver, if it is a method call, and expressions.
@@ -23,7 +18,7 @@ enum Arguments<'a> {
 }
 
 impl Arguments<'_> {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         match self {
             Arguments::Values(values) => values.len(),
             Arguments::Written(receiver, expressions) => usize::from(receiver.is_some()) + expressions.len(),
@@ -202,40 +197,6 @@ impl Evaluator {
         Ok(methods::method(self, receiver, &call)?)
     }
 
-    /// The user's method of a name for a receiver, and the receiver as its first argument.
-    fn user_function(
-        &mut self,
-        receiver: &Receiver,
-        name: &str,
-        turbofish: &[Generic],
-        at: At,
-    ) -> Result<Option<(Function, Value)>> {
-        if self.implementations.is_empty() {
-            return Ok(None);
-        }
-        let symbol = self.symbol_of(name);
-        if !self.implementations.iter().any(|implementation| implementation.functions.contains_key(&symbol)) {
-            return Ok(None);
-        }
-        let value = receiver.value(self, at)?;
-        let ty = self.type_of(&value);
-        if matches!(ty, Type::Unknown) {
-            return Ok(None);
-        }
-        let Some((implementation, item)) = self.find_function(symbol, &ty) else { return Ok(None) };
-        let Some(syn::FnArg::Receiver(own)) = item.sig.inputs.first() else { return Ok(None) };
-        let mutable = matches!(&own.kind, syn::ReceiverKind::Reference(_, _, Some(_)));
-        let first = match (mutable, receiver) {
-            (true, Receiver::Place(place)) => Value::Reference(place.clone()),
-            (true, Receiver::Value(value)) => Value::Reference(Place::new(value.clone())),
-            (false, _) => value,
-        };
-        let scope = implementation.scope.clone();
-        let function =
-            Function { item, scope, turbofish: turbofish.to_vec(), owner: Some((implementation, ty)) };
-        Ok(Some((function, first)))
-    }
-
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
         let name = call.method.to_string();
         // A closure in a field is no method, so the receiver of `(self.f)(x)` does not come here.
@@ -279,274 +240,13 @@ impl Evaluator {
         for argument in &call.args {
             arguments.push(self.expression(argument, &hint)?);
         }
-        let request = Call { name: &name, turbofish: &turbofish, arguments, expected, at: call };
+        let at = &call.method;
+        let request = Call { name: &name, turbofish: &turbofish, arguments, expected, at };
         if let Some(value) = methods::method(self, &receiver, &request)? {
             return Ok(value);
         }
         let value = receiver.value(self, call)?;
-        let (kind, method) = (value.kind(), &call.method);
-        Err(unsupported(method, format!("the method `{name}` of {kind}")).into())
-    }
-
-    /// Calls a function that the macro sees.
-    fn call_function(
-        &mut self,
-        function: &Function,
-        arguments: Arguments,
-        expected: &Type,
-        at: At,
-    ) -> Evaluated {
-        let item = &function.item;
-        let name = &item.sig.ident;
-        let mut frame = self.calls.clone();
-        while let Some(calls) = frame {
-            if Rc::ptr_eq(&calls.function, item) {
-                return Err(error(
-                    at,
-                    format!(
-                        "`{name}` calls itself, and a graph has no end then: write the recursion as a loop"
-                    ),
-                )
-                .into());
-            }
-            frame = calls.parent.clone();
-        }
-        if item.sig.inputs.len() != arguments.len() {
-            let (expected, found) = (item.sig.inputs.len(), arguments.len());
-            return Err(
-                error(at, format!("`{name}` takes {expected} arguments, but {found} are given")).into()
-            );
-        }
-        // Generic parameters of the `impl` block and of the function.
-        let mut around = function.scope.clone();
-        let mut block_scope = None;
-        if let Some((implementation, owner)) = &function.owner {
-            let generics = self.generic_scope(&implementation.generics, &implementation.scope);
-            if let Some(pattern) = &implementation.self_type {
-                self.unify(pattern, owner, &generics);
-            }
-            around =
-                Scope::inside(&generics, Names::SelfType(owner.clone(), implementation.self_type.clone()));
-            block_scope = Some(generics);
-        }
-        let generics = &item.sig.generics;
-        let scope = self.generic_scope(generics, &around);
-        self.bind_turbofish(generics, &function.turbofish, &scope);
-        let generic = !generics.params.is_empty()
-            || function.owner.as_ref().is_some_and(|(block, _)| !block.generics.params.is_empty());
-        if generic && let syn::ReturnType::Type(_, ty) = &item.sig.output {
-            self.unify(ty, expected, &scope);
-        }
-        // Arguments.
-        let mut values = Vec::with_capacity(arguments.len());
-        let mut given = match arguments {
-            Arguments::Values(values) => (values.into_iter().map(Some).collect::<Vec<_>>(), None),
-            Arguments::Written(receiver, expressions) => {
-                let mut values: Vec<_> = receiver.into_iter().map(Some).collect();
-                let skip = values.len();
-                values.resize_with(skip + expressions.len(), || None);
-                (values, Some((skip, expressions)))
-            }
-        };
-        for (index, input) in item.sig.inputs.iter().enumerate() {
-            let hint = match input {
-                syn::FnArg::Typed(input) => self.resolve(&input.ty, &scope)?,
-                syn::FnArg::Receiver(_) => Type::Unknown,
-            };
-            let value = match (given.0[index].take(), given.1) {
-                (Some(value), _) => value,
-                (None, Some((skip, expressions))) => self.expression(&expressions[index - skip], &hint)?,
-                (None, None) => Value::Uninitialised,
-            };
-            let value = match input {
-                syn::FnArg::Typed(input) => {
-                    let value = match (&*input.ty, value) {
-                        (syn::Type::Reference(ty), value) if ty.mutability.is_some() => value,
-                        (syn::Type::Path(_) | syn::Type::ImplTrait(_), value)
-                            if matches!(hint, Type::Unknown) =>
-                        {
-                            value
-                        }
-                        (_, value) => self.load(value, at)?,
-                    };
-                    let value = self.coerce(value, &hint, at)?;
-                    if generic {
-                        let ty = self.type_of(&value);
-                        if !self.unify(&input.ty, &ty, &scope) {
-                            return Err(error(
-                                at,
-                                format!(
-                                    "argument {} of `{name}` is {}, which does not fit its type",
-                                    index + 1,
-                                    value.kind()
-                                ),
-                            )
-                            .into());
-                        }
-                    }
-                    value
-                }
-                syn::FnArg::Receiver(receiver) => match &receiver.kind {
-                    syn::ReceiverKind::Reference(_, _, Some(_)) => match value {
-                        value @ Value::Reference(_) => value,
-                        value => Value::Reference(Place::new(value)),
-                    },
-                    _ => self.load(value, at)?,
-                },
-            };
-            values.push(value);
-        }
-        self.check_known(generics, &scope, name, at)?;
-        if let (Some((implementation, _)), Some(around)) = (&function.owner, &block_scope) {
-            self.check_known(&implementation.generics, around, name, at)?;
-        }
-        // Now all parameters are known that arguments can tell: `Self` is complete.
-        let mut inside = scope;
-        if let (Some((implementation, owner)), Some(generics)) = (&function.owner, &block_scope) {
-            let own = match &implementation.self_type {
-                Some(pattern) => self.resolve(pattern, generics)?,
-                None => owner.clone(),
-            };
-            inside = Scope::inside(&inside, Names::SelfType(own, implementation.self_type.clone()));
-        }
-        let returns = match &item.sig.output {
-            syn::ReturnType::Type(_, ty) => self.resolve(ty, &inside)?,
-            syn::ReturnType::Default => Type::Tuple(Rc::new(Vec::new())),
-        };
-        let calls = Some(Rc::new(Calls { function: item.clone(), parent: self.calls.clone() }));
-        let inputs = item.sig.inputs.iter().zip(values);
-        let result = self.execute(inside, calls, returns.clone(), |evaluator| {
-            for (input, value) in inputs {
-                let bindings = match input {
-                    syn::FnArg::Typed(input) => evaluator.bind(&input.pat, Subject::Value(value))?,
-                    syn::FnArg::Receiver(_) => vec![(evaluator.symbol_of("self"), value)],
-                };
-                evaluator.declare(bindings);
-            }
-            evaluator.deeper(name, |evaluator| evaluator.block(&item.block, &returns))
-        });
-        let value = result?;
-        let value = match &item.sig.output {
-            syn::ReturnType::Type(_, ty) if matches!(&**ty, syn::Type::Reference(ty) if ty.mutability.is_some()) => {
-                value
-            }
-            _ if matches!(returns, Type::Unknown) => value,
-            _ => self.load(value, at)?,
-        };
-        Ok(self.coerce(value, &returns, at)?)
-    }
-
-    /// Executes the body of a function or closure: `return` leads to its end.
-    pub(super) fn execute(
-        &mut self,
-        scope: Rc<Scope>,
-        calls: Option<Rc<Calls>>,
-        returns: Type,
-        body: impl FnOnce(&mut Self) -> Evaluated,
-    ) -> Evaluated {
-        let branches = self.branches();
-        let saved = Body {
-            scope: std::mem::replace(&mut self.scope, scope),
-            calls: std::mem::replace(&mut self.calls, calls),
-            returns: std::mem::replace(&mut self.returns, returns),
-            targets: std::mem::take(&mut self.targets),
-            branches: std::mem::replace(&mut self.function_branches, branches),
-        };
-        let result = body(self);
-        self.scope = saved.scope;
-        self.calls = saved.calls;
-        self.returns = saved.returns;
-        self.targets = saved.targets;
-        self.function_branches = saved.branches;
-        match result {
-            Err(Flow::Return(value)) => Ok(value),
-            other => other,
-        }
-    }
-
-    /// The user's implementation of an operator.
-    pub(super) fn user_operator(
-        &mut self,
-        operator: Operator,
-        a: &Value,
-        b: &Value,
-        at: At,
-    ) -> Result<Option<Value>> {
-        let (of, method) = operator.method();
-        self.user_method(of, method, a, vec![b.clone()], at)
-    }
-
-    /// A method of a trait (or an inherent one of the same name) that the user implemented for `a`; of
-    /// several implementations the one whose generic argument fits the first of the other arguments.
-    pub(super) fn user_method(
-        &mut self,
-        of: &str,
-        method: &str,
-        a: &Value,
-        arguments: Vec<Value>,
-        at: At,
-    ) -> Result<Option<Value>> {
-        if self.implementations.is_empty() {
-            return Ok(None);
-        }
-        let symbol = self.symbol_of(method);
-        let own = self.type_of(a);
-        let other = arguments.first().map(|value| self.type_of(value)).unwrap_or_default();
-        for implementation in self.implementations.clone().iter().rev() {
-            let Some(item) = implementation.functions.get(&symbol) else { continue };
-            let Some(last) = implementation.of.as_ref().and_then(|path| path.segments.last()) else {
-                continue;
-            };
-            if last.ident != of && !(of == "Index" && last.ident == "IndexMut") {
-                continue;
-            }
-            let Some(scope) = self.fitting(implementation, &own) else { continue };
-            let scope = Scope::inside(&scope, Names::SelfType(own.clone(), implementation.self_type.clone()));
-            let right = match &last.arguments {
-                syn::PathArguments::AngleBracketed(written) => {
-                    written.args.iter().find_map(|argument| match argument {
-                        syn::GenericArgument::Type(ty) => Some(ty.clone()),
-                        _ => None,
-                    })
-                }
-                _ => None,
-            };
-            let right = right.or_else(|| implementation.self_type.clone());
-            if let Some(right) = right
-                && !arguments.is_empty()
-                && !self.unify(&right, &other, &scope)
-            {
-                continue;
-            }
-            let function = Function {
-                item: item.clone(),
-                scope: implementation.scope.clone(),
-                turbofish: Vec::new(),
-                owner: Some((implementation.clone(), own)),
-            };
-            let mut values = vec![a.clone()];
-            values.extend(arguments);
-            let result = self.deeper(at, |evaluator| {
-                evaluator.call_function(&function, Arguments::Values(values), &Type::Unknown, at)
-            });
-            return self.finished(result, at).map(Some);
-        }
-        Ok(None)
-    }
-
-    /// Executes a model function with the values of its arguments. The spans are those of the
-    /// elements of its result, where they are written one by one, and of the result otherwise.
-    pub fn run(
-        &mut self,
-        item: &Rc<syn::ItemFn>,
-        scope: &Rc<Scope>,
-        turbofish: Vec<Generic>,
-        arguments: Vec<Value>,
-    ) -> Result<Value> {
-        let function = Function { item: item.clone(), scope: scope.clone(), turbofish, owner: None };
-        let result =
-            self.call_function(&function, Arguments::Values(arguments), &Type::Unknown, &item.sig.ident);
-        self.finished(result, &item.sig.ident)
+        Err(unsupported(at, format!("the method `{name}` of {}", value.kind())).into())
     }
 }
 

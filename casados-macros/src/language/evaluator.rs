@@ -1,6 +1,5 @@
 //! The state of an evaluation, and what everything else asks of it.
 
-pub use super::arithmetic::Operator;
 use super::environment::Scope;
 use super::items::{Implementation, Symbol};
 use super::place::Cell;
@@ -38,6 +37,9 @@ pub const STEPS: usize = 10_000_000;
 pub const NODES: usize = 4_000_000;
 /// Nested expressions and calls.
 pub const DEPTH: usize = 200;
+/// Bytes of the stack that the evaluation may use. An unoptimised macro needs 4 to 20 kB for a level, and
+/// the smallest threads that macros run in have 2 MiB.
+const STACK: usize = 5 << 18;
 
 /// Why the evaluation of an expression did not end with its value.
 #[derive(Debug)]
@@ -92,6 +94,8 @@ pub struct Evaluator {
     numbers: HashMap<String, u32>,
     steps: usize,
     depth: usize,
+    /// Where the stack was when the evaluation began.
+    bottom: Option<usize>,
 }
 
 /// What a `break` can end.
@@ -136,12 +140,13 @@ impl Evaluator {
         execute: impl FnOnce(&mut Self) -> Evaluated<T>,
     ) -> Evaluated<T> {
         self.tick(1, at)?;
-        if self.depth >= DEPTH {
+        let marker = 0_u8;
+        let here = std::ptr::from_ref(&marker).addr();
+        let used = self.bottom.get_or_insert(here).abs_diff(here);
+        if self.depth >= DEPTH || used > STACK {
             return Err(error(
                 at,
-                format!(
-                    "expressions and calls are nested more than {DEPTH} deep here: split them into statements"
-                ),
+                "expressions and calls are nested too deeply here: split them into statements",
             )
             .into());
         }

@@ -1,18 +1,26 @@
 //! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes its body.
 
+mod access;
 mod arithmetic;
+mod assignment;
 mod attribute;
+mod branch;
 mod call;
 mod closure;
+mod coercion;
 pub mod dual;
 mod environment;
 mod evaluator;
 mod expression;
 mod flatten;
+mod function;
+mod generics;
 mod items;
+mod literal;
 mod methods;
 mod model;
 mod module;
+mod operator;
 mod path;
 mod pattern;
 mod place;
@@ -22,6 +30,7 @@ mod statement;
 #[cfg(test)]
 mod tests;
 mod types;
+mod user;
 mod value;
 
 use crate::graph::{Graph, Node};

@@ -1,6 +1,9 @@
 //! Methods and functions that belong to the language: those of `f64`, integers, arrays, iterators, nalgebra.
 
+mod adapter;
+mod algebra;
 mod array;
+mod block;
 mod construction;
 mod consume;
 mod float;
@@ -90,7 +93,7 @@ pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Re
         }
         Value::Integer(integer) => integer::method(evaluator, *integer, call)?,
         Value::Array(_) => array::method(evaluator, receiver, &value, call)?,
-        Value::Range(_) | Value::Iterator(_) => iterator::method(evaluator, receiver, &value, call)?,
+        Value::Range(_) | Value::Iterator(_) => adapter::method(evaluator, receiver, &value, call)?,
         Value::Matrix(_) => matrix::method(evaluator, receiver, &value, call)?,
         Value::Option(content) => option::method(evaluator, receiver, content.as_deref(), call)?,
         Value::Bool(known) => option::bool_method(evaluator, *known, call)?,
@@ -162,5 +165,5 @@ pub fn matrix_operator(
     b: &Value,
     at: At,
 ) -> Result<Option<Value>> {
-    matrix::operator(evaluator, operator, a, b, at)
+    algebra::operator(evaluator, operator, a, b, at)
 }

@@ -49,13 +49,69 @@ fn refusals() {
     refused("let i: i32 = -1; x[i as usize]", "index out of range");
 }
 
+/// `head` and `tail` around `x[0]`, `n` times.
+fn nested(head: &str, tail: &str, n: usize) -> String {
+    format!("{}x[0]{}", head.repeat(n), tail.repeat(n))
+}
+
+/// Tests run in threads of 2 MiB, unoptimised: what does not overflow here does so nowhere.
 #[test]
 fn nesting_is_bounded() {
-    let deep = |n: usize| format!("{}x[0]{}", "(".repeat(n), ")".repeat(n));
-    assert!(evaluate(&format!("fn f(x: [f64; 6]) -> f64 {{ {} }}", deep(60))).is_ok());
-    refused(&deep(210), "nested more than");
-    let blocks = |n: usize| format!("{}x[0]{}", "{ if true ".repeat(n), " else { 0.0 } }".repeat(n));
-    let _ = evaluate(&format!("fn f(x: [f64; 6]) -> f64 {{ {} }}", blocks(10)));
+    // The first of these are expressions, the others blocks, closures and calls.
+    const EXPRESSIONS: usize = 13;
+    let forms = [
+        ("(", ")"),
+        ("-", ""),
+        ("x[1] + (", ")"),
+        ("{ ", " }"),
+        ("if x[1] > 0.0 { ", " } else { 0.0 }"),
+        ("if true { ", " } else { 0.0 }"),
+        ("Some(", ").unwrap()"),
+        ("[", "][0]"),
+        ("(", ", 0.0).0"),
+        ("x[1].max(", ")"),
+        ("", ".sin()"),
+        ("f64::max(x[1], ", ")"),
+        ("f64::sin(", ")"),
+        ("{ let y = ", "; y }"),
+        ("match 1 { 0 => 0.0, _ => ", " }"),
+        ("match x[1] > 0.0 { true => 0.0, false => ", " }"),
+        ("{ let mut y = 0.0; for _ in 0..1 { y += ", "; } y }"),
+        ("loop { break ", "; }"),
+        ("(|a: f64| a + ", ")(x[1])"),
+        ("(0..1).map(|_| ", ").sum::<f64>()"),
+        ("core::array::from_fn::<f64, 1, _>(|_| ", ")[0]"),
+        ("[0.0].iter().fold(0.0, |a: f64, b| a + b + ", ")"),
+        ("twice(", ")"),
+        ("Number(", ").twice().0"),
+        ("Number { 0: ", " }.0"),
+        ("(Number(x[1]) + Number(", ")).0"),
+    ];
+    let items = "struct Number(f64); \
+        impl Number { fn twice(self) -> Number { Number(twice(self.0)) } } \
+        impl core::ops::Add for Number { type Output = Number; fn add(self, other: Number) -> Number { \
+        Number(self.0 + other.0) } } fn twice(a: f64) -> f64 { a + a }";
+    let body = |expression: &str| format!("fn f(x: [f64; 6]) -> f64 {{ {items} {expression} }}");
+    for (number, (head, tail)) in forms.into_iter().enumerate() {
+        let source = |n: usize| body(&nested(head, tail, n));
+        let depth = if number < EXPRESSIONS { 60 } else { 20 };
+        if let Err(error) = evaluate(&source(depth)) {
+            panic!("{depth} times {head} {tail}: {error}");
+        }
+        if let Err(error) = evaluate(&source(150)) {
+            let error = error.to_string();
+            assert!(error.contains("nested too deeply"), "150 times {head} {tail}: {error}");
+        }
+    }
+    // Calls nest as well.
+    let calls = |n: usize| {
+        let functions: String =
+            (0..n).map(|i| format!("fn f{i}(a: f64) -> f64 {{ f{}(a) + 1.0 }} ", i + 1)).collect();
+        format!("fn f(x: [f64; 6]) -> f64 {{ {functions} fn f{n}(a: f64) -> f64 {{ a }} f0(x[0]) }}")
+    };
+    assert!(evaluate(&calls(20)).is_ok());
+    let error = evaluate(&calls(300)).err().map(|error| error.to_string());
+    assert!(error.is_some_and(|error| error.contains("nested too deeply")));
 }
 
 #[test]

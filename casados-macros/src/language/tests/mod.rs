@@ -9,9 +9,8 @@ mod patterns;
 mod selection;
 mod values;
 
-use super::environment::Scope;
 use super::evaluator::Evaluator;
-use super::value::Value;
+use super::value::{Function, Value};
 use crate::graph::Node;
 use crate::graph::Point;
 use std::rc::Rc;
@@ -66,7 +65,8 @@ pub fn evaluate(source: &str) -> syn::Result<(Evaluator, Vec<Node>)> {
     let item = Rc::new(syn::parse_str::<syn::ItemFn>(source)?);
     let mut evaluator = Evaluator::default();
     let x = (0..6).map(|index| Value::Real(evaluator.graph.variable(index))).collect();
-    let value = evaluator.run(&item, &Rc::new(Scope::default()), Vec::new(), vec![Value::array(x)])?;
+    let function = Function { item, scope: Rc::default(), turbofish: Vec::new(), owner: None };
+    let value = evaluator.call(&Value::Function(Rc::new(function)), vec![Value::array(x)], &"")?;
     let mut list = Vec::new();
     nodes(&mut evaluator, &value, &mut list);
     Ok((evaluator, list))

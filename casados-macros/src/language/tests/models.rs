@@ -52,6 +52,6 @@ fn nest() {
     ] {
         assert!(super::evaluate(&wrap(before, after, 20)).is_ok(), "{before}");
         let error = super::evaluate(&wrap(before, after, 205)).err().map(|error| error.to_string());
-        assert!(error.is_some_and(|error| error.contains("nested more than")), "{before}");
+        assert!(error.is_some_and(|error| error.contains("nested too deeply")), "{before}");
     }
 }

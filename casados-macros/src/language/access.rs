@@ -1,0 +1,209 @@
+//! Fields, elements and slices: expressions that name a place.
+
+use super::evaluator::{At, Evaluated, Evaluator, error, opaque};
+use super::methods::Receiver;
+use super::path::Named;
+use super::place::{Place, Projection};
+use super::types::Type;
+use super::value::{IntegerType, Range, Value};
+use quote::{ToTokens, quote};
+use std::rc::Rc;
+use syn::{Expr, Result};
+
+impl Evaluator {
+    /// The place an expression refers to, if it is one; its value otherwise.
+    pub(super) fn place(&mut self, expression: &Expr, mutable: bool) -> Evaluated<Receiver> {
+        self.place_expected(expression, mutable, &Type::Unknown)
+    }
+
+    pub(super) fn place_expected(
+        &mut self,
+        expression: &Expr,
+        mutable: bool,
+        expected: &Type,
+    ) -> Evaluated<Receiver> {
+        match expression {
+            Expr::Path(path) => Ok(match self.named(path)? {
+                Named::Variable(cell) => Receiver::Place(Place { cell, path: Vec::new() }),
+                Named::Value(value) => Receiver::Value(value),
+                Named::Builtin(builtin) => Receiver::Value(self.builtin_value(builtin, path)),
+            }),
+            Expr::Paren(inner) => {
+                self.deeper(expression, |e| e.place_expected(&inner.expr, mutable, expected))
+            }
+            Expr::Group(inner) => {
+                self.deeper(expression, |e| e.place_expected(&inner.expr, mutable, expected))
+            }
+            Expr::Field(field) => self.deeper(expression, |e| e.field_place(field, mutable)),
+            Expr::Index(index) => self.deeper(expression, |e| e.index_place(index, mutable)),
+            Expr::Unary(unary) if matches!(unary.op, syn::UnOp::Deref(_)) => {
+                let inner = self.deeper(expression, |e| e.place_expected(&unary.expr, mutable, expected))?;
+                Ok(match inner {
+                    Receiver::Place(place) => match self.read(&place, expression)? {
+                        Value::Reference(target) => Receiver::Place(target),
+                        _ => Receiver::Place(place),
+                    },
+                    Receiver::Value(Value::Reference(place)) => Receiver::Place(place),
+                    value => value,
+                })
+            }
+            other => Ok(Receiver::Value(self.expression(other, expected)?)),
+        }
+    }
+
+    fn field_place(&mut self, field: &syn::ExprField, mutable: bool) -> Evaluated<Receiver> {
+        let base = self.place(&field.base, mutable)?;
+        let base = self.dereferenced(base, field)?;
+        let value = base.value(self, field)?;
+        match (field_projection(&value, &field.member), base) {
+            (Ok(projection), Receiver::Place(place)) => {
+                Ok(Receiver::Place(self.project(&place, projection, field)?))
+            }
+            (Ok(projection), Receiver::Value(value)) => {
+                Ok(Receiver::Value(self.part(&value, projection, field)?))
+            }
+            (Err(_), _) => match (&value, &field.member) {
+                (Value::Opaque(tokens), member) => {
+                    Ok(Receiver::Value(Value::Opaque(Rc::new(quote!(#tokens.#member)))))
+                }
+                (Value::Range(range), syn::Member::Named(name)) => {
+                    let part = if name == "start" { &range.start } else { &range.end };
+                    match part {
+                        Some(value) => Ok(Receiver::Value(value.clone())),
+                        None => Err(error(field, "this range has no such end").into()),
+                    }
+                }
+                (value, member) => {
+                    let name = member.to_token_stream();
+                    Err(error(field, format!("{} has no field `{name}`", value.kind())).into())
+                }
+            },
+        }
+    }
+
+    /// With mutable references followed.
+    pub(super) fn dereferenced(&mut self, receiver: Receiver, at: At) -> Result<Receiver> {
+        Ok(match receiver {
+            Receiver::Place(place) => Receiver::Place(self.follow(place, at)?),
+            Receiver::Value(Value::Reference(place)) => Receiver::Place(self.follow(place, at)?),
+            value => value,
+        })
+    }
+
+    fn index_place(&mut self, index: &syn::ExprIndex, mutable: bool) -> Evaluated<Receiver> {
+        let base = self.place(&index.expr, mutable)?;
+        let base = self.dereferenced(base, index)?;
+        let value = base.value(self, index)?;
+        let hint = match &value {
+            Value::Struct(_) => Type::Unknown,
+            _ => Type::Integer(IntegerType::Usize),
+        };
+        let position = match &*index.index {
+            // Literals in a range or tuple get their type too, but it does not matter for them.
+            Expr::Range(_) | Expr::Tuple(_) => self.expression(&index.index, &Type::Unknown)?,
+            expression => self.expression(expression, &hint)?,
+        };
+        let position = self.load(position, &index.index)?;
+        let projection = match (&value, &position) {
+            (Value::Struct(_), _) => {
+                let name = if mutable { "index_mut" } else { "index" };
+                let receiver = match (&base, mutable) {
+                    (Receiver::Place(place), true) => Value::Reference(place.clone()),
+                    _ => value.clone(),
+                };
+                let result = self.user_method("Index", name, &receiver, vec![position.clone()], index)?;
+                return match result {
+                    Some(Value::Reference(place)) => Ok(Receiver::Place(place)),
+                    Some(value) => Ok(Receiver::Value(value)),
+                    None => Err(error(index, "this struct cannot be indexed").into()),
+                };
+            }
+            (Value::Opaque(tokens), Value::Integer(integer)) => {
+                let position = proc_macro2::Literal::i128_unsuffixed(integer.value);
+                return Ok(Receiver::Value(Value::Opaque(Rc::new(quote!(#tokens[#position])))));
+            }
+            (Value::Opaque(_), _) => return Err(opaque(&index.expr, "an array").into()),
+            (_, Value::Real(_) | Value::Condition(_)) => {
+                return Err(error(
+                    &index.index,
+                    "which element this is depends on model quantities: a graph model needs indices that are known \
+                     at compile time",
+                )
+                .into());
+            }
+            (Value::Array(elements), Value::Range(range)) => {
+                let (start, end) = self.bounds(range, elements.len(), &index.index)?;
+                Projection::Slice(start, end)
+            }
+            (Value::Array(_), position) => Projection::Index(self.usize(position, &index.index)?),
+            (Value::Matrix(_), Value::Tuple(parts)) if parts.len() == 2 => {
+                let row = self.usize(&parts[0], &index.index)?;
+                Projection::Element(row, self.usize(&parts[1], &index.index)?)
+            }
+            (Value::Matrix(matrix), position) => {
+                let position = self.usize(position, &index.index)?;
+                let rows = matrix.rows.max(1);
+                if position >= matrix.elements.len() {
+                    let length = matrix.elements.len();
+                    return Err(error(
+                        index,
+                        format!("index out of range: the length is {length} but the index is {position}"),
+                    )
+                    .into());
+                }
+                Projection::Element(position % rows, position / rows)
+            }
+            (value, _) => return Err(error(index, format!("{} cannot be indexed", value.kind())).into()),
+        };
+        match base {
+            Receiver::Place(place) => Ok(Receiver::Place(self.project(&place, projection, index)?)),
+            Receiver::Value(value) => Ok(Receiver::Value(self.part(&value, projection, index)?)),
+        }
+    }
+
+    /// First and end of a range of indices.
+    pub fn bounds(&mut self, range: &Range, length: usize, at: At) -> Result<(usize, usize)> {
+        let start = match &range.start {
+            Some(start) => self.usize(start, at)?,
+            None => 0,
+        };
+        let end = match &range.end {
+            Some(end) => self.usize(end, at)?.saturating_add(usize::from(range.inclusive)),
+            None => length,
+        };
+        Ok((start, end))
+    }
+}
+
+/// The way from a value to its field.
+fn field_projection(value: &Value, member: &syn::Member) -> std::result::Result<Projection, ()> {
+    match (value, member) {
+        (Value::Tuple(_), syn::Member::Unnamed(index)) => Ok(Projection::Field(index.index as usize)),
+        (Value::Struct(structure), member) => {
+            let name = member.to_token_stream().to_string();
+            let fields = &structure.definition.variants[structure.variant].fields;
+            fields.iter().position(|(field, _)| *field == name).map(Projection::Field).ok_or(())
+        }
+        (Value::Matrix(matrix), syn::Member::Named(name)) => {
+            let name = name.to_string();
+            if matrix.rows == 1 || matrix.columns == 1 {
+                let index =
+                    ["x", "y", "z", "w", "a", "b"].iter().position(|field| *field == name).ok_or(())?;
+                return Ok(if matrix.columns == 1 {
+                    Projection::Element(index, 0)
+                } else {
+                    Projection::Element(0, index)
+                });
+            }
+            let digits: Vec<usize> = match name.strip_prefix('m') {
+                Some(digits) => digits.chars().filter_map(|c| c.to_digit(10)).map(|d| d as usize).collect(),
+                None => return Err(()),
+            };
+            match digits.as_slice() {
+                &[row, column] if row > 0 && column > 0 => Ok(Projection::Element(row - 1, column - 1)),
+                _ => Err(()),
+            }
+        }
+        _ => Err(()),
+    }
+}

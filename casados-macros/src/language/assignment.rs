@@ -1,0 +1,131 @@
+//! Assignments: `=` also to several places at once, `+=` and its kind.
+
+use super::arithmetic::Operator;
+use super::evaluator::{Evaluated, Evaluator, error};
+use super::methods::Receiver;
+use super::types::Type;
+use super::value::Value;
+use quote::ToTokens;
+use syn::Expr;
+
+impl Evaluator {
+    pub(super) fn assignment(&mut self, assign: &syn::ExprAssign) -> Evaluated {
+        match &*assign.left {
+            Expr::Infer(_) => {
+                self.expression(&assign.right, &Type::Unknown)?;
+            }
+            Expr::Tuple(_) | Expr::Array(_) | Expr::Struct(_) | Expr::Call(_) => {
+                let value = self.expression(&assign.right, &Type::Unknown)?;
+                self.assign_parts(&assign.left, value)?;
+            }
+            left => {
+                let Receiver::Place(place) = self.place(left, true)? else {
+                    return Err(error(left, "this cannot be assigned to").into());
+                };
+                let old = self.read(&place, left)?;
+                let expected = self.type_of(&old);
+                let value = self.expression(&assign.right, &expected)?;
+                let value = self.coerce(value, &expected, &assign.right)?;
+                self.write(&place, value, assign)?;
+            }
+        }
+        Ok(Value::unit())
+    }
+
+    /// Destructuring assignment.
+    fn assign_parts(&mut self, left: &Expr, value: Value) -> Evaluated<()> {
+        self.deeper(left, |evaluator| evaluator.assign_parts_within(left, value))
+    }
+
+    fn assign_parts_within(&mut self, left: &Expr, value: Value) -> Evaluated<()> {
+        let parts: Vec<&Expr> = match left {
+            Expr::Infer(_) => return Ok(()),
+            Expr::Paren(inner) => return self.assign_parts(&inner.expr, value),
+            Expr::Tuple(tuple) => tuple.elems.iter().collect(),
+            Expr::Array(array) => array.elems.iter().collect(),
+            Expr::Call(call) => call.args.iter().collect(),
+            Expr::Struct(literal) => {
+                let Value::Struct(structure) = &value else {
+                    return Err(error(left, format!("expected a struct, found {}", value.kind())).into());
+                };
+                let names: Vec<String> = structure.definition.variants[structure.variant]
+                    .fields
+                    .iter()
+                    .map(|f| f.0.clone())
+                    .collect();
+                for field in &literal.fields {
+                    let member = field.member.to_token_stream().to_string();
+                    match names.iter().position(|name| *name == member) {
+                        Some(index) => self.assign_parts(&field.expr, structure.fields[index].clone())?,
+                        None => return Err(error(field, format!("there is no field `{member}`")).into()),
+                    }
+                }
+                return Ok(());
+            }
+            left => {
+                let Receiver::Place(place) = self.place(left, true)? else {
+                    return Err(error(left, "this cannot be assigned to").into());
+                };
+                return Ok(self.write(&place, value, left)?);
+            }
+        };
+        let value = self.load(value, left)?;
+        let values: Vec<Value> = match &value {
+            Value::Tuple(values) | Value::Array(values) => values.to_vec(),
+            Value::Struct(structure) => structure.fields.clone(),
+            other => return Err(error(left, format!("{} has no such parts", other.kind())).into()),
+        };
+        let is_rest =
+            |part: &&Expr| matches!(part, Expr::Range(range) if range.start.is_none() && range.end.is_none());
+        let rest = parts.iter().position(is_rest);
+        let count = parts.len() - usize::from(rest.is_some());
+        if count > values.len() || rest.is_none() && count != values.len() {
+            let length = values.len();
+            return Err(
+                error(left, format!("there are {count} parts on the left, but {length} values")).into()
+            );
+        }
+        for (index, part) in parts.iter().enumerate() {
+            let position = match rest {
+                Some(rest) if index == rest => continue,
+                Some(rest) if index > rest => values.len() - (parts.len() - index),
+                _ => index,
+            };
+            self.assign_parts(part, values[position].clone())?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn compound_assignment(&mut self, operator: Operator, binary: &syn::ExprBinary) -> Evaluated {
+        let place = match self.place(&binary.left, true)? {
+            Receiver::Place(place) => self.follow(place, binary)?,
+            Receiver::Value(Value::Reference(place)) => place,
+            Receiver::Value(_) => {
+                return Err(error(&binary.left, "this cannot be assigned to").into());
+            }
+        };
+        let before = self.read(&place, binary)?;
+        let shift = matches!(operator, Operator::Shl | Operator::Shr);
+        let hint = if shift { Type::Unknown } else { self.type_of(&before).scalar() };
+        let right = self.expression(&binary.right, &hint)?;
+        let (of, method) = operator.method();
+        let name = format!("{method}_assign");
+        if matches!(before, Value::Struct(_))
+            && self
+                .user_method(
+                    &format!("{of}Assign"),
+                    &name,
+                    &Value::Reference(place.clone()),
+                    vec![right.clone()],
+                    binary,
+                )?
+                .is_some()
+        {
+            return Ok(Value::unit());
+        }
+        let before = self.read(&place, binary)?;
+        let value = self.binary(operator, &before, &right, binary)?;
+        self.write(&place, value, binary)?;
+        Ok(Value::unit())
+    }
+}

@@ -1,0 +1,190 @@
+//! Methods of iterators: those that adapt them, search them, or change them in place.
+
+use super::iterator::{Iter, holds, into_iter, known_option};
+use super::{Call, Receiver, option};
+use crate::language::evaluator::{Evaluator, error};
+use crate::language::place::Place;
+use crate::language::value::Value;
+use syn::Result;
+
+/// A method of an iterator or a range. `None` if there is no such method.
+pub fn method(
+    evaluator: &mut Evaluator,
+    receiver: &Receiver,
+    value: &Value,
+    call: &Call,
+) -> Result<Option<Value>> {
+    if let Value::Range(range) = value {
+        match call.name {
+            "contains" => {
+                let item = evaluator.integer(call.only()?, call.at)?.value;
+                let above = match &range.start {
+                    Some(start) => evaluator.integer(start, call.at)?.value <= item,
+                    None => true,
+                };
+                let below = match &range.end {
+                    Some(end) => {
+                        item < evaluator
+                            .integer(end, call.at)?
+                            .value
+                            .saturating_add(i128::from(range.inclusive))
+                    }
+                    None => true,
+                };
+                return Ok(Some(Value::Bool(above && below)));
+            }
+            "clone" => return Ok(None),
+            _ => {}
+        }
+    }
+    if matches!(call.name, "clone" | "to_owned") {
+        return Ok(None);
+    }
+    let iter = into_iter(evaluator, value.clone(), call.at)?;
+    if let Some(value) = in_place(evaluator, receiver, iter.clone(), call)? {
+        return Ok(Some(value));
+    }
+    if let Some(adapted) = adapt(evaluator, iter.clone(), call)? {
+        return Ok(Some(Value::iterator(adapted)));
+    }
+    super::consume::consume(evaluator, iter, call)
+}
+
+/// Methods that take `&mut self`.
+fn in_place(
+    evaluator: &mut Evaluator,
+    receiver: &Receiver,
+    mut iter: Iter,
+    call: &Call,
+) -> Result<Option<Value>> {
+    let at = call.at;
+    let value = match call.name {
+        "next" => Value::Option(iter.next(evaluator, at)?.map(Box::new)),
+        "next_back" => Value::Option(iter.next_back(evaluator, at)?.map(Box::new)),
+        "nth" | "nth_back" => {
+            let n = evaluator.usize(call.only()?, at)?;
+            let back = call.name == "nth_back";
+            let mut step = || if back { iter.next_back(evaluator, at) } else { iter.next(evaluator, at) };
+            let mut value = step()?;
+            for _ in 0..n {
+                if value.is_none() {
+                    break;
+                }
+                value = step()?;
+            }
+            Value::Option(value.map(Box::new))
+        }
+        "peek" => match &mut iter {
+            Iter::Peekable(inner, peeked) => {
+                let next = match peeked.take() {
+                    Some(next) => next,
+                    None => inner.next(evaluator, at)?.map(Box::new),
+                };
+                *peeked = Some(next.clone());
+                Value::Option(next)
+            }
+            _ => return Ok(None),
+        },
+        "by_ref" => {
+            return Ok(Some(match receiver {
+                Receiver::Place(place) => Value::Reference(place.clone()),
+                Receiver::Value(value) => value.clone(),
+            }));
+        }
+        "find" | "position" | "any" | "all" | "find_map" => search(evaluator, &mut iter, call)?,
+        _ => return Ok(None),
+    };
+    option::update(evaluator, receiver, Value::iterator(iter), call)?;
+    Ok(Some(value))
+}
+
+/// Methods that stop early.
+fn search(evaluator: &mut Evaluator, iter: &mut Iter, call: &Call) -> Result<Value> {
+    let (closure, at) = (call.only()?, call.at);
+    match call.name {
+        "any" | "all" => {
+            // Conditions at run time are collected: all elements are looked at then.
+            let any = call.name == "any";
+            let mut result = Value::Bool(!any);
+            while let Some(value) = iter.next(evaluator, at)? {
+                let holds = evaluator.call(closure, vec![value], at)?;
+                result = if any {
+                    evaluator.or(&result, &holds, at)?
+                } else {
+                    evaluator.and(&result, &holds, at)?
+                };
+                if matches!(result, Value::Bool(known) if known == any) {
+                    break;
+                }
+            }
+            Ok(result)
+        }
+        "find_map" => {
+            while let Some(value) = iter.next(evaluator, at)? {
+                let value = evaluator.call(closure, vec![value], at)?;
+                if let Some(value) = known_option(value, at)? {
+                    return Ok(Value::some(value));
+                }
+            }
+            Ok(Value::Option(None))
+        }
+        _ => {
+            let mut index = 0;
+            while let Some(value) = iter.next(evaluator, at)? {
+                if holds(evaluator, closure, value.clone(), call.name, at)? {
+                    return Ok(Value::some(if call.name == "find" { value } else { Value::usize(index) }));
+                }
+                index += 1;
+            }
+            Ok(Value::Option(None))
+        }
+    }
+}
+
+/// Adaptors.
+fn adapt(evaluator: &mut Evaluator, iter: Iter, call: &Call) -> Result<Option<Iter>> {
+    let at = call.at;
+    let inner = Box::new(iter);
+    Ok(Some(match call.name {
+        "iter" | "into_iter" | "copied" | "cloned" | "fuse" => {
+            call.expect(0)?;
+            *inner
+        }
+        "zip" => Iter::Zip(inner, Box::new(into_iter(evaluator, call.only()?.clone(), at)?)),
+        "chain" => Iter::Chain(Some(inner), Box::new(into_iter(evaluator, call.only()?.clone(), at)?)),
+        "enumerate" => Iter::Enumerate(inner, 0),
+        "map" => Iter::Map(inner, call.only()?.clone()),
+        "filter" => Iter::Filter(inner, call.only()?.clone()),
+        "filter_map" => Iter::FilterMap(inner, call.only()?.clone()),
+        "flat_map" => {
+            let mapped = Box::new(Iter::Map(inner, call.only()?.clone()));
+            Iter::Flatten { inner: mapped, front: None, back: None }
+        }
+        "flatten" => Iter::Flatten { inner, front: None, back: None },
+        "take_while" => Iter::TakeWhile(Some(inner), call.only()?.clone()),
+        "skip_while" => Iter::SkipWhile(inner, Some(call.only()?.clone())),
+        "map_while" => Iter::MapWhile(Some(inner), call.only()?.clone()),
+        "scan" => {
+            call.expect(2)?;
+            Iter::Scan {
+                inner,
+                state: Place::new(call.arguments[0].clone()),
+                closure: call.arguments[1].clone(),
+            }
+        }
+        "rev" => Iter::Rev(inner),
+        "take" => Iter::Take(inner, evaluator.usize(call.only()?, at)?),
+        "skip" => Iter::Skip(inner, evaluator.usize(call.only()?, at)?),
+        "step_by" => {
+            let step = evaluator.usize(call.only()?, at)?;
+            if step == 0 {
+                return Err(error(at, "`step_by` needs a step of at least one"));
+            }
+            Iter::StepBy { inner, step, begun: false }
+        }
+        "cycle" => Iter::Cycle { original: inner.clone(), now: inner },
+        "peekable" => Iter::Peekable(inner, None),
+        "inspect" => Iter::Inspect(inner, call.only()?.clone()),
+        _ => return Ok(None),
+    }))
+}

@@ -1,0 +1,117 @@
+//! Methods and operators that the user implemented.
+
+use super::arithmetic::Operator;
+use super::call::Arguments;
+use super::environment::{Names, Scope};
+use super::evaluator::{At, Evaluator};
+use super::methods::Receiver;
+use super::place::Place;
+use super::types::Type;
+use super::value::{Function, Generic, Value};
+use syn::Result;
+
+impl Evaluator {
+    /// The user's method of a name for a receiver, and the receiver as its first argument.
+    pub(super) fn user_function(
+        &mut self,
+        receiver: &Receiver,
+        name: &str,
+        turbofish: &[Generic],
+        at: At,
+    ) -> Result<Option<(Function, Value)>> {
+        if self.implementations.is_empty() {
+            return Ok(None);
+        }
+        let symbol = self.symbol_of(name);
+        if !self.implementations.iter().any(|implementation| implementation.functions.contains_key(&symbol)) {
+            return Ok(None);
+        }
+        let value = receiver.value(self, at)?;
+        let ty = self.type_of(&value);
+        if matches!(ty, Type::Unknown) {
+            return Ok(None);
+        }
+        let Some((implementation, item)) = self.find_function(symbol, &ty) else { return Ok(None) };
+        let Some(syn::FnArg::Receiver(own)) = item.sig.inputs.first() else { return Ok(None) };
+        let mutable = matches!(&own.kind, syn::ReceiverKind::Reference(_, _, Some(_)));
+        let first = match (mutable, receiver) {
+            (true, Receiver::Place(place)) => Value::Reference(place.clone()),
+            (true, Receiver::Value(value)) => Value::Reference(Place::new(value.clone())),
+            (false, _) => value,
+        };
+        let scope = implementation.scope.clone();
+        let function =
+            Function { item, scope, turbofish: turbofish.to_vec(), owner: Some((implementation, ty)) };
+        Ok(Some((function, first)))
+    }
+
+    /// The user's implementation of an operator.
+    pub(super) fn user_operator(
+        &mut self,
+        operator: Operator,
+        a: &Value,
+        b: &Value,
+        at: At,
+    ) -> Result<Option<Value>> {
+        let (of, method) = operator.method();
+        self.user_method(of, method, a, vec![b.clone()], at)
+    }
+
+    /// A method of a trait (or an inherent one of the same name) that the user implemented for `a`; of
+    /// several implementations the one whose generic argument fits the first of the other arguments.
+    pub(super) fn user_method(
+        &mut self,
+        of: &str,
+        method: &str,
+        a: &Value,
+        arguments: Vec<Value>,
+        at: At,
+    ) -> Result<Option<Value>> {
+        if self.implementations.is_empty() {
+            return Ok(None);
+        }
+        let symbol = self.symbol_of(method);
+        let own = self.type_of(a);
+        let other = arguments.first().map(|value| self.type_of(value)).unwrap_or_default();
+        for implementation in self.implementations.clone().iter().rev() {
+            let Some(item) = implementation.functions.get(&symbol) else { continue };
+            let Some(last) = implementation.of.as_ref().and_then(|path| path.segments.last()) else {
+                continue;
+            };
+            if last.ident != of && !(of == "Index" && last.ident == "IndexMut") {
+                continue;
+            }
+            let Some(scope) = self.fitting(implementation, &own) else { continue };
+            let scope = Scope::inside(&scope, Names::SelfType(own.clone(), implementation.self_type.clone()));
+            let right = match &last.arguments {
+                syn::PathArguments::AngleBracketed(written) => {
+                    written.args.iter().find_map(|argument| match argument {
+                        syn::GenericArgument::Type(ty) => Some(ty.clone()),
+                        _ => None,
+                    })
+                }
+                _ => None,
+            };
+            let right = right.or_else(|| implementation.self_type.clone());
+            if let Some(right) = right
+                && !arguments.is_empty()
+                && !self.unify(&right, &other, &scope)
+            {
+                continue;
+            }
+            let function = Function {
+                item: item.clone(),
+                scope: implementation.scope.clone(),
+                turbofish: Vec::new(),
+                owner: Some((implementation.clone(), own)),
+            };
+            let mut values = vec![a.clone()];
+            values.extend(arguments);
+            let result = self.deeper(at, |evaluator| {
+                evaluator.call_function(&function, Arguments::Values(values), &Type::Unknown, at)
+            });
+            return self.finished(result, at).map(Some);
+        }
+        Ok(None)
+    }
+}
