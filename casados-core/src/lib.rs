@@ -7,7 +7,7 @@
 //! A model is a type that implements [`Dae`]; the attributes of `casados-macros` write that
 //! implementation from a Rust function.
 #![no_std]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
 #[cfg(feature = "alloc")]
 extern crate alloc;

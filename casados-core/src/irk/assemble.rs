@@ -7,6 +7,15 @@ use crate::scalar::Real;
 use crate::shape::assign;
 use crate::statistics::Statistics;
 
+/// What factors are for.
+#[derive(Clone, Copy)]
+pub(crate) enum Purpose {
+    /// An iteration, whose convergence shows whether they were good enough.
+    Iteration,
+    /// Derivatives, which nothing checks afterwards.
+    Sensitivities,
+}
+
 impl<M: Dae, T: Real, const S: usize> Linearization<M, T, S> {
     /// Factors of the Newton matrix of the Jacobian that is stored.
     ///
@@ -18,10 +27,14 @@ impl<M: Dae, T: Real, const S: usize> Linearization<M, T, S> {
         h: T,
         step: usize,
         iteration: usize,
+        purpose: Purpose,
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
         let Self { jacobian, factors } = self;
-        let planned = factors.factor(jacobian, &coefficients.a, h);
+        let planned = match purpose {
+            Purpose::Iteration => factors.factor(jacobian, &coefficients.a, h),
+            Purpose::Sensitivities => factors.factor_checked(jacobian, &coefficients.a, h),
+        };
         let planned = planned.map_err(|(unknown, stage)| Error::Singular {
             unknown: unknown_name::<M>(unknown),
             at: Place { step, stage, iteration },

@@ -15,7 +15,7 @@
 //! Where rounding errors of the model are larger than expected, residual and increments stop shrinking. Then
 //! it has converged too if either is small: more cannot be known.
 
-use super::assemble::unknown_name;
+use super::assemble::{Purpose, unknown_name};
 use super::record::{Coefficients, Work};
 use crate::error::{Error, Place};
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -82,7 +82,8 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 }
             }
             if current {
-                self.linear.factor(coefficients, self.inputs.time.step, step, iteration, statistics)?;
+                let h = self.inputs.time.step;
+                self.linear.factor(coefficients, h, step, iteration, Purpose::Iteration, statistics)?;
             }
             self.linear.factors.solve(&mut self.residual);
             let increment = self.update(y);

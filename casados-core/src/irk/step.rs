@@ -1,5 +1,6 @@
 //! The steps of an interval, one after the other.
 
+use super::assemble::Purpose;
 use super::evaluate::{dot, not_finite};
 use super::record::{Coefficients, Step, Work};
 use crate::error::Error;
@@ -35,21 +36,16 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         let count = steps.len();
         for (n, step) in steps.iter_mut().enumerate() {
             step.x = self.x;
-            match from {
-                From::Zero => step.y.as_mut().fill([T::ZERO; S]),
-                From::Given => {
-                    for (y, given) in step.y.as_mut().iter_mut().zip(self.given.as_ref()) {
-                        *y = [*given; S];
-                    }
-                }
-                From::Record(record) => {
-                    if let Some(record) = record.get(n) {
-                        step.y = record.y;
-                    }
-                }
+            self.start(from, n, &mut step.y);
+            let mut solved = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics);
+            if solved.as_ref().is_err_and(lost_digits) && self.linear.factors.is_planned() {
+                // The planned elimination may be to blame: once more, with the whole matrix pivoted.
+                self.linear.factors.set_pivoted(true);
+                self.start(from, n, &mut step.y);
+                solved = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics);
+                self.linear.factors.set_pivoted(false);
             }
-            self.relative = (T::ZERO, 0, 0);
-            let current = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics)?;
+            let current = solved?;
             let h = self.inputs.time.step;
             for (x, k) in self.x.as_mut().iter_mut().zip(step.y.as_ref()) {
                 *x = *x + h * dot(&coefficients.b, k);
@@ -74,6 +70,24 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         Ok(())
     }
 
+    /// Start values of the stages of a step.
+    fn start(&mut self, from: &From<'_, M, T, S>, n: usize, y: &mut ArrayK<M, [T; S]>) {
+        match from {
+            From::Zero => y.as_mut().fill([T::ZERO; S]),
+            From::Given => {
+                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
+                    *y = [*given; S];
+                }
+            }
+            From::Record(record) => {
+                if let Some(record) = record.get(n) {
+                    *y = record.y;
+                }
+            }
+        }
+        self.relative = (T::ZERO, 0, 0);
+    }
+
     /// The linearisation at the solution of a step: evaluated if it is not there, and factorised.
     ///
     /// # Errors
@@ -92,7 +106,16 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             self.evaluate_jacobian(n, 0)?;
             self.relative = self.relative_residual();
         }
-        self.linear.factor(coefficients, self.inputs.time.step, n, 0, statistics)
+        self.linear.factor(coefficients, self.inputs.time.step, n, 0, Purpose::Sensitivities, statistics)
+    }
+}
+
+/// Whether an iteration may have failed because its linear systems were solved badly.
+fn lost_digits(error: &Error) -> bool {
+    match error {
+        Error::NotConverged { .. } | Error::Overflow { .. } => true,
+        Error::NonFiniteModel { at, .. } => at.iteration > 0,
+        _ => false,
     }
 }
 

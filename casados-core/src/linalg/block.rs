@@ -2,6 +2,7 @@
 //!
 //! Generic over the scalar, so that the same code serves one number and registers of them.
 
+use super::fused::Arithmetic;
 use crate::scalar::Scalar;
 
 /// An s×s matrix, row by row.
@@ -9,7 +10,7 @@ pub type Block<E, const S: usize> = [[E; S]; S];
 
 /// `t − a b`
 #[inline(always)]
-pub fn subtract_product<E: Scalar, const S: usize>(
+pub fn subtract_product<A: Arithmetic, E: Scalar, const S: usize>(
     t: &Block<E, S>,
     a: &Block<E, S>,
     b: &Block<E, S>,
@@ -18,7 +19,7 @@ pub fn subtract_product<E: Scalar, const S: usize>(
     for i in 0..S {
         for k in 0..S {
             for j in 0..S {
-                t[i][j] = t[i][j] - a[i][k] * b[k][j];
+                t[i][j] = A::subtract(t[i][j], a[i][k], b[k][j]);
             }
         }
     }
@@ -27,12 +28,12 @@ pub fn subtract_product<E: Scalar, const S: usize>(
 
 /// `a b`
 #[inline(always)]
-pub fn product<E: Scalar, const S: usize>(a: &Block<E, S>, b: &Block<E, S>) -> Block<E, S> {
+pub fn product<A: Arithmetic, E: Scalar, const S: usize>(a: &Block<E, S>, b: &Block<E, S>) -> Block<E, S> {
     let mut t = [[E::from_f64(0.0); S]; S];
     for i in 0..S {
         for k in 0..S {
             for j in 0..S {
-                t[i][j] = t[i][j] + a[i][k] * b[k][j];
+                t[i][j] = A::subtract(t[i][j], -a[i][k], b[k][j]);
             }
         }
     }
@@ -42,7 +43,7 @@ pub fn product<E: Scalar, const S: usize>(a: &Block<E, S>, b: &Block<E, S>) -> B
 /// The inverse by Gauss-Jordan elimination with partial pivoting, without a branch on the values:
 /// rows are exchanged lane by lane. A singular block gives entries that are not finite.
 #[inline(always)]
-pub fn inverse<E: Scalar, const S: usize>(a: &Block<E, S>) -> Block<E, S> {
+pub fn inverse<A: Arithmetic, E: Scalar, const S: usize>(a: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
     let mut a = *a;
     let mut inverse = [[zero; S]; S];
@@ -70,8 +71,8 @@ pub fn inverse<E: Scalar, const S: usize>(a: &Block<E, S>) -> Block<E, S> {
             if i != k {
                 let factor = a[i][k];
                 for j in 0..S {
-                    a[i][j] = a[i][j] - factor * a[k][j];
-                    inverse[i][j] = inverse[i][j] - factor * inverse[k][j];
+                    a[i][j] = A::subtract(a[i][j], factor, a[k][j]);
+                    inverse[i][j] = A::subtract(inverse[i][j], factor, inverse[k][j]);
                 }
             }
         }

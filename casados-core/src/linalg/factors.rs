@@ -8,8 +8,8 @@ use crate::scalar::Real;
 use crate::shape::{Array, Plain, assign};
 use bytemuck::Zeroable;
 
-/// Multipliers of a planned elimination that are larger than this have lost too many digits.
-const GROWTH: f64 = 1e6;
+/// Planned factors are good enough if a solution satisfies its equations to this many ε of their terms.
+const ROUNDING: f64 = 4096.0;
 
 /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it is.
 #[inline(always)]
@@ -29,6 +29,8 @@ pub struct Factors<M: Dae, T: Plain, const S: usize> {
     dense: Dense<M, T, S>,
     /// Whether the dense factors are the ones that hold.
     is_dense: bool,
+    /// Whether the plan is not to be used.
+    pivoted: bool,
 }
 
 impl<M: Dae, T: Plain, const S: usize> Clone for Factors<M, T, S> {
@@ -39,7 +41,17 @@ impl<M: Dae, T: Plain, const S: usize> Clone for Factors<M, T, S> {
 impl<M: Dae, T: Plain, const S: usize> Copy for Factors<M, T, S> {}
 
 impl<M: Dae, T: Real, const S: usize> Factors<M, T, S> {
-    /// Factors of the matrix of these Jacobians, one per stage. Whether the plan was good enough.
+    /// Whether the plan is in use, so that pivoting the whole matrix may give better factors.
+    pub fn is_planned(&self) -> bool {
+        !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
+    }
+
+    /// From now on, whether every matrix is to be pivoted as a whole.
+    pub fn set_pivoted(&mut self, pivoted: bool) {
+        self.pivoted = pivoted;
+    }
+
+    /// Factors of the matrix of these Jacobians, one per stage. Whether those of the plan hold, if there is one.
     ///
     /// # Errors
     /// The unknown and the stage for which there is no pivot.
@@ -49,12 +61,54 @@ impl<M: Dae, T: Real, const S: usize> Factors<M, T, S> {
         a: &[[T; S]; S],
         h: T,
     ) -> Result<bool, (usize, usize)> {
-        let plan = &M::STRUCTURE.elimination;
-        self.is_dense = plan.pivots.is_empty() || !self.factor_by_plan(jacobian, a, h);
+        self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, a, h));
         if self.is_dense {
             self.factor_dense(jacobian, a, h)?;
         }
-        Ok(!self.is_dense || plan.pivots.is_empty())
+        Ok(!self.is_dense || M::STRUCTURE.elimination.pivots.is_empty())
+    }
+
+    /// As [`Factors::factor`], and the factors of the plan are tried on one solution before they are trusted.
+    ///
+    /// # Errors
+    /// The unknown and the stage for which there is no pivot.
+    pub fn factor_checked(
+        &mut self,
+        jacobian: &[M::Jacobian<T>; S],
+        a: &[[T; S]; S],
+        h: T,
+    ) -> Result<bool, (usize, usize)> {
+        let planned = self.factor(jacobian, a, h)?;
+        if self.is_dense || self.is_accurate(jacobian, a, h) {
+            return Ok(planned);
+        }
+        self.factor_dense(jacobian, a, h)?;
+        Ok(false)
+    }
+
+    /// Whether a solution of `J y = J v` satisfies these equations, each relative to the size of its terms:
+    /// however equations and unknowns are scaled, an elimination that lost digits shows here.
+    fn is_accurate(&self, jacobian: &[M::Jacobian<T>; S], a: &[[T; S]; S], h: T) -> bool {
+        let mut y: ArrayK<M, [[T; 1]; S]> = Zeroable::zeroed();
+        for (unknown, y) in y.as_mut().iter_mut().enumerate() {
+            for (stage, y) in y.iter_mut().enumerate() {
+                // Neither equal nor alternating, so that no structure hides an error.
+                *y = [T::from_f64(1.0 + 0.25 * ((3 * unknown + 5 * stage) % 7) as f64)];
+            }
+        }
+        let mut expected: ArrayK<M, [T; S]> = Zeroable::zeroed();
+        let mut found: ArrayK<M, [T; S]> = Zeroable::zeroed();
+        let mut size: ArrayK<M, [T; S]> = Zeroable::zeroed();
+        multiply::<M, T, S>(jacobian, a, h, &y, &mut expected, &mut size);
+        for (y, expected) in y.as_mut().iter_mut().zip(expected.as_ref()) {
+            *y = expected.map(|value| [value]);
+        }
+        self.solve(&mut y);
+        size.as_mut().fill([T::ZERO; S]);
+        multiply::<M, T, S>(jacobian, a, h, &y, &mut found, &mut size);
+        let bound = T::EPSILON * T::from_f64(ROUNDING);
+        let rows = expected.as_ref().iter().zip(found.as_ref()).zip(size.as_ref());
+        rows.flat_map(|((e, f), s)| e.iter().zip(f).zip(s)).all(|((e, f), s)| (*e - *f).abs() <= bound * *s)
     }
 
     /// By the plan; whether that went well.
@@ -77,9 +131,10 @@ impl<M: Dae, T: Real, const S: usize> Factors<M, T, S> {
                 }
             }
         }
-        let growth = sparse::factor(plan, blocks);
-        // A pivot that vanishes makes growth infinite or NaN.
-        growth <= T::from_f64(GROWTH)
+        sparse::factor(plan, blocks);
+        // A pivot that vanishes leaves infinite elements or NaN.
+        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
+        pivots.flatten().flatten().fold(true, |finite, element| finite & element.is_finite())
     }
 
     /// By pivoting the whole matrix, with the row of each equation in its slot.
@@ -131,11 +186,41 @@ impl<M: Dae, T: Real, const S: usize> Factors<M, T, S> {
 
     /// Copies what holds.
     pub fn copy_from(&mut self, other: &Self) {
+        self.pivoted = other.pivoted;
         self.is_dense = other.is_dense;
         if other.is_dense {
             assign(&mut self.dense, &other.dense);
         } else {
             assign(&mut self.blocks, &other.blocks);
+        }
+    }
+}
+
+/// `J y` in the slots of the equations, and the sum of the sizes of its terms.
+fn multiply<M: Dae, T: Real, const S: usize>(
+    jacobian: &[M::Jacobian<T>; S],
+    a: &[[T; S]; S],
+    h: T,
+    y: &ArrayK<M, [[T; 1]; S]>,
+    product: &mut ArrayK<M, [T; S]>,
+    size: &mut ArrayK<M, [T; S]>,
+) {
+    let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+    for e in 0..blocks[3] {
+        let (r, c) = pattern.at(e);
+        let (r, y) = (slot::<M>(r), &y[if e < blocks[1] { c } else { c - nx }]);
+        for (stage, jacobian) in jacobian.iter().enumerate() {
+            let [own] = y[stage];
+            let (mut sum, mut sizes) = (own, own.abs());
+            if e >= blocks[1] && e < blocks[2] {
+                (sum, sizes) = (T::ZERO, T::ZERO);
+                for (a, [y]) in a[stage].iter().zip(y) {
+                    let term = h * *a * *y;
+                    (sum, sizes) = (sum + term, sizes + term.abs());
+                }
+            }
+            product[r][stage] = product[r][stage] + jacobian[e] * sum;
+            size[r][stage] = size[r][stage] + jacobian[e].abs() * sizes;
         }
     }
 }

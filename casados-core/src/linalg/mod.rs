@@ -10,6 +10,7 @@
 mod block;
 mod dense;
 mod factors;
+mod fused;
 mod kernels;
 mod sparse;
 

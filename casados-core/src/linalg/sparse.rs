@@ -14,6 +14,7 @@
 //! never-taken exit costs nothing beside a block and leaves no panic in the program.
 
 use super::block::{Block, inverse, product, subtract_product};
+use super::fused::{Arithmetic, Kernel, dispatch};
 use crate::model::Elimination;
 use crate::scalar::Scalar;
 use crate::shape::{Array, Plain};
@@ -23,82 +24,113 @@ macro_rules! packets {
     ($columns:expr, $function:ident($plan:ident, $blocks:ident, $rows:ident)) => {{
         let mut column = 0;
         while column + 8 <= $columns {
-            $function::<E, R, S, 8>($plan, $blocks, $rows, column);
+            $function::<A, E, R, S, 8>($plan, $blocks, $rows, column);
             column += 8;
         }
         if column + 4 <= $columns {
-            $function::<E, R, S, 4>($plan, $blocks, $rows, column);
+            $function::<A, E, R, S, 4>($plan, $blocks, $rows, column);
             column += 4;
         }
         if column + 2 <= $columns {
-            $function::<E, R, S, 2>($plan, $blocks, $rows, column);
+            $function::<A, E, R, S, 2>($plan, $blocks, $rows, column);
             column += 2;
         }
         if column < $columns {
-            $function::<E, R, S, 1>($plan, $blocks, $rows, column);
+            $function::<A, E, R, S, 1>($plan, $blocks, $rows, column);
         }
     }};
 }
 
-/// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`.
-///
-/// The largest `|L|` is returned: growth that tells how far the static order can be trusted.
-#[inline(always)]
-pub fn factor<E: Scalar, const S: usize>(plan: &Elimination, blocks: &mut [Block<E, S>]) -> E {
-    let mut growth = E::from_f64(0.0);
-    let mut updates = plan.updates.iter();
-    for pivot in plan.pivots {
-        if !pivot.identity {
-            let Some(block) = blocks.get_mut(pivot.block as usize) else { continue };
-            let inverse = inverse(block);
-            *block = inverse;
-            for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
-                *block = product(block, &inverse);
+/// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`. A pivot block
+/// that is singular leaves elements that are not finite.
+pub fn factor<E: Scalar, const S: usize>(plan: &Elimination, blocks: &mut [Block<E, S>]) {
+    dispatch(Factor { plan, blocks });
+}
+
+struct Factor<'a, E, const S: usize> {
+    plan: &'a Elimination,
+    blocks: &'a mut [Block<E, S>],
+}
+
+impl<E: Scalar, const S: usize> Kernel for Factor<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { plan, blocks } = self;
+        let mut updates = plan.updates.iter();
+        for pivot in plan.pivots {
+            if !pivot.identity {
+                let Some(block) = blocks.get_mut(pivot.block as usize) else { continue };
+                let inverse = inverse::<A, E, S>(block);
+                *block = inverse;
+                for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
+                    *block = product::<A, E, S>(block, &inverse);
+                }
             }
-        }
-        for lower in pivot.lower() {
-            let Some(&lower) = blocks.get(lower) else { continue };
-            for value in lower.iter().flatten() {
-                let value = value.abs();
-                growth = E::select(growth.lt(value), value, growth);
-            }
-            for (upper, &target) in pivot.upper().zip(&mut updates) {
-                let Some(&upper) = blocks.get(upper) else { continue };
-                let Some(target) = blocks.get_mut(target as usize) else { continue };
-                *target = subtract_product(target, &lower, &upper);
+            for lower in pivot.lower() {
+                let Some(&lower) = blocks.get(lower) else { continue };
+                for (upper, &target) in pivot.upper().zip(&mut updates) {
+                    let Some(&upper) = blocks.get(upper) else { continue };
+                    let Some(target) = blocks.get_mut(target as usize) else { continue };
+                    *target = subtract_product::<A, E, S>(target, &lower, &upper);
+                }
             }
         }
     }
-    growth
 }
 
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all columns.
 ///
 /// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
 /// rows stays in the nearest cache.
-#[inline(always)]
 pub fn solve<E: Scalar + Plain, R: Array<E>, const S: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
 ) {
-    packets!(R::LEN, solve_packet(plan, blocks, rows));
+    dispatch(Solve { plan, blocks, rows });
+}
+
+struct Solve<'a, E, R, const S: usize> {
+    plan: &'a Elimination,
+    blocks: &'a [Block<E, S>],
+    rows: &'a mut [[R; S]],
+}
+
+impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { plan, blocks, rows } = self;
+        packets!(R::LEN, solve_packet(plan, blocks, rows));
+    }
 }
 
 /// Solves `Mᵀ X = R` in place.
-#[inline(always)]
 pub fn solve_transposed<E: Scalar + Plain, R: Array<E>, const S: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
 ) {
-    packets!(R::LEN, solve_packet_transposed(plan, blocks, rows));
+    dispatch(SolveTransposed(Solve { plan, blocks, rows }));
+}
+
+struct SolveTransposed<'a, E, R, const S: usize>(Solve<'a, E, R, S>);
+
+impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, E, R, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Solve { plan, blocks, rows } = self.0;
+        packets!(R::LEN, solve_packet_transposed(plan, blocks, rows));
+    }
 }
 
 /// `s` stages of a slot, `W` columns each.
 type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
 
-fn solve_packet<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+#[inline(always)]
+fn solve_packet<A: Arithmetic, E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
@@ -108,23 +140,24 @@ fn solve_packet<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
         let packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         for (block, other) in beside(plan, blocks, pivot.lower()) {
             let mut target = load(rows, other, column);
-            subtract(&mut target, block, &packet);
+            subtract::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, column, &target);
         }
     }
     for pivot in plan.pivots.iter().rev() {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         for (block, other) in beside(plan, blocks, pivot.upper()) {
-            subtract(&mut packet, block, &load(rows, other, column));
+            subtract::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
         }
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
-            packet = multiply(inverse, &packet);
+            packet = multiply::<A, E, S, W>(inverse, &packet);
         }
         store(rows, pivot.slot as usize, column, &packet);
     }
 }
 
-fn solve_packet_transposed<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+#[inline(always)]
+fn solve_packet_transposed<A: Arithmetic, E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
@@ -133,19 +166,19 @@ fn solve_packet_transposed<E: Scalar + Plain, R: Array<E>, const S: usize, const
     for pivot in plan.pivots {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
-            packet = multiply(&transposed(inverse), &packet);
+            packet = multiply::<A, E, S, W>(&transposed(inverse), &packet);
             store(rows, pivot.slot as usize, column, &packet);
         }
         for (block, other) in beside(plan, blocks, pivot.upper()) {
             let mut target = load(rows, other, column);
-            subtract(&mut target, &transposed(block), &packet);
+            subtract::<A, E, S, W>(&mut target, &transposed(block), &packet);
             store(rows, other, column, &target);
         }
     }
     for pivot in plan.pivots.iter().rev() {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         for (block, other) in beside(plan, blocks, pivot.lower()) {
-            subtract(&mut packet, &transposed(block), &load(rows, other, column));
+            subtract::<A, E, S, W>(&mut packet, &transposed(block), &load(rows, other, column));
         }
         store(rows, pivot.slot as usize, column, &packet);
     }
@@ -198,7 +231,7 @@ fn store<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
 
 /// `packet − block · other`
 #[inline(always)]
-fn subtract<E: Scalar, const S: usize, const W: usize>(
+fn subtract<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
     other: &Packet<E, S, W>,
@@ -206,7 +239,7 @@ fn subtract<E: Scalar, const S: usize, const W: usize>(
     for i in 0..S {
         for k in 0..S {
             for w in 0..W {
-                packet[i][w] = packet[i][w] - block[i][k] * other[k][w];
+                packet[i][w] = A::subtract(packet[i][w], block[i][k], other[k][w]);
             }
         }
     }
@@ -214,7 +247,7 @@ fn subtract<E: Scalar, const S: usize, const W: usize>(
 
 /// `block · packet`
 #[inline(always)]
-fn multiply<E: Scalar, const S: usize, const W: usize>(
+fn multiply<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
     block: &Block<E, S>,
     packet: &Packet<E, S, W>,
 ) -> Packet<E, S, W> {
@@ -222,7 +255,7 @@ fn multiply<E: Scalar, const S: usize, const W: usize>(
     for i in 0..S {
         for k in 0..S {
             for w in 0..W {
-                product[i][w] = product[i][w] + block[i][k] * packet[k][w];
+                product[i][w] = A::subtract(product[i][w], -block[i][k], packet[k][w]);
             }
         }
     }

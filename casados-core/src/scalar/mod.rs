@@ -90,6 +90,13 @@ pub trait Scalar:
     /// `±1`, with the sign of `a`
     fn signum(self) -> Self;
 
+    /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
+    /// machine has an instruction for it: elsewhere it is slow.
+    #[inline(always)]
+    fn subtract_product(self, a: Self, b: Self) -> Self {
+        self - a * b
+    }
+
     /// `a < b`
     fn lt(self, other: Self) -> Self::Mask;
     /// `a ≤ b`

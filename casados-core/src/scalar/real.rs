@@ -75,6 +75,11 @@ macro_rules! real {
             fn signum(self) -> Self {
                 <$t>::signum(self)
             }
+            #[cfg(feature = "std")]
+            #[inline(always)]
+            fn subtract_product(self, a: Self, b: Self) -> Self {
+                (-a).mul_add(b, self)
+            }
             #[inline(always)]
             fn lt(self, other: Self) -> bool {
                 self < other
