@@ -12,8 +12,8 @@ use super::forward::{ForwardMemory, Sweep};
 use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{axpy, slot};
-use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
+use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::model::{ArrayK, ArrayV, ArrayW, Dae, Pattern};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::Real;
 use crate::shape::assign;
@@ -122,24 +122,8 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     /// `sum −= Dᵀ H D`, the lower triangle.
     fn subtract(&mut self) {
         let Self { d, g, sum, entries, .. } = self;
-        let pattern = M::STRUCTURE.hessian;
-        for row in g.as_mut() {
-            row.as_mut().fill(T::ZERO);
-        }
-        for (e, value) in entries.as_ref().iter().enumerate() {
-            let (r, c) = pattern.at(e);
-            axpy(*value, d[c].as_ref(), g[r].as_mut());
-            if r != c {
-                axpy(*value, d[r].as_ref(), g[c].as_mut());
-            }
-        }
-        for (d, g) in d.as_ref().iter().zip(g.as_ref()) {
-            for (w, (sum, d)) in sum.as_mut().iter_mut().zip(d.as_ref()).enumerate() {
-                if *d != T::ZERO {
-                    axpy(-*d, &g.as_ref()[..=w], &mut sum.as_mut()[..=w]);
-                }
-            }
-        }
+        let (d, g, sum) = (d.as_ref(), g.as_mut(), sum.as_mut());
+        dispatch(Subtract { pattern: M::STRUCTURE.hessian, entries: entries.as_ref(), d, g, sum });
     }
 
     /// # Errors
@@ -189,6 +173,59 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
             check(values, 0)?;
         }
         Ok(())
+    }
+}
+
+/// `sum −= Dᵀ H D`, the lower triangle, with `H` given by its own.
+struct Subtract<'a, T, R> {
+    pattern: Pattern,
+    entries: &'a [T],
+    d: &'a [R],
+    g: &'a mut [R],
+    sum: &'a mut [R],
+}
+
+impl<T: Real, R: Array<T>> Kernel for Subtract<'_, T, R> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { pattern, entries, d, g, sum } = self;
+        for row in g.iter_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        // G = −H D
+        let mut add = |value: T, from: usize, to: usize| {
+            if let (Some(from), Some(to)) = (d.get(from), g.get_mut(to)) {
+                for (to, from) in to.as_mut().iter_mut().zip(from.as_ref()) {
+                    *to = A::subtract(*to, value, *from);
+                }
+            }
+        };
+        let places = pattern.rows.iter().zip(pattern.columns);
+        for ((&row, &column), &value) in places.zip(entries) {
+            add(value, column as usize, row as usize);
+            if row != column {
+                add(value, row as usize, column as usize);
+            }
+        }
+        // Rows of variables that no equation is curved in are zero: only the others count, four at a time.
+        let mut rows = d.iter().zip(g.iter()).filter(|(_, g)| g.as_ref().iter().any(|g| *g != T::ZERO));
+        let zero = R::from_fn(|_| T::ZERO);
+        loop {
+            let Some(first) = rows.next() else { break };
+            let mut next = || rows.next().unwrap_or((&zero, &zero));
+            let four = [first, next(), next(), next()];
+            let [(d0, g0), (d1, g1), (d2, g2), (d3, g3)] = four.map(|(d, g)| (d.as_ref(), g.as_ref()));
+            let g = g0.iter().zip(g1).zip(g2).zip(g3);
+            let d = d0.iter().zip(d1).zip(d2).zip(d3);
+            for (w, (sum, (((&d0, &d1), &d2), &d3))) in sum.iter_mut().zip(d).enumerate() {
+                for (sum, (((&g0, &g1), &g2), &g3)) in sum.as_mut().iter_mut().zip(g.clone()).take(w + 1) {
+                    // G has the other sign, so that this adds −D G.
+                    let sums = A::subtract(A::subtract(*sum, -d0, g0), -d1, g1);
+                    *sum = A::subtract(A::subtract(sums, -d2, g2), -d3, g3);
+                }
+            }
+        }
     }
 }
 

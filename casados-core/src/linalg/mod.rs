@@ -15,4 +15,5 @@ mod kernels;
 mod sparse;
 
 pub use factors::{Factors, slot};
+pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;
