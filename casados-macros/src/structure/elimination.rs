@@ -207,3 +207,107 @@ fn schedule(steps: &[Step]) -> Plan {
         .collect();
     plan
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(row: u32, column: u32, values: &[f64]) -> Entry {
+        let values = values.iter().map(|&re| Complex { re, im: 0.0 }).collect();
+        Entry { row, column, values, trivial: false }
+    }
+
+    /// `P A Q = (I + L)(P + U)` at the first sample, by the tables of the plan.
+    fn reconstruct(size: usize, entries: &[Entry], plan: &Plan) -> f64 {
+        let mut blocks: HashMap<(u32, u32), f64> = plan.blocks.iter().map(|&at| (at, 0.0)).collect();
+        for entry in entries {
+            *blocks.get_mut(&(entry.row, entry.column)).expect("the plan has every entry") =
+                entry.values[0].re;
+        }
+        let mut updates = plan.updates.iter();
+        for &[begin, upper, end] in &plan.ranges {
+            let at = |index: u32| plan.blocks[index as usize];
+            for lower in begin + 1..upper {
+                *blocks.get_mut(&at(lower)).unwrap() /= blocks[&at(begin)];
+                for u in upper..end {
+                    let change = blocks[&at(lower)] * blocks[&at(u)];
+                    *blocks.get_mut(&at(*updates.next().expect("one update for each pair"))).unwrap() -=
+                        change;
+                }
+            }
+        }
+        assert_eq!(updates.next(), None);
+        // A solution for A · 1, by the factors.
+        let mut b = vec![0.0; size];
+        entries.iter().for_each(|entry| b[entry.row as usize] += entry.values[0].re);
+        for (&(row, _), &[begin, upper, _]) in plan.pivots.iter().zip(&plan.ranges) {
+            for lower in begin + 1..upper {
+                let (r, c) = plan.blocks[lower as usize];
+                b[r as usize] -= blocks[&(r, c)] * b[row as usize];
+            }
+        }
+        let mut x = vec![0.0; size];
+        for (&(row, column), &[_, upper, end]) in plan.pivots.iter().zip(&plan.ranges).rev() {
+            let mut sum = b[row as usize];
+            for u in upper..end {
+                let (r, c) = plan.blocks[u as usize];
+                sum -= blocks[&(r, c)] * x[c as usize];
+            }
+            x[column as usize] = sum / blocks[&(row, column)];
+        }
+        x.iter().map(|x| (x - 1.0).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn factors_by_the_plan_solve_the_system() {
+        // A band of width five with a full last row and column, diagonally dominant: of condition about ten.
+        let n = 30u32;
+        let mut entries = Vec::new();
+        for r in 0..n {
+            for c in 0..n {
+                if r.abs_diff(c) <= 2 || r + 1 == n || c + 1 == n {
+                    let value = if r == c { 40.0 } else { f64::from((3 * r + 7 * c) % 5) - 1.5 };
+                    entries.push(entry(r, c, &[value]));
+                }
+            }
+        }
+        let plan = plan(n as usize, &entries);
+        assert!(reconstruct(n as usize, &entries, &plan) < 1e-13);
+        // The full row and column go last, so that there is hardly any fill.
+        assert!(plan.blocks.len() <= entries.len() + 2, "{} of {}", plan.blocks.len(), entries.len());
+    }
+
+    #[test]
+    fn a_pivot_that_vanishes_at_one_sample_is_not_taken() {
+        // By cost alone (0, 0) or (1, 1) are as good as any; each vanishes at one of the samples.
+        let entries = [
+            entry(0, 0, &[0.0, 1.0, 1.0]),
+            entry(0, 1, &[1.0, 1.0, 1.0]),
+            entry(1, 0, &[1.0, 1.0, 1.0]),
+            entry(1, 1, &[0.5, 0.0, 0.5]),
+        ];
+        let plan = plan(2, &entries);
+        assert!(matches!(plan.pivots[0], (0, 1) | (1, 0)), "{:?}", plan.pivots);
+    }
+
+    #[test]
+    fn rows_of_any_scale_have_the_same_plan() {
+        let make = |scale: f64| {
+            [
+                entry(0, 0, &[1.0 * scale, 2.0 * scale]),
+                entry(0, 1, &[3.0 * scale, 1.0 * scale]),
+                entry(1, 0, &[2.0, 1.0]),
+                entry(1, 1, &[0.1, 4.0]),
+                entry(1, 2, &[1.0, 1.0]),
+                entry(2, 2, &[1.0, 2.0]),
+            ]
+        };
+        assert_eq!(plan(3, &make(1.0)), plan(3, &make(1e-150)));
+        assert_eq!(plan(3, &make(1.0)), plan(3, &make(1e150)));
+    }
+
+    #[test]
+    fn nothing_to_eliminate() {
+        assert_eq!(plan(0, &[]), Plan { ..Plan::default() });
+    }
+}

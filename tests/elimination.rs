@@ -1,0 +1,145 @@
+//! The elimination planned by the macro, on models made to break a static order: the pivoted factorisation of
+//! the whole matrix takes over, and results stay right.
+
+use casados::prelude::*;
+use nalgebra::{SVector, vector};
+
+/// `A(p) k = b` in two algebraic unknowns, the first pivot of which may vanish at run time: `p z₀ + z₁ = 1`,
+/// `z₀ + z₁ = u`. Exactly: `z₀ = (1 − u)/(p − 1)`, `z₁ = u − z₀`.
+#[dae]
+fn vanishing(xdot: f64, x: f64, z: [f64; 2], u: [f64; 1], p: [f64; 1]) -> [f64; 3] {
+    [xdot + x - z[0], p[0] * z[0] + z[1] - 1.0, z[0] + z[1] - u[0]]
+}
+
+/// A pivot that is small, zero or large: the algebraic states are the closed form to rounding.
+#[test]
+fn pivots_that_vanish() {
+    let u = 0.25;
+    for p in [0.0, 1e-300, 1e-20, 1e-9, 0.5, 2.0, 1e9] {
+        let mut irk = Irk::<Vanishing, RadauIIA<3>>::new(Options::default()).unwrap();
+        irk.set_parameters(&vector![p]).unwrap();
+        let step = irk.forward(&vector![1.0], &vector![u], 0.1).unwrap();
+        let z0 = (1.0 - u) / (p - 1.0);
+        // Condition of [p 1; 1 1] times ε, with room for the eight operations of its elimination.
+        let condition = (p.abs() + 1.0).powi(2) / (p - 1.0).abs();
+        let bound = 8.0 * f64::EPSILON * condition * z0.abs().max((u - z0).abs());
+        assert!((step.z[0] - z0).abs() <= bound, "p = {p}: {} {z0}", step.z[0]);
+        assert!((step.z[1] - (u - z0)).abs() <= bound, "p = {p}: {}", step.z[1]);
+        // ∂z₀/∂u = −1/(p − 1), ∂z₀/∂p = −(1 − u)/(p − 1)²
+        let (by_u, by_p) = (-1.0 / (p - 1.0), -(1.0 - u) / (p - 1.0).powi(2));
+        assert!((step.dz_du[(0, 0)] - by_u).abs() <= 8.0 * f64::EPSILON * condition * by_u.abs());
+        assert!(
+            (step.dz_dp[(0, 0)] - by_p).abs() <= 16.0 * f64::EPSILON * condition * by_p.abs().max(by_u.abs())
+        );
+    }
+}
+
+/// Rows scaled by up to `10^±120` against each other: nothing changes but rounding.
+#[dae]
+fn scaled(xdot: [f64; 2], x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
+    [p[0] * (xdot[0] - x[1]), p[1] * (xdot[1] + x[0] + 0.1 * x[0] * x[0] * x[0])]
+}
+
+#[test]
+fn rows_of_any_scale() {
+    let run = |p: [f64; 2]| {
+        let mut irk = Irk::<Scaled, Gauss<3>>::new(Options { steps: 4, ..Default::default() }).unwrap();
+        irk.set_parameters(&SVector::from(p)).unwrap();
+        let step = irk.forward(&vector![1.0, 0.5], &SVector::zeros(), 0.5).unwrap();
+        let result = (step.x, step.dx_dx0);
+        assert_eq!(irk.statistics().dense, 0, "scaling of rows is no reason to leave the plan");
+        result
+    };
+    let (x, s) = run([1.0, 1.0]);
+    for p in [[1e120, 1e-120], [1e-120, 1e120], [1e150, 1e150]] {
+        let (scaled_x, scaled_s) = run(p);
+        // Four steps of a system of condition below two, some twenty roundings each.
+        assert!((scaled_x - x).amax() <= 80.0 * f64::EPSILON, "{}", scaled_x - x);
+        assert!((scaled_s - s).amax() <= 80.0 * f64::EPSILON, "{}", scaled_s - s);
+    }
+}
+
+/// `x ż-type` coupling whose coefficient crosses zero along the trajectory: `cos(t) a + sin(t) b = 1`,
+/// `−sin(t) a + cos(t) b = x`. Exactly `a = cos t − x sin t`, `b = sin t + x cos t`, whichever entry vanishes.
+#[dae]
+fn rotating(xdot: f64, x: f64, z: [f64; 2], t: f64) -> [f64; 3] {
+    let (s, c) = t.sin_cos();
+    [xdot + x, c * z[0] + s * z[1] - 1.0, -s * z[0] + c * z[1] - x]
+}
+
+#[test]
+fn a_pivot_crosses_zero() {
+    let mut irk = Irk::<Rotating, RadauIIA<2>>::new(Options { steps: 1, ..Default::default() }).unwrap();
+    let mut x = vector![1.0];
+    for n in 0..400 {
+        let (start, h) = (f64::from(n) * 0.01, 0.01);
+        irk.set_time(start).unwrap();
+        let step = irk.forward(&x, &SVector::zeros(), h).unwrap();
+        let (s, c) = (start + h).sin_cos();
+        let (a, b) = (c - step.x[0] * s, s + step.x[0] * c);
+        // A rotation has condition one; the time at the last stage carries a few roundings of t ≤ 4.
+        assert!((step.z[0] - a).abs() <= 32.0 * f64::EPSILON, "{n}: {} {a}", step.z[0]);
+        assert!((step.z[1] - b).abs() <= 32.0 * f64::EPSILON, "{n}: {} {b}", step.z[1]);
+        let by_x = step.dx_dx0[(0, 0)];
+        assert!((step.dz_dx0[(0, 0)] + s * by_x).abs() <= 32.0 * f64::EPSILON);
+        x = step.x;
+    }
+}
+
+/// The plan of a model has the pattern of its Newton matrix, and each unknown is the pivot of one equation.
+#[test]
+fn every_unknown_has_one_pivot() {
+    fn check<M: Dae>(unknowns: usize) {
+        let plan = M::STRUCTURE.elimination;
+        assert_eq!(plan.pivots.len(), unknowns);
+        let mut slots: Vec<u32> = plan.slot_of_equation.to_vec();
+        slots.sort_unstable();
+        assert_eq!(slots, (0..unknowns as u32).collect::<Vec<_>>());
+        let mut pivots: Vec<u32> = plan.pivots.iter().map(|pivot| pivot.slot).collect();
+        pivots.sort_unstable();
+        assert_eq!(pivots, slots);
+        assert_eq!(plan.pivots.last().map(|pivot| pivot.end as usize), Some(plan.slots.len()));
+    }
+    check::<Vanishing>(3);
+    check::<Scaled>(2);
+    check::<Rotating>(3);
+}
+
+/// Two algebraic states whose matrix is anything: no static order is good for all of them.
+#[dae]
+fn any_matrix(xdot: f64, x: f64, z: [f64; 2], p: [f64; 4]) -> [f64; 3] {
+    [xdot + x, p[0] * z[0] + p[1] * z[1] - x, p[2] * z[0] + p[3] * z[1] - 1.0]
+}
+
+/// Permutations, and matrices next to them: of two orders one has a pivot of zero, and the other one gives the answer.
+#[test]
+fn the_whole_matrix_is_pivoted_where_the_plan_fails() {
+    let mut pivoted = 0;
+    for tiny in [0.0, 1e-300, 1e-17, 1e-12] {
+        for p in [[1.0, tiny, tiny, 1.0], [tiny, 1.0, 1.0, tiny]] {
+            let mut irk = Irk::<AnyMatrix, RadauIIA<2>>::new(Options::default()).unwrap();
+            irk.set_parameters(&SVector::from(p)).unwrap();
+            let step = irk.hessian(&vector![1.0], &SVector::zeros(), 0.1, &vector![1.0]).unwrap();
+            let determinant = p[0] * p[3] - p[1] * p[2];
+            let (z0, z1) = ((p[3] * step.x[0] - p[1]) / determinant, (p[0] - p[2] * step.x[0]) / determinant);
+            // A matrix of condition one, and some ten roundings.
+            assert!((step.z[0] - z0).abs() <= 16.0 * f64::EPSILON, "{p:?}: {} {z0}", step.z[0]);
+            assert!((step.z[1] - z1).abs() <= 16.0 * f64::EPSILON, "{p:?}: {} {z1}", step.z[1]);
+            let by_x = p[3] / determinant * step.dx_dx0[(0, 0)];
+            assert!((step.dz_dx0[(0, 0)] - by_x).abs() <= 16.0 * f64::EPSILON, "{p:?}");
+            pivoted += irk.statistics().dense;
+        }
+    }
+    assert!(pivoted > 0, "no static order is right for all of these");
+}
+
+/// A matrix that is singular is an error that names the unknown, and the integrator goes on.
+#[test]
+fn singular_matrices_are_refused() {
+    let mut irk = Irk::<AnyMatrix, RadauIIA<2>>::new(Options::default()).unwrap();
+    irk.set_parameters(&vector![1.0, 2.0, 2.0, 4.0]).unwrap();
+    let error = irk.solve(&vector![1.0], &SVector::zeros(), 0.1).map(|step| step.x).unwrap_err();
+    assert!(matches!(error, casados::Error::Singular { unknown: "z[0]" | "z[1]", .. }), "{error}");
+    irk.set_parameters(&vector![1.0, 0.0, 0.0, 1.0]).unwrap();
+    assert!(irk.solve(&vector![1.0], &SVector::zeros(), 0.1).is_ok());
+}
