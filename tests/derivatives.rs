@@ -1,8 +1,8 @@
 //! Derivative code three ways: what the attributes emit, `num-dual`, and complex step or differences of order 8; on the
 //! example models and on random models that cover every function of the language.
 
+use casados::GraphDae;
 use casados::testing::{Points, Report, check_derivatives, check_pattern};
-use casados::{Dae, GraphDae};
 use std::path::Path;
 
 #[allow(clippy::all, dead_code, unused_parens, unused_variables)]
@@ -39,7 +39,7 @@ fn check<M: GraphDae>(points: &Points<M>) {
         assert!(row.inconclusive * 10 <= row.entries, "{report}");
     }
     check_pattern(points).assert();
-    assert!(M::STRUCTURE.jacobian.len() > 0, "{} depends on nothing", M::STRUCTURE.name);
+    assert!(!M::STRUCTURE.jacobian.is_empty(), "{} depends on nothing", M::STRUCTURE.name);
 }
 
 macro_rules! random_models {

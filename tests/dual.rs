@@ -42,7 +42,7 @@ mod chain {
     use nalgebra::SVector;
     use num_dual::DualNum;
 
-    const CONTROLS: usize = 2 / 2;
+    const CONTROLS: usize = 5 / 4;
 
     fn link<T: DualNum<Primitive = f64> + Copy>(a: T, b: T) -> T {
         (a - b) * (a - b) + a.sin()

@@ -38,7 +38,7 @@ fn values_are_those_of_the_function() {
         Long::residual(&[0.1, 0.2, 0.3, x, 0.4, -0.6, 0.0], &mut f);
         assert_eq!(f.map(f64::to_bits), long([0.1, 0.2, 0.3], [x, 0.4, -0.6]).map(f64::to_bits));
     }
-    assert!(Long::STRUCTURE.operations.residual > 1000);
+    const { assert!(Long::STRUCTURE.operations.residual > 1000) };
 }
 
 #[test]

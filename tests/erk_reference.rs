@@ -1,6 +1,5 @@
 //! Explicit integrators against reference values of an independent code: pendulum and chains, RK4, one step.
 
-#[allow(dead_code)]
 mod data;
 mod systems;
 

@@ -7,6 +7,7 @@ use nalgebra::SVector;
 #[path = "../examples/models/awe.rs"]
 #[allow(dead_code)]
 mod awe;
+#[allow(dead_code)]
 #[path = "../examples/models/chain.rs"]
 mod chain;
 #[allow(dead_code)]
@@ -28,7 +29,7 @@ fn derivatives<M: GraphDae>(points: &Points<M>) {
         assert!(row.inconclusive * 10 <= row.entries, "{report}");
     }
     check_pattern(points).assert();
-    assert!(M::STRUCTURE.jacobian.len() > 0, "{} depends on nothing", M::STRUCTURE.name);
+    assert!(!M::STRUCTURE.jacobian.is_empty(), "{} depends on nothing", M::STRUCTURE.name);
 }
 
 #[test]

@@ -40,20 +40,15 @@ fn expand(
     }
     let models = language::read(form, attribute.clone(), item.clone()).and_then(|source| {
         let mut models = Vec::new();
-        let mut errors: Option<syn::Error> = None;
+        let mut mistakes = language::mistakes::Mistakes::default();
         for model in source.models {
             match structure::analyse(model) {
                 Ok(model) => models.push(model),
-                Err(error) => match &mut errors {
-                    Some(errors) => errors.combine(error),
-                    None => errors = Some(error),
-                },
+                Err(error) => mistakes.note(error),
             }
         }
-        match errors {
-            Some(errors) => Err(errors),
-            None => emit::expand(source.item, source.place, &models),
-        }
+        mistakes.none()?;
+        emit::expand(source.item, source.place, &models)
     });
     models.unwrap_or_else(|error| emit::with_errors(attribute, item, &error))
 }

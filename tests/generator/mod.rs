@@ -85,7 +85,7 @@ const BINARY: &[&str] = &[
 /// One model: bindings that use variables and earlier bindings, then equations that use the bindings.
 fn model(text: &mut String, number: usize, turn: &mut usize) {
     let mut random = Random::new(1000 + number as u64);
-    let explicit = number % 3 == 0;
+    let explicit = number.is_multiple_of(3);
     let nx = 1 + random.below(4);
     let nu = random.below(3);
     let np = random.below(3);
@@ -150,7 +150,7 @@ fn model(text: &mut String, number: usize, turn: &mut usize) {
         // Index 1: the unknown of the row with a coefficient that is never zero.
         let left = match (explicit, row < nx) {
             (true, _) => String::new(),
-            (false, true) if number % 2 == 0 => format!("xdot[{row}] - "),
+            (false, true) if number.is_multiple_of(2) => format!("xdot[{row}] - "),
             (false, true) => format!("(1.5 + x[{row}].sin()) * xdot[{row}] + "),
             (false, false) => format!("z[{0}] + z[{0}].powi(3) - 0.1 * ", row - nx),
         };

@@ -6,6 +6,7 @@
 //! - `crate = path`: where casados is found.
 
 use super::Instance;
+use super::mistakes::Mistakes;
 use proc_macro2::{Ident, Span, TokenStream};
 use syn::parse::{Parse, ParseStream, Parser};
 use syn::spanned::Spanned;
@@ -40,29 +41,31 @@ impl Arguments {
         let mut arguments = Self { krate: syn::parse_quote!(::casados), name: None, values: Vec::new() };
         let entries = syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
         let mut krate = false;
+        let mut mistakes = Mistakes::default();
         for entry in entries {
             match entry {
                 Entry::Crate(span, path) => {
                     if std::mem::replace(&mut krate, true) {
-                        return Err(Error::new(span, "`crate` is given twice"));
+                        mistakes.note(Error::new(span, "`crate` is given twice"));
                     }
                     arguments.krate = path;
                 }
                 Entry::Name(span, name) => {
                     if arguments.name.replace(name).is_some() {
-                        return Err(Error::new(span, "`name` is given twice"));
+                        mistakes.note(Error::new(span, "`name` is given twice"));
                     }
                 }
                 Entry::Values(values) => {
                     for name in &values.names {
                         if arguments.values.iter().any(|other| other.names.contains(name)) {
-                            return Err(Error::new(name.span(), format!("`{name}` is given twice")));
+                            mistakes.note(Error::new(name.span(), format!("`{name}` is given twice")));
                         }
                     }
                     arguments.values.push(values);
                 }
             }
         }
+        mistakes.none()?;
         Ok(arguments)
     }
 
@@ -83,21 +86,24 @@ impl Arguments {
                 }
             }
         }
+        let mut mistakes = Mistakes::default();
         for values in &self.values {
             for name in &values.names {
                 if !parameters.iter().any(|parameter| parameter.ident == *name) {
-                    return Err(Error::new(
+                    mistakes.note(Error::new(
                         name.span(),
                         format!("the model has no const parameter `{name}`; {POSSIBLE}"),
                     ));
                 }
             }
         }
-        if let Some(missing) = parameters
+        mistakes.none()?;
+        let mut mistakes = Mistakes::default();
+        for missing in parameters
             .iter()
-            .find(|parameter| !self.values.iter().any(|values| values.names.contains(&parameter.ident)))
+            .filter(|parameter| !self.values.iter().any(|values| values.names.contains(&parameter.ident)))
         {
-            return Err(Error::new_spanned(
+            mistakes.note(Error::new_spanned(
                 missing,
                 format!(
                     "no values for `{0}`: list them in the attribute, as in `{0} = [1, 2]`",
@@ -105,6 +111,7 @@ impl Arguments {
                 ),
             ));
         }
+        mistakes.none()?;
         let mut combinations: Vec<Vec<(&Ident, u64)>> = vec![Vec::new()];
         for values in &self.values {
             if combinations.len().saturating_mul(values.rows.len()) > MAX_INSTANCES {

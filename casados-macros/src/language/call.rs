@@ -64,10 +64,7 @@ impl Evaluator {
     pub(super) fn call_expression(&mut self, call: &syn::ExprCall, expected: &Type) -> Evaluated {
         let callee = match &*call.func {
             Expr::Path(path) => match self.named(path)? {
-                Named::Variable(cell) => {
-                    let value = cell.borrow().clone();
-                    value
-                }
+                Named::Variable(cell) => cell.borrow().clone(),
                 Named::Value(value) => value,
                 Named::Builtin(builtin) => {
                     let hint = argument_hint(&builtin, expected);

@@ -76,13 +76,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
     if !signature::is_dual(&function) {
         return Ok(None);
     }
-    if cfg!(not(feature = "num-dual")) {
-        return Err(Error::new_spanned(
-            &function.sig.generics,
-            "a model over `DualNum` needs the feature `num-dual` of casados: enable it in Cargo.toml, or write the \
-             model with `f64` and without type parameters, so that its derivatives are found at compile time",
-        ));
-    }
+    require_feature(&function, cfg!(feature = "num-dual"))?;
     let arguments = Arguments::read(attribute)?;
     let mut consts = function.sig.generics.clone();
     consts.params =
@@ -110,6 +104,18 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
         })
         .collect::<Result<_>>()?;
     Ok(Some(Source { item, place, models }))
+}
+
+/// Dual models need the feature `num-dual`.
+pub(super) fn require_feature(function: &ItemFn, enabled: bool) -> Result<()> {
+    if enabled {
+        return Ok(());
+    }
+    Err(Error::new_spanned(
+        &function.sig.generics,
+        "a model over `DualNum` needs the feature `num-dual` of casados: enable it in Cargo.toml, or write the \
+         model with `f64` and without type parameters, so that its derivatives are found at compile time",
+    ))
 }
 
 /// The generic arguments of a call.
@@ -190,8 +196,9 @@ impl Signature {
             return Err(Error::new_spanned(
                 ty,
                 format!(
-                    "{equations} numbers are returned where the model has {expected} unknowns: one for each \
-                     differential and algebraic state"
+                    "the model returns {}, but has {expected} unknowns: return one for each differential and \
+                     algebraic state",
+                    super::model::numbers(equations)
                 ),
             ));
         }

@@ -29,7 +29,7 @@ pub enum Names {
     /// Type parameters, known as soon as an argument tells.
     Types(Vec<(Symbol, RefCell<Type>)>),
     /// `Self`, and how the `impl` block writes it.
-    SelfType(Type, Option<syn::Type>),
+    SelfType(Type, Option<Rc<syn::Type>>),
     /// Items of a block or module.
     Items(Box<Items>),
 }

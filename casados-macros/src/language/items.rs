@@ -74,7 +74,7 @@ pub struct Implementation {
     /// Its generic parameters.
     pub generics: syn::Generics,
     /// The type it is for; `None` for the defaults of a trait.
-    pub self_type: Option<syn::Type>,
+    pub self_type: Option<Rc<syn::Type>>,
     /// The trait and its generic arguments.
     pub of: Option<syn::Path>,
     /// Functions.
@@ -258,7 +258,7 @@ impl Evaluator {
     fn implementation(&mut self, item: &syn::ItemImpl, scope: &Rc<Scope>) {
         let mut implementation = Implementation {
             generics: item.generics.clone(),
-            self_type: Some((*item.self_ty).clone()),
+            self_type: Some(Rc::new((*item.self_ty).clone())),
             of: item.trait_.as_ref().map(|(path, _)| path.clone()),
             functions: HashMap::new(),
             constants: HashMap::new(),

@@ -18,6 +18,7 @@ mod generics;
 mod items;
 mod literal;
 mod methods;
+pub mod mistakes;
 mod model;
 mod module;
 mod operator;

@@ -4,6 +4,7 @@
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};
 use super::flatten;
+use super::mistakes::Mistakes;
 use super::place::Place;
 use super::signature::{self, Argument, Role};
 use super::value::{Function, Generic, Integer, IntegerType, Value};
@@ -90,11 +91,18 @@ impl Template<'_> {
     ) -> Result<(Variables, Vec<Value>)> {
         let mut types = Vec::new();
         let mut names = Vec::new();
+        let mut mistakes = Mistakes::default();
         for argument in arguments {
-            let ty = evaluator.resolve(&argument.ty, scope)?;
+            let ty = match evaluator.resolve(&argument.ty, scope) {
+                Ok(ty) => ty,
+                Err(error) => {
+                    mistakes.note(error);
+                    continue;
+                }
+            };
             // A dry run: names first, since the position of a variable depends on all dimensions.
             let mut list = Vec::new();
-            evaluator.instantiate(
+            let instance = evaluator.instantiate(
                 &ty,
                 argument.role.name().to_owned(),
                 &mut |evaluator, name| {
@@ -102,10 +110,14 @@ impl Template<'_> {
                     Ok(evaluator.graph.variable(0))
                 },
                 &argument.ty,
-            )?;
+            );
+            if let Err(error) = instance {
+                mistakes.note(error);
+            }
             types.push(ty);
             names.push(list);
         }
+        mistakes.none()?;
         let names_of = |role: Role| {
             let position = arguments.iter().position(|argument| argument.role == role);
             position.map_or_else(Vec::new, |position| names[position].clone())
@@ -192,7 +204,8 @@ impl Template<'_> {
     }
 }
 
-fn numbers(n: usize) -> String {
+/// So many numbers, in words.
+pub(super) fn numbers(n: usize) -> String {
     if n == 1 { "1 number".to_owned() } else { format!("{n} numbers") }
 }
 

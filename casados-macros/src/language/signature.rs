@@ -1,6 +1,7 @@
 //! The signature of a model: its arguments, recognised by name.
 
 use super::Form;
+use super::mistakes::Mistakes;
 use proc_macro2::Ident;
 use syn::spanned::Spanned;
 use syn::{Error, FnArg, ItemFn, Pat, Result};
@@ -62,20 +63,14 @@ pub struct Argument {
 pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
     check_qualifiers(function)?;
     let mut arguments = Vec::<Argument>::new();
+    let mut mistakes = Mistakes::default();
     for input in &function.sig.inputs {
-        let FnArg::Typed(input) = input else {
-            return Err(Error::new_spanned(input, "a model is a function without `self`"));
-        };
-        let role = role(form, &input.pat)?;
-        if arguments.iter().any(|argument| argument.role == role) {
-            return Err(Error::new_spanned(
-                &input.pat,
-                format!("the argument `{}` is given twice", role.name()),
-            ));
+        match argument(form, input, &arguments) {
+            Ok(argument) => arguments.push(argument),
+            Err(error) => mistakes.note(error),
         }
-        check_type(&input.ty)?;
-        arguments.push(Argument { role, ty: (*input.ty).clone() });
     }
+    mistakes.none()?;
     let has = |role: Role| arguments.iter().any(|argument| argument.role == role);
     if form == Form::Dae && !has(Role::Xdot) {
         return Err(Error::new(
@@ -90,6 +85,19 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
         ));
     }
     Ok(arguments)
+}
+
+/// One argument, after those before it.
+fn argument(form: Form, input: &FnArg, before: &[Argument]) -> Result<Argument> {
+    let FnArg::Typed(input) = input else {
+        return Err(Error::new_spanned(input, "a model is a function without `self`"));
+    };
+    let role = role(form, &input.pat)?;
+    if before.iter().any(|argument| argument.role == role) {
+        return Err(Error::new_spanned(&input.pat, format!("the argument `{}` is given twice", role.name())));
+    }
+    check_type(&input.ty)?;
+    Ok(Argument { role, ty: (*input.ty).clone() })
 }
 
 /// What is wrong with a type whatever the items in sight.

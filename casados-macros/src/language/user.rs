@@ -92,7 +92,7 @@ impl Evaluator {
                 }
                 _ => None,
             };
-            let right = right.or_else(|| implementation.self_type.clone());
+            let right = right.or_else(|| implementation.self_type.as_deref().cloned());
             if let Some(right) = right
                 && !arguments.is_empty()
                 && !self.unify(&right, &other, &scope)

@@ -115,6 +115,14 @@ fn nesting_is_bounded() {
 }
 
 #[test]
+fn dual_models_need_their_feature() {
+    let function = syn::parse_quote! { fn f<T: DualNum + Copy>(xdot: [T; 1]) -> [T; 1] { xdot } };
+    let error = crate::language::dual::require_feature(&function, false).unwrap_err().to_string();
+    assert!(error.contains("needs the feature `num-dual`") && error.contains("with `f64`"), "{error}");
+    assert!(crate::language::dual::require_feature(&function, true).is_ok());
+}
+
+#[test]
 fn constants_from_outside() {
     let source = "fn f(x: [f64; 6]) -> f64 {
         let [a, b] = crate::PAIR; let t: [f64; 3] = TABLE;
