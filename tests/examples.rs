@@ -10,7 +10,6 @@ mod awe;
 #[allow(dead_code)]
 #[path = "../examples/models/chain.rs"]
 mod chain;
-#[allow(dead_code)]
 mod data;
 #[path = "../examples/models/pendulum.rs"]
 mod pendulum;

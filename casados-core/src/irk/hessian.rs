@@ -211,8 +211,7 @@ impl<T: Real, R: Array<T>> Kernel for Subtract<'_, T, R> {
         // Rows of variables that no equation is curved in are zero: only the others count, four at a time.
         let mut rows = d.iter().zip(g.iter()).filter(|(_, g)| g.as_ref().iter().any(|g| *g != T::ZERO));
         let zero = R::from_fn(|_| T::ZERO);
-        loop {
-            let Some(first) = rows.next() else { break };
+        while let Some(first) = rows.next() {
             let mut next = || rows.next().unwrap_or((&zero, &zero));
             let four = [first, next(), next(), next()];
             let [(d0, g0), (d1, g1), (d2, g2), (d3, g3)] = four.map(|(d, g)| (d.as_ref(), g.as_ref()));
