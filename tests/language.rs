@@ -24,6 +24,8 @@ mod iterators;
 mod nalgebra_values;
 #[path = "language/statements.rs"]
 mod statements;
+#[path = "language/traits.rs"]
+mod traits;
 
 use casados::shape::{Array, Shape};
 use casados::{Dae, model::ArrayV};

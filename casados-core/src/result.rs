@@ -63,7 +63,7 @@ pub struct Directional<M: Dae, T: Plain, const C: usize> {
     pub dz0: MatrixZC<M, T, C>,
 }
 
-/// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`.
+/// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`. By default all are zero.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Seeds<M: Dae, T: Plain, const C: usize> {
@@ -165,6 +165,13 @@ plain!([M: Dae, T: Plain] ForwardAdjoint<M, T> { forward, grad_x0, grad_u, grad_
 plain!([M: Dae, T: Plain] Hessian<M, T> { first, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
 plain!([M: Dae, T: Plain] Dense<M, T> { x, z });
 plain!([M: Dae, T: Plain] DenseForward<M, T> { dense, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp });
+
+/// No direction at all: the seeds that are wanted are set in it.
+impl<M: Dae, T: Plain, const C: usize> Default for Seeds<M, T, C> {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
 
 /// A result contains a smaller one.
 macro_rules! contains {

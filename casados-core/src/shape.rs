@@ -30,7 +30,9 @@ macro_rules! plain {
         }
         impl<$($generics)*> core::fmt::Debug for $type {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                f.debug_struct(stringify!($type))$(.field(stringify!($field), &self.$field))*.finish()
+                // The name alone: `stringify` has the generic parameters too.
+                let name = stringify!($type);
+                f.debug_struct(name.split('<').next().unwrap_or(name).trim_end())$(.field(stringify!($field), &self.$field))*.finish()
             }
         }
     };

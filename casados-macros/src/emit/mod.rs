@@ -85,6 +85,7 @@ fn assemble(
                 #[allow(dead_code)]
                 #module
                 #[doc(inline)]
+                #[allow(unused_imports)]
                 #visibility use #ident::#name;
             })
         }

@@ -79,6 +79,12 @@ impl Evaluator {
         };
         match self.load(callee, call)? {
             Value::Function(function) => {
+                let several = self.overloads(&function);
+                if several.len() > 1 {
+                    let arguments = self.arguments(&call.args)?;
+                    let function = self.choose(several, &arguments, call)?;
+                    return self.call_function(&function, Arguments::Values(arguments), expected, call);
+                }
                 self.call_function(&function, Arguments::Written(None, &call.args), expected, call)
             }
             Value::Constructor(ty, variant) => {
@@ -194,6 +200,11 @@ impl Evaluator {
         Ok(methods::method(self, receiver, &call)?)
     }
 
+    /// The values of arguments about which nothing is known.
+    fn arguments(&mut self, written: &Punctuated<Expr, Token![,]>) -> Evaluated<Vec<Value>> {
+        written.iter().map(|argument| self.expression(argument, &Type::Unknown)).collect()
+    }
+
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
         let name = call.method.to_string();
         // A closure in a field is no method, so the receiver of `(self.f)(x)` does not come here.
@@ -207,12 +218,25 @@ impl Evaluator {
             None => Vec::new(),
         };
         if let Some((function, first)) = self.user_function(&receiver, &name, &turbofish, call)? {
+            let several = self.overloads(&function);
+            if several.len() > 1 {
+                let mut arguments = vec![first];
+                arguments.extend(self.arguments(&call.args)?);
+                let function = self.choose(several, &arguments, call)?;
+                return self.call_function(&function, Arguments::Values(arguments), expected, call);
+            }
             return self.call_function(
                 &function,
                 Arguments::Written(Some(first), &call.args),
                 expected,
                 call,
             );
+        }
+        if name == "into"
+            && let Some(function) = self.user_conversion(&receiver, expected, call)?
+        {
+            let value = receiver.value(self, call)?;
+            return self.call_function(&function, Arguments::Values(vec![value]), expected, call);
         }
         // Numbers are copied before the arguments are executed.
         let receiver = match &receiver {

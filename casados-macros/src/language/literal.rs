@@ -114,7 +114,8 @@ impl Evaluator {
         let declared = &definition.variants[variant].fields;
         let mut fields = match &literal.rest {
             Some(rest) => {
-                let value = self.expression(rest, expected)?;
+                let own = Type::Struct(definition.clone(), arguments.clone());
+                let value = self.expression(rest, &own)?;
                 match self.load(value, rest)? {
                     Value::Struct(structure) if Rc::ptr_eq(&structure.definition, &definition) => {
                         structure.fields.clone()

@@ -200,7 +200,7 @@ impl Evaluator {
         }
     }
 
-    /// `assert!` and its relatives, and nalgebra's `vector!` and `matrix!`.
+    /// `assert!` and its relatives, `matches!`, and nalgebra's `vector!` and `matrix!`.
     pub(super) fn macro_call(&mut self, call: &syn::Macro, _expected: &Type) -> Evaluated {
         let name = call.path.segments.last().map(|last| last.ident.to_string()).unwrap_or_default();
         let tokens = call.tokens.clone();
@@ -236,6 +236,16 @@ impl Evaluator {
                     Truth::Known(false) => Err(error(call, failed(&arguments, 2)).into()),
                     Truth::When(_) => Err(runtime_assertion(call).into()),
                 }
+            }
+            "matches" => {
+                let parts = |input: syn::parse::ParseStream| {
+                    let subject: Expr = input.parse()?;
+                    input.parse::<Token![,]>()?;
+                    let pattern: proc_macro2::TokenStream = input.parse()?;
+                    syn::parse2::<Expr>(quote::quote!(match #subject { #pattern => true, _ => false }))
+                };
+                let choice = parts.parse2(tokens)?;
+                self.expression(&choice, &Type::Bool)
             }
             "panic" | "unreachable" | "todo" | "unimplemented" => {
                 let message = match list.parse2(tokens) {

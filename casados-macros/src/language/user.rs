@@ -3,7 +3,8 @@
 use super::arithmetic::Operator;
 use super::call::Arguments;
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluator};
+use super::evaluator::{At, Evaluator, error};
+use super::items::Implementation;
 use super::methods::Receiver;
 use super::place::Place;
 use super::types::Type;
@@ -43,6 +44,101 @@ impl Evaluator {
         let function =
             Function { item, scope, turbofish: turbofish.to_vec(), owner: Some((implementation, ty)) };
         Ok(Some((function, first)))
+    }
+
+    /// The implementations of a generic trait for one type, of which the arguments of a call choose one:
+    /// `impl From<A> for X` and `impl From<B> for X`. Only the function itself if it is not of such a trait.
+    pub(super) fn overloads(&mut self, function: &Function) -> Vec<Function> {
+        let Some((implementation, ty)) = &function.owner else { return Vec::new() };
+        let generic = |implementation: &Implementation| {
+            let last = implementation.of.as_ref()?.segments.last()?;
+            matches!(last.arguments, syn::PathArguments::AngleBracketed(_)).then(|| last.ident.clone())
+        };
+        let Some(of) = generic(implementation) else { return Vec::new() };
+        let symbol = self.symbol(&function.item.sig.ident);
+        let mut several = Vec::new();
+        for other in self.implementations.clone() {
+            if let Some(item) = other.functions.get(&symbol)
+                && generic(&other).is_some_and(|name| name == of)
+                && self.fitting(&other, ty).is_some()
+            {
+                several.push(Function {
+                    item: item.clone(),
+                    scope: other.scope.clone(),
+                    turbofish: function.turbofish.clone(),
+                    owner: Some((other.clone(), ty.clone())),
+                });
+            }
+        }
+        several
+    }
+
+    /// Of several functions the only one that takes these arguments.
+    pub(super) fn choose(&mut self, several: Vec<Function>, arguments: &[Value], at: At) -> Result<Function> {
+        let mut fitting = Vec::new();
+        for function in several {
+            if self.takes(&function, arguments) {
+                fitting.push(function);
+            }
+        }
+        match (fitting.pop(), fitting.is_empty()) {
+            (Some(function), true) => Ok(function),
+            _ => Err(error(
+                at,
+                "the macro cannot tell which implementation of the trait is meant: give the function another name",
+            )),
+        }
+    }
+
+    /// Whether the types of arguments are those of a function, as far as they are known.
+    fn takes(&mut self, function: &Function, arguments: &[Value]) -> bool {
+        let Some((implementation, ty)) = &function.owner else { return false };
+        let Some(scope) = self.fitting(implementation, ty) else { return false };
+        let scope = Scope::inside(&scope, Names::SelfType(ty.clone(), implementation.self_type.clone()));
+        let inputs = &function.item.sig.inputs;
+        inputs.len() == arguments.len()
+            && inputs.iter().zip(arguments).all(|(input, value)| match input {
+                syn::FnArg::Receiver(_) => true,
+                syn::FnArg::Typed(input) => {
+                    let found = self.type_of(value);
+                    self.unify(&input.ty, &found, &scope)
+                }
+            })
+    }
+
+    /// The user's `From` that `into` calls, if there is one for the value and the type that is expected.
+    pub(super) fn user_conversion(
+        &mut self,
+        receiver: &Receiver,
+        expected: &Type,
+        at: At,
+    ) -> Result<Option<Function>> {
+        let symbol = self.symbol_of("from");
+        let value = [receiver.value(self, at)?];
+        let mut fitting = Vec::new();
+        for implementation in self.implementations.clone() {
+            let Some(item) = implementation.functions.get(&symbol) else { continue };
+            if self.fitting(&implementation, expected).is_none() {
+                continue;
+            }
+            let function = Function {
+                item: item.clone(),
+                scope: implementation.scope.clone(),
+                turbofish: Vec::new(),
+                owner: Some((implementation.clone(), expected.clone())),
+            };
+            if self.takes(&function, &value) {
+                fitting.push(function);
+            }
+        }
+        match (expected, fitting.pop()) {
+            (_, None) => Ok(None),
+            (Type::Unknown, Some(_)) => Err(error(
+                at,
+                "the macro does not see what type `into` makes here: write `Type::from(..)`, or give the variable its type",
+            )),
+            (_, Some(function)) => Ok(Some(function)),
+        }
     }
 
     /// The user's implementation of an operator.

@@ -5,7 +5,8 @@ use super::{Call, float, integer, matrix};
 use crate::language::evaluator::{At, Evaluator, error, unsupported};
 use crate::language::place::Place;
 use crate::language::types::Type;
-use crate::language::value::{Builtin, Integer, IntegerType, Value};
+use crate::language::value::{Builtin, Function, Integer, IntegerType, Struct, Value};
+use std::rc::Rc;
 use syn::Result;
 
 /// A call of a function by path. `None` if there is no such function.
@@ -86,7 +87,7 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
             let ty = function.owner.clone().unwrap_or_default();
             let ty = if matches!(ty, Type::Unknown) { call.expected.clone() } else { ty };
             return match ty {
-                Type::Unknown | Type::Struct(..) => Ok(None),
+                Type::Unknown => Ok(None),
                 ty => default(evaluator, &ty, at).map(Some),
             };
         }
@@ -169,6 +170,21 @@ pub fn default(evaluator: &mut Evaluator, ty: &Type, at: At) -> Result<Value> {
             Value::matrix(*rows, *columns, vec![zero; rows * columns])
         }
         Type::Real | Type::Unknown => Value::Real(evaluator.graph.constant(0.0)),
+        Type::Struct(definition, arguments) => {
+            let name = evaluator.symbol_of("default");
+            if let Some((implementation, item)) = evaluator.find_function(name, ty) {
+                let (scope, owner) = (implementation.scope.clone(), Some((implementation, ty.clone())));
+                let function = Function { item, scope, turbofish: Vec::new(), owner };
+                return evaluator.call(&Value::Function(Rc::new(function)), Vec::new(), at);
+            }
+            if definition.is_enum {
+                return Err(error(at, "the default of an enum is not known here: name the variant"));
+            }
+            // Derived.
+            let types = evaluator.field_types(definition, 0, arguments)?;
+            let fields = types.iter().map(|ty| default(evaluator, ty, at)).collect::<Result<_>>()?;
+            Value::Struct(Rc::new(Struct { definition: definition.clone(), variant: 0, fields }))
+        }
         _ => return Err(error(at, "the default value of this type is not known here")),
     })
 }
