@@ -47,9 +47,14 @@ impl<const S: usize> Explicit for Custom<S> {
 
 /// The explicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
 ///
-/// ```ignore
+/// ```
+/// # use casados_core::{Error, Erk, Rk4, Ode, Options, model::{VectorU, VectorX}};
+/// # fn example<Pendulum: Ode>(x0: VectorX<Pendulum, f64>, u: VectorU<Pendulum, f64>) -> Result<(), Error> {
 /// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
 /// let step = erk.forward(&x0, &u, 0.05)?;
+/// let (x, jacobian) = (step.x, step.dx_dx0);
+/// # Ok(())
+/// # }
 /// ```
 #[cfg(feature = "alloc")]
 pub type Erk<M, B, T = f64, W = crate::memory::Heap> = <B as Explicit>::Integrator<M, T, W>;

@@ -39,9 +39,14 @@ use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 
 /// The implicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
 ///
-/// ```ignore
+/// ```
+/// # use casados_core::{Error, Irk, Gauss, Dae, Options, model::{VectorU, VectorX}};
+/// # fn example<Pendulum: Dae>(x0: VectorX<Pendulum, f64>, u: VectorU<Pendulum, f64>) -> Result<(), Error> {
 /// let mut irk = Irk::<Pendulum, Gauss<4>>::new(Options { steps: 2, ..Default::default() })?;
 /// let step = irk.forward(&x0, &u, 0.05)?;
+/// let (x, jacobian) = (step.x, step.dx_dx0);
+/// # Ok(())
+/// # }
 /// ```
 #[cfg(feature = "alloc")]
 pub type Irk<M, B, T = f64, W = crate::memory::Heap> = <B as Implicit>::Integrator<M, T, W>;

@@ -4,7 +4,7 @@ use super::evaluator::{At, Evaluated, Evaluator, error, opaque, unsupported};
 use super::methods::{self, Call, Receiver};
 use super::path::Named;
 use super::types::Type;
-use super::value::{Builtin, Generic, Struct, Value};
+use super::value::{Builtin, Function, Generic, Struct, Value};
 use std::rc::Rc;
 use syn::punctuated::Punctuated;
 use syn::{Expr, Result, Token};
@@ -78,15 +78,7 @@ impl Evaluator {
             other => self.expression(other, &Type::Unknown)?,
         };
         match self.load(callee, call)? {
-            Value::Function(function) => {
-                let several = self.overloads(&function);
-                if several.len() > 1 {
-                    let arguments = self.arguments(&call.args)?;
-                    let function = self.choose(several, &arguments, call)?;
-                    return self.call_function(&function, Arguments::Values(arguments), expected, call);
-                }
-                self.call_function(&function, Arguments::Written(None, &call.args), expected, call)
-            }
+            Value::Function(function) => self.call_written(&function, None, &call.args, expected, call),
             Value::Constructor(ty, variant) => {
                 let ty = match (&ty, expected) {
                     (Type::Struct(a, known), Type::Struct(b, _)) if Rc::ptr_eq(a, b) && known.is_empty() => {
@@ -200,9 +192,26 @@ impl Evaluator {
         Ok(methods::method(self, receiver, &call)?)
     }
 
-    /// The values of arguments about which nothing is known.
-    fn arguments(&mut self, written: &Punctuated<Expr, Token![,]>) -> Evaluated<Vec<Value>> {
-        written.iter().map(|argument| self.expression(argument, &Type::Unknown)).collect()
+    /// Calls a function with arguments as they are written; of several that only differ in their arguments the
+    /// one that these fit.
+    fn call_written(
+        &mut self,
+        function: &Function,
+        receiver: Option<Value>,
+        written: &Punctuated<Expr, Token![,]>,
+        expected: &Type,
+        at: At,
+    ) -> Evaluated {
+        let several = self.overloads(function);
+        if several.len() < 2 {
+            return self.call_function(function, Arguments::Written(receiver, written), expected, at);
+        }
+        let mut arguments: Vec<_> = receiver.into_iter().collect();
+        for argument in written {
+            arguments.push(self.expression(argument, &Type::Unknown)?);
+        }
+        let function = self.choose(several, &arguments, at)?;
+        self.call_function(&function, Arguments::Values(arguments), expected, at)
     }
 
     pub(super) fn method_call(&mut self, call: &syn::ExprMethodCall, expected: &Type) -> Evaluated {
@@ -218,25 +227,12 @@ impl Evaluator {
             None => Vec::new(),
         };
         if let Some((function, first)) = self.user_function(&receiver, &name, &turbofish, call)? {
-            let several = self.overloads(&function);
-            if several.len() > 1 {
-                let mut arguments = vec![first];
-                arguments.extend(self.arguments(&call.args)?);
-                let function = self.choose(several, &arguments, call)?;
-                return self.call_function(&function, Arguments::Values(arguments), expected, call);
-            }
-            return self.call_function(
-                &function,
-                Arguments::Written(Some(first), &call.args),
-                expected,
-                call,
-            );
+            return self.call_written(&function, Some(first), &call.args, expected, call);
         }
         if name == "into"
-            && let Some(function) = self.user_conversion(&receiver, expected, call)?
+            && let Some(value) = self.user_conversion(&receiver, expected, call)?
         {
-            let value = receiver.value(self, call)?;
-            return self.call_function(&function, Arguments::Values(vec![value]), expected, call);
+            return Ok(value);
         }
         // Numbers are copied before the arguments are executed.
         let receiver = match &receiver {

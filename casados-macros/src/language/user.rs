@@ -3,7 +3,7 @@
 use super::arithmetic::Operator;
 use super::call::Arguments;
 use super::environment::{Names, Scope};
-use super::evaluator::{At, Evaluator, error};
+use super::evaluator::{At, Evaluated, Evaluator, error};
 use super::items::Implementation;
 use super::methods::Receiver;
 use super::place::Place;
@@ -106,15 +106,18 @@ impl Evaluator {
             })
     }
 
-    /// The user's `From` that `into` calls, if there is one for the value and the type that is expected.
+    /// What `into` makes by the user's `From`, if there is one for the value and the type that is expected.
     pub(super) fn user_conversion(
         &mut self,
         receiver: &Receiver,
         expected: &Type,
         at: At,
-    ) -> Result<Option<Function>> {
+    ) -> Evaluated<Option<Value>> {
         let symbol = self.symbol_of("from");
-        let value = [receiver.value(self, at)?];
+        if !self.implementations.iter().any(|implementation| implementation.functions.contains_key(&symbol)) {
+            return Ok(None);
+        }
+        let value = vec![receiver.value(self, at)?];
         let mut fitting = Vec::new();
         for implementation in self.implementations.clone() {
             let Some(item) = implementation.functions.get(&symbol) else { continue };
@@ -136,8 +139,9 @@ impl Evaluator {
             (Type::Unknown, Some(_)) => Err(error(
                 at,
                 "the macro does not see what type `into` makes here: write `Type::from(..)`, or give the variable its type",
-            )),
-            (_, Some(function)) => Ok(Some(function)),
+            )
+            .into()),
+            (_, Some(function)) => self.call_function(&function, Arguments::Values(value), expected, at).map(Some),
         }
     }
 
