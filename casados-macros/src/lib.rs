@@ -30,6 +30,10 @@ fn expand(
     attribute: proc_macro2::TokenStream,
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
+    if let Err(error) = language::nesting::check(&attribute).and(language::nesting::check(&item)) {
+        let error = error.to_compile_error();
+        return quote::quote! { #item #error };
+    }
     match language::dual::read(form, attribute.clone(), item.clone()) {
         Ok(None) => {}
         Ok(Some(source)) => {

@@ -21,6 +21,7 @@ mod methods;
 pub mod mistakes;
 mod model;
 mod module;
+pub mod nesting;
 mod operator;
 mod path;
 mod pattern;
