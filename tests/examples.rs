@@ -1,7 +1,7 @@
 //! The example models: their derivative code three ways, and the identities of their sensitivities.
 
-use casados::testing::{Integrator, Points, check_derivatives, check_pattern, check_sensitivities};
-use casados::{Dae, DormandPrince5, Erk, Gauss, GraphDae, Irk, Options, RadauIIA, Rk4, Shape};
+use casados::testing::{Points, check_derivatives, check_pattern};
+use casados::{DormandPrince5, Erk, Gauss, GraphDae, Irk, RadauIIA, Rk4};
 use nalgebra::SVector;
 
 #[path = "../examples/models/awe.rs"]
@@ -11,12 +11,14 @@ mod awe;
 #[path = "../examples/models/chain.rs"]
 mod chain;
 mod data;
+mod interval;
 #[path = "../examples/models/pendulum.rs"]
 mod pendulum;
 
 use awe::Awe;
 use chain::Chain;
 use data::Record;
+use interval::{check, options};
 use pendulum::Pendulum;
 
 /// Every comparison passes, and at most a tenth of the entries are near a kink or a singularity, where
@@ -55,68 +57,33 @@ fn aircraft_derivatives() {
     derivatives::<Awe>(&Points::given(points.iter().step_by(13).map(flat)));
 }
 
-/// All checks of one interval; of the comparisons with differences at most a tenth may be unable to tell.
-fn intervals<M, I, const NX: usize, const NU: usize, const NP: usize>(
-    mut integrator: I,
-    x0: &SVector<f64, NX>,
-    u: &SVector<f64, NU>,
-    p: &SVector<f64, NP>,
-    h: f64,
-) where
-    M: Dae,
-    M::Shape: Shape<
-            VectorX<f64> = SVector<f64, NX>,
-            VectorU<f64> = SVector<f64, NU>,
-            VectorP<f64> = SVector<f64, NP>,
-        >,
-    I: Integrator<M>,
-{
-    let report =
-        check_sensitivities::<M, I>(&mut integrator, x0, u, p, h).expect("the interval can be integrated");
-    println!("{report}");
-    report.assert();
-    for row in &report.rows {
-        assert!(row.inconclusive * 10 <= row.entries, "{report}");
-    }
-}
-
-fn options(steps: usize) -> Options {
-    Options { steps, ..Default::default() }
-}
-
 #[test]
 fn pendulum_sensitivities() {
     let x0 = SVector::from([0.1, 2.4, -0.3, 1.2]);
     let (u, p) = (SVector::from([0.7]), SVector::zeros());
-    intervals::<Pendulum, _, 4, 1, 0>(
+    check::<Pendulum, _, 4, 1, 0>(
         Irk::<Pendulum, Gauss<2>>::new(options(1)).expect("valid"),
         &x0,
         &u,
         &p,
         0.05,
     );
-    intervals::<Pendulum, _, 4, 1, 0>(
+    check::<Pendulum, _, 4, 1, 0>(
         Irk::<Pendulum, Gauss<4>>::new(options(4)).expect("valid"),
         &x0,
         &u,
         &p,
         0.1,
     );
-    intervals::<Pendulum, _, 4, 1, 0>(
+    check::<Pendulum, _, 4, 1, 0>(
         Irk::<Pendulum, RadauIIA<3>>::new(options(2)).expect("valid"),
         &x0,
         &u,
         &p,
         0.1,
     );
-    intervals::<Pendulum, _, 4, 1, 0>(
-        Erk::<Pendulum, Rk4>::new(options(3)).expect("valid"),
-        &x0,
-        &u,
-        &p,
-        0.1,
-    );
-    intervals::<Pendulum, _, 4, 1, 0>(
+    check::<Pendulum, _, 4, 1, 0>(Erk::<Pendulum, Rk4>::new(options(3)).expect("valid"), &x0, &u, &p, 0.1);
+    check::<Pendulum, _, 4, 1, 0>(
         Erk::<Pendulum, DormandPrince5>::new(options(1)).expect("valid"),
         &x0,
         &u,
@@ -131,27 +98,21 @@ fn chain_sensitivities() {
     let x0: SVector<f64, 9> = record.vector("x0").expect("x0");
     let u: SVector<f64, 3> = record.vector("u").expect("u");
     let p = SVector::zeros();
-    intervals::<Chain<9>, _, 9, 3, 0>(
+    check::<Chain<9>, _, 9, 3, 0>(
         Irk::<Chain<9>, Gauss<2>>::new(options(1)).expect("valid"),
         &x0,
         &u,
         &p,
         0.2,
     );
-    intervals::<Chain<9>, _, 9, 3, 0>(
+    check::<Chain<9>, _, 9, 3, 0>(
         Irk::<Chain<9>, RadauIIA<2>>::new(options(3)).expect("valid"),
         &x0,
         &u,
         &p,
         0.2,
     );
-    intervals::<Chain<9>, _, 9, 3, 0>(
-        Erk::<Chain<9>, Rk4>::new(options(2)).expect("valid"),
-        &x0,
-        &u,
-        &p,
-        0.2,
-    );
+    check::<Chain<9>, _, 9, 3, 0>(Erk::<Chain<9>, Rk4>::new(options(2)).expect("valid"), &x0, &u, &p, 0.2);
 }
 
 /// One of the intervals of the optimal orbit; with an algebraic state.
@@ -163,5 +124,5 @@ fn aircraft_sensitivities() {
     let u: SVector<f64, 4> = interval.vector("u").expect("u");
     let h = record.number("T").expect("T");
     let irk = Irk::<Awe, RadauIIA<4>>::new(options(1)).expect("valid");
-    intervals::<Awe, _, 23, 4, 0>(irk, &x0, &u, &SVector::zeros(), h);
+    check::<Awe, _, 23, 4, 0>(irk, &x0, &u, &SVector::zeros(), h);
 }

@@ -1,38 +1,12 @@
 //! Identities that hold to rounding whatever the model: adjoint and forward sensitivities are transposes of each other,
 //! Hessians are symmetric and derivatives of gradients, calls repeat their bits, Gauss methods keep quadratic invariants.
 
-use casados::testing::{Integrator, check_sensitivities};
-use casados::{Dae, Erk, Gauss, Irk, Options, RadauIIA, Rk4, Shape, dae, ode};
+mod interval;
+
+use casados::testing::Integrator;
+use casados::{Erk, Gauss, Irk, RadauIIA, Rk4, dae, ode};
+use interval::{check, options};
 use nalgebra::SVector;
-
-/// All checks of one interval; of the comparisons with differences at most a tenth may be unable to tell.
-fn check<M, I, const NX: usize, const NU: usize, const NP: usize>(
-    mut integrator: I,
-    x0: &SVector<f64, NX>,
-    u: &SVector<f64, NU>,
-    p: &SVector<f64, NP>,
-    h: f64,
-) where
-    M: Dae,
-    M::Shape: Shape<
-            VectorX<f64> = SVector<f64, NX>,
-            VectorU<f64> = SVector<f64, NU>,
-            VectorP<f64> = SVector<f64, NP>,
-        >,
-    I: Integrator<M>,
-{
-    let report =
-        check_sensitivities::<M, I>(&mut integrator, x0, u, p, h).expect("the interval can be integrated");
-    println!("{report}");
-    report.assert();
-    for row in &report.rows {
-        assert!(row.inconclusive * 10 <= row.entries, "{report}");
-    }
-}
-
-fn options(steps: usize) -> Options {
-    Options { steps, ..Default::default() }
-}
 
 /// A fully implicit model with every kind of variable: `z` and parameters that enter nonlinearly, time, a state-dependent
 /// mass matrix.

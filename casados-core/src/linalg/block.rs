@@ -8,36 +8,46 @@ use crate::scalar::Scalar;
 /// An s×s matrix, row by row.
 pub type Block<E, const S: usize> = [[E; S]; S];
 
-/// `t − a b`
+/// `s` rows of `W` columns: the stages of a slot in a right-hand side, or, with `W = s`, a block.
+pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
+
+/// `packet − block · other`
 #[inline(always)]
-pub fn subtract_product<A: Arithmetic, E: Scalar, const S: usize>(
-    t: &Block<E, S>,
-    a: &Block<E, S>,
-    b: &Block<E, S>,
-) -> Block<E, S> {
-    let mut t = *t;
+pub fn subtract<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    block: &Block<E, S>,
+    other: &Packet<E, S, W>,
+) {
     for i in 0..S {
         for k in 0..S {
-            for j in 0..S {
-                t[i][j] = A::subtract(t[i][j], a[i][k], b[k][j]);
+            for w in 0..W {
+                packet[i][w] = A::subtract(packet[i][w], block[i][k], other[k][w]);
             }
         }
     }
-    t
 }
 
-/// `a b`
+/// `block · packet`
 #[inline(always)]
-pub fn product<A: Arithmetic, E: Scalar, const S: usize>(a: &Block<E, S>, b: &Block<E, S>) -> Block<E, S> {
-    let mut t = [[E::from_f64(0.0); S]; S];
+pub fn multiply<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
+    block: &Block<E, S>,
+    packet: &Packet<E, S, W>,
+) -> Packet<E, S, W> {
+    let mut product = [[E::from_f64(0.0); W]; S];
     for i in 0..S {
         for k in 0..S {
-            for j in 0..S {
-                t[i][j] = A::subtract(t[i][j], -a[i][k], b[k][j]);
+            for w in 0..W {
+                product[i][w] = A::subtract(product[i][w], -block[i][k], packet[k][w]);
             }
         }
     }
-    t
+    product
+}
+
+/// The rows as columns.
+#[inline(always)]
+pub fn transposed<E: Copy, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
+    core::array::from_fn(|i| core::array::from_fn(|j| block[j][i]))
 }
 
 /// The inverse by Gauss-Jordan elimination with partial pivoting, without a branch on the values:

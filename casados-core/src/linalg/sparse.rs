@@ -13,7 +13,7 @@
 //! The compiler does not look into the tables of the plan; elements are fetched with `get`, whose
 //! never-taken exit costs nothing beside a block and leaves no panic in the program.
 
-use super::block::{Block, inverse, product, subtract_product};
+use super::block::{Block, Packet, inverse, multiply, subtract, transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use crate::model::Elimination;
 use crate::scalar::Scalar;
@@ -64,7 +64,7 @@ impl<E: Scalar, const S: usize> Kernel for Factor<'_, E, S> {
                 let inverse = inverse::<A, E, S>(block);
                 *block = inverse;
                 for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
-                    *block = product::<A, E, S>(block, &inverse);
+                    *block = multiply::<A, E, S, S>(block, &inverse);
                 }
             }
             for lower in pivot.lower() {
@@ -72,7 +72,7 @@ impl<E: Scalar, const S: usize> Kernel for Factor<'_, E, S> {
                 for (upper, &target) in pivot.upper().zip(&mut updates) {
                     let Some(&upper) = blocks.get(upper) else { continue };
                     let Some(target) = blocks.get_mut(target as usize) else { continue };
-                    *target = subtract_product::<A, E, S>(target, &lower, &upper);
+                    subtract::<A, E, S, S>(target, &lower, &upper);
                 }
             }
         }
@@ -125,9 +125,6 @@ impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<
         packets!(R::LEN, solve_packet_transposed(plan, blocks, rows));
     }
 }
-
-/// `s` stages of a slot, `W` columns each.
-type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
 
 #[inline(always)]
 fn solve_packet<A: Arithmetic, E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
@@ -227,42 +224,4 @@ fn store<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
             }
         }
     }
-}
-
-/// `packet − block · other`
-#[inline(always)]
-fn subtract<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
-    block: &Block<E, S>,
-    other: &Packet<E, S, W>,
-) {
-    for i in 0..S {
-        for k in 0..S {
-            for w in 0..W {
-                packet[i][w] = A::subtract(packet[i][w], block[i][k], other[k][w]);
-            }
-        }
-    }
-}
-
-/// `block · packet`
-#[inline(always)]
-fn multiply<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
-    block: &Block<E, S>,
-    packet: &Packet<E, S, W>,
-) -> Packet<E, S, W> {
-    let mut product = [[E::from_f64(0.0); W]; S];
-    for i in 0..S {
-        for k in 0..S {
-            for w in 0..W {
-                product[i][w] = A::subtract(product[i][w], -block[i][k], packet[k][w]);
-            }
-        }
-    }
-    product
-}
-
-#[inline(always)]
-fn transposed<E: Copy, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
-    core::array::from_fn(|i| core::array::from_fn(|j| block[j][i]))
 }
