@@ -32,6 +32,7 @@ pub mod result;
 pub mod scalar;
 pub mod shape;
 pub mod statistics;
+pub mod structure;
 pub mod tableau;
 #[cfg(feature = "testing")]
 pub mod testing;

@@ -1,0 +1,71 @@
+//! The plan by which the Newton matrix is eliminated.
+
+/// The order in which the Newton matrix is eliminated, with everything that follows from it and the pattern.
+///
+/// Made by the macro from the pattern of `f_ẋ ∪ f_x ∪ f_z` and from the values of the model at sample points; the entries
+/// are s×s blocks, so that it serves every tableau. A *slot* is an unknown `(k, z)` and the equation that is its pivot.
+#[derive(Clone, Copy, Debug)]
+pub struct Elimination {
+    /// The pivots in order.
+    pub pivots: &'static [Pivot],
+    /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its unknown.
+    pub slots: &'static [u32],
+    /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
+    pub updates: &'static [u32],
+    /// For each structural non-zero of the Newton matrix: where it goes and what it is made of.
+    pub assembly: &'static [Assembly],
+    /// For each equation its slot.
+    pub slot_of_equation: &'static [u32],
+}
+
+impl Elimination {
+    /// No plan: the matrix is eliminated as a dense one.
+    pub const NONE: Self =
+        Self { pivots: &[], slots: &[], updates: &[], assembly: &[], slot_of_equation: &[] };
+}
+
+/// A pivot: the blocks that it owns lie one after the other, itself, its column `L`, its row `U`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pivot {
+    /// The unknown that it determines.
+    pub slot: u32,
+    /// Its own block.
+    pub block: u32,
+    /// Where the blocks of its row begin.
+    pub upper: u32,
+    /// Where the blocks of its row end.
+    pub end: u32,
+    /// The pivot is the identity, whatever the step size and the point.
+    pub identity: bool,
+}
+
+impl Pivot {
+    /// The blocks of its column, below it.
+    #[must_use]
+    #[inline(always)]
+    pub const fn lower(&self) -> core::ops::Range<usize> {
+        self.block as usize + 1..self.upper as usize
+    }
+    /// The blocks of its row, to the right of it.
+    #[must_use]
+    #[inline(always)]
+    pub const fn upper(&self) -> core::ops::Range<usize> {
+        self.upper as usize..self.end as usize
+    }
+}
+
+/// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Assembly {
+    /// The block.
+    pub block: u32,
+    /// The entry of the Jacobian that multiplies the unknown itself (`f_ẋ` or `f_z`), or [`Assembly::NONE`].
+    pub direct: u32,
+    /// The entry of `f_x`, or [`Assembly::NONE`].
+    pub state: u32,
+}
+
+impl Assembly {
+    /// No entry.
+    pub const NONE: u32 = u32::MAX;
+}
