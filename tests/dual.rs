@@ -73,10 +73,10 @@ fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
         let (mut f, mut g) = (ArrayK::<M, f64>::from_fn(zero), ArrayK::<M, f64>::from_fn(zero));
         let mut jacobian = M::Jacobian::<f64>::from_fn(|_| f64::NAN);
         let mut sparse = G::Jacobian::<f64>::from_fn(|_| f64::NAN);
-        M::jacobian_constants(&mut jacobian);
-        G::jacobian_constants(&mut sparse);
-        M::residual_jacobian(&v, &mut f, &mut jacobian);
-        G::residual_jacobian(&v, &mut g, &mut sparse);
+        M::jacobian_constants::<f64>(&mut jacobian);
+        G::jacobian_constants::<f64>(&mut sparse);
+        M::residual_jacobian::<f64>(&v, &mut f, &mut jacobian);
+        G::residual_jacobian::<f64>(&v, &mut g, &mut sparse);
         close("residual", f.as_ref(), g.as_ref());
         close(
             "Jacobian",
@@ -85,14 +85,14 @@ fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
         );
 
         let (mut a, mut b) = (ArrayV::<M, f64>::from_fn(zero), ArrayV::<M, f64>::from_fn(zero));
-        M::adjoint(&v, &mu, &mut a);
-        G::adjoint(&v, &mu, &mut b);
+        M::adjoint::<f64>(&v, &mu, &mut a);
+        G::adjoint::<f64>(&v, &mu, &mut b);
         close("adjoint", a.as_ref(), b.as_ref());
 
         let mut hessian = M::Hessian::<f64>::from_fn(|_| f64::NAN);
         let mut sparse = G::Hessian::<f64>::from_fn(|_| f64::NAN);
-        M::hessian(&v, &mu, &mut hessian);
-        G::hessian(&v, &mu, &mut sparse);
+        M::hessian::<f64>(&v, &mu, &mut hessian);
+        G::hessian::<f64>(&v, &mu, &mut sparse);
         close(
             "Hessian",
             &dense(&M::STRUCTURE.hessian, hessian.as_ref(), M::Shape::NV),
@@ -145,16 +145,16 @@ fn values_are_those_of_the_function() {
     let v = [0.3, 0.1, -0.2, 0.5, 0.0, 0.4, 1.0, -1.5, 2.0, 0.0];
     let mut f = [0.0; 4];
     let expected = pendulum([0.3, 0.1, -0.2, 0.5], [0.0, 0.4, 1.0, -1.5], [2.0]);
-    Pendulum::residual(&v, &mut f);
+    Pendulum::residual::<f64>(&v, &mut f);
     assert_eq!(f, expected);
     f = [0.0; 4];
-    Pendulum::residual_jacobian(&v, &mut f, &mut [0.0; 36]);
+    Pendulum::residual_jacobian::<f64>(&v, &mut f, &mut [0.0; 36]);
     assert_eq!(f, expected);
 
     let v = [0.3, 0.1, 2.7, 0.5, -1.0, 1.5, 0.8, 0.2];
     let [velocity, force] = spring(0.2, [1.5, 0.8], [2.7, 0.5], -1.0);
     let mut f = [0.0; 2];
-    Spring::residual(&v, &mut f);
+    Spring::residual::<f64>(&v, &mut f);
     assert_eq!(f, [0.3 - velocity, 0.1 - force]);
 }
 
@@ -162,7 +162,7 @@ fn values_are_those_of_the_function() {
 /// which is no state of the second equation, three evaluations instead of 25. Three pairs of them have second derivatives.
 #[test]
 fn sparse_models_take_few_passes() {
-    Chain::<12>::residual_jacobian(&[0.3; 26], &mut [0.0; 12], &mut [0.0; 300]);
+    Chain::<12>::residual_jacobian::<f64>(&[0.3; 26], &mut [0.0; 12], &mut [0.0; 300]);
     let passes = Chain::<12>::passes().get().unwrap();
     assert_eq!((passes.len(), passes.pairs().len()), (3, 3));
 }
@@ -170,7 +170,7 @@ fn sparse_models_take_few_passes() {
 /// A model that looks at its state may depend on anything elsewhere.
 #[test]
 fn models_that_branch_take_a_pass_for_each_variable() {
-    Spring::residual_jacobian(&[0.3; 8], &mut [0.0; 2], &mut [0.0; 14]);
+    Spring::residual_jacobian::<f64>(&[0.3; 8], &mut [0.0; 2], &mut [0.0; 14]);
     let passes = Spring::passes().get().unwrap();
     assert_eq!((passes.len(), passes.pairs().len()), (7, 28));
 }

@@ -31,11 +31,11 @@ fn long(xdot: [f64; 3], x: [f64; 3]) -> [f64; 3] {
 fn values_are_those_of_the_function() {
     for x in [-1.5, -0.0, 0.0, 0.3, 2.0] {
         let mut f = [0.0; 2];
-        Valve::residual(&[0.3, x, 1.7, -0.4, 0.9], &mut f);
+        Valve::residual::<f64>(&[0.3, x, 1.7, -0.4, 0.9], &mut f);
         assert_eq!(f.map(f64::to_bits), valve(0.9, 0.3, 1.7, x, -0.4).map(f64::to_bits));
 
         let mut f = [0.0; 3];
-        Long::residual(&[0.1, 0.2, 0.3, x, 0.4, -0.6, 0.0], &mut f);
+        Long::residual::<f64>(&[0.1, 0.2, 0.3, x, 0.4, -0.6, 0.0], &mut f);
         assert_eq!(f.map(f64::to_bits), long([0.1, 0.2, 0.3], [x, 0.4, -0.6]).map(f64::to_bits));
     }
     const { assert!(Long::STRUCTURE.operations.residual > 1000) };

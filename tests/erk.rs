@@ -36,47 +36,61 @@ impl Dae for Oscillator {
         elimination: Elimination::NONE,
     };
 
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
-        let [k0, k1, x0, x1, u, p, t] = *v;
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let [k0, k1, x0, x1, u, p, t] = v.map(|cell| S::load(&cell));
         let n = S::from_f64;
-        f[0] = n(-2.0) * (k1 - (p * (n(1.0) - x0 * x0) * x1 - x0 + u * u));
-        f[1] = n(0.5) * (k0 - (x1 + u * t));
+        S::store(n(-2.0) * (k1 - (p * (n(1.0) - x0 * x0) * x1 - x0 + u * u)), &mut f[0]);
+        S::store(n(0.5) * (k0 - (x1 + u * t)), &mut f[1]);
     }
-    fn jacobian_constants<S: Lanes>(jacobian: &mut [S; 8]) {
+    fn jacobian_constants<S: Lanes>(jacobian: &mut [S::Cell; 8]) {
         let n = S::from_f64;
-        (jacobian[0], jacobian[1], jacobian[4]) = (n(-2.0), n(0.5), n(-0.5));
-    }
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, jacobian: &mut [S; 8]) {
-        Self::residual(v, f);
-        let [_, _, x0, x1, u, p, t] = *v;
-        let n = S::from_f64;
-        jacobian[2] = n(2.0) * (n(-2.0) * p * x0 * x1 - n(1.0));
-        jacobian[3] = n(2.0) * p * (n(1.0) - x0 * x0);
-        jacobian[5] = n(4.0) * u;
-        jacobian[6] = n(-0.5) * t;
-        jacobian[7] = n(2.0) * (n(1.0) - x0 * x0) * x1;
-    }
-    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>) {
-        let (mut f, mut jacobian) = ([S::from_f64(0.0); 2], [S::from_f64(0.0); 8]);
-        Self::jacobian_constants(&mut jacobian);
-        Self::residual_jacobian(v, &mut f, &mut jacobian);
-        *gradient = [S::from_f64(0.0); 7];
-        for (entry, &value) in jacobian.iter().enumerate() {
-            let (row, column) = Self::STRUCTURE.jacobian.at(entry);
-            gradient[column] = gradient[column] + mu[row] * value;
+        for (entry, value) in [(0, -2.0), (1, 0.5), (4, -0.5)] {
+            n(value).store(&mut jacobian[entry]);
         }
     }
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, hessian: &mut [S; 5]) {
-        let [_, _, x0, x1, _, p, _] = *v;
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        jacobian: &mut [S::Cell; 8],
+    ) {
+        Self::residual::<S>(v, f);
+        let [_, _, x0, x1, u, p, t] = v.map(|cell| S::load(&cell));
         let n = S::from_f64;
-        let twice = n(2.0) * mu[0];
-        *hessian = [
+        S::store(n(2.0) * (n(-2.0) * p * x0 * x1 - n(1.0)), &mut jacobian[2]);
+        S::store(n(2.0) * p * (n(1.0) - x0 * x0), &mut jacobian[3]);
+        S::store(n(4.0) * u, &mut jacobian[5]);
+        S::store(n(-0.5) * t, &mut jacobian[6]);
+        S::store(n(2.0) * (n(1.0) - x0 * x0) * x1, &mut jacobian[7]);
+    }
+    fn adjoint<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        gradient: &mut ArrayV<Self, S::Cell>,
+    ) {
+        let (mut f, mut jacobian) = ([v[0]; 2], [v[0]; 8]);
+        Self::jacobian_constants::<S>(&mut jacobian);
+        Self::residual_jacobian::<S>(v, &mut f, &mut jacobian);
+        for cell in gradient.iter_mut() {
+            S::from_f64(0.0).store(cell);
+        }
+        for (entry, value) in jacobian.iter().enumerate() {
+            let (row, column) = Self::STRUCTURE.jacobian.at(entry);
+            let sum = S::load(&gradient[column]) + S::load(&mu[row]) * S::load(value);
+            sum.store(&mut gradient[column]);
+        }
+    }
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, hessian: &mut [S::Cell; 5]) {
+        let [_, _, x0, x1, _, p, _] = v.map(|cell| S::load(&cell));
+        let n = S::from_f64;
+        let twice = n(2.0) * S::load(&mu[0]);
+        let values = [
             twice * n(-2.0) * p * x1,
             twice * n(-2.0) * p * x0,
             twice * n(2.0),
             twice * n(-2.0) * x0 * x1,
             twice * (n(1.0) - x0 * x0),
         ];
+        hessian.iter_mut().zip(values).for_each(|(cell, value)| value.store(cell));
     }
 }
 

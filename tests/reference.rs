@@ -141,12 +141,12 @@ fn awe_jacobian() -> Test {
             *v = *value;
         }
         let mut f = [0.0; 24];
-        Awe::residual(&v, &mut f);
+        Awe::residual::<f64>(&v, &mut f);
         assert_eq!(f.map(f64::to_bits), <[f64; 24]>::from(plain).map(f64::to_bits), "point {i}");
 
         let mut values = [f64::NAN; 302];
-        Awe::jacobian_constants(&mut values);
-        Awe::residual_jacobian(&v, &mut f, &mut values);
+        Awe::jacobian_constants::<f64>(&mut values);
+        Awe::residual_jacobian::<f64>(&v, &mut f, &mut values);
         assert_eq!(f.map(f64::to_bits), <[f64; 24]>::from(plain).map(f64::to_bits), "point {i}");
         let mut jacobian = SMatrix::<f64, 24, 51>::zeros();
         for entry in 0..structure.jacobian.len() {

@@ -45,7 +45,7 @@ pub use memory::Heap;
 pub use memory::{Inline, mode};
 pub use model::{Dae, GraphDae, Ode};
 pub use options::Options;
-pub use scalar::{Lanes, Real, Scalar};
+pub use scalar::{Field, Lanes, Real, Scalar};
 pub use shape::{Dims, Shape};
 pub use statistics::Statistics;
 pub use tableau::{

@@ -69,33 +69,41 @@ pub trait Dae: 'static {
     const STRUCTURE: Structure;
 
     /// The residual `f(v)`.
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>);
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>);
 
     /// The constant entries of the Jacobian; the others are left as they are. Called once for
     /// every array that [`Dae::residual_jacobian`] will fill.
-    fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S>);
+    fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S::Cell>);
 
     /// The residual and the entries of the Jacobian that are not constant.
     fn residual_jacobian<S: Lanes>(
-        v: &ArrayV<Self, S>,
-        f: &mut ArrayK<Self, S>,
-        jacobian: &mut Self::Jacobian<S>,
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        jacobian: &mut Self::Jacobian<S::Cell>,
     );
 
     /// The gradient `∇ᵥ(μᵀ f)` over `(ẋ, x, z, u, p)`. The last element, that of `t`, is set to zero.
-    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>);
+    fn adjoint<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        gradient: &mut ArrayV<Self, S::Cell>,
+    );
 
     /// All entries of the lower triangle of `∇²(μᵀ f)`.
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, hessian: &mut Self::Hessian<S>);
+    fn hessian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        hessian: &mut Self::Hessian<S::Cell>,
+    );
 }
 
 /// A model whose code is generic over every scalar: duals and complex numbers included, which is
 /// what independent checks of its derivatives need. Graph models are; dual models are not.
 pub trait GraphDae: Dae {
     /// The residual `f(v)`; `v` has `NV` elements and `f` has `NK`.
-    fn residual_of<S: Scalar>(v: &[S], f: &mut [S]);
+    fn residual_of<S: Scalar<Cell = S>>(v: &[S], f: &mut [S]);
     /// The gradient `∇ᵥ(μᵀ f)`, as [`Dae::adjoint`].
-    fn adjoint_of<S: Scalar>(v: &[S], mu: &[S], gradient: &mut [S]);
+    fn adjoint_of<S: Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]);
 }
 
 /// A model in explicit form: row `r` of the residual is `c (ẋ_j − g_j(x, u, p, t))` with a constant `c`

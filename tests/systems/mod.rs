@@ -63,52 +63,63 @@ pub const fn triangle<const N: usize>() -> [[u32; N]; 2] {
     positions
 }
 
-fn lane<S: Lanes>(values: &[S], lane: usize) -> Vec<f64> {
-    values.iter().map(|value| value.lane(lane)).collect()
+fn lane<S: Lanes>(values: &[S::Cell], lane: usize) -> Vec<f64> {
+    values.iter().map(|value| S::lane(value, lane)).collect()
 }
 
-pub fn residual<M: Equations, S: Lanes>(v: &ArrayV<M, S>, f: &mut ArrayK<M, S>) {
-    M::equations(v.as_ref(), f.as_mut());
+pub fn residual<M: Equations, S: Lanes>(v: &ArrayV<M, S::Cell>, f: &mut ArrayK<M, S::Cell>) {
+    let v: Vec<S> = v.as_ref().iter().map(S::load).collect();
+    let mut values = vec![S::from_f64(0.0); M::Shape::NK];
+    M::equations(&v, &mut values);
+    f.as_mut().iter_mut().zip(values).for_each(|(cell, value)| value.store(cell));
 }
 
-pub fn jacobian<M: Equations, S: Lanes>(v: &ArrayV<M, S>, jacobian: &mut [S]) {
+pub fn jacobian<M: Equations, S: Lanes>(v: &ArrayV<M, S::Cell>, jacobian: &mut [S::Cell]) {
     let pattern = M::STRUCTURE.jacobian;
     for l in 0..S::LANES {
-        let v = lane(v.as_ref(), l);
+        let v = lane::<S>(v.as_ref(), l);
         for variable in 0..v.len() - 1 {
             let v: Vec<_> = (0..v.len()).map(|i| Dual64::new(v[i], f64::from(i == variable))).collect();
             let mut f = vec![Dual64::from(0.0); M::Shape::NK];
             M::equations(&v, &mut f);
             for (entry, value) in jacobian.iter_mut().enumerate() {
                 if pattern.at(entry).1 == variable {
-                    value.set_lane(l, f[pattern.at(entry).0].eps);
+                    S::set_lane(value, l, f[pattern.at(entry).0].eps);
                 }
             }
         }
     }
 }
 
-pub fn adjoint<M: Equations, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, gradient: &mut ArrayV<M, S>) {
-    let zero = S::from_f64(0.0);
-    let mut values = vec![zero; M::STRUCTURE.jacobian.len()];
+pub fn adjoint<M: Equations, S: Lanes>(
+    v: &ArrayV<M, S::Cell>,
+    mu: &ArrayK<M, S::Cell>,
+    gradient: &mut ArrayV<M, S::Cell>,
+) {
+    let mut values = vec![v.as_ref()[0]; M::STRUCTURE.jacobian.len()];
     jacobian::<M, S>(v, &mut values);
-    gradient.as_mut().fill(zero);
-    for (entry, &value) in values.iter().enumerate() {
+    gradient.as_mut().iter_mut().for_each(|cell| S::from_f64(0.0).store(cell));
+    for (entry, value) in values.iter().enumerate() {
         let (row, column) = M::STRUCTURE.jacobian.at(entry);
-        gradient[column] = gradient[column] + mu[row] * value;
+        let sum = S::load(&gradient[column]) + S::load(&mu[row]) * S::load(value);
+        sum.store(&mut gradient[column]);
     }
 }
 
-pub fn hessian<M: Equations, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, hessian: &mut [S]) {
+pub fn hessian<M: Equations, S: Lanes>(
+    v: &ArrayV<M, S::Cell>,
+    mu: &ArrayK<M, S::Cell>,
+    hessian: &mut [S::Cell],
+) {
     for l in 0..S::LANES {
-        let (v, mu) = (lane(v.as_ref(), l), lane(mu.as_ref(), l));
+        let (v, mu) = (lane::<S>(v.as_ref(), l), lane::<S>(mu.as_ref(), l));
         for (entry, value) in hessian.iter_mut().enumerate() {
             let (a, b) = M::STRUCTURE.hessian.at(entry);
             let one = |i: usize, j: usize| f64::from(i == j);
             let v: Vec<_> = (0..v.len()).map(|i| HyperDual64::new(v[i], one(i, a), one(i, b), 0.0)).collect();
             let mut f = vec![HyperDual64::from(0.0); mu.len()];
             M::equations(&v, &mut f);
-            value.set_lane(l, f.iter().zip(&mu).map(|(f, mu)| f.eps1eps2 * mu).sum());
+            S::set_lane(value, l, f.iter().zip(&mu).map(|(f, mu)| f.eps1eps2 * mu).sum());
         }
     }
 }
@@ -147,25 +158,25 @@ macro_rules! system {
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
                     elimination: Elimination::NONE,
                 };
-                fn residual<S: casados::Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+                fn residual<S: casados::Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
                     $crate::systems::residual::<Self, S>(v, f);
                 }
-                fn jacobian_constants<S: casados::Lanes>(_: &mut Self::Jacobian<S>) {}
+                fn jacobian_constants<S: casados::Lanes>(_: &mut Self::Jacobian<S::Cell>) {}
                 fn residual_jacobian<S: casados::Lanes>(
-                    v: &ArrayV<Self, S>,
-                    f: &mut ArrayK<Self, S>,
-                    jacobian: &mut Self::Jacobian<S>,
+                    v: &ArrayV<Self, S::Cell>,
+                    f: &mut ArrayK<Self, S::Cell>,
+                    jacobian: &mut Self::Jacobian<S::Cell>,
                 ) {
                     $crate::systems::residual::<Self, S>(v, f);
                     $crate::systems::jacobian::<Self, S>(v, jacobian);
                 }
-                fn adjoint<S: casados::Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, g: &mut ArrayV<Self, S>) {
+                fn adjoint<S: casados::Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, g: &mut ArrayV<Self, S::Cell>) {
                     $crate::systems::adjoint::<Self, S>(v, mu, g);
                 }
                 fn hessian<S: casados::Lanes>(
-                    v: &ArrayV<Self, S>,
-                    mu: &ArrayK<Self, S>,
-                    hessian: &mut Self::Hessian<S>,
+                    v: &ArrayV<Self, S::Cell>,
+                    mu: &ArrayK<Self, S::Cell>,
+                    hessian: &mut Self::Hessian<S::Cell>,
                 ) {
                     $crate::systems::hessian::<Self, S>(v, mu, hessian);
                 }

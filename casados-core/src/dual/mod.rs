@@ -44,65 +44,77 @@ fn passes<M: DualModel>(point: impl Fn(usize) -> f64) -> &'static Passes {
 }
 
 /// `f(v)`
-pub fn residual<M: DualModel, S: Lanes>(v: &ArrayV<M, S>, f: &mut ArrayK<M, S>) {
+pub fn residual<M: DualModel, S: Lanes>(v: &ArrayV<M, S::Cell>, f: &mut ArrayK<M, S::Cell>) {
     for lane in 0..S::LANES {
-        M::evaluate::<f64>(|i| v[i].lane(lane), |row, value| f[row].set_lane(lane, value));
+        M::evaluate::<f64>(|i| S::lane(&v[i], lane), |row, value| S::set_lane(&mut f[row], lane, value));
     }
 }
 
 /// `f(v)` and its Jacobian.
 pub fn residual_jacobian<M: DualModel, S: Lanes>(
-    v: &ArrayV<M, S>,
-    f: &mut ArrayK<M, S>,
-    jacobian: &mut M::Jacobian<S>,
+    v: &ArrayV<M, S::Cell>,
+    f: &mut ArrayK<M, S::Cell>,
+    jacobian: &mut M::Jacobian<S::Cell>,
 ) {
     residual::<M, S>(v, f);
     for entry in jacobian.as_mut() {
-        *entry = S::from_f64(0.0);
+        S::from_f64(0.0).store(entry);
     }
     for lane in 0..S::LANES {
         first_order::<M>(
-            |i| v[i].lane(lane),
+            |i| S::lane(&v[i], lane),
             |row, column, value| {
-                jacobian[jacobian_entry::<M::Shape>(row, column)].set_lane(lane, value);
+                S::set_lane(&mut jacobian[jacobian_entry::<M::Shape>(row, column)], lane, value);
             },
         );
     }
 }
 
 /// `∇(μᵀ f)`
-pub fn adjoint<M: DualModel, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, gradient: &mut ArrayV<M, S>) {
+pub fn adjoint<M: DualModel, S: Lanes>(
+    v: &ArrayV<M, S::Cell>,
+    mu: &ArrayK<M, S::Cell>,
+    gradient: &mut ArrayV<M, S::Cell>,
+) {
     for element in gradient.as_mut() {
-        *element = S::from_f64(0.0);
+        S::from_f64(0.0).store(element);
     }
     for lane in 0..S::LANES {
         first_order::<M>(
-            |i| v[i].lane(lane),
+            |i| S::lane(&v[i], lane),
             |row, column, value| {
-                let sum = gradient[column].lane(lane) + mu[row].lane(lane) * value;
-                gradient[column].set_lane(lane, sum);
+                let sum = S::lane(&gradient[column], lane) + S::lane(&mu[row], lane) * value;
+                S::set_lane(&mut gradient[column], lane, sum);
             },
         );
     }
 }
 
 /// The lower triangle of `∇²(μᵀ f)`.
-pub fn hessian<M: DualModel, S: Lanes>(v: &ArrayV<M, S>, mu: &ArrayK<M, S>, hessian: &mut M::Hessian<S>) {
+pub fn hessian<M: DualModel, S: Lanes>(
+    v: &ArrayV<M, S::Cell>,
+    mu: &ArrayK<M, S::Cell>,
+    hessian: &mut M::Hessian<S::Cell>,
+) {
     for entry in hessian.as_mut() {
-        *entry = S::from_f64(0.0);
+        S::from_f64(0.0).store(entry);
     }
     for lane in 0..S::LANES {
-        let passes = passes::<M>(|i| v[i].lane(lane));
+        let passes = passes::<M>(|i| S::lane(&v[i], lane));
         for &(first, second) in passes.pairs() {
             M::evaluate::<HyperDual64>(
                 |i| {
                     let seed = |colour| f64::from(passes.contains(colour, i));
-                    HyperDual64::new(v[i].lane(lane), seed(first), seed(second), 0.0)
+                    HyperDual64::new(S::lane(&v[i], lane), seed(first), seed(second), 0.0)
                 },
                 |row, value| {
                     if let (Some(a), Some(b)) = (passes.column(first, row), passes.column(second, row)) {
                         let entry = &mut hessian[hessian_entry(a, b)];
-                        entry.set_lane(lane, entry.lane(lane) + mu[row].lane(lane) * value.eps1eps2);
+                        S::set_lane(
+                            entry,
+                            lane,
+                            S::lane(entry, lane) + S::lane(&mu[row], lane) * value.eps1eps2,
+                        );
                     }
                 },
             );

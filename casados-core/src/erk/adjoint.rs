@@ -47,7 +47,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         columns: usize,
         mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
     ) -> Result<(), Error> {
-        M::jacobian_constants(&mut self.forward.jacobian);
+        M::jacobian_constants::<T>(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
             lambda.as_mut()[..columns].fill(T::ZERO);
         }
@@ -115,7 +115,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     /// `∇(μᵀ f)` by reverse mode.
     fn pull_one(&mut self, point: &Point<M, T>, mu: &ArrayK<M, T>, at: Place) -> Result<(), Error> {
-        M::adjoint(&point.v, mu, &mut self.gradient);
+        M::adjoint::<T>(&point.v, mu, &mut self.gradient);
         check(self.gradient.as_ref(), Quantity::Adjoint, at, |variable| variable)
     }
 

@@ -94,7 +94,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
         mut at_stage: impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let columns = directions.columns();
-        M::jacobian_constants(&mut self.jacobian);
+        M::jacobian_constants::<T>(&mut self.jacobian);
         for (i, row) in self.dx.as_mut().iter_mut().enumerate() {
             let row = &mut row.as_mut()[..columns];
             row.fill(T::ZERO);

@@ -46,7 +46,7 @@ impl<M: Ode, T: Real> Curvature<M, T> {
         dxi: &ArrayX<M, ArrayW<M, T>>,
         at: Place,
     ) -> Result<(), Error> {
-        M::hessian(&point.v, mu, &mut self.entries);
+        M::hessian::<T>(&point.v, mu, &mut self.entries);
         check(self.entries.as_ref(), Quantity::Hessian, at, |entry| M::STRUCTURE.hessian.at(entry).0)?;
         self.multiply(&scheme.curved, dxi);
         self.project(&scheme.curved, dxi);

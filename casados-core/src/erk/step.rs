@@ -126,7 +126,7 @@ impl<M: Ode, T: Real> Point<M, T> {
         at: Place,
     ) -> Result<(), Error> {
         self.counts.residuals += 1;
-        M::residual(&self.v, &mut self.f);
+        M::residual::<T>(&self.v, &mut self.f);
         check(self.f.as_ref(), Quantity::Residual, at, |equation| equation)?;
         self.assign(scheme, k);
         Ok(())
@@ -148,7 +148,7 @@ impl<M: Ode, T: Real> Point<M, T> {
     /// The residual and its Jacobian at this point.
     pub fn jacobian(&mut self, jacobian: &mut M::Jacobian<T>, at: Place) -> Result<(), Error> {
         self.counts.jacobians += 1;
-        M::residual_jacobian(&self.v, &mut self.f, jacobian);
+        M::residual_jacobian::<T>(&self.v, &mut self.f, jacobian);
         check(self.f.as_ref(), Quantity::Residual, at, |equation| equation)?;
         check(jacobian.as_ref(), Quantity::Jacobian, at, |entry| M::STRUCTURE.jacobian.at(entry).0)
     }

@@ -51,7 +51,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     /// An element that is not finite.
     pub(crate) fn evaluate_residual(&mut self, step: usize, iteration: usize) -> Result<(), Error> {
         for stage in 0..S {
-            M::residual(&self.points[stage], &mut self.f);
+            M::residual::<T>(&self.points[stage], &mut self.f);
             self.store_residual(Place { step, stage, iteration })?;
         }
         Ok(())
@@ -64,7 +64,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     pub(crate) fn evaluate_jacobian(&mut self, step: usize, iteration: usize) -> Result<(), Error> {
         for stage in 0..S {
             let jacobian = &mut self.linear.jacobian[stage];
-            M::residual_jacobian(&self.points[stage], &mut self.f, jacobian);
+            M::residual_jacobian::<T>(&self.points[stage], &mut self.f, jacobian);
             let at = Place { step, stage, iteration };
             if let Some((entry, value)) = not_finite(jacobian.as_ref()) {
                 // The residual may well be finite; if it is not, it is the better message.

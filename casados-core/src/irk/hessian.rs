@@ -80,7 +80,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                 for (equation, to) in self.mu.as_mut().iter_mut().enumerate() {
                     [*to] = self.backward.mu[slot::<M>(equation)][stage];
                 }
-                M::hessian(&work.points[stage], &self.mu, &mut self.entries);
+                M::hessian::<T>(&work.points[stage], &self.mu, &mut self.entries);
                 if let Some((entry, value)) = super::evaluate::not_finite(self.entries.as_ref()) {
                     return Err(Error::NonFiniteModel {
                         quantity: Quantity::Hessian,

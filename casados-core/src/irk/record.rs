@@ -134,7 +134,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     pub(crate) fn prepare(&mut self) {
         if !self.ready {
             for jacobian in &mut self.linear.jacobian {
-                M::jacobian_constants(jacobian);
+                M::jacobian_constants::<T>(jacobian);
             }
             self.ready = true;
         }

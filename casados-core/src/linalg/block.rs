@@ -3,7 +3,7 @@
 //! Generic over the scalar, so that the same code serves one number and registers of them.
 
 use super::fused::Arithmetic;
-use crate::scalar::Scalar;
+use crate::scalar::Field;
 
 /// An s×s matrix, row by row.
 pub type Block<E, const S: usize> = [[E; S]; S];
@@ -13,7 +13,7 @@ pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
 
 /// `packet − block · other`
 #[inline(always)]
-pub fn subtract<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
+pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
     other: &Packet<E, S, W>,
@@ -29,7 +29,7 @@ pub fn subtract<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
 
 /// `block · packet`
 #[inline(always)]
-pub fn multiply<A: Arithmetic, E: Scalar, const S: usize, const W: usize>(
+pub fn multiply<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     block: &Block<E, S>,
     packet: &Packet<E, S, W>,
 ) -> Packet<E, S, W> {
@@ -53,7 +53,7 @@ pub fn transposed<E: Copy, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
 /// The inverse by Gauss-Jordan elimination with partial pivoting, without a branch on the values:
 /// rows are exchanged lane by lane. A singular block gives entries that are not finite.
 #[inline(always)]
-pub fn inverse<A: Arithmetic, E: Scalar, const S: usize>(a: &Block<E, S>) -> Block<E, S> {
+pub fn inverse<A: Arithmetic, E: Field, const S: usize>(a: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
     let mut a = *a;
     let mut inverse = [[zero; S]; S];
@@ -62,7 +62,7 @@ pub fn inverse<A: Arithmetic, E: Scalar, const S: usize>(a: &Block<E, S>) -> Blo
     }
     for k in 0..S {
         for i in k + 1..S {
-            let larger = a[k][k].abs().lt(a[i][k].abs());
+            let larger = a[k][k].is_smaller(a[i][k]);
             for j in 0..S {
                 let (p, q) = (a[k][j], a[i][j]);
                 a[k][j] = E::select(larger, q, p);

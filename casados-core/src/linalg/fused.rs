@@ -4,12 +4,12 @@
 //! everything in it is inlined, and [`dispatch`] enters it through a function that is compiled for the better
 //! machine if this is one. Results differ by rounding only.
 
-use crate::scalar::Scalar;
+use crate::scalar::Field;
 
 /// How `t − a b` is computed.
 pub trait Arithmetic {
     /// `t − a b`
-    fn subtract<E: Scalar>(t: E, a: E, b: E) -> E;
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E;
 }
 
 /// Rounded twice.
@@ -17,7 +17,7 @@ pub struct Separate;
 
 impl Arithmetic for Separate {
     #[inline(always)]
-    fn subtract<E: Scalar>(t: E, a: E, b: E) -> E {
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t - a * b
     }
 }
@@ -29,7 +29,7 @@ pub struct Fused;
 #[cfg(all(feature = "std", any(target_arch = "x86_64", target_arch = "aarch64")))]
 impl Arithmetic for Fused {
     #[inline(always)]
-    fn subtract<E: Scalar>(t: E, a: E, b: E) -> E {
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t.subtract_product(a, b)
     }
 }

@@ -16,7 +16,7 @@
 use super::block::{Block, Packet, inverse, multiply, subtract, transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use crate::model::Elimination;
-use crate::scalar::Scalar;
+use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 
 /// Calls a function for all columns, eight, four, two and one at a time.
@@ -43,7 +43,7 @@ macro_rules! packets {
 
 /// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`. A pivot block
 /// that is singular leaves elements that are not finite.
-pub fn factor<E: Scalar, const S: usize>(plan: &Elimination, blocks: &mut [Block<E, S>]) {
+pub fn factor<E: Field, const S: usize>(plan: &Elimination, blocks: &mut [Block<E, S>]) {
     dispatch(Factor { plan, blocks });
 }
 
@@ -52,7 +52,7 @@ struct Factor<'a, E, const S: usize> {
     blocks: &'a mut [Block<E, S>],
 }
 
-impl<E: Scalar, const S: usize> Kernel for Factor<'_, E, S> {
+impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -83,7 +83,7 @@ impl<E: Scalar, const S: usize> Kernel for Factor<'_, E, S> {
 ///
 /// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
 /// rows stays in the nearest cache.
-pub fn solve<E: Scalar + Plain, R: Array<E>, const S: usize>(
+pub fn solve<E: Field + Plain, R: Array<E>, const S: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
@@ -97,7 +97,7 @@ struct Solve<'a, E, R, const S: usize> {
     rows: &'a mut [[R; S]],
 }
 
-impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S> {
+impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -107,7 +107,7 @@ impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, 
 }
 
 /// Solves `Mᵀ X = R` in place.
-pub fn solve_transposed<E: Scalar + Plain, R: Array<E>, const S: usize>(
+pub fn solve_transposed<E: Field + Plain, R: Array<E>, const S: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
@@ -117,7 +117,7 @@ pub fn solve_transposed<E: Scalar + Plain, R: Array<E>, const S: usize>(
 
 struct SolveTransposed<'a, E, R, const S: usize>(Solve<'a, E, R, S>);
 
-impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, E, R, S> {
+impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, E, R, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -127,7 +127,7 @@ impl<E: Scalar + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<
 }
 
 #[inline(always)]
-fn solve_packet<A: Arithmetic, E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+fn solve_packet<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
@@ -154,7 +154,7 @@ fn solve_packet<A: Arithmetic, E: Scalar + Plain, R: Array<E>, const S: usize, c
 }
 
 #[inline(always)]
-fn solve_packet_transposed<A: Arithmetic, E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],
@@ -193,7 +193,7 @@ fn beside<'a, E, const S: usize>(
 }
 
 #[inline(always)]
-fn load<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
     column: usize,
@@ -210,7 +210,7 @@ fn load<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
 }
 
 #[inline(always)]
-fn store<E: Scalar + Plain, R: Array<E>, const S: usize, const W: usize>(
+fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &mut [[R; S]],
     slot: usize,
     column: usize,

@@ -6,7 +6,7 @@
 //! made of pieces (`abs`, `signum`, `atan2`, `cbrt` and `powf` of negative numbers, comparisons), the real part
 //! chooses the piece. Inverse functions follow Kahan, "Branch cuts for complex elementary functions" (1987).
 
-use super::Scalar;
+use super::{Field, Scalar, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};
 use num_complex::Complex64;
 
@@ -21,12 +21,22 @@ fn polar(r: f64, angle: f64) -> Complex64 {
     c(r * c_, r * s)
 }
 
-impl Scalar for Complex64 {
+impl Field for Complex64 {
     type Mask = bool;
 
     fn from_f64(value: f64) -> Self {
         c(value, 0.0)
     }
+    fn is_smaller(self, other: Self) -> bool {
+        self.norm_sqr() < other.norm_sqr()
+    }
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+}
+
+impl Scalar for Complex64 {
+    own_cell!();
 
     fn sqrt(self) -> Self {
         if self.re == 0.0 && self.im == 0.0 {
@@ -199,8 +209,5 @@ impl Scalar for Complex64 {
     }
     fn not(a: bool) -> bool {
         !a
-    }
-    fn select(mask: bool, a: Self, b: Self) -> Self {
-        if mask { a } else { b }
     }
 }

@@ -9,17 +9,28 @@
 //!   multiplies `a^(n − 3)` by `a³`); with a variable exponent it is `exp(b ln a)`;
 //! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
 
-use super::Scalar;
+use super::{Field, Scalar, own_cell};
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
 
 macro_rules! dual {
     ($t:ty, $constant:expr; $($name:ident)*) => {
-        impl Scalar for $t {
+        impl Field for $t {
             type Mask = bool;
 
             fn from_f64(value: f64) -> Self {
                 Self::from(value)
             }
+            fn is_smaller(self, other: Self) -> bool {
+                self.re.abs() < other.re.abs()
+            }
+            fn select(mask: bool, a: Self, b: Self) -> Self {
+                if mask { a } else { b }
+            }
+        }
+
+        impl Scalar for $t {
+            own_cell!();
+
             $(
                 fn $name(self) -> Self {
                     DualNum::$name(&self)
@@ -97,9 +108,6 @@ macro_rules! dual {
             }
             fn not(a: bool) -> bool {
                 !a
-            }
-            fn select(mask: bool, a: Self, b: Self) -> Self {
-                if mask { a } else { b }
             }
         }
     };

@@ -1,5 +1,6 @@
 //! The numbers that model code and kernels are generic over.
 //!
+//! - [`Field`]: what can be added, multiplied, divided, and compared in size.
 //! - [`Scalar`]: anything that can be computed with: `f32`, `f64`, registers of them, duals, complex numbers.
 //! - [`Lanes`]: one or more real numbers side by side, each of which can be read and written.
 //! - [`Real`]: one real number, which can be compared: what decisions are made on.
@@ -14,10 +15,24 @@ use crate::shape::Plain;
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What model code is generic over.
-///
-/// Elementary functions have the meaning of the `f64` methods of the same name.
-pub trait Scalar:
+/// A number that lies in memory as itself.
+macro_rules! own_cell {
+    () => {
+        type Cell = Self;
+        #[inline(always)]
+        fn load(cell: &Self) -> Self {
+            *cell
+        }
+        #[inline(always)]
+        fn store(self, cell: &mut Self) {
+            *cell = self;
+        }
+    };
+}
+pub(crate) use own_cell;
+
+/// What elimination is generic over: numbers that can be added, multiplied, divided, and compared in size.
+pub trait Field:
     Copy
     + Debug
     + 'static
@@ -32,6 +47,45 @@ pub trait Scalar:
 
     /// A constant.
     fn from_f64(value: f64) -> Self;
+
+    /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
+    /// machine has an instruction for it: elsewhere it is slow.
+    #[inline(always)]
+    fn subtract_product(self, a: Self, b: Self) -> Self {
+        self - a * b
+    }
+
+    /// `|a| < |b|`
+    fn is_smaller(self, other: Self) -> Self::Mask;
+
+    /// `if mask { a } else { b }`, lane by lane
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+}
+
+/// A piece of straight-line code on scalars of one type.
+pub trait Piece {
+    /// To be `#[inline(always)]`.
+    fn run(self);
+}
+
+/// What model code is generic over.
+///
+/// Elementary functions have the meaning of the `f64` methods of the same name.
+pub trait Scalar: Field {
+    /// How a number lies in memory: as itself, or, for a register of `N` numbers, as `[f64; N]`.
+    type Cell: Copy + 'static;
+
+    /// A number from memory.
+    fn load(cell: &Self::Cell) -> Self;
+    /// A number to memory.
+    fn store(self, cell: &mut Self::Cell);
+
+    /// Runs a piece of code that is compiled for the instructions which this type consists of. Never inlined:
+    /// pieces are long.
+    #[inline(never)]
+    fn vectorize<P: Piece>(piece: P) {
+        piece.run();
+    }
 
     /// `√a`
     fn sqrt(self) -> Self;
@@ -90,13 +144,6 @@ pub trait Scalar:
     /// `±1`, with the sign of `a`
     fn signum(self) -> Self;
 
-    /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
-    /// machine has an instruction for it: elsewhere it is slow.
-    #[inline(always)]
-    fn subtract_product(self, a: Self, b: Self) -> Self {
-        self - a * b
-    }
-
     /// `a < b`
     fn lt(self, other: Self) -> Self::Mask;
     /// `a ≤ b`
@@ -109,22 +156,20 @@ pub trait Scalar:
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// not
     fn not(a: Self::Mask) -> Self::Mask;
-    /// `if mask { a } else { b }`, lane by lane
-    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
 }
 
 /// One or more real numbers side by side.
-pub trait Lanes: Scalar + Plain {
+pub trait Lanes: Scalar<Cell: Plain> + Plain {
     /// How many.
     const LANES: usize;
     /// One of them. `lane < LANES`
-    fn lane(self, lane: usize) -> f64;
+    fn lane(cell: &Self::Cell, lane: usize) -> f64;
     /// One of them set. `lane < LANES`
-    fn set_lane(&mut self, lane: usize, value: f64);
+    fn set_lane(cell: &mut Self::Cell, lane: usize, value: f64);
 }
 
 /// One real number: `f32` or `f64`.
-pub trait Real: Lanes + PartialOrd + Default {
+pub trait Real: Lanes<Cell = Self> + PartialOrd + Default {
     /// Zero.
     const ZERO: Self;
     /// One.

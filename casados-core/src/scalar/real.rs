@@ -1,17 +1,35 @@
 //! `f32` and `f64`.
 
-use super::{Lanes, Real, Scalar};
+use super::{Field, Lanes, Real, Scalar, own_cell};
 
 /// The methods of one real type, from `std` where it is there and from `libm` elsewhere.
 macro_rules! real {
     ($t:ident, $($name:ident = $libm:ident),*; $powf:ident, $atan2:ident, $hypot:ident, $sincos:ident) => {
-        impl Scalar for $t {
+        impl Field for $t {
             type Mask = bool;
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
                 value as $t
             }
+            #[cfg(feature = "std")]
+            #[inline(always)]
+            fn subtract_product(self, a: Self, b: Self) -> Self {
+                (-a).mul_add(b, self)
+            }
+            #[inline(always)]
+            fn is_smaller(self, other: Self) -> bool {
+                <$t>::abs(self) < <$t>::abs(other)
+            }
+            #[inline(always)]
+            fn select(mask: bool, a: Self, b: Self) -> Self {
+                if mask { a } else { b }
+            }
+        }
+
+        impl Scalar for $t {
+            own_cell!();
+
             $(
                 #[inline(always)]
                 fn $name(self) -> Self {
@@ -75,11 +93,6 @@ macro_rules! real {
             fn signum(self) -> Self {
                 <$t>::signum(self)
             }
-            #[cfg(feature = "std")]
-            #[inline(always)]
-            fn subtract_product(self, a: Self, b: Self) -> Self {
-                (-a).mul_add(b, self)
-            }
             #[inline(always)]
             fn lt(self, other: Self) -> bool {
                 self < other
@@ -104,21 +117,17 @@ macro_rules! real {
             fn not(a: bool) -> bool {
                 !a
             }
-            #[inline(always)]
-            fn select(mask: bool, a: Self, b: Self) -> Self {
-                if mask { a } else { b }
-            }
         }
 
         impl Lanes for $t {
             const LANES: usize = 1;
             #[inline(always)]
-            fn lane(self, _: usize) -> f64 {
-                self as f64
+            fn lane(cell: &Self, _: usize) -> f64 {
+                *cell as f64
             }
             #[inline(always)]
-            fn set_lane(&mut self, _: usize, value: f64) {
-                *self = value as $t;
+            fn set_lane(cell: &mut Self, _: usize, value: f64) {
+                *cell = value as $t;
             }
         }
 

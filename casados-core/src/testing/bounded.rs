@@ -4,7 +4,7 @@
 //! (Wilkinson; Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3). Run through emitted code it
 //! yields condition times epsilon of every entry, which is what tolerances of comparisons are made of.
 
-use crate::scalar::{Lanes, Scalar};
+use crate::scalar::{Field, Lanes, Scalar, own_cell};
 use bytemuck::Zeroable;
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -107,12 +107,23 @@ macro_rules! functions {
     };
 }
 
-impl Scalar for Bounded {
+impl Field for Bounded {
     type Mask = bool;
 
     fn from_f64(value: f64) -> Self {
         Self::exact(value)
     }
+    fn is_smaller(self, other: Self) -> bool {
+        self.value.abs() < other.value.abs()
+    }
+    fn select(mask: bool, a: Self, b: Self) -> Self {
+        if mask { a } else { b }
+    }
+}
+
+impl Scalar for Bounded {
+    own_cell!();
+
     functions! {
         sqrt(a, f) = 0.5 / f;
         cbrt(a, f) = f / (3.0 * a);
@@ -189,18 +200,15 @@ impl Scalar for Bounded {
     fn not(a: bool) -> bool {
         !a
     }
-    fn select(mask: bool, a: Self, b: Self) -> Self {
-        if mask { a } else { b }
-    }
 }
 
 impl Lanes for Bounded {
     const LANES: usize = 1;
-    fn lane(self, _: usize) -> f64 {
-        self.value
+    fn lane(cell: &Self, _: usize) -> f64 {
+        cell.value
     }
     // A number that comes from code which does not carry the bound along is at least rounded.
-    fn set_lane(&mut self, _: usize, value: f64) {
-        *self = Self { value, error: f64::EPSILON * value.abs() };
+    fn set_lane(cell: &mut Self, _: usize, value: f64) {
+        *cell = Self { value, error: f64::EPSILON * value.abs() };
     }
 }

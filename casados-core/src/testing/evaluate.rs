@@ -36,27 +36,27 @@ pub(super) const fn variables<M: Dae>() -> usize {
 }
 
 /// A point in another arithmetic.
-fn lift<M: Dae, S: Lanes>(v: &ArrayV<M, f64>) -> ArrayV<M, S> {
+fn lift<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> ArrayV<M, S> {
     Array::from_fn(|i| S::from_f64(v[i]))
 }
 
-fn filled<S: Lanes, A: Array<S>>(value: f64) -> A {
+fn filled<S: Lanes<Cell = S>, A: Array<S>>(value: f64) -> A {
     A::from_fn(|_| S::from_f64(value))
 }
 
 /// `f(v)`
-pub(super) fn residual<M: Dae, S: Lanes>(v: &ArrayV<M, S>) -> ArrayK<M, S> {
+pub(super) fn residual<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>) -> ArrayK<M, S> {
     let mut f = filled::<S, ArrayK<M, S>>(f64::NAN);
-    M::residual(v, &mut f);
+    M::residual::<S>(v, &mut f);
     f
 }
 
 /// `f(v)` beside its Jacobian, and the Jacobian. Entries that nothing has written are NaN.
-pub(super) fn jacobian<M: Dae, S: Lanes>(v: &ArrayV<M, f64>) -> (ArrayK<M, S>, DMatrix<S>) {
+pub(super) fn jacobian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>) -> (ArrayK<M, S>, DMatrix<S>) {
     let mut f = filled::<S, ArrayK<M, S>>(f64::NAN);
     let mut values = filled::<S, M::Jacobian<S>>(f64::NAN);
-    M::jacobian_constants(&mut values);
-    M::residual_jacobian(&lift::<M, S>(v), &mut f, &mut values);
+    M::jacobian_constants::<S>(&mut values);
+    M::residual_jacobian::<S>(&lift::<M, S>(v), &mut f, &mut values);
     let mut dense = DMatrix::from_element(M::Shape::NK, variables::<M>(), S::from_f64(0.0));
     for entry in 0..M::STRUCTURE.jacobian.len() {
         dense[M::STRUCTURE.jacobian.at(entry)] = values[entry];
@@ -65,18 +65,18 @@ pub(super) fn jacobian<M: Dae, S: Lanes>(v: &ArrayV<M, f64>) -> (ArrayK<M, S>, D
 }
 
 /// `∇(μᵀ f)`, with `t`.
-pub(super) fn adjoint<M: Dae, S: Lanes>(v: &ArrayV<M, S>, mu: &[f64]) -> ArrayV<M, S> {
+pub(super) fn adjoint<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, S>, mu: &[f64]) -> ArrayV<M, S> {
     let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
     let mut gradient = filled::<S, ArrayV<M, S>>(f64::NAN);
-    M::adjoint(v, &mu, &mut gradient);
+    M::adjoint::<S>(v, &mu, &mut gradient);
     gradient
 }
 
 /// `∇²(μᵀ f)`, both triangles.
-pub(super) fn hessian<M: Dae, S: Lanes>(v: &ArrayV<M, f64>, mu: &[f64]) -> DMatrix<S> {
+pub(super) fn hessian<M: Dae, S: Lanes<Cell = S>>(v: &ArrayV<M, f64>, mu: &[f64]) -> DMatrix<S> {
     let mu = <ArrayK<M, S> as Array<S>>::from_fn(|r| S::from_f64(mu[r]));
     let mut values = filled::<S, M::Hessian<S>>(f64::NAN);
-    M::hessian(&lift::<M, S>(v), &mu, &mut values);
+    M::hessian::<S>(&lift::<M, S>(v), &mu, &mut values);
     let mut dense = DMatrix::from_element(variables::<M>(), variables::<M>(), S::from_f64(0.0));
     for entry in 0..M::STRUCTURE.hessian.len() {
         let (i, j) = M::STRUCTURE.hessian.at(entry);
@@ -109,7 +109,7 @@ pub(super) fn own_hessian<M: Dae>(v: &ArrayV<M, f64>, mu: &[f64]) -> Estimate {
 }
 
 /// A function of a point in another arithmetic, at `v` in the direction of variable `j`.
-fn at<S: Scalar>(
+fn at<S: Scalar<Cell = S>>(
     v: &[f64],
     outputs: usize,
     seed: impl Fn(usize, f64) -> S,

@@ -1,7 +1,7 @@
 //! Forward differentiation over any scalar: `Forward<Bounded>` yields rounding bounds of first derivatives,
 //! `Forward<Forward<Bounded>>` those of second derivatives.
 
-use crate::scalar::Scalar;
+use crate::scalar::{Field, Scalar, own_cell};
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -66,12 +66,23 @@ macro_rules! functions {
     };
 }
 
-impl<S: Scalar> Scalar for Forward<S> {
+impl<S: Scalar> Field for Forward<S> {
     type Mask = S::Mask;
 
     fn from_f64(value: f64) -> Self {
         Self { re: S::from_f64(value), d: S::from_f64(0.0) }
     }
+    fn is_smaller(self, other: Self) -> S::Mask {
+        S::is_smaller(self.re, other.re)
+    }
+    fn select(mask: S::Mask, a: Self, b: Self) -> Self {
+        Self { re: S::select(mask, a.re, b.re), d: S::select(mask, a.d, b.d) }
+    }
+}
+
+impl<S: Scalar> Scalar for Forward<S> {
+    own_cell!();
+
     functions! {
         sqrt(a, f) = n::<S>(0.5) / f;
         cbrt(a, f) = f / (n::<S>(3.0) * a);
@@ -142,9 +153,6 @@ impl<S: Scalar> Scalar for Forward<S> {
     }
     fn not(a: S::Mask) -> S::Mask {
         S::not(a)
-    }
-    fn select(mask: S::Mask, a: Self, b: Self) -> Self {
-        Self { re: S::select(mask, a.re, b.re), d: S::select(mask, a.d, b.d) }
     }
 }
 

@@ -12,27 +12,33 @@ pub const NONE: Operations = Operations { residual: 0, residual_jacobian: 0, adj
 
 /// `∇(μᵀ f)` from the Jacobian.
 pub fn adjoint_of_jacobian<M: Dae, S: Lanes>(
-    v: &ArrayV<M, S>,
-    mu: &ArrayK<M, S>,
-    gradient: &mut ArrayV<M, S>,
-    mut jacobian: M::Jacobian<S>,
-    mut f: ArrayK<M, S>,
+    v: &ArrayV<M, S::Cell>,
+    mu: &ArrayK<M, S::Cell>,
+    gradient: &mut ArrayV<M, S::Cell>,
+    mut jacobian: M::Jacobian<S::Cell>,
+    mut f: ArrayK<M, S::Cell>,
 ) {
-    M::jacobian_constants(&mut jacobian);
-    M::residual_jacobian(v, &mut f, &mut jacobian);
-    gradient.as_mut().fill(S::from_f64(0.0));
+    M::jacobian_constants::<S>(&mut jacobian);
+    M::residual_jacobian::<S>(v, &mut f, &mut jacobian);
+    for cell in gradient.as_mut() {
+        S::from_f64(0.0).store(cell);
+    }
     for (entry, value) in jacobian.as_ref().iter().enumerate() {
         let (row, column) = M::STRUCTURE.jacobian.at(entry);
-        gradient[column] = gradient[column] + mu[row] * *value;
+        let sum = S::load(&gradient[column]) + S::load(&mu[row]) * S::load(value);
+        sum.store(&mut gradient[column]);
     }
 }
 
 /// `μᵀ f` is differentiated by `adjoint_of_jacobian`, for a model with `[S; $k]` equations and `[S; $j]` entries.
 macro_rules! adjoint {
     ($j:literal, $k:literal) => {
-        fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>) {
-            let zero = S::from_f64(0.0);
-            crate::models::adjoint_of_jacobian::<Self, S>(v, mu, gradient, [zero; $j], [zero; $k]);
+        fn adjoint<S: Lanes>(
+            v: &ArrayV<Self, S::Cell>,
+            mu: &ArrayK<Self, S::Cell>,
+            gradient: &mut ArrayV<Self, S::Cell>,
+        ) {
+            crate::models::adjoint_of_jacobian::<Self, S>(v, mu, gradient, [v[0]; $j], [v[0]; $k]);
         }
     };
 }
@@ -69,16 +75,27 @@ impl Dae for Nonlinear {
         elimination: Elimination::NONE,
     };
 
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         let [k0, k1, x0, x1, z, u, p, t] = *v;
         let one = S::from_f64(1.0);
         f[0] = k0 * (one + x0 * x0) + k1 * x0 - x1 * z - u * t;
         f[1] = k1 - p * x0.sin() + z;
         f[2] = z + z * z * z - x0 * x1 - u * u - p;
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(_: &mut [S; 15]) {}
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 15]) {
-        Self::residual(v, f);
+    fn jacobian_constants<S: Lanes>(_: &mut [S::Cell; 15]) {}
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        j: &mut [S::Cell; 15],
+    ) {
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         let [k0, k1, x0, x1, z, u, p, t] = *v;
         let n = S::from_f64;
         *j = [
@@ -98,9 +115,14 @@ impl Dae for Nonlinear {
             -x0.sin(),
             n(-1.0),
         ];
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
     adjoint!(15, 3);
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 8]) {
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, h: &mut [S::Cell; 8]) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (h.map(|cell| S::load(&cell)), h);
+        let h = &mut values;
         let [k0, _, x0, _, z, _, p, _] = *v;
         let n = S::from_f64;
         *h = [
@@ -113,6 +135,7 @@ impl Dae for Nonlinear {
             n(-2.0) * mu[2],
             -mu[1] * x0.cos(),
         ];
+        cells.iter_mut().zip(h).for_each(|(cell, value)| value.store(cell));
     }
 }
 
@@ -138,21 +161,40 @@ impl Dae for Linear {
         operations: NONE,
         elimination: Elimination::NONE,
     };
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         let [k, x, z, u, p, _] = *v;
         *f = [k - p * x - u, z - x];
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(j: &mut [S; 6]) {
+    fn jacobian_constants<S: Lanes>(j: &mut [S::Cell; 6]) {
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         let one = S::from_f64(1.0);
         (j[0], j[2], j[3], j[4]) = (one, -one, one, -one);
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 6]) {
-        Self::residual(v, f);
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        j: &mut [S::Cell; 6],
+    ) {
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         (j[1], j[5]) = (-v[4], -v[1]);
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
     adjoint!(6, 2);
-    fn hessian<S: Lanes>(_: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 1]) {
+    fn hessian<S: Lanes>(_: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, h: &mut [S::Cell; 1]) {
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (h.map(|cell| S::load(&cell)), h);
+        let h = &mut values;
         *h = [-mu[0]];
+        cells.iter_mut().zip(h).for_each(|(cell, value)| value.store(cell));
     }
 }
 
@@ -178,20 +220,37 @@ impl Dae for Fragile {
         operations: NONE,
         elimination: Elimination::NONE,
     };
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         let [k, x, z, u, _] = *v;
         *f = [k - x.sqrt() + u, u * z - x];
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(_: &mut [S; 6]) {}
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 6]) {
-        Self::residual(v, f);
+    fn jacobian_constants<S: Lanes>(_: &mut [S::Cell; 6]) {}
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        j: &mut [S::Cell; 6],
+    ) {
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         let [_, x, z, u, _] = *v;
         let one = S::from_f64(1.0);
         *j = [one, S::from_f64(-0.5) / x.sqrt(), -one, u, one, z];
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
     adjoint!(6, 2);
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 2]) {
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, h: &mut [S::Cell; 2]) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (h.map(|cell| S::load(&cell)), h);
+        let h = &mut values;
         *h = [mu[0] * S::from_f64(0.25) / (v[1] * v[1].sqrt()), mu[1]];
+        cells.iter_mut().zip(h).for_each(|(cell, value)| value.store(cell));
     }
 }
 
@@ -217,20 +276,40 @@ impl Dae for Algebraic {
         operations: NONE,
         elimination: Elimination::NONE,
     };
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         let [z, u, _] = *v;
         *f = [z * z * z - u];
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(j: &mut [S; 2]) {
+    fn jacobian_constants<S: Lanes>(j: &mut [S::Cell; 2]) {
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         j[1] = S::from_f64(-1.0);
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 2]) {
-        Self::residual(v, f);
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        j: &mut [S::Cell; 2],
+    ) {
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         j[0] = S::from_f64(3.0) * v[0] * v[0];
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
     adjoint!(2, 1);
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 1]) {
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, h: &mut [S::Cell; 1]) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (h.map(|cell| S::load(&cell)), h);
+        let h = &mut values;
         *h = [mu[0] * S::from_f64(6.0) * v[0]];
+        cells.iter_mut().zip(h).for_each(|(cell, value)| value.store(cell));
     }
 }
 
@@ -288,7 +367,10 @@ impl Dae for Rod {
         operations: NONE,
         elimination: Elimination::NONE,
     };
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         let zero = S::from_f64(0.0);
         for i in 0..N {
             let x = v[N + i];
@@ -296,10 +378,18 @@ impl Dae for Rod {
             let right = if i + 1 == N { zero } else { v[N + i + 1] };
             f[i] = v[i] - left - right + x + x + x * x * x;
         }
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(_: &mut [S; ENTRIES]) {}
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; ENTRIES]) {
-        Self::residual(v, f);
+    fn jacobian_constants<S: Lanes>(_: &mut [S::Cell; ENTRIES]) {}
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        j: &mut [S::Cell; ENTRIES],
+    ) {
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         for (e, j) in j.iter_mut().enumerate() {
             let (r, c) = Self::STRUCTURE.jacobian.at(e);
             *j = if c == r {
@@ -310,14 +400,23 @@ impl Dae for Rod {
                 S::from_f64(-1.0)
             };
         }
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
-    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>) {
-        let zero = S::from_f64(0.0);
-        adjoint_of_jacobian::<Self, S>(v, mu, gradient, [zero; ENTRIES], [zero; N]);
+    fn adjoint<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        gradient: &mut ArrayV<Self, S::Cell>,
+    ) {
+        adjoint_of_jacobian::<Self, S>(v, mu, gradient, [v[0]; ENTRIES], [v[0]; N]);
     }
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; N]) {
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, h: &mut [S::Cell; N]) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (h.map(|cell| S::load(&cell)), h);
+        let h = &mut values;
         for i in 0..N {
             h[i] = mu[i] * S::from_f64(6.0) * v[N + i];
         }
+        cells.iter_mut().zip(h).for_each(|(cell, value)| value.store(cell));
     }
 }

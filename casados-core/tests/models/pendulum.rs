@@ -105,26 +105,46 @@ impl Dae for Pendulum {
         operations: NONE,
         elimination: Elimination::NONE,
     };
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         let [cart, ball] = accelerations([v[5], v[7], v[8]].map(Hyper::of));
         *f = [v[0] - v[6], v[1] - v[7], v[2] - cart.0[0], v[3] - ball.0[0]];
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(_: &mut [S; 12]) {}
-    fn residual_jacobian<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>, j: &mut [S; 12]) {
-        Self::residual(v, f);
+    fn jacobian_constants<S: Lanes>(_: &mut [S::Cell; 12]) {}
+    fn residual_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        j: &mut [S::Cell; 12],
+    ) {
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (j.map(|cell| S::load(&cell)), j);
+        let j = &mut values;
         let one = S::from_f64(1.0);
         let [angle, rate, force] = core::array::from_fn(|i| perturbed(v, i, i).map(|a| -a.0[1]));
         *j = [one, one, one, one, -one, -one, angle[0], rate[0], angle[1], rate[1], force[0], force[1]];
+        cells.iter_mut().zip(j).for_each(|(cell, value)| value.store(cell));
     }
-    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, gradient: &mut ArrayV<Self, S>) {
-        let zero = S::from_f64(0.0);
-        adjoint_of_jacobian::<Self, S>(v, mu, gradient, [zero; 12], [zero; 4]);
+    fn adjoint<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        gradient: &mut ArrayV<Self, S::Cell>,
+    ) {
+        adjoint_of_jacobian::<Self, S>(v, mu, gradient, [v[0]; 12], [v[0]; 4]);
     }
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, h: &mut [S; 6]) {
+    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, h: &mut [S::Cell; 6]) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (h.map(|cell| S::load(&cell)), h);
+        let h = &mut values;
         let pairs = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
         for (h, (first, second)) in h.iter_mut().zip(pairs) {
             let [cart, ball] = perturbed(v, first, second);
             *h = -(mu[2] * cart.0[3] + mu[3] * ball.0[3]);
         }
+        cells.iter_mut().zip(h).for_each(|(cell, value)| value.store(cell));
     }
 }

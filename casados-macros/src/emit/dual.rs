@@ -120,32 +120,32 @@ pub fn write(model: &Model) -> TokenStream {
                     }
                 };
 
-                fn residual<CasadosS: #krate::Lanes>(variables: &[CasadosS; #lv], residual: &mut [CasadosS; #lk]) {
+                fn residual<CasadosS: #krate::Lanes>(variables: &[CasadosS::Cell; #lv], residual: &mut [CasadosS::Cell; #lk]) {
                     #krate::dual::residual::<Self, CasadosS>(variables, residual);
                 }
 
-                fn jacobian_constants<CasadosS: #krate::Lanes>(_: &mut [CasadosS; #lj]) {}
+                fn jacobian_constants<CasadosS: #krate::Lanes>(_: &mut [CasadosS::Cell; #lj]) {}
 
                 fn residual_jacobian<CasadosS: #krate::Lanes>(
-                    variables: &[CasadosS; #lv],
-                    residual: &mut [CasadosS; #lk],
-                    jacobian: &mut [CasadosS; #lj],
+                    variables: &[CasadosS::Cell; #lv],
+                    residual: &mut [CasadosS::Cell; #lk],
+                    jacobian: &mut [CasadosS::Cell; #lj],
                 ) {
                     #krate::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
                 }
 
                 fn adjoint<CasadosS: #krate::Lanes>(
-                    variables: &[CasadosS; #lv],
-                    seeds: &[CasadosS; #lk],
-                    gradient: &mut [CasadosS; #lv],
+                    variables: &[CasadosS::Cell; #lv],
+                    seeds: &[CasadosS::Cell; #lk],
+                    gradient: &mut [CasadosS::Cell; #lv],
                 ) {
                     #krate::dual::adjoint::<Self, CasadosS>(variables, seeds, gradient);
                 }
 
                 fn hessian<CasadosS: #krate::Lanes>(
-                    variables: &[CasadosS; #lv],
-                    seeds: &[CasadosS; #lk],
-                    hessian: &mut [CasadosS; #lh],
+                    variables: &[CasadosS::Cell; #lv],
+                    seeds: &[CasadosS::Cell; #lk],
+                    hessian: &mut [CasadosS::Cell; #lh],
                 ) {
                     #krate::dual::hessian::<Self, CasadosS>(variables, seeds, hessian);
                 }

@@ -40,9 +40,9 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
         }
     });
     let implementations = quote! {
-        #[allow(clippy::all, clippy::pedantic, unused_variables)]
+        #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_variables)]
         mod code {
-            use #krate::Scalar;
+            use #krate::scalar::{Piece, Scalar};
             #code
         }
 
@@ -55,50 +55,50 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
             const STRUCTURE: #krate::model::Structure = #structure;
 
             #[inline]
-            fn residual<S: #krate::Lanes>(v: &[S; #lv], f: &mut [S; #lk]) {
-                code::residual(#c v, f);
+            fn residual<S: #krate::Lanes>(v: &[S::Cell; #lv], f: &mut [S::Cell; #lk]) {
+                code::residual::<S>(#c v, f);
             }
 
             #[inline]
-            fn jacobian_constants<S: #krate::Lanes>(jacobian: &mut [S; #lj]) {
-                code::jacobian_constants(#c jacobian);
+            fn jacobian_constants<S: #krate::Lanes>(jacobian: &mut [S::Cell; #lj]) {
+                code::jacobian_constants::<S>(#c jacobian);
             }
 
             #[inline]
             fn residual_jacobian<S: #krate::Lanes>(
-                v: &[S; #lv],
-                f: &mut [S; #lk],
-                jacobian: &mut [S; #lj],
+                v: &[S::Cell; #lv],
+                f: &mut [S::Cell; #lk],
+                jacobian: &mut [S::Cell; #lj],
             ) {
-                code::residual_jacobian(#c v, f, jacobian);
+                code::residual_jacobian::<S>(#c v, f, jacobian);
             }
 
             #[inline]
-            fn adjoint<S: #krate::Lanes>(v: &[S; #lv], mu: &[S; #lk], gradient: &mut [S; #lv]) {
-                code::adjoint(#c v, mu, gradient);
-                gradient[#time] = S::from_f64(0.0);
+            fn adjoint<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], gradient: &mut [S::Cell; #lv]) {
+                code::adjoint::<S>(#c v, mu, gradient);
+                S::from_f64(0.0).store(&mut gradient[#time]);
             }
 
             #[inline]
-            fn hessian<S: #krate::Lanes>(v: &[S; #lv], mu: &[S; #lk], hessian: &mut [S; #lh]) {
-                code::hessian(#c v, mu, hessian);
+            fn hessian<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], hessian: &mut [S::Cell; #lh]) {
+                code::hessian::<S>(#c v, mu, hessian);
             }
         }
 
         #[automatically_derived]
         impl #krate::GraphDae for #ty {
-            fn residual_of<S: #krate::Scalar>(v: &[S], f: &mut [S]) {
+            fn residual_of<S: #krate::Scalar<Cell = S>>(v: &[S], f: &mut [S]) {
                 if let (Some(v), Some(f)) = (v.first_chunk(), f.first_chunk_mut()) {
-                    code::residual(#c v, f);
+                    code::residual::<S>(#c v, f);
                 }
             }
 
-            fn adjoint_of<S: #krate::Scalar>(v: &[S], mu: &[S], gradient: &mut [S]) {
+            fn adjoint_of<S: #krate::Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]) {
                 if let (Some(v), Some(mu), Some(gradient)) =
                     (v.first_chunk(), mu.first_chunk(), gradient.first_chunk_mut())
                 {
-                    code::adjoint(#c v, mu, gradient);
-                    gradient[#time] = S::from_f64(0.0);
+                    code::adjoint::<S>(#c v, mu, gradient);
+                    S::from_f64(0.0).store(&mut gradient[#time]);
                 }
             }
         }

@@ -43,14 +43,9 @@ impl Routine<'_> {
         let mut text = String::new();
         let count = if operations == 1 { "operation" } else { "operations" };
         let _ = writeln!(text, "/// {} {operations} {count}.", self.documentation);
-        if let [whole] = plan.chunks.as_slice() {
-            writer.function(&mut text, self.name, "#[inline]\npub ", &steps, whole, 0);
-        } else {
-            writer.driver(&mut text, &plan);
-            for (number, piece) in plan.chunks.iter().enumerate() {
-                let name = format!("{}_{number}", self.name);
-                writer.function(&mut text, &name, "#[inline(never)]\n", &steps, piece, plan.slots);
-            }
+        writer.driver(&mut text, &plan);
+        for (number, piece) in plan.chunks.iter().enumerate() {
+            writer.piece(&mut text, number, &steps, piece, plan.slots);
         }
         text
     }
@@ -67,54 +62,52 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn signature(&self, text: &mut String, name: &str, slots: usize) {
-        let _ = write!(text, "fn {name}<S: Scalar>(");
-        if self.opaque > 0 {
-            let _ = write!(text, "c: &[f64; {}], ", self.opaque);
-        }
-        for (array, length) in self.routine.inputs {
-            let _ = write!(text, "{array}: &[S; {length}], ");
-        }
-        if slots > 0 {
-            let _ = write!(text, "w: &mut [S; {slots}], ");
-        }
-        for (array, length) in self.routine.outputs {
-            let _ = write!(text, "{array}: &mut [S; {length}], ");
-        }
-        text.truncate(text.trim_end_matches([',', ' ']).len());
-        text.push_str(") {\n");
+    /// What a piece is given: name and type of each argument, with a lifetime or without.
+    fn arguments(&self, slots: usize, lifetime: &str) -> Vec<(&str, String)> {
+        let Routine { inputs, outputs, .. } = self.routine;
+        let mut arguments = Vec::new();
+        arguments.extend((self.opaque > 0).then(|| ("c", format!("&{lifetime}[f64; {}]", self.opaque))));
+        arguments.extend(inputs.iter().map(|(name, n)| (*name, format!("&{lifetime}[S::Cell; {n}]"))));
+        arguments.extend((slots > 0).then(|| ("w", format!("&{lifetime}mut [S; {slots}]"))));
+        arguments.extend(outputs.iter().map(|(name, n)| (*name, format!("&{lifetime}mut [S::Cell; {n}]"))));
+        arguments
     }
 
-    /// The function that calls the pieces.
+    /// The name of the type of a piece.
+    fn name(&self, number: usize) -> String {
+        format!("Piece_{}_{number}", self.routine.name)
+    }
+
+    /// The function that runs the pieces.
     fn driver(&self, text: &mut String, plan: &Plan) {
-        text.push_str("pub ");
-        self.signature(text, self.routine.name, 0);
-        let mut arguments: Vec<&str> = Vec::new();
-        arguments.extend((self.opaque > 0).then_some("c"));
-        arguments.extend(self.routine.inputs.iter().map(|input| input.0));
+        let parameters: Vec<String> =
+            self.arguments(0, "").iter().map(|(name, ty)| format!("{name}: {ty}")).collect();
+        let _ = writeln!(
+            text,
+            "#[inline]\npub fn {}<S: Scalar>({}) {{",
+            self.routine.name,
+            parameters.join(", ")
+        );
         if plan.slots > 0 {
             let _ = writeln!(text, "let mut w = [S::from_f64(0.0); {}];", plan.slots);
-            arguments.push("&mut w");
         }
-        arguments.extend(self.routine.outputs.iter().map(|output| output.0));
-        let arguments = arguments.join(", ");
+        let names: Vec<&str> = self
+            .arguments(plan.slots, "")
+            .iter()
+            .map(|&(name, _)| if name == "w" { "&mut w" } else { name })
+            .collect();
         for number in 0..plan.chunks.len() {
-            let _ = writeln!(text, "{}_{number}({arguments});", self.routine.name);
+            let _ = writeln!(text, "S::vectorize({}::<S>({}));", self.name(number), names.join(", "));
         }
         text.push_str("}\n");
     }
 
-    fn function(
-        &self,
-        text: &mut String,
-        name: &str,
-        modifiers: &str,
-        steps: &[Step],
-        piece: &Chunk,
-        slots: usize,
-    ) {
-        text.push_str(modifiers);
-        self.signature(text, name, slots);
+    fn piece(&self, text: &mut String, number: usize, steps: &[Step], piece: &Chunk, slots: usize) {
+        let name = self.name(number);
+        let (names, types): (Vec<&str>, Vec<String>) = self.arguments(slots, "'a ").into_iter().unzip();
+        let _ = writeln!(text, "struct {name}<'a, S: Scalar>({});", types.join(", "));
+        let _ = writeln!(text, "impl<S: Scalar> Piece for {name}<'_, S> {{");
+        let _ = writeln!(text, "#[inline(always)]\nfn run(self) {{\nlet Self({}) = self;", names.join(", "));
         let steps = &steps[piece.steps.clone()];
 
         let read = steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step));
@@ -127,10 +120,10 @@ impl Writer<'_> {
             };
         }
         for index in variables {
-            let _ = writeln!(text, "let {} = v[{index}];", self.variable(index));
+            let _ = writeln!(text, "let {} = S::load(&v[{index}]);", self.variable(index));
         }
         for row in seeds {
-            let _ = writeln!(text, "let mu_{row} = mu[{row}];");
+            let _ = writeln!(text, "let mu_{row} = S::load(&mu[{row}]);");
         }
         for &(node, slot) in &piece.loads {
             let name = self.names[node.0 as usize];
@@ -157,7 +150,7 @@ impl Writer<'_> {
                 }
                 Step::Store(output) => {
                     let (array, index, node) = &self.routine.stores[output];
-                    let _ = writeln!(text, "{array}[{index}] = {};", self.atom(*node));
+                    let _ = writeln!(text, "S::store({}, &mut {array}[{index}]);", self.atom(*node));
                 }
             }
             for node in chunk::computed(step) {
@@ -171,7 +164,7 @@ impl Writer<'_> {
                 }
             }
         }
-        text.push_str("}\n");
+        text.push_str("}\n}\n");
     }
 
     fn is_condition(&self, node: Node) -> bool {

@@ -58,32 +58,60 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         elimination: Elimination::NONE,
     };
 
-    fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+        let f = &mut values;
         residual(v, f);
+        cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
-    fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S>) {
+    fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S::Cell>) {
+        let (mut values, cells) = (jacobian.map(|cell| S::load(&cell)), jacobian);
+        let jacobian = &mut values;
         jacobian[0] = S::from_f64(1.0);
         jacobian[3] = S::from_f64(-1.0);
         if FAULT != CONSTANT_FORGOTTEN {
             jacobian[6] = S::from_f64(-1.0);
         }
+        cells.iter_mut().zip(jacobian).for_each(|(cell, value)| value.store(cell));
     }
     fn residual_jacobian<S: Lanes>(
-        v: &ArrayV<Self, S>,
-        f: &mut ArrayK<Self, S>,
-        jacobian: &mut Self::Jacobian<S>,
+        v: &ArrayV<Self, S::Cell>,
+        f: &mut ArrayK<Self, S::Cell>,
+        jacobian: &mut Self::Jacobian<S::Cell>,
     ) {
-        residual(v, f);
+        Self::residual::<S>(v, f);
+        let v = &v.map(|cell| S::load(&cell));
+        let (mut values, cells) = (jacobian.map(|cell| S::load(&cell)), jacobian);
+        let jacobian = &mut values;
         let (s, c) = v[1].sin_cos();
         jacobian[1] = if FAULT == JACOBIAN_SIGN { v[3] * c } else { -v[3] * c };
         jacobian[2] = v[2] * v[1].exp();
         jacobian[4] = v[1].exp();
         jacobian[5] = -s;
+        cells.iter_mut().zip(jacobian).for_each(|(cell, value)| value.store(cell));
     }
-    fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, g: &mut ArrayV<Self, S>) {
+    fn adjoint<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        g: &mut ArrayV<Self, S::Cell>,
+    ) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (g.map(|cell| S::load(&cell)), g);
+        let g = &mut values;
         gradient::<FAULT, S>(v, mu, g);
+        cells.iter_mut().zip(g).for_each(|(cell, value)| value.store(cell));
     }
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, hessian: &mut Self::Hessian<S>) {
+    fn hessian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayK<Self, S::Cell>,
+        hessian: &mut Self::Hessian<S::Cell>,
+    ) {
+        let v = &v.map(|cell| S::load(&cell));
+        let mu = &mu.map(|cell| S::load(&cell));
+        let (mut values, cells) = (hessian.map(|cell| S::load(&cell)), hessian);
+        let hessian = &mut values;
         let (s, c) = v[1].sin_cos();
         let e = v[1].exp();
         hessian[0] = mu[0] * v[3] * s;
@@ -92,6 +120,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         }
         hessian[1] = mu[1] * e;
         hessian[2] = -mu[0] * c;
+        cells.iter_mut().zip(hessian).for_each(|(cell, value)| value.store(cell));
     }
 }
 

@@ -207,31 +207,56 @@ mod logistic {
             elimination: Elimination::NONE,
         };
 
-        fn residual<S: Lanes>(v: &ArrayV<Self, S>, f: &mut ArrayK<Self, S>) {
+        fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+            let v = &v.map(|cell| S::load(&cell));
+            let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
+            let f = &mut values;
             let [xdot, x, u, limit, _] = *v;
             f[0] = xdot - u * x * (S::from_f64(1.0) - x / limit);
+            cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
         }
-        fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S>) {
+        fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S::Cell>) {
+            let (mut values, cells) = (jacobian.map(|cell| S::load(&cell)), jacobian);
+            let jacobian = &mut values;
             jacobian[0] = S::from_f64(1.0);
+            cells.iter_mut().zip(jacobian).for_each(|(cell, value)| value.store(cell));
         }
         fn residual_jacobian<S: Lanes>(
-            v: &ArrayV<Self, S>,
-            f: &mut ArrayK<Self, S>,
-            jacobian: &mut Self::Jacobian<S>,
+            v: &ArrayV<Self, S::Cell>,
+            f: &mut ArrayK<Self, S::Cell>,
+            jacobian: &mut Self::Jacobian<S::Cell>,
         ) {
-            Self::residual(v, f);
+            Self::residual::<S>(v, f);
+            let v = &v.map(|cell| S::load(&cell));
+            let (mut values, cells) = (jacobian.map(|cell| S::load(&cell)), jacobian);
+            let jacobian = &mut values;
             let [_, x, u, limit, _] = *v;
             let (one, r) = (S::from_f64(1.0), x / limit);
             jacobian[1] = -u * (one - r - r);
             jacobian[2] = -x * (one - r);
             jacobian[3] = -u * r * r;
+            cells.iter_mut().zip(jacobian).for_each(|(cell, value)| value.store(cell));
         }
-        fn adjoint<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, g: &mut ArrayV<Self, S>) {
+        fn adjoint<S: Lanes>(
+            v: &ArrayV<Self, S::Cell>,
+            mu: &ArrayK<Self, S::Cell>,
+            g: &mut ArrayV<Self, S::Cell>,
+        ) {
             let (mut f, mut jacobian) = ([mu[0]; 1], [mu[0]; 4]);
-            Self::residual_jacobian(v, &mut f, &mut jacobian);
-            *g = [mu[0], mu[0] * jacobian[1], mu[0] * jacobian[2], mu[0] * jacobian[3], S::from_f64(0.0)];
+            Self::residual_jacobian::<S>(v, &mut f, &mut jacobian);
+            let (mu, jacobian) = (S::load(&mu[0]), jacobian.map(|cell| S::load(&cell)));
+            let values = [mu, mu * jacobian[1], mu * jacobian[2], mu * jacobian[3], S::from_f64(0.0)];
+            g.iter_mut().zip(values).for_each(|(cell, value)| value.store(cell));
         }
-        fn hessian<S: Lanes>(v: &ArrayV<Self, S>, mu: &ArrayK<Self, S>, hessian: &mut Self::Hessian<S>) {
+        fn hessian<S: Lanes>(
+            v: &ArrayV<Self, S::Cell>,
+            mu: &ArrayK<Self, S::Cell>,
+            hessian: &mut Self::Hessian<S::Cell>,
+        ) {
+            let v = &v.map(|cell| S::load(&cell));
+            let mu = &mu.map(|cell| S::load(&cell));
+            let (mut values, cells) = (hessian.map(|cell| S::load(&cell)), hessian);
+            let hessian = &mut values;
             let [_, x, u, limit, _] = *v;
             let (one, two, r) = (S::from_f64(1.0), S::from_f64(2.0), x / limit);
             let mu = mu[0];
@@ -242,6 +267,7 @@ mod logistic {
                 -mu * r * r,
                 mu * two * u * r * r / limit,
             ];
+            cells.iter_mut().zip(hessian).for_each(|(cell, value)| value.store(cell));
         }
     }
 
