@@ -27,6 +27,14 @@ impl Record {
         Ok(list.iter().cloned().map(Self).collect())
     }
 
+    /// An object.
+    pub fn record(&self, key: &str) -> Result<Self, String> {
+        match &self.0[key] {
+            value @ Value::Object(_) => Ok(Self(value.clone())),
+            _ => Err(format!("`{key}` is not an object")),
+        }
+    }
+
     /// A number.
     pub fn number(&self, key: &str) -> Result<f64, String> {
         self.0[key].as_f64().ok_or_else(|| format!("`{key}` is not a number"))
