@@ -32,6 +32,13 @@ impl Dae for Oscillator {
         constant: &[true, true, false, false, true, false, false, false],
         hessian: Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
         linear: &[false, true],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 2],
+        trivial: &[],
+        quadratures: &[],
+        directions: &[0, 1, 2, 3],
+        curved: &[2, 3, 4, 5],
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,
     };

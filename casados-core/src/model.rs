@@ -7,7 +7,7 @@
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
-pub use crate::structure::{Assembly, Elimination, Operations, Pattern, Pivot, Structure};
+pub use crate::structure::{Assembly, Elimination, Operations, Pattern, Pivot, Structure, all};
 
 /// `[T; NX]` of a model.
 pub type ArrayX<M, T> = <<M as Dae>::Shape as Shape>::ArrayX<T>;

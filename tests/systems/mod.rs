@@ -132,7 +132,7 @@ macro_rules! system {
         $(#[$doc])*
         struct $name;
         const _: () = {
-            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure};
+            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all};
             const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
             const JACOBIAN: usize = ($nx + $nz) * (NV - 1);
             const HESSIAN: usize = NV * (NV - 1) / 2;
@@ -155,6 +155,13 @@ macro_rules! system {
                     constant: &[false; JACOBIAN],
                     hessian: Pattern { rows: &TRIANGLE[0], columns: &TRIANGLE[1] },
                     linear: &[false; $nx + $nz],
+                    linear_in_state: false,
+                    constant_matrix: false,
+                    constant_rows: &[false; $nx + $nz],
+                    trivial: &[],
+                    quadratures: &[],
+                    directions: &all::<{ $nx + $nu + $np }>(),
+                    curved: &all::<{ 2 * $nx + $nz + $nu + $np }>(),
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
                     elimination: Elimination::NONE,
                 };

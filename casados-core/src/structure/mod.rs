@@ -28,6 +28,28 @@ pub struct Structure {
     pub hessian: Pattern,
     /// Equations that are linear in `(ẋ, x, z, u, p)` jointly: they have no second derivatives.
     pub linear: &'static [bool],
+    /// The entries of `f_ẋ`, `f_x` and `f_z` do not depend on `(ẋ, x, z)`; on `u`, `p` and `t` they may.
+    /// The residual is then affine in the stages' unknowns: one iteration of Newton's method is exact.
+    pub linear_in_state: bool,
+    /// Those entries do not depend on `t` either: nothing in the Newton matrix changes within an interval but with the
+    /// size of the steps. One factorisation then serves all steps of an interval, and all intervals of the same `u` and `p`.
+    pub constant_matrix: bool,
+    /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton matrix depend on the step
+    /// size and the tableau only, so that they are assembled once; and one exact iteration of Newton's method
+    /// satisfies these equations to rounding.
+    pub constant_rows: &'static [bool],
+    /// Equations `c ẋ_j + c′ v + c″(t) = 0` with constant `c` and `c′`, where `v` is any variable but a derivative, or
+    /// none: `q̇ = v`. They can be solved for `k_j` by hand, whatever the point. Ascending.
+    pub trivial: &'static [u32],
+    /// States that influence nobody: no equation depends on `x_j`, only on `ẋ_j`. Their columns of the Newton matrix are
+    /// `f_ẋ` alone, their columns of `dk/dx₀` are zero, and their multipliers pass through an interval unchanged. Ascending.
+    pub quadratures: &'static [u32],
+    /// Directions `w = (x₀, u, p)` that an equation depends on, as indices into `w`, ascending. For the others the stages
+    /// have no derivative: the column of `dx₊/dw` is `e_j` for the state `j` and zero for a control or a
+    /// parameter, and rows and columns of second derivatives are zero.
+    pub directions: &'static [u32],
+    /// Variables that occur in the pattern of the Hessian, ascending: only their rows of `D_i` enter second derivatives.
+    pub curved: &'static [u32],
     /// Numbers of arithmetic operations.
     pub operations: Operations,
     /// How the Newton matrix is eliminated.
@@ -74,4 +96,16 @@ pub struct Operations {
     pub adjoint: u32,
     /// `∇²(μᵀ f)`
     pub hessian: u32,
+}
+
+/// `0, 1, ..., N − 1`: the directions or variables of a model of which nothing better is known.
+#[must_use]
+pub const fn all<const N: usize>() -> [u32; N] {
+    let mut numbers = [0; N];
+    let mut index = 0;
+    while index < N {
+        numbers[index] = index as u32;
+        index += 1;
+    }
+    numbers
 }

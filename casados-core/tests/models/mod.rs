@@ -3,7 +3,7 @@
 
 pub mod pendulum;
 
-use casados_core::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure};
+use casados_core::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
 
@@ -71,6 +71,13 @@ impl Dae for Nonlinear {
         constant: &[false; 15],
         hessian: Pattern { rows: &[2, 2, 2, 3, 4, 4, 5, 6], columns: &[0, 1, 2, 2, 3, 4, 5, 2] },
         linear: &[false; 3],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 3],
+        trivial: &[],
+        quadratures: &[],
+        directions: &[0, 1, 2, 3],
+        curved: &[0, 1, 2, 3, 4, 5, 6],
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -158,6 +165,13 @@ impl Dae for Linear {
         constant: &[true, false, true, true, true, false],
         hessian: Pattern { rows: &[4], columns: &[1] },
         linear: &[false, true],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 2],
+        trivial: &[],
+        quadratures: &[],
+        directions: &[0, 1, 2],
+        curved: &[1, 4],
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -217,6 +231,13 @@ impl Dae for Fragile {
         constant: &[false; 6],
         hessian: Pattern { rows: &[1, 3], columns: &[1, 2] },
         linear: &[false; 2],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 2],
+        trivial: &[],
+        quadratures: &[],
+        directions: &[0, 1],
+        curved: &[1, 2, 3],
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -273,6 +294,13 @@ impl Dae for Algebraic {
         constant: &[false, true],
         hessian: Pattern { rows: &[0], columns: &[0] },
         linear: &[false],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 1],
+        trivial: &[],
+        quadratures: &[],
+        directions: &[0],
+        curved: &[0],
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -364,6 +392,13 @@ impl Dae for Rod {
         constant: &[false; ENTRIES],
         hessian: Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN },
         linear: &[false; N],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; N],
+        trivial: &[],
+        quadratures: &[],
+        directions: &all::<{ N + 1 }>(),
+        curved: &ROD_HESSIAN,
         operations: NONE,
         elimination: Elimination::NONE,
     };

@@ -102,6 +102,13 @@ impl Dae for Pendulum {
         constant: &[false; 12],
         hessian: Pattern { rows: &[5, 7, 7, 8, 8, 8], columns: &[5, 5, 7, 5, 7, 8] },
         linear: &[true, true, false, false],
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 4],
+        trivial: &[],
+        quadratures: &[0],
+        directions: &[1, 2, 3, 4],
+        curved: &[5, 7, 8],
         operations: NONE,
         elimination: Elimination::NONE,
     };

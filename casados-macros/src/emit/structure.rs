@@ -2,14 +2,14 @@
 
 use crate::graph::Node;
 use crate::language::Variables;
-use crate::structure::{Analysis, Elimination, Operations};
+use crate::structure::{Analysis, Elimination, Facts, Operations};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::HashMap;
 
 /// The value of `Dae::STRUCTURE`.
 pub fn write(analysis: &Analysis) -> TokenStream {
-    let Analysis { model, jacobian, blocks, constant, hessian, linear, operations, .. } = analysis;
+    let Analysis { model, jacobian, blocks, constant, hessian, linear, facts, operations, .. } = analysis;
     let krate = &model.krate;
     let name = model.name.to_string();
     let Variables { x, z, u, p } = &model.variables;
@@ -18,6 +18,9 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let &Operations { residual, residual_jacobian, adjoint, hessian: second } = operations;
     let [residual, residual_jacobian, adjoint, second] =
         [residual, residual_jacobian, adjoint, second].map(Literal::u32_unsuffixed);
+    let Facts { linear_in_state, constant_matrix, constant_rows, .. } = facts;
+    let [trivial, quadratures, directions, curved] =
+        [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved].map(|list| numbers(list));
     let elimination = elimination(analysis);
     quote! {
         #krate::model::Structure {
@@ -31,6 +34,13 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             constant: &[#(#constant),*],
             hessian: #hessian,
             linear: &[#(#linear),*],
+            linear_in_state: #linear_in_state,
+            constant_matrix: #constant_matrix,
+            constant_rows: &[#(#constant_rows),*],
+            trivial: &[#(#trivial),*],
+            quadratures: &[#(#quadratures),*],
+            directions: &[#(#directions),*],
+            curved: &[#(#curved),*],
             operations: #krate::model::Operations {
                 residual: #residual,
                 residual_jacobian: #residual_jacobian,
@@ -70,8 +80,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         let (direct, state) = (entry(position.direct), entry(position.state));
         quote!(assembly(#block, #direct, #state))
     });
-    let [slots, updates, slot_of_equation] = [&slots, &plan.updates, &slot_of_equation]
-        .map(|table| table.iter().map(|&index| Literal::u32_unsuffixed(index)).collect::<Vec<_>>());
+    let [slots, updates, slot_of_equation] =
+        [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
     quote! {{
         use #krate::model::{Assembly, Pivot};
         const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool) -> Pivot {
@@ -88,6 +98,10 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             slot_of_equation: &[#(#slot_of_equation),*],
         }
     }}
+}
+
+fn numbers(list: &[u32]) -> Vec<Literal> {
+    list.iter().map(|&index| Literal::u32_unsuffixed(index)).collect()
 }
 
 fn pattern(krate: &syn::Path, entries: &[(u32, u32, Node)]) -> TokenStream {

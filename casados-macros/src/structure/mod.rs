@@ -2,6 +2,7 @@
 //! derivatives that the engine will ask for, as graphs.
 
 mod elimination;
+mod facts;
 mod index;
 mod samples;
 #[cfg(test)]
@@ -10,6 +11,7 @@ mod tests;
 use crate::graph::{self, Degree, Entry, Node};
 use crate::language::{Model, Variables};
 pub use elimination::Plan;
+pub use facts::Facts;
 pub use samples::Position;
 use std::collections::HashSet;
 
@@ -29,6 +31,8 @@ pub struct Analysis {
     pub hessian: Vec<Entry>,
     /// Equations that are linear in `(ẋ, x, z, u, p)` jointly.
     pub linear: Vec<bool>,
+    /// What lets the engine leave work out.
+    pub facts: Facts,
     /// For an explicit model: for each state its row and coefficient.
     pub explicit: Option<Vec<(u32, f64)>>,
     /// Numbers of operations.
@@ -106,6 +110,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
         adjoint: graph.operations(&gradient),
         hessian: graph.operations(&hessian.iter().map(|entry| entry.2).collect::<Vec<_>>()),
     };
+    let facts = facts::find(graph, (&jacobian, blocks, &constant), &hessian, &linear, ends);
     let explicit = explicit(&model, &jacobian, ends);
     let elimination = elimination(&model, &jacobian, blocks);
     Ok(Analysis {
@@ -116,6 +121,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
         gradient,
         hessian,
         linear,
+        facts,
         explicit,
         operations,
         elimination,

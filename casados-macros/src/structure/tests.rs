@@ -1,4 +1,4 @@
-use super::{Analysis, analyse};
+use super::{Analysis, Facts, analyse};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use crate::language::{Model, Variables};
 use proc_macro2::Span;
@@ -102,6 +102,65 @@ fn linear_equations() {
     // Time is no direction of derivatives, but the entry varies with it.
     assert_eq!(analysis.constant, [true, true, false, false, false]);
     assert!(analysis.jacobian.iter().all(|entry| entry.1 < 5));
+}
+
+/// `ẋ₀ − 2 x₁`, `c ẋ₁ − sin(t) x₁ − u`, `ẋ₂ − p x₀²`, `z − x₀ − 1`: what varies with the state, with time, not at all.
+#[test]
+fn facts() {
+    let build = |square: bool, time: bool| {
+        accepted(model([3, 1, 2, 1], move |g, v| {
+            let (x, z, u, p) = (&v[3..6], v[6], v[7], v[9]);
+            let (one, two) = (g.constant(1.0), g.constant(2.0));
+            let twice = mul(g, two, x[1]);
+            let first = sub(g, v[0], twice);
+            let factor = if time { g.unary(Unary::Sin, v[10]) } else { p };
+            let (outside, swinging) = (g.opaque(0), mul(g, factor, x[1]));
+            let scaled = mul(g, outside, v[1]);
+            let second = sub(g, scaled, swinging);
+            let second = sub(g, second, u);
+            let power = if square { mul(g, x[0], x[0]) } else { x[0] };
+            let power = mul(g, p, power);
+            let (third, fourth) = (sub(g, v[2], power), sub(g, z, x[0]));
+            vec![first, second, third, sub(g, fourth, one)]
+        }))
+        .facts
+    };
+    let expected = Facts {
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: vec![true, false, false, true],
+        trivial: vec![0],
+        quadratures: vec![2],
+        // x₀, x₁, u₀ and p₀; neither x₂ nor u₁.
+        directions: vec![0, 1, 3, 5],
+        curved: vec![3, 9],
+    };
+    assert_eq!(build(true, true), expected);
+    let straight = Facts { linear_in_state: true, ..expected.clone() };
+    assert_eq!(build(false, true), straight);
+    // The bilinear terms p x₀ and p x₁ are curved, but not within an interval.
+    let constant = Facts { constant_matrix: true, curved: vec![3, 4, 9], ..straight };
+    assert_eq!(build(false, false), constant);
+}
+
+/// One variable or a function of time at the right is trivial; two variables or a varying coefficient are not.
+#[test]
+fn trivial_rows() {
+    let trivial = |row: fn(&mut Graph, &[Node]) -> Node| {
+        accepted(model([1, 0, 2, 0], move |g, v| {
+            let right = row(g, v);
+            vec![sub(g, v[0], right)]
+        }))
+        .facts
+        .trivial
+    };
+    assert_eq!(trivial(|_, v| v[1]), [0]);
+    assert_eq!(trivial(|_, v| v[2]), [0]);
+    assert_eq!(trivial(|g, _| g.constant(3.0)), [0]);
+    assert_eq!(trivial(|g, v| g.unary(Unary::Sin, v[4])), [0]);
+    assert!(trivial(|g, v| sub(g, v[2], v[3])).is_empty());
+    assert!(trivial(|g, v| mul(g, v[2], v[3])).is_empty());
+    assert!(trivial(|g, v| mul(g, v[4], v[1])).is_empty());
 }
 
 #[test]

@@ -54,6 +54,13 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
             columns: if FAULT == HESSIAN_PATTERN { &[1, 2, 1] } else { &[1, 1, 1] },
         },
         linear: if FAULT == LINEAR_DECLARED { &[false, true] } else { &[false, false] },
+        linear_in_state: false,
+        constant_matrix: false,
+        constant_rows: &[false; 2],
+        trivial: &[],
+        quadratures: &[],
+        directions: &[0, 1, 2],
+        curved: &[1, 2, 3],
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,
     };

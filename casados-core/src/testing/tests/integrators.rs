@@ -203,6 +203,13 @@ mod logistic {
             constant: &[true, false, false, false],
             hessian: Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] },
             linear: &[false],
+            linear_in_state: false,
+            constant_matrix: false,
+            constant_rows: &[false; 1],
+            trivial: &[],
+            quadratures: &[],
+            directions: &[0, 1, 2],
+            curved: &[1, 2, 3],
             operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
             elimination: Elimination::NONE,
         };

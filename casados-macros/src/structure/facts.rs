@@ -1,0 +1,65 @@
+//! Facts that let the engine leave work out: what influences nobody, what never changes, what is straight.
+
+use crate::graph::{Degree, Entry, Graph, Node};
+use std::collections::BTreeSet;
+
+/// The facts of `casados_core::model::Structure` that are no derivatives.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Facts {
+    /// The entries of `f_ẋ, f_x, f_z` do not depend on `(ẋ, x, z)`.
+    pub linear_in_state: bool,
+    /// Nor on `t`.
+    pub constant_matrix: bool,
+    /// Equations whose entries in `f_ẋ, f_x, f_z` are constant.
+    pub constant_rows: Vec<bool>,
+    /// Equations `c ẋ_j + c′ v + c″(t) = 0`.
+    pub trivial: Vec<u32>,
+    /// States that influence nobody.
+    pub quadratures: Vec<u32>,
+    /// Directions `(x₀, u, p)` that an equation depends on.
+    pub directions: Vec<u32>,
+    /// Variables that occur in the Hessian.
+    pub curved: Vec<u32>,
+}
+
+/// Reads the facts off the derivatives. `ends` is where `ẋ, x, z, u, p` end among the variables.
+pub fn find(
+    graph: &Graph,
+    (jacobian, blocks, constant): (&[Entry], [usize; 6], &[bool]),
+    hessian: &[Entry],
+    linear: &[bool],
+    ends: [u32; 5],
+) -> Facts {
+    let [nx, end_x, end_z, _, time] = ends;
+    let matrix: Vec<Node> = jacobian[..blocks[3]].iter().map(|entry| entry.2).collect();
+    let independent = |set: &dyn Fn(u32) -> bool| {
+        graph.degrees(&matrix, set).iter().all(|&degree| degree == Degree::Constant)
+    };
+    let mut constant_rows = vec![true; linear.len()];
+    let mut terms = vec![(0, 0, true); linear.len()];
+    for (entry, (&(row, variable, _), &constant)) in jacobian.iter().zip(constant).enumerate() {
+        let (derivatives, others, all) = &mut terms[row as usize];
+        *(if variable < nx { derivatives } else { others }) += 1;
+        *all &= constant;
+        constant_rows[row as usize] &= constant || entry >= blocks[3];
+    }
+    let trivial = |&(row, &(derivatives, others, constant)): &(u32, &(u32, u32, bool))| {
+        linear[row as usize] && derivatives == 1 && others <= 1 && constant
+    };
+    let used: BTreeSet<u32> = jacobian.iter().map(|entry| entry.1).collect();
+    // Directions are (x, u, p): the variables from x on, less z.
+    let direction = |&variable: &u32| {
+        let outside = (nx..end_x).contains(&variable) || variable >= end_z;
+        outside.then(|| if variable < end_x { variable - nx } else { variable - end_z + nx })
+    };
+    let curved: BTreeSet<u32> = hessian.iter().flat_map(|entry| [entry.0, entry.1]).collect();
+    Facts {
+        linear_in_state: independent(&|variable| variable < end_z),
+        constant_matrix: independent(&|variable| variable < end_z || variable == time),
+        trivial: (0..).zip(&terms).filter(trivial).map(|(row, _)| row).collect(),
+        constant_rows,
+        quadratures: (0..nx).filter(|state| !used.contains(&(state + nx))).collect(),
+        directions: used.iter().filter_map(direction).collect(),
+        curved: curved.into_iter().collect(),
+    }
+}
