@@ -9,6 +9,7 @@
 mod complex;
 #[cfg(feature = "num-dual")]
 mod dual;
+pub(crate) mod lanes;
 mod real;
 
 use crate::shape::Plain;
@@ -166,20 +167,25 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     fn lane(cell: &Self::Cell, lane: usize) -> f64;
     /// One of them set. `lane < LANES`
     fn set_lane(cell: &mut Self::Cell, lane: usize, value: f64);
+
+    /// Neither infinite nor NaN.
+    fn is_finite(self) -> Self::Mask;
+    /// The larger one; `other` if one of them is NaN.
+    fn max(self, other: Self) -> Self;
+    /// Whether a mask is true in a lane.
+    fn any(mask: Self::Mask) -> bool;
+    /// Whether a mask is true in every lane.
+    fn all(mask: Self::Mask) -> bool;
 }
 
 /// One real number: `f32` or `f64`.
-pub trait Real: Lanes<Cell = Self> + PartialOrd + Default {
+pub trait Real: Lanes<Cell = Self, Mask = bool> + PartialOrd + Default {
     /// Zero.
     const ZERO: Self;
     /// One.
     const ONE: Self;
     /// The distance from one to the next larger number.
     const EPSILON: Self;
-    /// Neither infinite nor NaN.
-    fn is_finite(self) -> bool;
-    /// The larger one; `other` if `self` is NaN.
-    fn max(self, other: Self) -> Self;
     /// As `f64`, exactly.
     fn to_f64(self) -> f64;
 }

@@ -129,12 +129,6 @@ macro_rules! real {
             fn set_lane(cell: &mut Self, _: usize, value: f64) {
                 *cell = value as $t;
             }
-        }
-
-        impl Real for $t {
-            const ZERO: Self = 0.0;
-            const ONE: Self = 1.0;
-            const EPSILON: Self = <$t>::EPSILON;
             #[inline(always)]
             fn is_finite(self) -> bool {
                 <$t>::is_finite(self)
@@ -143,6 +137,20 @@ macro_rules! real {
             fn max(self, other: Self) -> Self {
                 if self > other { self } else { other }
             }
+            #[inline(always)]
+            fn any(mask: bool) -> bool {
+                mask
+            }
+            #[inline(always)]
+            fn all(mask: bool) -> bool {
+                mask
+            }
+        }
+
+        impl Real for $t {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const EPSILON: Self = <$t>::EPSILON;
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 self as f64

@@ -211,4 +211,16 @@ impl Lanes for Bounded {
     fn set_lane(cell: &mut Self, _: usize, value: f64) {
         *cell = Self { value, error: f64::EPSILON * value.abs() };
     }
+    fn is_finite(self) -> bool {
+        self.value.is_finite()
+    }
+    fn max(self, other: Self) -> Self {
+        if self.value > other.value { self } else { other }
+    }
+    fn any(mask: bool) -> bool {
+        mask
+    }
+    fn all(mask: bool) -> bool {
+        mask
+    }
 }

@@ -1,0 +1,142 @@
+//! The registers of 64-bit Arm.
+#![allow(unsafe_code)]
+
+use core::arch::aarch64::*;
+
+// SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine has
+// the instructions, and NEON is compiled in (`is_there` says so where it is not: such a target has no `std`). Loads and stores,
+// which take pointers, are made on arrays that are as large as the register, and ask for no alignment.
+
+/// Functions of an expression of intrinsics each.
+macro_rules! define {
+    ($($(#[$attribute:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
+        $(#[$attribute])*
+        #[inline(always)]
+        #[allow(unused_unsafe)]
+        pub fn $name($($argument: $type),*) -> $result {
+            // SAFETY: see the head of the file.
+            unsafe { $body }
+        }
+    )* };
+}
+
+macro_rules! shared {
+    ($element:ty, $width:literal, $load:ident, $store:ident) => {
+        pub const WIDTH: usize = $width;
+
+        /// Lanes that are not used are copies of the last one that is.
+        #[inline(always)]
+        pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
+            let all: [$element; $width] =
+                core::array::from_fn(|lane| cell[if lane < N { lane } else { N - 1 }]);
+            // SAFETY: the array is as large as the register.
+            unsafe { $load(all.as_ptr()) }
+        }
+        #[inline(always)]
+        pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
+            let mut all = [0.0; $width];
+            // SAFETY: the array is as large as the register.
+            unsafe { $store(all.as_mut_ptr(), a) };
+            cell.copy_from_slice(&all[..N]);
+        }
+        /// Calls `f`; not inlined.
+        #[inline(never)]
+        pub fn enter<A, R, F: FnOnce(A) -> R>(argument: A, f: F) -> R {
+            f(argument)
+        }
+    };
+}
+
+/// Two `f64`.
+pub mod neon_f64 {
+    use super::*;
+    pub type Register = float64x2_t;
+    pub type Mask = uint64x2_t;
+    pub const FUSED: bool = true;
+
+    shared!(f64, 2, vld1q_f64, vst1q_f64);
+    define! {
+        splat(a: f64) -> Register { vdupq_n_f64(a) }
+        add(a: Register, b: Register) -> Register { vaddq_f64(a, b) }
+        sub(a: Register, b: Register) -> Register { vsubq_f64(a, b) }
+        mul(a: Register, b: Register) -> Register { vmulq_f64(a, b) }
+        div(a: Register, b: Register) -> Register { vdivq_f64(a, b) }
+        sqrt(a: Register) -> Register { vsqrtq_f64(a) }
+        max(a: Register, b: Register) -> Register { vbslq_f64(vcgtq_f64(a, b), a, b) }
+        and(a: Register, b: Register) -> Register {
+            vreinterpretq_f64_u64(vandq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
+        }
+        or(a: Register, b: Register) -> Register {
+            vreinterpretq_f64_u64(vorrq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
+        }
+        xor(a: Register, b: Register) -> Register {
+            vreinterpretq_f64_u64(veorq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
+        }
+        mul_add(a: Register, b: Register, c: Register) -> Register { vfmaq_f64(c, a, b) }
+        subtract_product(c: Register, a: Register, b: Register) -> Register { vfmsq_f64(c, a, b) }
+        lt(a: Register, b: Register) -> Mask { vcltq_f64(a, b) }
+        le(a: Register, b: Register) -> Mask { vcleq_f64(a, b) }
+        eq(a: Register, b: Register) -> Mask { vceqq_f64(a, b) }
+        mask_and(a: Mask, b: Mask) -> Mask { vandq_u64(a, b) }
+        mask_or(a: Mask, b: Mask) -> Mask { vorrq_u64(a, b) }
+        mask_not(a: Mask) -> Mask { veorq_u64(a, vdupq_n_u64(u64::MAX)) }
+        select(m: Mask, a: Register, b: Register) -> Register { vbslq_f64(m, a, b) }
+        bits(m: Mask) -> u32 { (vgetq_lane_u64::<0>(m) & 1 | vgetq_lane_u64::<1>(m) & 2) as u32 }
+        add_bits(a: Register, b: Register) -> Register {
+            vreinterpretq_f64_u64(vaddq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
+        }
+        sub_bits(a: Register, b: Register) -> Register {
+            vreinterpretq_f64_u64(vsubq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
+        }
+        shift_left_52(a: Register) -> Register {
+            vreinterpretq_f64_u64(vshlq_n_u64::<52>(vreinterpretq_u64_f64(a)))
+        }
+        shift_right_52(a: Register) -> Register {
+            vreinterpretq_f64_u64(vshrq_n_u64::<52>(vreinterpretq_u64_f64(a)))
+        }
+    }
+}
+
+/// Four `f32`.
+pub mod neon_f32 {
+    pub use super::neon_f64 as doubles;
+    use super::*;
+    pub type Register = float32x4_t;
+    pub type Mask = uint32x4_t;
+
+    shared!(f32, 4, vld1q_f32, vst1q_f32);
+    define! {
+        splat(a: f32) -> Register { vdupq_n_f32(a) }
+        add(a: Register, b: Register) -> Register { vaddq_f32(a, b) }
+        sub(a: Register, b: Register) -> Register { vsubq_f32(a, b) }
+        mul(a: Register, b: Register) -> Register { vmulq_f32(a, b) }
+        div(a: Register, b: Register) -> Register { vdivq_f32(a, b) }
+        sqrt(a: Register) -> Register { vsqrtq_f32(a) }
+        max(a: Register, b: Register) -> Register { vbslq_f32(vcgtq_f32(a, b), a, b) }
+        and(a: Register, b: Register) -> Register {
+            vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b)))
+        }
+        or(a: Register, b: Register) -> Register {
+            vreinterpretq_f32_u32(vorrq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b)))
+        }
+        xor(a: Register, b: Register) -> Register {
+            vreinterpretq_f32_u32(veorq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b)))
+        }
+        subtract_product(c: Register, a: Register, b: Register) -> Register { vfmsq_f32(c, a, b) }
+        lt(a: Register, b: Register) -> Mask { vcltq_f32(a, b) }
+        le(a: Register, b: Register) -> Mask { vcleq_f32(a, b) }
+        eq(a: Register, b: Register) -> Mask { vceqq_f32(a, b) }
+        mask_and(a: Mask, b: Mask) -> Mask { vandq_u32(a, b) }
+        mask_or(a: Mask, b: Mask) -> Mask { vorrq_u32(a, b) }
+        mask_not(a: Mask) -> Mask { vmvnq_u32(a) }
+        select(m: Mask, a: Register, b: Register) -> Register { vbslq_f32(m, a, b) }
+        bits(m: Mask) -> u32 {
+            vgetq_lane_u32::<0>(m) & 1
+                | vgetq_lane_u32::<1>(m) & 2
+                | vgetq_lane_u32::<2>(m) & 4
+                | vgetq_lane_u32::<3>(m) & 8
+        }
+        widen(a: Register) -> [float64x2_t; 2] { [vcvt_f64_f32(vget_low_f32(a)), vcvt_high_f64_f32(a)] }
+        narrow(a: [float64x2_t; 2]) -> Register { vcvt_high_f32_f64(vcvt_f32_f64(a[0]), a[1]) }
+    }
+}

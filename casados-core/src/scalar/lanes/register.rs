@@ -1,0 +1,337 @@
+//! The types: one number type over each kind of register.
+
+use super::functions::{Double, Single, doubles, singles};
+#[cfg(target_arch = "aarch64")]
+use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
+#[cfg(target_arch = "x86_64")]
+use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
+use crate::scalar::{Field, Lanes, Piece, Scalar};
+use bytemuck::Zeroable;
+use core::fmt::{self, Debug, Formatter};
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+macro_rules! operators {
+    ($name:ident, $ops:ident: $($trait:ident $method:ident $function:ident),*) => { $(
+        impl<const N: usize> $trait for $name<N> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self($ops::$function(self.0, other.0))
+            }
+        }
+    )* };
+}
+
+/// Elementary functions: of the whole register, whatever part of it is used.
+macro_rules! through {
+    ($name:ident, $ops:ident, $functions:ident: $($unary:ident)*; $($binary:ident)*) => {
+        $(
+            #[inline(always)]
+            fn $unary(self) -> Self {
+                Self($ops::enter(whole!($name, $ops, self), $functions::$unary).0)
+            }
+        )*
+        $(
+            #[inline(always)]
+            fn $binary(self, other: Self) -> Self {
+                let arguments = (whole!($name, $ops, self), whole!($name, $ops, other));
+                Self($ops::enter(arguments, $functions::$binary).0)
+            }
+        )*
+    };
+}
+macro_rules! whole {
+    ($name:ident, $ops:ident, $a:expr) => {
+        $name::<{ $ops::WIDTH }>($a.0)
+    };
+}
+
+/// A type of numbers: its documentation, its name, the type of one lane, the module of its instructions, and
+/// the module of its elementary functions.
+macro_rules! register {
+    ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy)]
+        #[repr(transparent)]
+        pub struct $name<const N: usize>($ops::Register);
+
+        // SAFETY: a register is numbers and nothing else, all of them zero if its bits are.
+        #[allow(unsafe_code)]
+        unsafe impl<const N: usize> Zeroable for $name<N> {}
+
+        impl<const N: usize> $name<N> {
+            /// The lanes that are used, one bit each.
+            const USED: u32 = {
+                assert!(N >= 1 && N <= $ops::WIDTH, "a register with more numbers than it holds");
+                (1 << N) - 1
+            };
+
+            /// A number in every lane.
+            #[inline(always)]
+            pub fn splat(value: $element) -> Self {
+                Self($ops::splat(value))
+            }
+            /// The numbers of the lanes that are used.
+            #[inline(always)]
+            pub fn to_array(self) -> [$element; N] {
+                let mut array = [0.0; N];
+                Scalar::store(self, &mut array);
+                array
+            }
+        }
+
+        impl<const N: usize> Debug for $name<N> {
+            fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+                self.to_array().fmt(f)
+            }
+        }
+
+        impl<const N: usize> PartialEq for $name<N> {
+            fn eq(&self, other: &Self) -> bool {
+                Self::all(Scalar::eq(*self, *other))
+            }
+        }
+
+        operators!($name, $ops: Add add add, Sub sub sub, Mul mul mul, Div div div);
+
+        impl<const N: usize> Neg for $name<N> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self($ops::xor(self.0, $ops::splat(-0.0)))
+            }
+        }
+
+        impl<const N: usize> Field for $name<N> {
+            type Mask = $ops::Mask;
+
+            #[inline(always)]
+            fn from_f64(value: f64) -> Self {
+                Self::splat(value as $element)
+            }
+            #[inline(always)]
+            fn subtract_product(self, a: Self, b: Self) -> Self {
+                Self($ops::subtract_product(self.0, a.0, b.0))
+            }
+            #[inline(always)]
+            fn is_smaller(self, other: Self) -> Self::Mask {
+                Scalar::lt(Scalar::abs(self), Scalar::abs(other))
+            }
+            #[inline(always)]
+            fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
+                Self($ops::select(mask, a.0, b.0))
+            }
+        }
+
+        impl<const N: usize> Scalar for $name<N> {
+            type Cell = [$element; N];
+
+            #[inline(always)]
+            fn load(cell: &Self::Cell) -> Self {
+                const { assert!(Self::USED != 0) };
+                Self($ops::load(cell))
+            }
+            #[inline(always)]
+            fn store(self, cell: &mut Self::Cell) {
+                $ops::store(self.0, cell);
+            }
+            #[inline(always)]
+            fn vectorize<P: Piece>(piece: P) {
+                $ops::enter(piece, P::run);
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self($ops::sqrt(self.0))
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                Self($ops::and(self.0, $ops::splat($element::from_bits(!(-0.0 as $element).to_bits()))))
+            }
+            #[inline(always)]
+            fn signum(self) -> Self {
+                let sign = $ops::and(self.0, $ops::splat(-0.0));
+                Self($ops::select($ops::eq(self.0, self.0), $ops::or(sign, $ops::splat(1.0)), self.0))
+            }
+            // As `f64` does it: square and multiply, and of a negative exponent the reciprocal.
+            #[inline(always)]
+            fn powi(self, n: i32) -> Self {
+                let (mut base, mut left) = (self, n.unsigned_abs());
+                let mut power = if left & 1 == 1 { base } else { Self::splat(1.0) };
+                left >>= 1;
+                while left > 0 {
+                    base = base * base;
+                    if left & 1 == 1 {
+                        power = power * base;
+                    }
+                    left >>= 1;
+                }
+                if n < 0 { Self::splat(1.0) / power } else { power }
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                let (sin, cos) = $ops::enter(whole!($name, $ops, self), $functions::sin_cos);
+                (Self(sin.0), Self(cos.0))
+            }
+            through!($name, $ops, $functions: cbrt exp exp2 exp_m1 ln ln_1p log2 log10 sin cos tan asin acos atan
+                sinh cosh tanh asinh acosh atanh; atan2 hypot powf);
+
+            #[inline(always)]
+            fn lt(self, other: Self) -> Self::Mask {
+                $ops::lt(self.0, other.0)
+            }
+            #[inline(always)]
+            fn le(self, other: Self) -> Self::Mask {
+                $ops::le(self.0, other.0)
+            }
+            #[inline(always)]
+            fn eq(self, other: Self) -> Self::Mask {
+                $ops::eq(self.0, other.0)
+            }
+            #[inline(always)]
+            fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+                $ops::mask_and(a, b)
+            }
+            #[inline(always)]
+            fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+                $ops::mask_or(a, b)
+            }
+            #[inline(always)]
+            fn not(a: Self::Mask) -> Self::Mask {
+                $ops::mask_not(a)
+            }
+        }
+
+        impl<const N: usize> Lanes for $name<N> {
+            const LANES: usize = N;
+
+            #[inline(always)]
+            fn lane(cell: &Self::Cell, lane: usize) -> f64 {
+                cell[lane] as f64
+            }
+            #[inline(always)]
+            fn set_lane(cell: &mut Self::Cell, lane: usize, value: f64) {
+                cell[lane] = value as $element;
+            }
+            #[inline(always)]
+            fn is_finite(self) -> Self::Mask {
+                $ops::lt(Scalar::abs(self).0, $ops::splat($element::INFINITY))
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                Self($ops::max(self.0, other.0))
+            }
+            #[inline(always)]
+            fn any(mask: Self::Mask) -> bool {
+                $ops::bits(mask) & Self::USED != 0
+            }
+            #[inline(always)]
+            fn all(mask: Self::Mask) -> bool {
+                $ops::bits(mask) & Self::USED == Self::USED
+            }
+        }
+    };
+}
+
+macro_rules! double {
+    ($name:ident, $ops:ident) => {
+        impl Double for $name<{ $ops::WIDTH }> {
+            const FUSED: bool = $ops::FUSED;
+
+            #[inline(always)]
+            fn mul_add(self, b: Self, c: Self) -> Self {
+                Self($ops::mul_add(self.0, b.0, c.0))
+            }
+            #[inline(always)]
+            fn and_bits(self, other: Self) -> Self {
+                Self($ops::and(self.0, other.0))
+            }
+            #[inline(always)]
+            fn or_bits(self, other: Self) -> Self {
+                Self($ops::or(self.0, other.0))
+            }
+            #[inline(always)]
+            fn xor_bits(self, other: Self) -> Self {
+                Self($ops::xor(self.0, other.0))
+            }
+            #[inline(always)]
+            fn add_bits(self, other: Self) -> Self {
+                Self($ops::add_bits(self.0, other.0))
+            }
+            #[inline(always)]
+            fn sub_bits(self, other: Self) -> Self {
+                Self($ops::sub_bits(self.0, other.0))
+            }
+            #[inline(always)]
+            fn shift_left_52(self) -> Self {
+                Self($ops::shift_left_52(self.0))
+            }
+            #[inline(always)]
+            fn shift_right_52(self) -> Self {
+                Self($ops::shift_right_52(self.0))
+            }
+            #[inline(always)]
+            fn bits_of(mask: Self::Mask) -> u32 {
+                $ops::bits(mask)
+            }
+        }
+    };
+}
+
+macro_rules! single {
+    ($name:ident, $ops:ident, $double:ident) => {
+        impl Single for $name<{ $ops::WIDTH }> {
+            type Double = $double<{ $ops::doubles::WIDTH }>;
+
+            #[inline(always)]
+            fn widen(self) -> [Self::Double; 2] {
+                $ops::widen(self.0).map($double)
+            }
+            #[inline(always)]
+            fn narrow(low: Self::Double, high: Self::Double) -> Self {
+                Self($ops::narrow([low.0, high.0]))
+            }
+        }
+    };
+}
+
+register! {
+    /// Up to two `f64`, in a register that every machine of the kind has.
+    F64x2, f64, base_f64, doubles
+}
+register! {
+    /// Up to four `f32`, in a register that every machine of the kind has.
+    F32x4, f32, base_f32, singles
+}
+double!(F64x2, base_f64);
+single!(F32x4, base_f32, F64x2);
+
+#[cfg(target_arch = "x86_64")]
+register! {
+    /// Up to four `f64`, AVX2 and FMA.
+    F64x4, f64, avx2_f64, doubles
+}
+#[cfg(target_arch = "x86_64")]
+register! {
+    /// Up to eight `f32`, AVX2 and FMA.
+    F32x8, f32, avx2_f32, singles
+}
+#[cfg(target_arch = "x86_64")]
+double!(F64x4, avx2_f64);
+#[cfg(target_arch = "x86_64")]
+single!(F32x8, avx2_f32, F64x4);
+
+#[cfg(target_arch = "x86_64")]
+register! {
+    /// Up to eight `f64`, AVX-512.
+    F64x8, f64, avx512_f64, doubles
+}
+#[cfg(target_arch = "x86_64")]
+register! {
+    /// Up to sixteen `f32`, AVX-512.
+    F32x16, f32, avx512_f32, singles
+}
+#[cfg(target_arch = "x86_64")]
+double!(F64x8, avx512_f64);
+#[cfg(target_arch = "x86_64")]
+single!(F32x16, avx512_f32, F64x8);

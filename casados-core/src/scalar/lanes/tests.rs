@@ -1,0 +1,169 @@
+//! Registers against single numbers, lane by lane, on all kinds of registers that the machine has.
+
+use super::*;
+use crate::scalar::{Lanes, Piece, Scalar};
+use std::vec::Vec;
+
+/// Numbers in which something is special, and their neighbours.
+fn specials() -> Vec<f64> {
+    let mut values = std::vec![0.0, f64::INFINITY, f64::NAN];
+    for magnitude in
+        [f64::MIN_POSITIVE, 5e-324, 1e-310, 1e-300, 1e-30, 1e-8, 0.1, 0.5, 1.0, 1.5, 3.0, 710.0, 1e8]
+            .into_iter()
+            .chain([1e16, 1e100, 1e300, f64::MAX])
+    {
+        values.extend([magnitude, magnitude * (1.0 - 0.5 * f64::EPSILON), magnitude * (1.0 + f64::EPSILON)]);
+    }
+    values.iter().flat_map(|&value| [value, -value]).collect()
+}
+
+/// Runs a closure where the instructions of `L` may be used.
+struct Inside<F>(F);
+impl<F: FnMut()> Piece for Inside<F> {
+    #[inline(always)]
+    fn run(mut self) {
+        (self.0)();
+    }
+}
+fn inside<L: Scalar>(f: impl FnMut()) {
+    L::vectorize(Inside(f));
+}
+
+/// Equal bits, or both NaN.
+fn same(a: f64, b: f64) -> bool {
+    a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan()
+}
+
+/// A cell whose lanes are `values[start], values[start + stride], ..`
+fn cell<L: Lanes>(values: &[f64], start: usize, stride: usize) -> L::Cell {
+    let mut cell = <L::Cell as bytemuck::Zeroable>::zeroed();
+    for lane in 0..L::LANES {
+        L::set_lane(&mut cell, lane, values[(start + stride * lane) % values.len()]);
+    }
+    cell
+}
+
+/// Arithmetic of registers gives the bits that arithmetic of `S`, one lane, gives.
+fn arithmetic<L: Lanes, S: Lanes<Mask = bool>>() {
+    let values = specials();
+    inside::<L>(|| {
+        for i in 0..values.len() {
+            for j in 0..values.len() {
+                let (a_cell, b_cell) = (cell::<L>(&values, i, 1), cell::<L>(&values, j, 3));
+                let (a, b) = (L::load(&a_cell), L::load(&b_cell));
+                let less = [a.lt(b), a.le(b), a.eq(b), a.is_smaller(b), a.is_finite()];
+                let masks = [less[0], less[1], less[2], less[3], less[4], L::and(less[0], less[3])];
+                let masks = masks.into_iter().chain([L::or(less[0], less[2]), L::not(less[0])]);
+                let results = [a + b, a - b, a * b, a / b, -a, a.abs(), a.signum(), a.sqrt(), a.max(b)]
+                    .into_iter()
+                    .chain([a.powi(3), a.powi(-2), a.powi(0), L::from_f64(0.1)])
+                    .chain(masks.clone().map(|mask| L::select(mask, a, b)));
+                let mut seen = std::vec![std::vec![]; L::LANES];
+                for result in results {
+                    let mut out = a_cell;
+                    result.store(&mut out);
+                    (0..L::LANES).for_each(|lane| seen[lane].push(L::lane(&out, lane)));
+                }
+                let mut truth = std::vec![[false; 8]; L::LANES];
+                for lane in 0..L::LANES {
+                    let single = |cell| {
+                        let mut one = <S::Cell as bytemuck::Zeroable>::zeroed();
+                        S::set_lane(&mut one, 0, L::lane(cell, lane));
+                        S::load(&one)
+                    };
+                    let (a, b) = (single(&a_cell), single(&b_cell));
+                    let less = [a.lt(b), a.le(b), a.eq(b), a.is_smaller(b), a.is_finite()];
+                    let masks = [less[0], less[1], less[2], less[3], less[4], less[0] & less[3]];
+                    let masks = masks.into_iter().chain([less[0] | less[2], !less[0]]);
+                    let results = [a + b, a - b, a * b, a / b, -a, a.abs(), a.signum(), a.sqrt(), a.max(b)]
+                        .into_iter()
+                        .chain([a.powi(3), a.powi(-2), a.powi(0), S::from_f64(0.1)])
+                        .chain(masks.clone().map(|mask| S::select(mask, a, b)));
+                    masks.enumerate().for_each(|(index, mask)| truth[lane][index] = mask);
+                    for (index, result) in results.enumerate() {
+                        let mut one = <S::Cell as bytemuck::Zeroable>::zeroed();
+                        result.store(&mut one);
+                        let expected = S::lane(&one, 0);
+                        assert!(
+                            same(seen[lane][index], expected),
+                            "operation {index} of {a:?} and {b:?}: {:e}, not {expected:e}",
+                            seen[lane][index]
+                        );
+                    }
+                }
+                for (index, mask) in masks.enumerate() {
+                    assert_eq!(
+                        L::any(mask),
+                        truth.iter().any(|lane| lane[index]),
+                        "any {index} of {a:?}, {b:?}"
+                    );
+                    assert_eq!(
+                        L::all(mask),
+                        truth.iter().all(|lane| lane[index]),
+                        "all {index} of {a:?}, {b:?}"
+                    );
+                }
+                assert_eq!(a == a, (0..L::LANES).all(|lane| !L::lane(&a_cell, lane).is_nan()));
+            }
+        }
+    });
+}
+
+/// `c − a b`, rounded once where the machine can.
+fn products<L: Lanes>(fused: bool) {
+    inside::<L>(|| {
+        let a = 1.0 + f64::EPSILON;
+        let product = L::from_f64(1.0).subtract_product(L::from_f64(a), L::from_f64(1.0 - f64::EPSILON));
+        let expected = if fused { f64::EPSILON * f64::EPSILON } else { 0.0 };
+        let mut out = cell::<L>(&[0.0], 0, 1);
+        product.store(&mut out);
+        assert_eq!(L::lane(&out, L::LANES - 1), expected);
+    });
+}
+
+/// Checks each kind of register that the machine has.
+macro_rules! on_every_register {
+    ($check:ident) => {
+        if is_there(Level::Base) {
+            $check!(F64x2, f64, 1, 2);
+            $check!(F32x4, f32, 1, 2, 3, 4);
+        }
+        #[cfg(target_arch = "x86_64")]
+        if is_there(Level::Avx2) {
+            $check!(F64x4, f64, 1, 2, 3, 4);
+            $check!(F32x8, f32, 1, 3, 5, 8);
+        }
+        #[cfg(target_arch = "x86_64")]
+        if is_there(Level::Avx512) {
+            $check!(F64x8, f64, 1, 3, 5, 6, 7, 8);
+            $check!(F32x16, f32, 1, 7, 9, 16);
+        }
+    };
+}
+
+#[test]
+fn arithmetic_has_the_bits_of_single_numbers() {
+    macro_rules! check {
+        ($name:ident, $single:ident, $($lanes:literal),*) => { $( arithmetic::<$name<$lanes>, $single>(); )* };
+    }
+    on_every_register!(check);
+}
+
+#[test]
+fn products_are_subtracted_with_one_rounding_where_the_machine_can() {
+    products::<F64x2<2>>(cfg!(target_arch = "aarch64"));
+    #[cfg(target_arch = "x86_64")]
+    if is_there(Level::Avx2) {
+        products::<F64x4<3>>(true);
+    }
+    #[cfg(target_arch = "x86_64")]
+    if is_there(Level::Avx512) {
+        products::<F64x8<5>>(true);
+    }
+}
+
+#[test]
+fn the_level_is_one_that_the_machine_has_and_the_limit_allows() {
+    assert!(is_there(level()));
+    assert!(level() >= Level::Base);
+}

@@ -1,0 +1,351 @@
+//! The registers of x86-64: SSE2, which every such machine has, AVX2 with FMA, and AVX-512.
+//!
+//! One module for each kind of register, all with the same functions.
+#![allow(unsafe_code)]
+
+use core::arch::x86_64::*;
+
+// SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine
+// has the instructions. SSE2 is part of x86-64. A register of AVX2 or AVX-512 is computed with only after
+// detection, as the head of `lanes` says. Loads and stores, which take pointers, are made on references to
+// arrays that are as large as what is read or written, and ask for no alignment.
+
+/// Functions of one intrinsic each.
+macro_rules! wrap {
+    ($($name:ident($($argument:ident: $type:ty),*) -> $result:ty = $intrinsic:ident $(::<$constant:tt>)?;)*) => { $(
+        #[inline(always)]
+        #[allow(unused_unsafe)] // The compiler knows that SSE2 is always there.
+        pub fn $name($($argument: $type),*) -> $result {
+            // SAFETY: see the head of the file.
+            unsafe { $intrinsic $(::<$constant>)? ($($argument),*) }
+        }
+    )* };
+}
+
+/// Functions of an expression of intrinsics each.
+macro_rules! define {
+    ($($(#[$attribute:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
+        $(#[$attribute])*
+        #[inline(always)]
+        #[allow(unused_unsafe)] // The compiler knows that SSE2 is always there.
+        pub fn $name($($argument: $type),*) -> $result {
+            // SAFETY: see the head of the file.
+            unsafe { $body }
+        }
+    )* };
+}
+
+/// Loads and stores of whole registers, and of their first `N` numbers.
+macro_rules! memory {
+    ($element:ty, $width:literal, $load:ident, $store:ident, $set:ident; $($index:literal)*) => {
+        pub const WIDTH: usize = $width;
+
+        /// Lanes that are not used are copies of the last one that is.
+        #[inline(always)]
+        #[allow(unused_unsafe)]
+        pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
+            // SAFETY: the array is as large as the register that is loaded whole.
+            unsafe {
+                if N == $width {
+                    $load(cell.as_ptr())
+                } else {
+                    $set($(cell[if $index < N { $index } else { N - 1 }]),*)
+                }
+            }
+        }
+        #[inline(always)]
+        pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
+            let mut all = [0.0; $width];
+            // SAFETY: the array is as large as the register.
+            unsafe { $store(all.as_mut_ptr(), a) };
+            cell.copy_from_slice(&all[..N]);
+        }
+    };
+}
+
+/// A function that is compiled for given instructions.
+macro_rules! enter {
+    ($features:literal) => {
+        /// Calls `f` where the instructions of this register may be used; not inlined.
+        #[inline(always)]
+        pub fn enter<A, R, F: FnOnce(A) -> R>(argument: A, f: F) -> R {
+            #[target_feature(enable = $features)]
+            #[inline(never)]
+            fn inside<A, R, F: FnOnce(A) -> R>(argument: A, f: F) -> R {
+                f(argument)
+            }
+            // SAFETY: see the head of the file.
+            unsafe { inside(argument, f) }
+        }
+    };
+}
+
+/// Two `f64`.
+pub mod sse2_f64 {
+    use super::*;
+    pub type Register = __m128d;
+    pub type Mask = __m128d;
+    pub const FUSED: bool = false;
+
+    enter!("sse2");
+    memory!(f64, 2, _mm_loadu_pd, _mm_storeu_pd, _mm_setr_pd; 0 1);
+    wrap! {
+        splat(a: f64) -> Register = _mm_set1_pd;
+        add(a: Register, b: Register) -> Register = _mm_add_pd;
+        sub(a: Register, b: Register) -> Register = _mm_sub_pd;
+        mul(a: Register, b: Register) -> Register = _mm_mul_pd;
+        div(a: Register, b: Register) -> Register = _mm_div_pd;
+        sqrt(a: Register) -> Register = _mm_sqrt_pd;
+        max(a: Register, b: Register) -> Register = _mm_max_pd;
+        and(a: Register, b: Register) -> Register = _mm_and_pd;
+        or(a: Register, b: Register) -> Register = _mm_or_pd;
+        xor(a: Register, b: Register) -> Register = _mm_xor_pd;
+        lt(a: Register, b: Register) -> Mask = _mm_cmplt_pd;
+        le(a: Register, b: Register) -> Mask = _mm_cmple_pd;
+        eq(a: Register, b: Register) -> Mask = _mm_cmpeq_pd;
+        mask_and(a: Mask, b: Mask) -> Mask = _mm_and_pd;
+        mask_or(a: Mask, b: Mask) -> Mask = _mm_or_pd;
+    }
+    define! {
+        /// Rounded twice.
+        mul_add(a: Register, b: Register, c: Register) -> Register { _mm_add_pd(_mm_mul_pd(a, b), c) }
+        subtract_product(c: Register, a: Register, b: Register) -> Register { _mm_sub_pd(c, _mm_mul_pd(a, b)) }
+        mask_not(a: Mask) -> Mask { _mm_xor_pd(a, _mm_castsi128_pd(_mm_set1_epi64x(-1))) }
+        select(m: Mask, a: Register, b: Register) -> Register { _mm_or_pd(_mm_and_pd(m, a), _mm_andnot_pd(m, b)) }
+        bits(m: Mask) -> u32 { _mm_movemask_pd(m) as u32 }
+        add_bits(a: Register, b: Register) -> Register {
+            _mm_castsi128_pd(_mm_add_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
+        }
+        sub_bits(a: Register, b: Register) -> Register {
+            _mm_castsi128_pd(_mm_sub_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
+        }
+        shift_left_52(a: Register) -> Register { _mm_castsi128_pd(_mm_slli_epi64::<52>(_mm_castpd_si128(a))) }
+        shift_right_52(a: Register) -> Register { _mm_castsi128_pd(_mm_srli_epi64::<52>(_mm_castpd_si128(a))) }
+    }
+}
+
+/// Four `f32`.
+pub mod sse_f32 {
+    pub use super::sse2_f64 as doubles;
+    use super::*;
+    pub type Register = __m128;
+    pub type Mask = __m128;
+
+    enter!("sse2");
+    memory!(f32, 4, _mm_loadu_ps, _mm_storeu_ps, _mm_setr_ps; 0 1 2 3);
+    wrap! {
+        splat(a: f32) -> Register = _mm_set1_ps;
+        add(a: Register, b: Register) -> Register = _mm_add_ps;
+        sub(a: Register, b: Register) -> Register = _mm_sub_ps;
+        mul(a: Register, b: Register) -> Register = _mm_mul_ps;
+        div(a: Register, b: Register) -> Register = _mm_div_ps;
+        sqrt(a: Register) -> Register = _mm_sqrt_ps;
+        max(a: Register, b: Register) -> Register = _mm_max_ps;
+        and(a: Register, b: Register) -> Register = _mm_and_ps;
+        or(a: Register, b: Register) -> Register = _mm_or_ps;
+        xor(a: Register, b: Register) -> Register = _mm_xor_ps;
+        lt(a: Register, b: Register) -> Mask = _mm_cmplt_ps;
+        le(a: Register, b: Register) -> Mask = _mm_cmple_ps;
+        eq(a: Register, b: Register) -> Mask = _mm_cmpeq_ps;
+        mask_and(a: Mask, b: Mask) -> Mask = _mm_and_ps;
+        mask_or(a: Mask, b: Mask) -> Mask = _mm_or_ps;
+    }
+    define! {
+        subtract_product(c: Register, a: Register, b: Register) -> Register { _mm_sub_ps(c, _mm_mul_ps(a, b)) }
+        mask_not(a: Mask) -> Mask { _mm_xor_ps(a, _mm_castsi128_ps(_mm_set1_epi32(-1))) }
+        select(m: Mask, a: Register, b: Register) -> Register { _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b)) }
+        bits(m: Mask) -> u32 { _mm_movemask_ps(m) as u32 }
+        widen(a: Register) -> [__m128d; 2] { [_mm_cvtps_pd(a), _mm_cvtps_pd(_mm_movehl_ps(a, a))] }
+        narrow(a: [__m128d; 2]) -> Register { _mm_movelh_ps(_mm_cvtpd_ps(a[0]), _mm_cvtpd_ps(a[1])) }
+    }
+}
+
+/// Four `f64`.
+pub mod avx2_f64 {
+    use super::*;
+    pub type Register = __m256d;
+    pub type Mask = __m256d;
+    pub const FUSED: bool = true;
+
+    enter!("avx2,fma");
+    memory!(f64, 4, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_setr_pd; 0 1 2 3);
+    wrap! {
+        splat(a: f64) -> Register = _mm256_set1_pd;
+        add(a: Register, b: Register) -> Register = _mm256_add_pd;
+        sub(a: Register, b: Register) -> Register = _mm256_sub_pd;
+        mul(a: Register, b: Register) -> Register = _mm256_mul_pd;
+        div(a: Register, b: Register) -> Register = _mm256_div_pd;
+        sqrt(a: Register) -> Register = _mm256_sqrt_pd;
+        max(a: Register, b: Register) -> Register = _mm256_max_pd;
+        and(a: Register, b: Register) -> Register = _mm256_and_pd;
+        or(a: Register, b: Register) -> Register = _mm256_or_pd;
+        xor(a: Register, b: Register) -> Register = _mm256_xor_pd;
+        mul_add(a: Register, b: Register, c: Register) -> Register = _mm256_fmadd_pd;
+        lt(a: Register, b: Register) -> Mask = _mm256_cmp_pd::<_CMP_LT_OQ>;
+        le(a: Register, b: Register) -> Mask = _mm256_cmp_pd::<_CMP_LE_OQ>;
+        eq(a: Register, b: Register) -> Mask = _mm256_cmp_pd::<_CMP_EQ_OQ>;
+        mask_and(a: Mask, b: Mask) -> Mask = _mm256_and_pd;
+        mask_or(a: Mask, b: Mask) -> Mask = _mm256_or_pd;
+    }
+    define! {
+        subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_pd(a, b, c) }
+        mask_not(a: Mask) -> Mask { _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi64x(-1))) }
+        select(m: Mask, a: Register, b: Register) -> Register { _mm256_blendv_pd(b, a, m) }
+        bits(m: Mask) -> u32 { _mm256_movemask_pd(m) as u32 }
+        add_bits(a: Register, b: Register) -> Register {
+            _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
+        }
+        sub_bits(a: Register, b: Register) -> Register {
+            _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
+        }
+        shift_left_52(a: Register) -> Register {
+            _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(a)))
+        }
+        shift_right_52(a: Register) -> Register {
+            _mm256_castsi256_pd(_mm256_srli_epi64::<52>(_mm256_castpd_si256(a)))
+        }
+    }
+}
+
+/// Eight `f32`.
+pub mod avx2_f32 {
+    pub use super::avx2_f64 as doubles;
+    use super::*;
+    pub type Register = __m256;
+    pub type Mask = __m256;
+
+    enter!("avx2,fma");
+    memory!(f32, 8, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_setr_ps; 0 1 2 3 4 5 6 7);
+    wrap! {
+        splat(a: f32) -> Register = _mm256_set1_ps;
+        add(a: Register, b: Register) -> Register = _mm256_add_ps;
+        sub(a: Register, b: Register) -> Register = _mm256_sub_ps;
+        mul(a: Register, b: Register) -> Register = _mm256_mul_ps;
+        div(a: Register, b: Register) -> Register = _mm256_div_ps;
+        sqrt(a: Register) -> Register = _mm256_sqrt_ps;
+        max(a: Register, b: Register) -> Register = _mm256_max_ps;
+        and(a: Register, b: Register) -> Register = _mm256_and_ps;
+        or(a: Register, b: Register) -> Register = _mm256_or_ps;
+        xor(a: Register, b: Register) -> Register = _mm256_xor_ps;
+        lt(a: Register, b: Register) -> Mask = _mm256_cmp_ps::<_CMP_LT_OQ>;
+        le(a: Register, b: Register) -> Mask = _mm256_cmp_ps::<_CMP_LE_OQ>;
+        eq(a: Register, b: Register) -> Mask = _mm256_cmp_ps::<_CMP_EQ_OQ>;
+        mask_and(a: Mask, b: Mask) -> Mask = _mm256_and_ps;
+        mask_or(a: Mask, b: Mask) -> Mask = _mm256_or_ps;
+    }
+    define! {
+        subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_ps(a, b, c) }
+        mask_not(a: Mask) -> Mask { _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))) }
+        select(m: Mask, a: Register, b: Register) -> Register { _mm256_blendv_ps(b, a, m) }
+        bits(m: Mask) -> u32 { _mm256_movemask_ps(m) as u32 }
+        widen(a: Register) -> [__m256d; 2] {
+            [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))]
+        }
+        narrow(a: [__m256d; 2]) -> Register {
+            _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0]))
+        }
+    }
+}
+
+/// Loads and stores under a mask, masks of one bit for each lane.
+macro_rules! masked {
+    ($element:ty, $width:literal, $mask:ident, $load:ident, $store:ident, $blend:ident) => {
+        pub const WIDTH: usize = $width;
+
+        /// Lanes that are not used are copies of the first.
+        #[inline(always)]
+        pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
+            // SAFETY: only the lanes of the array are read.
+            unsafe { $load(splat(cell[0]), $mask::MAX >> ($width - N), cell.as_ptr()) }
+        }
+        #[inline(always)]
+        pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
+            // SAFETY: only the lanes of the array are written.
+            unsafe { $store(cell.as_mut_ptr(), $mask::MAX >> ($width - N), a) }
+        }
+        define! {
+            mask_and(a: Mask, b: Mask) -> Mask { a & b }
+            mask_or(a: Mask, b: Mask) -> Mask { a | b }
+            mask_not(a: Mask) -> Mask { !a }
+            select(m: Mask, a: Register, b: Register) -> Register { $blend(m, b, a) }
+            bits(m: Mask) -> u32 { u32::from(m) }
+        }
+    };
+}
+
+/// Eight `f64`.
+pub mod avx512_f64 {
+    use super::*;
+    pub type Register = __m512d;
+    pub type Mask = __mmask8;
+    pub const FUSED: bool = true;
+
+    enter!("avx512f,avx512dq,avx512vl");
+    masked!(f64, 8, u8, _mm512_mask_loadu_pd, _mm512_mask_storeu_pd, _mm512_mask_blend_pd);
+    wrap! {
+        splat(a: f64) -> Register = _mm512_set1_pd;
+        add(a: Register, b: Register) -> Register = _mm512_add_pd;
+        sub(a: Register, b: Register) -> Register = _mm512_sub_pd;
+        mul(a: Register, b: Register) -> Register = _mm512_mul_pd;
+        div(a: Register, b: Register) -> Register = _mm512_div_pd;
+        sqrt(a: Register) -> Register = _mm512_sqrt_pd;
+        max(a: Register, b: Register) -> Register = _mm512_max_pd;
+        and(a: Register, b: Register) -> Register = _mm512_and_pd;
+        or(a: Register, b: Register) -> Register = _mm512_or_pd;
+        xor(a: Register, b: Register) -> Register = _mm512_xor_pd;
+        mul_add(a: Register, b: Register, c: Register) -> Register = _mm512_fmadd_pd;
+        lt(a: Register, b: Register) -> Mask = _mm512_cmp_pd_mask::<_CMP_LT_OQ>;
+        le(a: Register, b: Register) -> Mask = _mm512_cmp_pd_mask::<_CMP_LE_OQ>;
+        eq(a: Register, b: Register) -> Mask = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>;
+    }
+    define! {
+        subtract_product(c: Register, a: Register, b: Register) -> Register { _mm512_fnmadd_pd(a, b, c) }
+        add_bits(a: Register, b: Register) -> Register {
+            _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)))
+        }
+        sub_bits(a: Register, b: Register) -> Register {
+            _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)))
+        }
+        shift_left_52(a: Register) -> Register {
+            _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(a)))
+        }
+        shift_right_52(a: Register) -> Register {
+            _mm512_castsi512_pd(_mm512_srli_epi64::<52>(_mm512_castpd_si512(a)))
+        }
+    }
+}
+
+/// Sixteen `f32`.
+pub mod avx512_f32 {
+    pub use super::avx512_f64 as doubles;
+    use super::*;
+    pub type Register = __m512;
+    pub type Mask = __mmask16;
+
+    enter!("avx512f,avx512dq,avx512vl");
+    masked!(f32, 16, u16, _mm512_mask_loadu_ps, _mm512_mask_storeu_ps, _mm512_mask_blend_ps);
+    wrap! {
+        splat(a: f32) -> Register = _mm512_set1_ps;
+        add(a: Register, b: Register) -> Register = _mm512_add_ps;
+        sub(a: Register, b: Register) -> Register = _mm512_sub_ps;
+        mul(a: Register, b: Register) -> Register = _mm512_mul_ps;
+        div(a: Register, b: Register) -> Register = _mm512_div_ps;
+        sqrt(a: Register) -> Register = _mm512_sqrt_ps;
+        max(a: Register, b: Register) -> Register = _mm512_max_ps;
+        and(a: Register, b: Register) -> Register = _mm512_and_ps;
+        or(a: Register, b: Register) -> Register = _mm512_or_ps;
+        xor(a: Register, b: Register) -> Register = _mm512_xor_ps;
+        lt(a: Register, b: Register) -> Mask = _mm512_cmp_ps_mask::<_CMP_LT_OQ>;
+        le(a: Register, b: Register) -> Mask = _mm512_cmp_ps_mask::<_CMP_LE_OQ>;
+        eq(a: Register, b: Register) -> Mask = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>;
+    }
+    define! {
+        subtract_product(c: Register, a: Register, b: Register) -> Register { _mm512_fnmadd_ps(a, b, c) }
+        widen(a: Register) -> [__m512d; 2] {
+            [_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a))]
+        }
+        narrow(a: [__m512d; 2]) -> Register {
+            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm512_cvtpd_ps(a[0])), _mm512_cvtpd_ps(a[1]))
+        }
+    }
+}
