@@ -6,14 +6,22 @@
 //!
 //! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
 //! by the plan of the model (`sparse`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
+//! [`EigenFactors`] is the same for stages that share one Jacobian, in the eigenbasis of the tableau.
 
 mod block;
+mod complex;
 mod dense;
+#[allow(dead_code)] // Methods that share one Jacobian among stages use it.
+mod eigen;
 mod factors;
 mod fused;
 mod kernels;
 mod sparse;
 
+#[allow(unused_imports)]
+pub(crate) use complex::Complex;
+#[allow(unused_imports)]
+pub(crate) use eigen::{EigenFactors, Eigenbasis, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;

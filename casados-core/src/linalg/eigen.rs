@@ -1,0 +1,454 @@
+//! The Newton matrix of stages that share one Jacobian, in the eigenbasis of the tableau.
+//!
+//! With one Jacobian for all stages the Newton matrix is `I ⊗ [f_ẋ | f_z] + h A ⊗ [f_x | 0]`. From
+//! `A = V diag(μ) V⁻¹` it falls into `S` systems of the size of the model,
+//!
+//! ```text
+//! [f_ẋ + hμ_l f_x | f_z] ŷ_l = b̂_l        b̂ = V⁻¹ b        y = V ŷ
+//! ```
+//!
+//! of which complex conjugate ones need to be solved only once (J. C. Butcher 1976; E. Hairer, G. Wanner, Solving
+//! Ordinary Differential Equations II, section IV.8). All have the pattern and the elimination plan of the model, so they
+//! are solved side by side, `L = ⌈S/2⌉` complex numbers at a time; a real eigenvalue takes part as a complex one.
+
+use super::complex::Complex;
+use super::dense::Dense;
+use super::factors::slot;
+use super::fused::{Arithmetic, Kernel, dispatch};
+use super::sparse;
+use crate::model::{ArrayK, Assembly, Dae};
+use crate::scalar::{Field, Real};
+use crate::shape::Plain;
+use crate::tableau::Tableau;
+use bytemuck::Zeroable;
+use core::array::from_fn;
+
+/// `A = V diag(μ) V⁻¹` of a tableau with at most one real eigenvalue, such as those of Gauss and Radau.
+#[derive(Clone, Copy, Debug)]
+pub struct Eigenbasis<T, const S: usize, const L: usize> {
+    /// `μ`; the real one first, of conjugate ones that with the positive imaginary part.
+    values: Complex<T, L>,
+    /// Columns of `V⁻¹`.
+    left: [Complex<T, L>; S],
+    /// Rows of `V`, with a factor of two where they stand for a conjugate too.
+    right: [Complex<T, L>; S],
+}
+
+impl<T: Real, const S: usize, const L: usize> Eigenbasis<T, S, L> {
+    /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than `1e-10`.
+    pub fn new(tableau: &Tableau<S>) -> Option<Self> {
+        const { assert!(L == S.div_ceil(2), "L must be S / 2, rounded up") };
+        let basis = Eigenbasis::<f64, S, L>::compute(tableau.a())?;
+        let cast = |z: Complex<f64, L>| Complex { re: z.re.map(T::from_f64), im: z.im.map(T::from_f64) };
+        Some(Self { values: cast(basis.values), left: basis.left.map(cast), right: basis.right.map(cast) })
+    }
+
+    /// The eigenvalues `μ` of `A`: if `S` is odd the first is real, and of each complex pair there is one.
+    pub fn values(&self) -> &Complex<T, L> {
+        &self.values
+    }
+
+    /// `b̂ = V⁻¹ b`
+    #[inline(always)]
+    pub fn split<A: Arithmetic>(&self, b: impl Iterator<Item = T>) -> Complex<T, L> {
+        let mut sum = Complex::ZERO;
+        for (left, b) in self.left.iter().zip(b) {
+            for l in 0..L {
+                sum.re[l] = A::subtract(sum.re[l], -left.re[l], b);
+                sum.im[l] = A::subtract(sum.im[l], -left.im[l], b);
+            }
+        }
+        sum
+    }
+
+    /// `y_i` of `y = V ŷ`
+    #[inline(always)]
+    pub fn join<A: Arithmetic>(&self, stage: usize, y: &Complex<T, L>) -> T {
+        let right = &self.right[stage];
+        let mut sum = T::ZERO;
+        for l in 0..L {
+            sum = A::subtract(A::subtract(sum, -right.re[l], y.re[l]), right.im[l], y.im[l]);
+        }
+        sum
+    }
+}
+
+type Number = Complex<f64, 1>;
+
+impl<const S: usize, const L: usize> Eigenbasis<f64, S, L> {
+    fn compute(a: &[[f64; S]; S]) -> Option<Self> {
+        let mut basis = Self { values: Complex::ZERO, left: [Complex::ZERO; S], right: [Complex::ZERO; S] };
+        let (mut reals, mut pairs) = (0, S % 2);
+        for root in eigenvalues(a) {
+            let is_real = root.im[0].abs() <= 1e-8 * root.re[0].abs();
+            if !is_real && root.im[0] < 0.0 {
+                continue;
+            }
+            let start = if is_real { Complex::real(root.re) } else { root };
+            let (value, left, right) = eigenvectors(a, start)?;
+            let lane = if is_real { reals } else { pairs };
+            if lane >= if is_real { S % 2 } else { L } {
+                return None;
+            }
+            let (counter, weight) = if is_real { (&mut reals, 1.0) } else { (&mut pairs, 2.0) };
+            *counter += 1;
+            let set = |to: &mut Complex<f64, L>, z: Number| (to.re[lane], to.im[lane]) = (z.re[0], z.im[0]);
+            set(&mut basis.values, value);
+            for stage in 0..S {
+                set(&mut basis.left[stage], left[stage]);
+                set(&mut basis.right[stage], right[stage].scaled(weight));
+            }
+        }
+        (pairs == L && basis.reproduces(a)).then_some(basis)
+    }
+
+    /// Whether `V diag(μ) V⁻¹` is `A`.
+    fn reproduces(&self, a: &[[f64; S]; S]) -> bool {
+        let largest = a.iter().flatten().fold(0.0, |m: f64, a| m.max(a.abs()));
+        (0..S).all(|j| {
+            let column = self.values * self.left[j];
+            (0..S).all(|i| {
+                let sum: f64 = (0..L)
+                    .map(|l| self.right[i].re[l] * column.re[l] - self.right[i].im[l] * column.im[l])
+                    .sum();
+                (sum - a[i][j]).abs() <= 1e-10 * largest
+            })
+        })
+    }
+}
+
+/// All eigenvalues, to half the digits at least: the zeros of the characteristic polynomial (D. K. Faddeev), all at once
+/// by the iteration of Durand and Kerner.
+fn eigenvalues<const S: usize>(a: &[[f64; S]; S]) -> [Number; S] {
+    // p(μ) = μˢ + c_{S−1} μ^{S−1} + … + c_0
+    let mut coefficients = [0.0; S];
+    let mut product = [[0.0; S]; S];
+    for k in 1..=S {
+        let shift = if k == 1 { 1.0 } else { coefficients[S + 1 - k] };
+        let mut next = [[0.0; S]; S];
+        for (next, a) in next.iter_mut().zip(a) {
+            for (j, next) in next.iter_mut().enumerate() {
+                *next = a[j] * shift + a.iter().zip(&product).map(|(a, row)| a * row[j]).sum::<f64>();
+            }
+        }
+        product = next;
+        let trace: f64 = (0..S).map(|i| product[i][i]).sum();
+        coefficients[S - k] = -trace / k as f64;
+    }
+    // All zeros are of the size of the geometric mean of them; the start values lie around it, not symmetric.
+    let size = if S == 0 { 1.0 } else { root_of(coefficients[0].abs(), S) };
+    let turn = Complex { re: [0.4], im: [0.9] };
+    let mut power = Complex::real([size]);
+    let mut roots = from_fn(|_| {
+        power = power * turn;
+        power
+    });
+    for _ in 0..200 {
+        for i in 0..S {
+            let root = roots[i];
+            let mut value = Complex::real([1.0]);
+            for c in coefficients.iter().rev() {
+                value = value * root + Complex::real([*c]);
+            }
+            let mut others = Complex::real([1.0]);
+            for (j, other) in roots.iter().enumerate() {
+                if j != i {
+                    others = others * (root - *other);
+                }
+            }
+            roots[i] = root - value / others;
+        }
+    }
+    roots
+}
+
+/// `a^(1/n)` by bisection: no elementary functions are needed for it.
+fn root_of(a: f64, n: usize) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0f64.max(a));
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        let power = (0..n).fold(1.0, |power, _| power * middle);
+        if power < a { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// From an approximate eigenvalue: the eigenvalue, and the left and the right eigenvector with product one. Two-sided
+/// inverse iteration with the quotient of Rayleigh (A. M. Ostrowski 1959).
+fn eigenvectors<const S: usize>(
+    a: &[[f64; S]; S],
+    start: Number,
+) -> Option<(Number, [Number; S], [Number; S])> {
+    let one = Complex::real([1.0]);
+    let (mut value, mut left, mut right) = (start, [one; S], [one; S]);
+    for _ in 0..6 {
+        // Beside the eigenvalue, so that the matrix is regular.
+        let shift = value.scaled(1.0 + 1e-10);
+        let matrix: [[Number; S]; S] =
+            from_fn(|i| from_fn(|j| Complex::real([a[i][j]]) - if i == j { shift } else { Complex::ZERO }));
+        right = direction(matrix, right)?;
+        left = direction(from_fn(|i| from_fn(|j| matrix[j][i])), left)?;
+        let mut overlap = Complex::ZERO;
+        let mut quotient = Complex::ZERO;
+        for i in 0..S {
+            let mut product = Complex::ZERO;
+            for j in 0..S {
+                product = product + right[j].scaled(a[i][j]);
+            }
+            overlap = overlap + left[i] * right[i];
+            quotient = quotient + left[i] * product;
+        }
+        left = left.map(|l| l / overlap);
+        value = quotient / overlap;
+        if start.im[0] == 0.0 {
+            value.im = [0.0];
+        }
+    }
+    value.is_finite().then_some((value, left, right))
+}
+
+/// `M⁻¹ b`, divided by its largest element. Gauss elimination with partial pivoting.
+fn direction<const S: usize>(mut matrix: [[Number; S]; S], mut b: [Number; S]) -> Option<[Number; S]> {
+    let size = |z: Number| z.re[0].abs() + z.im[0].abs();
+    for k in 0..S {
+        let best =
+            (k..S).fold(k, |best, i| if size(matrix[i][k]) > size(matrix[best][k]) { i } else { best });
+        matrix.swap(k, best);
+        b.swap(k, best);
+        for i in k + 1..S {
+            let factor = matrix[i][k] / matrix[k][k];
+            for j in k..S {
+                matrix[i][j] = matrix[i][j] - factor * matrix[k][j];
+            }
+            b[i] = b[i] - factor * b[k];
+        }
+    }
+    for k in (0..S).rev() {
+        for j in k + 1..S {
+            b[k] = b[k] - matrix[k][j] * b[j];
+        }
+        b[k] = b[k] / matrix[k][k];
+    }
+    let largest = b.iter().fold(0.0, |m: f64, z| m.max(size(*z)));
+    let scaled = b.map(|z| z.scaled(1.0 / largest));
+    scaled.iter().all(Complex::is_finite).then_some(scaled)
+}
+
+/// A right-hand side or a solution of the `L` systems, one row for each slot.
+pub type Rows<M, T, const L: usize> = ArrayK<M, [[Complex<T, L>; 1]; 1]>;
+
+/// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all `L` eigenvalues.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+pub struct EigenFactors<M: Dae, T: Plain, const L: usize> {
+    blocks: M::Factors<[[Complex<T, L>; 1]; 1]>,
+    /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
+    dense: [Dense<M, T, 2>; L],
+    is_dense: bool,
+    pivoted: bool,
+}
+
+impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
+    /// Whether the plan is in use, so that pivoting may give better factors.
+    pub fn is_planned(&self) -> bool {
+        !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
+    }
+
+    /// From now on, whether every matrix is to be pivoted.
+    pub fn set_pivoted(&mut self, pivoted: bool) {
+        self.pivoted = pivoted;
+    }
+
+    /// Factors of the matrices of a Jacobian. Whether those of the plan hold, if there is one.
+    ///
+    /// # Errors
+    /// The unknown for which there is no pivot.
+    pub fn factor(&mut self, jacobian: &M::Jacobian<T>, values: &Complex<T, L>, h: T) -> Result<bool, usize> {
+        let scale = values.scaled(h);
+        self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
+        if self.is_dense {
+            self.factor_dense(jacobian, &scale)?;
+        }
+        Ok(!self.is_dense || M::STRUCTURE.elimination.pivots.is_empty())
+    }
+
+    /// By the plan; whether that went well.
+    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
+        let plan = &M::STRUCTURE.elimination;
+        let blocks = self.blocks.as_mut();
+        blocks.fill([[Complex::ZERO]]);
+        for entry in plan.assembly {
+            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
+            if entry.state != Assembly::NONE {
+                *element = scale.scaled(jacobian[entry.state as usize]);
+            }
+            if entry.direct != Assembly::NONE {
+                let direct = jacobian[entry.direct as usize];
+                element.re = element.re.map(|re| re + direct);
+            }
+        }
+        sparse::factor(plan, blocks);
+        // A pivot that vanishes leaves infinite elements or NaN.
+        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
+        pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
+    }
+
+    /// By pivoting whole matrices.
+    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> Result<(), usize> {
+        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+        for (l, dense) in self.dense.iter_mut().enumerate() {
+            dense.clear();
+            for e in 0..blocks[3] {
+                let (r, c) = pattern.at(e);
+                let (r, value) = (slot::<M>(r), jacobian[e]);
+                if e >= blocks[1] && e < blocks[2] {
+                    dense.add_row(r, c - nx, 0, value, &[scale.re[l], -scale.im[l]]);
+                    dense.add_row(r, c - nx, 1, value, &[scale.im[l], scale.re[l]]);
+                } else {
+                    let c = if e < blocks[1] { c } else { c - nx };
+                    dense.add(r, c, 0, value);
+                    dense.add(r, c, 1, value);
+                }
+            }
+            dense.factor().map_err(|(unknown, _)| unknown)?;
+        }
+        Ok(())
+    }
+
+    /// Solves all `L` systems in place; equations are in their slots.
+    pub fn solve(&self, rows: &mut Rows<M, T, L>) {
+        if self.is_dense {
+            self.solve_dense(rows);
+        } else {
+            sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), rows.as_mut());
+        }
+    }
+
+    fn solve_dense(&self, rows: &mut Rows<M, T, L>) {
+        let mut parts: ArrayK<M, [[T; 1]; 2]> = Zeroable::zeroed();
+        for (l, dense) in self.dense.iter().enumerate() {
+            for (part, [[row]]) in parts.as_mut().iter_mut().zip(rows.as_ref()) {
+                *part = [[row.re[l]], [row.im[l]]];
+            }
+            dense.solve(&mut parts);
+            for ([[re], [im]], [[row]]) in parts.as_ref().iter().zip(rows.as_mut()) {
+                (row.re[l], row.im[l]) = (*re, *im);
+            }
+        }
+    }
+
+    /// Solves the Newton system of the stages in place: `b` has one row for each slot, of all stages, as
+    /// [`Factors::solve`](super::Factors::solve) has it. `rows` is memory to work in.
+    pub fn solve_stages<const S: usize>(
+        &self,
+        basis: &Eigenbasis<T, S, L>,
+        b: &mut ArrayK<M, [[T; 1]; S]>,
+        rows: &mut Rows<M, T, L>,
+    ) {
+        dispatch(Split { basis, b: b.as_ref(), rows: rows.as_mut() });
+        self.solve(rows);
+        dispatch(Join { basis, b: b.as_mut(), rows: rows.as_ref() });
+    }
+}
+
+struct Split<'a, T, const S: usize, const L: usize> {
+    basis: &'a Eigenbasis<T, S, L>,
+    b: &'a [[[T; 1]; S]],
+    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+}
+
+impl<T: Real, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
+            *row = self.basis.split::<A>(b.iter().map(|[b]| *b));
+        }
+    }
+}
+
+struct Join<'a, T, const S: usize, const L: usize> {
+    basis: &'a Eigenbasis<T, S, L>,
+    b: &'a mut [[[T; 1]; S]],
+    rows: &'a [[[Complex<T, L>; 1]; 1]],
+}
+
+impl<T: Real, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for ([[row]], b) in self.rows.iter().zip(self.b) {
+            for (stage, [b]) in b.iter_mut().enumerate() {
+                *b = self.basis.join::<A>(stage, row);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tableau::{Gauss, Method, RadauIIA};
+
+    /// Whether the systems of the basis are those of `A`: `V μ V⁻¹ b = A b`. Errors are those of eigenvectors, ε times
+    /// the condition of the basis, which is the size of the terms of the sum.
+    fn check<const S: usize, const L: usize>(tableau: &Tableau<S>) {
+        let basis = Eigenbasis::<f64, S, L>::new(tableau).expect("a basis");
+        for column in 0..S {
+            let unit = (0..S).map(|j| if j == column { 1.0 } else { 0.0 });
+            let image = *basis.values() * basis.split::<super::super::fused::Separate>(unit);
+            for stage in 0..S {
+                let found = basis.join::<super::super::fused::Separate>(stage, &image);
+                let right = basis.right[stage];
+                let terms: f64 =
+                    (0..L).map(|l| right.re[l].hypot(right.im[l]) * image.re[l].hypot(image.im[l])).sum();
+                let error = (found - tableau.a()[stage][column]).abs();
+                assert!(
+                    error <= 64.0 * f64::EPSILON * terms,
+                    "{S} stages, ({stage}, {column}): {error:e} of {terms:e}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn bases_reproduce_their_tableaux() {
+        check::<1, 1>(&Gauss::<1>::TABLEAU);
+        check::<2, 1>(&Gauss::<2>::TABLEAU);
+        check::<3, 2>(&Gauss::<3>::TABLEAU);
+        check::<4, 2>(&Gauss::<4>::TABLEAU);
+        check::<5, 3>(&Gauss::<5>::TABLEAU);
+        check::<6, 3>(&Gauss::<6>::TABLEAU);
+        check::<7, 4>(&Gauss::<7>::TABLEAU);
+        check::<8, 4>(&Gauss::<8>::TABLEAU);
+        check::<9, 5>(&Gauss::<9>::TABLEAU);
+        check::<1, 1>(&RadauIIA::<1>::TABLEAU);
+        check::<2, 1>(&RadauIIA::<2>::TABLEAU);
+        check::<3, 2>(&RadauIIA::<3>::TABLEAU);
+        check::<4, 2>(&RadauIIA::<4>::TABLEAU);
+        check::<5, 3>(&RadauIIA::<5>::TABLEAU);
+        check::<6, 3>(&RadauIIA::<6>::TABLEAU);
+        check::<7, 4>(&RadauIIA::<7>::TABLEAU);
+        check::<8, 4>(&RadauIIA::<8>::TABLEAU);
+        check::<9, 5>(&RadauIIA::<9>::TABLEAU);
+    }
+
+    /// The real eigenvalue of the three-stage Radau IIA method: 1/γ with γ = (6 + 81^(1/3) − 9^(1/3)) / 30 … its inverse
+    /// `3 + 3^(2/3) − 3^(1/3)` is published in Hairer and Wanner, section IV.8.
+    #[test]
+    fn published_eigenvalue() {
+        let basis = Eigenbasis::<f64, 3, 2>::new(&RadauIIA::<3>::TABLEAU).expect("a basis");
+        let gamma = 3.0 + 3.0f64.powf(2.0 / 3.0) - 3.0f64.powf(1.0 / 3.0);
+        assert!((1.0 / basis.values().re[0] - gamma).abs() <= 32.0 * f64::EPSILON * gamma);
+        assert_eq!(basis.values().im[0], 0.0);
+    }
+
+    /// A diagonally implicit tableau has one eigenvalue twice, and no basis.
+    #[test]
+    fn defective_tableaux_have_none() {
+        let gamma = 1.0 - 0.5f64.sqrt();
+        let a = [[gamma, 0.0], [1.0 - gamma, gamma]];
+        let tableau = Tableau::new(a, [1.0 - gamma, gamma], [gamma, 1.0]).expect("a tableau");
+        assert!(Eigenbasis::<f64, 2, 1>::new(&tableau).is_none());
+    }
+}
