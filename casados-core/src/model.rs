@@ -7,7 +7,7 @@
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
-pub use crate::structure::{Assembly, Elimination, Operations, Pattern, Pivot, Structure, all};
+pub use crate::structure::{Assembly, Cost, Elimination, Operations, Pattern, Pivot, Structure, all};
 
 /// `[T; NX]` of a model.
 pub type ArrayX<M, T> = <<M as Dae>::Shape as Shape>::ArrayX<T>;
@@ -95,6 +95,12 @@ pub trait Dae: 'static {
         mu: &ArrayK<Self, S::Cell>,
         hessian: &mut Self::Hessian<S::Cell>,
     );
+
+    /// What is known about the model, to be printed: `println!("{}", Pendulum::describe())`.
+    #[must_use]
+    fn describe() -> &'static Structure {
+        const { &Self::STRUCTURE }
+    }
 }
 
 /// A model whose code is generic over every scalar: duals and complex numbers included, which is

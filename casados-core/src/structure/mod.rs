@@ -1,7 +1,10 @@
 //! What is known about a model before it runs: facts that the macro found in its graph, as constants.
 
+mod cost;
+mod describe;
 mod elimination;
 
+pub use cost::Cost;
 pub use elimination::{Assembly, Elimination, Pivot};
 
 /// What is known about a model before it runs.

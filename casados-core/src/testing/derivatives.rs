@@ -1,6 +1,7 @@
 //! The derivatives of a model against independent ones.
 
 use super::evaluate::{self, Estimate, variables};
+use super::facts;
 use super::points::{Points, Random};
 use super::report::{Entry, Report};
 use crate::model::{ArrayV, Dae, GraphDae};
@@ -61,8 +62,9 @@ pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
     report
 }
 
-/// Checks by differences that entries outside of the declared patterns are zero: those of the Jacobian, and
-/// those of the Hessian.
+/// Checks by differences that entries outside of the declared patterns are zero, those of the Jacobian and
+/// those of the Hessian; and that what is declared constant does not change from point to point, and what is declared to be felt by
+/// nobody has no entries.
 pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("patterns of {}", type_name::<M>()));
     let n = variables::<M>();
@@ -91,6 +93,10 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
         let entries = outside(&declared_twice, &found);
         let (scale, name) = (largest(&found.value), |i| hessian_entry::<M>(i));
         report.compare("Hessian outside", "differences", number, scale, entries.into_iter(), name);
+    }
+    let points: Vec<_> = samples(points).collect();
+    for ((number, v, _), (_, other, _)) in points.iter().zip(points.iter().cycle().skip(1)) {
+        facts::compare::<M>(&mut report, *number, v, other);
     }
     report
 }

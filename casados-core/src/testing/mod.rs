@@ -1,7 +1,8 @@
 //! Checks of models and integrators, for `cargo test` on a model of one's own.
 //!
 //! - [`check_derivatives`]: Jacobian, adjoint and Hessian of a model against `num-dual`, the complex step
-//!   and differences ([`check_by_differences`] for dual models); [`check_pattern`]: zeros where zeros were declared.
+//!   and differences ([`check_by_differences`] for dual models); [`check_pattern`]: zeros where zeros were declared, and
+//!   nothing changes that was declared constant.
 //! - [`check_sensitivities`]: forward, adjoint and second-order sensitivities of an integrator against each other
 //!   and against differences of its solution; [`check_exact`]: against a closed form.
 //! - [`convergence`]: an integrator against an exact solution, with the order that it reaches.
@@ -17,6 +18,7 @@ mod convergence;
 mod derivatives;
 mod differences;
 mod evaluate;
+mod facts;
 mod forward;
 mod integrator;
 mod points;

@@ -19,6 +19,7 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         documentation: vec![syn::parse_quote!(#[doc = " A model."])],
         instance: Vec::new(),
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
+        samplings: Vec::new(),
         graph,
         spans: vec![Span::call_site(); residual.len()],
         residual,

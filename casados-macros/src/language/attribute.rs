@@ -3,10 +3,12 @@
 //! - `NX = [9, 15]`, `NX = 1..=5`, `NX = 9`: the values of a const parameter to make models of;
 //! - `(M, N) = [(1, 2), (3, 4)]`: of several together;
 //! - `name = Ident`: another name for the model's type;
-//! - `crate = path`: where casados is found.
+//! - `crate = path`: where casados is found;
+//! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives.
 
-use super::Instance;
 use super::mistakes::Mistakes;
+use super::sampling::{self, Kind, Sampling, Setting};
+use super::{Instance, Variables};
 use proc_macro2::{Ident, Span, TokenStream};
 use syn::parse::{Parse, ParseStream, Parser};
 use syn::spanned::Spanned;
@@ -14,7 +16,7 @@ use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
 
 /// What an attribute can say.
 const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
-    `(M, N) = [(1, 2), (3, 4)]`), `name = Type` and `crate = path`";
+    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `nominal(x = ..)` and `range(x = ..)`";
 
 /// More models than this in one attribute are taken for a mistake.
 const MAX_INSTANCES: usize = 1000;
@@ -27,6 +29,8 @@ pub struct Arguments {
     pub name: Option<Ident>,
     /// Groups of const parameters with the values that they take together.
     values: Vec<Values>,
+    /// Nominal values and ranges.
+    settings: Vec<Setting>,
 }
 
 /// Const parameters and the values that they take together.
@@ -38,7 +42,12 @@ struct Values {
 impl Arguments {
     /// Reads the tokens in the brackets.
     pub fn read(tokens: TokenStream) -> Result<Self> {
-        let mut arguments = Self { krate: syn::parse_quote!(::casados), name: None, values: Vec::new() };
+        let mut arguments = Self {
+            krate: syn::parse_quote!(::casados),
+            name: None,
+            values: Vec::new(),
+            settings: Vec::new(),
+        };
         let entries = syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
         let mut krate = false;
         let mut mistakes = Mistakes::default();
@@ -63,10 +72,28 @@ impl Arguments {
                     }
                     arguments.values.push(values);
                 }
+                Entry::Settings(settings) => {
+                    for setting in settings {
+                        let repeated = arguments.settings.iter().find_map(|other| setting.repeats(other));
+                        repeated.into_iter().for_each(|error| mistakes.note(error));
+                        arguments.settings.push(setting);
+                    }
+                }
             }
         }
         mistakes.none()?;
         Ok(arguments)
+    }
+
+    /// What is known about the values of each of the variables `(ẋ, x, z, u, p, t)`.
+    pub fn samplings(&self, variables: &Variables) -> Result<Vec<Sampling>> {
+        sampling::resolve(&self.settings, variables)
+    }
+
+    /// Dual models have no plan that nominal values and ranges could improve.
+    pub fn without_settings(&self) -> Result<()> {
+        let message = "a dual model has no elimination plan: nominal values and ranges would change nothing";
+        self.settings.first().map_or(Ok(()), |setting| Err(Error::new(setting.span(), message)))
     }
 
     /// The models to make: every combination of the values of the const parameters of `generics`.
@@ -155,6 +182,7 @@ enum Entry {
     Crate(Span, syn::Path),
     Name(Span, Ident),
     Values(Values),
+    Settings(Vec<Setting>),
 }
 
 impl Parse for Entry {
@@ -172,6 +200,14 @@ impl Parse for Entry {
         } else {
             vec![input.parse::<Ident>().map_err(|_| Error::new(span, POSSIBLE))?]
         };
+        if let [name] = &names[..]
+            && let Some(kind) = Kind::of(name)
+            && input.peek(syn::token::Paren)
+        {
+            let content;
+            syn::parenthesized!(content in input);
+            return Ok(Self::Settings(Setting::list(kind, &content)?));
+        }
         if names.is_empty() {
             return Err(Error::new(span, POSSIBLE));
         }

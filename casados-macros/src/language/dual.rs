@@ -78,6 +78,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
     }
     require_feature(&function, cfg!(feature = "num-dual"))?;
     let arguments = Arguments::read(attribute)?;
+    arguments.without_settings()?;
     let mut consts = function.sig.generics.clone();
     consts.params =
         consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();

@@ -26,6 +26,7 @@ mod operator;
 mod path;
 mod pattern;
 mod place;
+mod sampling;
 mod select;
 pub mod signature;
 mod statement;
@@ -40,6 +41,7 @@ use attribute::Arguments;
 use model::Template;
 use proc_macro2::{Span, TokenStream};
 use quote::ToTokens;
+pub use sampling::Sampling;
 
 /// Which attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +83,8 @@ pub struct Model {
     pub instance: Vec<Instance>,
     /// Names of the variables.
     pub variables: Variables,
+    /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
+    pub samplings: Vec<Sampling>,
     /// The expressions.
     pub graph: Graph,
     /// `f`, one node per equation.
@@ -163,7 +167,12 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
 
 fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>> {
     let instances = arguments.instances(&template.function.sig.generics)?;
-    instances.into_iter().map(|instance| template.model(instance)).collect()
+    let model = |instance| {
+        let mut model = template.model(instance)?;
+        model.samplings = arguments.samplings(&model.variables)?;
+        Ok(model)
+    };
+    instances.into_iter().map(model).collect()
 }
 
 /// The name of the type of a model, as far as its attribute can be read.

@@ -73,6 +73,7 @@ impl Template<'_> {
             documentation: self.documentation.clone(),
             instance,
             variables,
+            samplings: Vec::new(),
             graph: evaluator.graph,
             residual,
             spans,

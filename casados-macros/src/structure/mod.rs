@@ -9,7 +9,7 @@ mod samples;
 mod tests;
 
 use crate::graph::{self, Degree, Entry, Node};
-use crate::language::{Model, Variables};
+use crate::language::{Model, Sampling, Variables};
 pub use elimination::Plan;
 pub use facts::Facts;
 pub use samples::Position;
@@ -132,8 +132,9 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
 fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6]) -> Elimination {
     let Variables { x, z, u, p } = &model.variables;
     let positions = samples::pattern(jacobian, blocks, x.len() as u32);
-    let variables = 2 * x.len() + z.len() + u.len() + p.len() + 1;
-    let entries = samples::sample(&model.graph, jacobian, &positions, variables, model.opaque.len());
+    let mut samplings = model.samplings.clone();
+    samplings.resize(2 * x.len() + z.len() + u.len() + p.len() + 1, Sampling::default());
+    let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
     let plan = elimination::plan(model.residual.len(), &entries);
     let updated: HashSet<u32> = plan.updates.iter().copied().collect();
     let identity = plan

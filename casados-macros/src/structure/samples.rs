@@ -1,7 +1,11 @@
 //! The Newton matrix of a model at sample points: what an elimination order is judged by.
+//!
+//! Where nothing is said about the values of a variable, points are of several kinds. The user may say more: a nominal
+//! value (the first point has it exactly, the others are within half of its size) and a range (no point is outside).
 
 use super::elimination::{Complex, Entry};
 use crate::graph::{Graph, Node, Point};
+use crate::language::Sampling;
 use std::collections::BTreeMap;
 
 /// Sample points that are wanted, and how many may be drawn to get them: at some the model has no finite value.
@@ -38,7 +42,7 @@ pub fn sample(
     graph: &Graph,
     jacobian: &[(u32, u32, Node)],
     positions: &[Position],
-    variables: usize,
+    samplings: &[Sampling],
     opaque: usize,
 ) -> Vec<Entry> {
     let nodes: Vec<Node> = jacobian.iter().map(|entry| entry.2).collect();
@@ -58,7 +62,8 @@ pub fn sample(
         if found == POINTS {
             break;
         }
-        let point: Vec<f64> = (0..variables).map(|_| coordinate(&mut random, draw)).collect();
+        let point: Vec<f64> =
+            samplings.iter().map(|sampling| coordinate(&mut random, draw, *sampling)).collect();
         let values = graph.evaluate(&nodes, Point { variables: &point, opaque: &constants, seeds: &[] });
         let used = positions.iter().flat_map(|p| [p.direct, p.state]).flatten();
         if used.clone().all(|entry| values[entry as usize].is_finite()) {
@@ -85,8 +90,20 @@ pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &Posi
     position.state.is_none() && direct == Some(1.0)
 }
 
+/// A coordinate of the point with this number.
+fn coordinate(random: &mut Random, draw: usize, sampling: Sampling) -> f64 {
+    let anywhere = anywhere(random, draw);
+    match (sampling.nominal, sampling.range) {
+        (None, None) => anywhere,
+        (Some(nominal), _) if draw == 0 => nominal,
+        (Some(nominal), None) if nominal != 0.0 => nominal * random.between(0.5, 1.5),
+        (Some(_), None) => anywhere,
+        (_, Some((low, high))) => random.between(low, high),
+    }
+}
+
 /// Points of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any magnitude.
-fn coordinate(random: &mut Random, draw: usize) -> f64 {
+fn anywhere(random: &mut Random, draw: usize) -> f64 {
     let value = random.between(-1.0, 1.0);
     match draw % 4 {
         0 => value,

@@ -1,6 +1,6 @@
 use super::{Analysis, Facts, analyse};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
-use crate::language::{Model, Variables};
+use crate::language::{Model, Sampling, Variables};
 use proc_macro2::Span;
 
 /// A model with the given dimensions `[nx, nz, nu, np]`.
@@ -15,6 +15,7 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         documentation: Vec::new(),
         instance: Vec::new(),
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
+        samplings: Vec::new(),
         spans: vec![Span::call_site(); residual.len()],
         graph,
         residual,
@@ -181,6 +182,36 @@ const END: &str = ": the model is not of index 1";
 fn reason(model: Model) -> String {
     let message = refusal(model);
     message.split(END).next().unwrap_or_default().to_string()
+}
+
+/// `ẋ − x z₀ − z₁ = 0`, `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`: at `u = 30` the coefficient of `z₀` vanishes, which nobody
+/// can know without a word about `u`.
+#[test]
+fn nominal_values_and_ranges_decide_about_pivots() {
+    let pivots = |sampling: Sampling| {
+        let mut model = model([1, 2, 1, 0], |g, v| {
+            let [one, two, three, thirty] = [1.0, 2.0, 3.0, 30.0].map(|value| g.constant(value));
+            let (x, [z0, z1, u]) = (v[1], [v[2], v[3], v[4]]);
+            let (product, coefficient) = (mul(g, x, z0), sub(g, u, thirty));
+            let first = sub(g, v[0], product);
+            let (left, right) = (mul(g, coefficient, z0), mul(g, two, z1));
+            let second = g.binary(Binary::Add, left, right);
+            let (left, right) = (mul(g, two, z0), mul(g, three, z1));
+            let third = g.binary(Binary::Add, left, right);
+            vec![sub(g, first, z1), sub(g, second, one), sub(g, third, u)]
+        });
+        model.samplings = vec![Sampling::default(); 6];
+        model.samplings[4] = sampling;
+        accepted(model).elimination.plan.pivots
+    };
+    let at = |row, column, pivots: &[(u32, u32)]| pivots.contains(&(row, column));
+    let known = |nominal, range| pivots(Sampling { nominal, range });
+    // Determined by the second equation: the coefficient must not vanish.
+    assert!(at(1, 1, &known(None, None)));
+    assert!(!at(1, 1, &known(Some(30.0), None)));
+    assert!(!at(1, 1, &known(Some(30.0), Some((0.0, 60.0)))));
+    assert!(!at(1, 1, &known(None, Some((29.9, 30.1)))));
+    assert!(at(1, 1, &known(Some(-5.0), Some((-6.0, 6.0)))));
 }
 
 /// The pendulum in Cartesian coordinates: the multiplier is in no equation that it could be determined from.

@@ -14,6 +14,13 @@ pub const HESSIAN_TERM: u8 = 3;
 pub const HESSIAN_PATTERN: u8 = 4;
 pub const CONSTANT_FORGOTTEN: u8 = 5;
 pub const LINEAR_DECLARED: u8 = 6;
+pub const CONSTANT_DECLARED: u8 = 7;
+pub const DIRECTION_LEFT_OUT: u8 = 8;
+pub const CURVED_LEFT_OUT: u8 = 9;
+pub const QUADRATURE_DECLARED: u8 = 10;
+pub const TRIVIAL_DECLARED: u8 = 11;
+pub const STRAIGHT_DECLARED: u8 = 12;
+pub const MATRIX_DECLARED: u8 = 13;
 
 fn residual<S: Scalar>(v: &[S], f: &mut [S]) {
     f[0] = v[0] - v[3] * v[1].sin() - v[2];
@@ -54,13 +61,13 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
             columns: if FAULT == HESSIAN_PATTERN { &[1, 2, 1] } else { &[1, 1, 1] },
         },
         linear: if FAULT == LINEAR_DECLARED { &[false, true] } else { &[false, false] },
-        linear_in_state: false,
-        constant_matrix: false,
-        constant_rows: &[false; 2],
-        trivial: &[],
-        quadratures: &[],
-        directions: &[0, 1, 2],
-        curved: &[1, 2, 3],
+        linear_in_state: FAULT == STRAIGHT_DECLARED,
+        constant_matrix: FAULT == MATRIX_DECLARED,
+        constant_rows: if FAULT == CONSTANT_DECLARED { &[false, true] } else { &[false, false] },
+        trivial: if FAULT == TRIVIAL_DECLARED { &[0] } else { &[] },
+        quadratures: if FAULT == QUADRATURE_DECLARED { &[0] } else { &[] },
+        directions: if FAULT == DIRECTION_LEFT_OUT { &[0, 1] } else { &[0, 1, 2] },
+        curved: if FAULT == CURVED_LEFT_OUT { &[1, 3] } else { &[1, 2, 3] },
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,
     };

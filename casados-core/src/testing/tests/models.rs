@@ -3,6 +3,7 @@
 use super::example::*;
 use crate::testing::{Points, Report, check_derivatives, check_pattern};
 use std::string::ToString;
+use std::vec::Vec;
 
 fn check<const FAULT: u8>() -> Report {
     check_derivatives::<Example<FAULT>>(&Points::random(10).all(-2.0..=2.0))
@@ -38,6 +39,22 @@ fn faults_are_found_and_named() {
     found(check::<LINEAR_DECLARED>(), "Hessian, linear rows", "of equation 1 by angle and angle");
     let pattern = check_pattern::<Example<HESSIAN_PATTERN>>(&Points::random(5));
     found(pattern, "Hessian outside", "by force and angle");
+}
+
+#[test]
+fn false_facts_are_found() {
+    fn found<const FAULT: u8>(quantity: &str) {
+        let report = check_pattern::<Example<FAULT>>(&Points::random(5));
+        let wrong: Vec<_> = report.rows.iter().filter(|row| row.wrong > 0).map(|row| row.quantity).collect();
+        assert_eq!(wrong, [quantity], "{report}");
+    }
+    found::<CONSTANT_DECLARED>("constant rows");
+    found::<DIRECTION_LEFT_OUT>("directions");
+    found::<CURVED_LEFT_OUT>("curved variables");
+    found::<QUADRATURE_DECLARED>("quadratures");
+    found::<TRIVIAL_DECLARED>("trivial equations");
+    found::<STRAIGHT_DECLARED>("linear in the state");
+    found::<MATRIX_DECLARED>("constant matrix");
 }
 
 #[test]

@@ -1,0 +1,369 @@
+//! A model describes itself: the text of a [`Structure`].
+
+use super::{Cost, Elimination, Structure};
+use core::fmt::{self, Display, Formatter, Write};
+
+/// Columns of the text.
+const WIDTH: usize = 96;
+/// Where the words of a line begin.
+const INDENT: usize = 15;
+/// More words than this of one list are not written.
+const WORDS: usize = 64;
+/// Numbers of stages for which the cost is listed.
+const STAGES: [usize; 4] = [1, 2, 3, 4];
+
+/// Dimensions and names, equations by kind, counts of operations, sparsity, the elimination order, and the
+/// expected cost of a step: for a reader who wants to know what the library has found in a model.
+///
+/// Equations are counted from 0; long lists are cut.
+impl Display for Structure {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let kind = match (self.is_explicit(), self.z.len()) {
+            (true, _) => "explicit, ẋ = g(x, u, p, t)",
+            (false, 0) => "implicit, f(ẋ, x, u, p, t) = 0",
+            (false, _) => "differential-algebraic, f(ẋ, x, z, u, p, t) = 0",
+        };
+        writeln!(f, "{}: {kind}\n", self.name)?;
+        names(f, "states x", self.x)?;
+        names(f, "algebraic z", self.z)?;
+        names(f, "controls u", self.u)?;
+        names(f, "parameters p", self.p)?;
+        writeln!(f)?;
+        self.equations(f)?;
+        self.sparsity(f)?;
+        writeln!(f)?;
+        self.elimination(f)?;
+        writeln!(f)?;
+        self.costs(f)
+    }
+}
+
+impl Structure {
+    /// Whether every equation has one derivative of its own, with a constant coefficient, and there are no
+    /// algebraic states.
+    #[must_use]
+    pub fn is_explicit(&self) -> bool {
+        let nx = self.x.len();
+        let mut one = (0..nx).map(|row| {
+            let mut own = (0..self.blocks[1]).filter(move |&e| self.jacobian.at(e).0 == row);
+            own.next().filter(|_| own.next().is_none())
+        });
+        self.z.is_empty()
+            && one.all(|entry| {
+                entry.is_some_and(|entry| {
+                    let column = self.jacobian.at(entry).1;
+                    let others = (0..self.blocks[1]).filter(|&e| self.jacobian.at(e).1 == column);
+                    self.constant.get(entry) == Some(&true) && others.count() == 1
+                })
+            })
+    }
+
+    /// The name of a variable `(ẋ, x, z, u, p, t)` by its index.
+    #[must_use]
+    pub fn variable(&self, index: u32) -> impl Display {
+        let nx = self.x.len();
+        let mut index = index as usize;
+        if let Some(&name) = self.x.get(index) {
+            return Name { name, derivative: true };
+        }
+        index = index.saturating_sub(nx);
+        for block in [self.x, self.z, self.u, self.p] {
+            if let Some(&name) = block.get(index) {
+                return Name { name, derivative: false };
+            }
+            index -= block.len();
+        }
+        Name { name: "t", derivative: false }
+    }
+
+    /// The name of an unknown `(k, z)` by its index: a derivative or an algebraic state.
+    #[must_use]
+    pub fn unknown(&self, index: u32) -> impl Display {
+        let nx = self.x.len() as u32;
+        self.variable(if index < nx { index } else { index + nx })
+    }
+
+    fn equations(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let equations = self.linear.len() as u32;
+        let trivial = |row: &u32| self.trivial.contains(row);
+        let linear = |row: &u32| self.linear.get(*row as usize) == Some(&true);
+        let constant = |row: &u32| self.constant_rows.get(*row as usize) == Some(&true);
+        let line = |f: &mut Formatter<'_>, title: &str, list: &dyn Fn(&u32) -> bool, note: &'static str| {
+            let count = (0..equations).filter(list).count();
+            if count == 0 {
+                return Ok(());
+            }
+            let rows = Ranges((0..equations).filter(list).peekable());
+            words(f, title, [Span::Count(count)].into_iter().chain(rows).chain([Span::Note(note)]))
+        };
+        line(f, "trivial", &trivial, "c ẋ + c′ v + c″(t) = 0")?;
+        line(f, "linear", &|row| linear(row) && !trivial(row), "linear in (ẋ, x, z, u, p)")?;
+        line(f, "nonlinear", &|row| !linear(row), "with second derivatives")?;
+        line(f, "constant", &constant, "rows of the Newton matrix that never change")?;
+        if !self.quadratures.is_empty() {
+            let states = self.quadratures.iter().filter_map(|&state| self.x.get(state as usize));
+            words(f, "quadratures", states.map(|name| Item::Name(name)))?;
+        }
+        if self.linear_in_state {
+            let matrix = if self.constant_matrix { "; its matrix serves a whole interval" } else { "" };
+            writeln!(f, "{:INDENT$}one iteration of Newton's method is exact{matrix}", "")?;
+        }
+        writeln!(f)
+    }
+
+    fn sparsity(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let blocks = ["ẋ", "x", "z", "u", "p"];
+        let present: [bool; 5] = [true, true, !self.z.is_empty(), !self.u.is_empty(), !self.p.is_empty()];
+        title(f, "non-zeros")?;
+        for (name, _) in blocks.iter().zip(present).filter(|(_, present)| *present) {
+            write!(f, "    f_{name}")?;
+        }
+        writeln!(f, "    all")?;
+        let row = |f: &mut Formatter<'_>, name: &str, constant: bool| {
+            title(f, name)?;
+            let count = |begin: usize, end: usize| match constant {
+                false => end - begin,
+                true => self.constant.get(begin..end).unwrap_or_default().iter().filter(|c| **c).count(),
+            };
+            for (block, _) in present.iter().enumerate().filter(|(_, present)| **present) {
+                write!(f, "{:>7}", count(self.blocks[block], self.blocks[block + 1]))?;
+            }
+            write!(f, "{:>7}", count(0, self.jacobian.len()))
+        };
+        let variables = 2 * self.x.len() + self.z.len() + self.u.len() + self.p.len();
+        row(f, "  Jacobian", false)?;
+        writeln!(f, " of {}", self.linear.len() * variables)?;
+        row(f, "  constant", true)?;
+        writeln!(f)?;
+        title(f, "  Hessian")?;
+        writeln!(
+            f,
+            "{} of {} in the lower triangle, of {} of {variables} variables",
+            self.hessian.len(),
+            variables * (variables + 1) / 2,
+            self.curved.len(),
+        )?;
+        title(f, "directions")?;
+        let directions = self.x.len() + self.u.len() + self.p.len();
+        writeln!(f, "{} of {directions} of (x₀, u, p) have any influence", self.directions.len())?;
+        title(f, "operations")?;
+        let operations = &self.operations;
+        if *operations == Default::default() {
+            return writeln!(f, "not known");
+        }
+        writeln!(
+            f,
+            "f {}, f and Jacobian {}, gradient {}, Hessian {}",
+            operations.residual, operations.residual_jacobian, operations.adjoint, operations.hessian
+        )
+    }
+
+    fn elimination(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Elimination { pivots, slots, assembly, slot_of_equation, .. } = self.elimination;
+        title(f, "elimination")?;
+        if pivots.is_empty() {
+            return writeln!(f, "no plan: the whole matrix is pivoted");
+        }
+        let identities = pivots.iter().filter(|pivot| pivot.identity).count();
+        writeln!(
+            f,
+            "{} blocks = {} non-zeros + {} fill; {identities} of {} pivots are identities",
+            slots.len(),
+            assembly.len(),
+            slots.len().saturating_sub(assembly.len()),
+            pivots.len(),
+        )?;
+        let order = pivots.iter().map(|pivot| {
+            let equation = slot_of_equation.iter().position(|&slot| slot == pivot.slot);
+            Assignment { unknown: self.unknown(pivot.slot), equation: equation.unwrap_or_default() }
+        });
+        title(f, "  order")?;
+        writeln!(f, "each unknown ← the equation that it is found from")?;
+        words(f, "", order)
+    }
+
+    fn costs(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        const TITLE: usize = 38;
+        write!(f, "{:TITLE$}", "operations of a step, s stages")?;
+        for s in STAGES {
+            write!(f, "      s = {s:1}")?;
+        }
+        writeln!(f)?;
+        let costs = STAGES.map(|s| self.cost(s));
+        let row = |f: &mut Formatter<'_>, title: &dyn Display, value: fn(&Cost) -> u64| {
+            let mut length = Length(0);
+            write!(length, "{title}")?;
+            write!(f, "  {title}{:1$}", "", TITLE.saturating_sub(2 + length.0))?;
+            for cost in &costs {
+                write!(f, "{:>11}", value(cost))?;
+            }
+            writeln!(f)
+        };
+        if self.operations != Default::default() {
+            row(f, &"f", |c| c.residual)?;
+            row(f, &"f and Jacobian", |c| c.residual_jacobian)?;
+        }
+        row(f, &"factors", |c| c.factorisation)?;
+        row(f, &"a solve, each column", |c| c.solve)?;
+        row(f, &"an iteration with new factors", |c| c.iteration)?;
+        row(f, &format_args!("forward, {} directions", self.directions.len()), |c| c.forward)?;
+        row(f, &"adjoint", |c| c.adjoint)?;
+        row(f, &"Hessian, beside both", |c| c.hessian)
+    }
+}
+
+/// The name of a variable; `ẋ[2]` for the derivative of `x[2]`.
+struct Name {
+    name: &'static str,
+    derivative: bool,
+}
+
+impl Display for Name {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match (self.derivative, self.name.strip_prefix('x')) {
+            (false, _) => f.write_str(self.name),
+            (true, Some(rest)) if !rest.starts_with(char::is_alphanumeric) => write!(f, "ẋ{rest}"),
+            (true, _) => write!(f, "d({})/dt", self.name),
+        }
+    }
+}
+
+/// An unknown and the equation that determines it.
+struct Assignment<N> {
+    unknown: N,
+    equation: usize,
+}
+
+impl<N: Display> Display for Assignment<N> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ← {}", self.unknown, self.equation)
+    }
+}
+
+/// Numbers that follow each other; before them how many there are, after them what they are.
+enum Span {
+    Count(usize),
+    Numbers(u32, u32),
+    Note(&'static str),
+}
+
+impl Display for Span {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Count(count) => write!(f, "{count}:"),
+            Self::Numbers(first, last) if first == last => write!(f, "{first}"),
+            Self::Numbers(first, last) => write!(f, "{first}-{last}"),
+            Self::Note(note) => write!(f, "({note})"),
+        }
+    }
+}
+
+/// Ascending numbers, in runs.
+struct Ranges<I: Iterator<Item = u32>>(core::iter::Peekable<I>);
+
+impl<I: Iterator<Item = u32>> Iterator for Ranges<I> {
+    type Item = Span;
+    fn next(&mut self) -> Option<Self::Item> {
+        let first = self.0.next()?;
+        let mut last = first;
+        while self.0.next_if(|&next| next == last + 1).is_some() {
+            last += 1;
+        }
+        Some(Span::Numbers(first, last))
+    }
+}
+
+/// Counts characters: nothing is allocated to find out how long a word is.
+struct Length(usize);
+
+impl Write for Length {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0 += text.chars().count();
+        Ok(())
+    }
+}
+
+fn title(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
+    write!(f, "{title:INDENT$}")
+}
+
+fn names(f: &mut Formatter<'_>, title: &str, names: &[&str]) -> fmt::Result {
+    if names.is_empty() {
+        return Ok(());
+    }
+    words(f, title, [Item::Count(names.len())].into_iter().chain(Runs(names)))
+}
+
+/// How many there are, one of them, or several whose indices follow each other.
+enum Item<'a> {
+    Count(usize),
+    Name(&'a str),
+    Run(&'a str, &'a str),
+}
+
+impl Display for Item<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(count) => write!(f, "{count}:"),
+            Self::Name(name) => f.write_str(name),
+            Self::Run(first, last) => write!(f, "{first} .. {last}"),
+        }
+    }
+}
+
+/// Names, with `x[0] .. x[9]` in the place of more than three.
+struct Runs<'a>(&'a [&'a str]);
+
+impl<'a> Iterator for Runs<'a> {
+    type Item = Item<'a>;
+    fn next(&mut self) -> Option<Item<'a>> {
+        let follows = |pair: &[&str]| match (indexed(pair[0]), indexed(pair[1])) {
+            (Some((a, i)), Some((b, j))) => a == b && i + 1 == j,
+            _ => false,
+        };
+        let run = 1 + self.0.windows(2).take_while(|pair| follows(pair)).count();
+        let (first, rest) = self.0.split_first()?;
+        match self.0.get(run - 1) {
+            Some(last) if run > 3 => {
+                self.0 = self.0.get(run..).unwrap_or_default();
+                Some(Item::Run(first, last))
+            }
+            _ => {
+                self.0 = rest;
+                Some(Item::Name(first))
+            }
+        }
+    }
+}
+
+/// `("x", 3)` of `x[3]`.
+fn indexed(name: &str) -> Option<(&str, u32)> {
+    let (head, index) = name.strip_suffix(']')?.rsplit_once('[')?;
+    Some((head, index.parse().ok()?))
+}
+
+/// A title and words beside it, in lines; many are cut.
+fn words<W: Display>(f: &mut Formatter<'_>, title: &str, words: impl Iterator<Item = W>) -> fmt::Result {
+    self::title(f, title)?;
+    let mut column = INDENT;
+    let mut left_out = 0;
+    for (index, word) in words.enumerate() {
+        if index >= WORDS {
+            left_out += 1;
+            continue;
+        }
+        let mut length = Length(0);
+        write!(length, "{word}")?;
+        if column > INDENT && column + 2 + length.0 > WIDTH {
+            write!(f, "\n{:INDENT$}", "")?;
+            column = INDENT;
+        }
+        let gap = if column > INDENT { "  " } else { "" };
+        write!(f, "{gap}{word}")?;
+        column += gap.len() + length.0;
+    }
+    if left_out > 0 {
+        write!(f, "  and {left_out} more")?;
+    }
+    writeln!(f)
+}

@@ -1,0 +1,75 @@
+//! The facts of a structure that let the engine leave work out, against patterns and values.
+
+use super::evaluate;
+use super::report::{Entry, Report};
+use crate::model::{ArrayV, Dae};
+use crate::shape::{Array, Shape};
+use std::format;
+use std::vec::Vec;
+
+/// Compares what is declared with the declared patterns, and with the Jacobian at two points.
+pub(super) fn compare<M: Dae>(
+    report: &mut Report,
+    number: usize,
+    v: &ArrayV<M, f64>,
+    other: &ArrayV<M, f64>,
+) {
+    let structure = &M::STRUCTURE;
+    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+    let (end_z, time) = (2 * nx + nz, M::Shape::NV - 1);
+    let matrix = structure.blocks[3];
+    let jacobian = |v: &ArrayV<M, f64>| {
+        let (_, jacobian) = evaluate::jacobian::<M, f64>(v);
+        Vec::from(jacobian.as_ref())
+    };
+    let mut unchanged = |what: &'static str, entries: &[usize], moved: &dyn Fn(usize) -> bool| {
+        let v2 = <ArrayV<M, f64> as Array<f64>>::from_fn(|i| if moved(i) { other[i] } else { v[i] });
+        let (here, there) = (jacobian(v), jacobian(&v2));
+        let found =
+            entries.iter().map(|&e| (e, Entry { value: there[e], expected: here[e], tolerance: 0.0 }));
+        let name = |e: usize| {
+            let (row, column) = structure.jacobian.at(e);
+            format!("of equation {row} by {}", structure.variable(column as u32))
+        };
+        report.compare(what, "another point", number, 0.0, found, name);
+    };
+    let all: Vec<usize> = (0..matrix).collect();
+    if structure.linear_in_state {
+        unchanged("linear in the state", &all, &|i| i < end_z);
+    }
+    if structure.constant_matrix {
+        unchanged("constant matrix", &all, &|i| i < end_z || i == time);
+    }
+    let constant = |&e: &usize| structure.constant_rows.get(structure.jacobian.at(e).0) == Some(&true);
+    unchanged("constant rows", &all.iter().copied().filter(constant).collect::<Vec<_>>(), &|_| true);
+
+    // What is left out must not be felt: no entry in the columns of the others.
+    let mut absent = |what: &'static str, count: usize, listed: &[u32], entries: &dyn Fn(usize) -> usize| {
+        let others = (0..count).filter(|&i| !listed.contains(&(i as u32)));
+        let found = others.map(|i| (i, Entry { value: entries(i) as f64, expected: 0.0, tolerance: 0.0 }));
+        report.compare(what, "pattern", number, 0.0, found, |i| format!("entries of number {i}"));
+    };
+    let column = |variable: usize| {
+        structure.jacobian.columns.iter().filter(|&&column| column as usize == variable).count()
+    };
+    let direction = |i: usize| column(if i < nx { nx + i } else { nx + nz + i });
+    absent("directions", M::Shape::NW, structure.directions, &direction);
+    let curved = |i: usize| {
+        let pattern = [structure.hessian.rows, structure.hessian.columns];
+        pattern.iter().flat_map(|list| list.iter()).filter(|&&variable| variable as usize == i).count()
+    };
+    absent("curved variables", time, structure.curved, &curved);
+    let influential: Vec<u32> =
+        (0..nx as u32).filter(|state| !structure.quadratures.contains(state)).collect();
+    absent("quadratures", nx, &influential, &|state| column(nx + state));
+    let ordinary: Vec<u32> =
+        (0..M::Shape::NK as u32).filter(|row| !structure.trivial.contains(row)).collect();
+    // One derivative, one other variable at most, constant coefficients.
+    absent("trivial equations", M::Shape::NK, &ordinary, &|row| {
+        let own = |e: &usize| structure.jacobian.at(*e).0 == row;
+        let derivatives = (0..structure.blocks[1]).filter(own).count();
+        let others = (structure.blocks[1]..structure.jacobian.len()).filter(own).count();
+        let varying = (0..structure.jacobian.len()).filter(own).filter(|&e| !structure.constant[e]).count();
+        usize::from(derivatives != 1) + others.saturating_sub(1) + varying
+    });
+}
