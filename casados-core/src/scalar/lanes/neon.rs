@@ -1,6 +1,7 @@
 //! The registers of 64-bit Arm.
 #![allow(unsafe_code)]
 
+use super::functions::Call;
 use core::arch::aarch64::*;
 
 // SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine has
@@ -9,11 +10,11 @@ use core::arch::aarch64::*;
 
 /// Functions of an expression of intrinsics each.
 macro_rules! define {
-    ($($(#[$attribute:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
+    ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
         $(#[$attribute])*
         #[inline(always)]
         #[allow(unused_unsafe)]
-        pub fn $name($($argument: $type),*) -> $result {
+        pub fn $name $(<const $bits: i32>)? ($($argument: $type),*) -> $result {
             // SAFETY: see the head of the file.
             unsafe { $body }
         }
@@ -39,10 +40,10 @@ macro_rules! shared {
             unsafe { $store(all.as_mut_ptr(), a) };
             cell.copy_from_slice(&all[..N]);
         }
-        /// Calls `f`; not inlined.
+        /// Calls `F`; not inlined.
         #[inline(never)]
-        pub fn enter<A, R, F: FnOnce(A) -> R>(argument: A, f: F) -> R {
-            f(argument)
+        pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {
+            F::call(argument)
         }
     };
 }
@@ -88,11 +89,11 @@ pub mod neon_f64 {
         sub_bits(a: Register, b: Register) -> Register {
             vreinterpretq_f64_u64(vsubq_u64(vreinterpretq_u64_f64(a), vreinterpretq_u64_f64(b)))
         }
-        shift_left_52(a: Register) -> Register {
-            vreinterpretq_f64_u64(vshlq_n_u64::<52>(vreinterpretq_u64_f64(a)))
+        shift_left<BITS>(a: Register) -> Register {
+            vreinterpretq_f64_u64(vshlq_n_u64::<BITS>(vreinterpretq_u64_f64(a)))
         }
-        shift_right_52(a: Register) -> Register {
-            vreinterpretq_f64_u64(vshrq_n_u64::<52>(vreinterpretq_u64_f64(a)))
+        shift_right<BITS>(a: Register) -> Register {
+            vreinterpretq_f64_u64(vshrq_n_u64::<BITS>(vreinterpretq_u64_f64(a)))
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The types: one number type over each kind of register.
 
-use super::functions::{Double, Single, doubles, singles};
+use super::functions::{self, Double, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
@@ -22,32 +22,67 @@ macro_rules! operators {
     )* };
 }
 
-/// Elementary functions: of the whole register, whatever part of it is used.
-macro_rules! through {
-    ($name:ident, $ops:ident, $functions:ident: $($unary:ident)*; $($binary:ident)*) => {
-        $(
-            #[inline(always)]
-            fn $unary(self) -> Self {
-                Self($ops::enter(whole!($name, $ops, self), $functions::$unary).0)
-            }
-        )*
-        $(
-            #[inline(always)]
-            fn $binary(self, other: Self) -> Self {
-                let arguments = (whole!($name, $ops, self), whole!($name, $ops, other));
-                Self($ops::enter(arguments, $functions::$binary).0)
-            }
-        )*
-    };
-}
+/// A register with all its lanes, for functions that are the same whatever part of it is used.
 macro_rules! whole {
     ($name:ident, $ops:ident, $a:expr) => {
         $name::<{ $ops::WIDTH }>($a.0)
     };
 }
 
+/// The elementary functions of doubles.
+macro_rules! of_doubles {
+    ($name:ident, $ops:ident: $($unary:ident)*; $($binary:ident)*) => {
+        $(
+            #[inline(always)]
+            fn $unary(self) -> Self {
+                Self($ops::enter::<functions::$unary, _>(whole!($name, $ops, self)).0)
+            }
+        )*
+        $(
+            #[inline(always)]
+            fn $binary(self, other: Self) -> Self {
+                let arguments = (whole!($name, $ops, self), whole!($name, $ops, other));
+                Self($ops::enter::<functions::$binary, _>(arguments).0)
+            }
+        )*
+        #[inline(always)]
+        fn sin_cos(self) -> (Self, Self) {
+            let (sin, cos) = $ops::enter::<functions::sin_cos, _>(whole!($name, $ops, self));
+            (Self(sin.0), Self(cos.0))
+        }
+    };
+}
+
+/// The elementary functions of `f32`: those of doubles, rounded.
+macro_rules! of_singles {
+    ($name:ident, $ops:ident: $($unary:ident)*; $($binary:ident)*) => {
+        $(
+            #[inline(always)]
+            fn $unary(self) -> Self {
+                let [low, high] = whole!($name, $ops, self).widen();
+                Self($name::narrow(Scalar::$unary(low), Scalar::$unary(high)).0)
+            }
+        )*
+        $(
+            #[inline(always)]
+            fn $binary(self, other: Self) -> Self {
+                let [low, high] = whole!($name, $ops, self).widen();
+                let [other_low, other_high] = whole!($name, $ops, other).widen();
+                let low = Scalar::$binary(low, other_low);
+                Self($name::narrow(low, Scalar::$binary(high, other_high)).0)
+            }
+        )*
+        #[inline(always)]
+        fn sin_cos(self) -> (Self, Self) {
+            let [low, high] = whole!($name, $ops, self).widen();
+            let ((sin_low, cos_low), (sin_high, cos_high)) = (low.sin_cos(), high.sin_cos());
+            (Self($name::narrow(sin_low, sin_high).0), Self($name::narrow(cos_low, cos_high).0))
+        }
+    };
+}
+
 /// A type of numbers: its documentation, its name, the type of one lane, the module of its instructions, and
-/// the module of its elementary functions.
+/// the macro of its elementary functions.
 macro_rules! register {
     ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident) => {
         $(#[$attribute])*
@@ -137,7 +172,7 @@ macro_rules! register {
             }
             #[inline(always)]
             fn vectorize<P: Piece>(piece: P) {
-                $ops::enter(piece, P::run);
+                $ops::enter::<functions::Run, _>(piece);
             }
 
             #[inline(always)]
@@ -168,13 +203,8 @@ macro_rules! register {
                 }
                 if n < 0 { Self::splat(1.0) / power } else { power }
             }
-            #[inline(always)]
-            fn sin_cos(self) -> (Self, Self) {
-                let (sin, cos) = $ops::enter(whole!($name, $ops, self), $functions::sin_cos);
-                (Self(sin.0), Self(cos.0))
-            }
-            through!($name, $ops, $functions: cbrt exp exp2 exp_m1 ln ln_1p log2 log10 sin cos tan asin acos atan
-                sinh cosh tanh asinh acosh atanh; atan2 hypot powf);
+            $functions!($name, $ops: cbrt exp exp2 exp_m1 ln ln_1p log2 log10 sin cos tan asin acos atan sinh
+                cosh tanh asinh acosh atanh; atan2 hypot powf);
 
             #[inline(always)]
             fn lt(self, other: Self) -> Self::Mask {
@@ -263,12 +293,12 @@ macro_rules! double {
                 Self($ops::sub_bits(self.0, other.0))
             }
             #[inline(always)]
-            fn shift_left_52(self) -> Self {
-                Self($ops::shift_left_52(self.0))
+            fn shift_left<const BITS: i32>(self) -> Self {
+                Self($ops::shift_left::<BITS>(self.0))
             }
             #[inline(always)]
-            fn shift_right_52(self) -> Self {
-                Self($ops::shift_right_52(self.0))
+            fn shift_right<const BITS: i32>(self) -> Self {
+                Self($ops::shift_right::<BITS>(self.0))
             }
             #[inline(always)]
             fn bits_of(mask: Self::Mask) -> u32 {
@@ -297,11 +327,11 @@ macro_rules! single {
 
 register! {
     /// Up to two `f64`, in a register that every machine of the kind has.
-    F64x2, f64, base_f64, doubles
+    F64x2, f64, base_f64, of_doubles
 }
 register! {
     /// Up to four `f32`, in a register that every machine of the kind has.
-    F32x4, f32, base_f32, singles
+    F32x4, f32, base_f32, of_singles
 }
 double!(F64x2, base_f64);
 single!(F32x4, base_f32, F64x2);
@@ -309,12 +339,12 @@ single!(F32x4, base_f32, F64x2);
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to four `f64`, AVX2 and FMA.
-    F64x4, f64, avx2_f64, doubles
+    F64x4, f64, avx2_f64, of_doubles
 }
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to eight `f32`, AVX2 and FMA.
-    F32x8, f32, avx2_f32, singles
+    F32x8, f32, avx2_f32, of_singles
 }
 #[cfg(target_arch = "x86_64")]
 double!(F64x4, avx2_f64);
@@ -324,12 +354,12 @@ single!(F32x8, avx2_f32, F64x4);
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to eight `f64`, AVX-512.
-    F64x8, f64, avx512_f64, doubles
+    F64x8, f64, avx512_f64, of_doubles
 }
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to sixteen `f32`, AVX-512.
-    F32x16, f32, avx512_f32, singles
+    F32x16, f32, avx512_f32, of_singles
 }
 #[cfg(target_arch = "x86_64")]
 double!(F64x8, avx512_f64);

@@ -3,6 +3,7 @@
 //! One module for each kind of register, all with the same functions.
 #![allow(unsafe_code)]
 
+use super::functions::Call;
 use core::arch::x86_64::*;
 
 // SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine
@@ -24,11 +25,11 @@ macro_rules! wrap {
 
 /// Functions of an expression of intrinsics each.
 macro_rules! define {
-    ($($(#[$attribute:meta])* $name:ident($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
+    ($($(#[$attribute:meta])* $name:ident $(<$bits:ident>)? ($($argument:ident: $type:ty),*) -> $result:ty { $body:expr })*) => { $(
         $(#[$attribute])*
         #[inline(always)]
         #[allow(unused_unsafe)] // The compiler knows that SSE2 is always there.
-        pub fn $name($($argument: $type),*) -> $result {
+        pub fn $name $(<const $bits: i32>)? ($($argument: $type),*) -> $result {
             // SAFETY: see the head of the file.
             unsafe { $body }
         }
@@ -66,16 +67,16 @@ macro_rules! memory {
 /// A function that is compiled for given instructions.
 macro_rules! enter {
     ($features:literal) => {
-        /// Calls `f` where the instructions of this register may be used; not inlined.
+        /// Calls `F` where the instructions of this register may be used; not inlined.
         #[inline(always)]
-        pub fn enter<A, R, F: FnOnce(A) -> R>(argument: A, f: F) -> R {
+        pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {
             #[target_feature(enable = $features)]
             #[inline(never)]
-            fn inside<A, R, F: FnOnce(A) -> R>(argument: A, f: F) -> R {
-                f(argument)
+            fn inside<F: Call<A>, A>(argument: A) -> F::Output {
+                F::call(argument)
             }
             // SAFETY: see the head of the file.
-            unsafe { inside(argument, f) }
+            unsafe { inside::<F, A>(argument) }
         }
     };
 }
@@ -119,8 +120,8 @@ pub mod sse2_f64 {
         sub_bits(a: Register, b: Register) -> Register {
             _mm_castsi128_pd(_mm_sub_epi64(_mm_castpd_si128(a), _mm_castpd_si128(b)))
         }
-        shift_left_52(a: Register) -> Register { _mm_castsi128_pd(_mm_slli_epi64::<52>(_mm_castpd_si128(a))) }
-        shift_right_52(a: Register) -> Register { _mm_castsi128_pd(_mm_srli_epi64::<52>(_mm_castpd_si128(a))) }
+        shift_left<BITS>(a: Register) -> Register { _mm_castsi128_pd(_mm_slli_epi64::<BITS>(_mm_castpd_si128(a))) }
+        shift_right<BITS>(a: Register) -> Register { _mm_castsi128_pd(_mm_srli_epi64::<BITS>(_mm_castpd_si128(a))) }
     }
 }
 
@@ -198,11 +199,11 @@ pub mod avx2_f64 {
         sub_bits(a: Register, b: Register) -> Register {
             _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)))
         }
-        shift_left_52(a: Register) -> Register {
-            _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(a)))
+        shift_left<BITS>(a: Register) -> Register {
+            _mm256_castsi256_pd(_mm256_slli_epi64::<BITS>(_mm256_castpd_si256(a)))
         }
-        shift_right_52(a: Register) -> Register {
-            _mm256_castsi256_pd(_mm256_srli_epi64::<52>(_mm256_castpd_si256(a)))
+        shift_right<BITS>(a: Register) -> Register {
+            _mm256_castsi256_pd(_mm256_srli_epi64::<BITS>(_mm256_castpd_si256(a)))
         }
     }
 }
@@ -306,11 +307,11 @@ pub mod avx512_f64 {
         sub_bits(a: Register, b: Register) -> Register {
             _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)))
         }
-        shift_left_52(a: Register) -> Register {
-            _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(a)))
+        shift_left<BITS>(a: Register) -> Register {
+            _mm512_castsi512_pd(_mm512_sll_epi64(_mm512_castpd_si512(a), _mm_cvtsi32_si128(BITS)))
         }
-        shift_right_52(a: Register) -> Register {
-            _mm512_castsi512_pd(_mm512_srli_epi64::<52>(_mm512_castpd_si512(a)))
+        shift_right<BITS>(a: Register) -> Register {
+            _mm512_castsi512_pd(_mm512_srl_epi64(_mm512_castpd_si512(a), _mm_cvtsi32_si128(BITS)))
         }
     }
 }

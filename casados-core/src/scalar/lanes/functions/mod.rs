@@ -1,6 +1,12 @@
 //! Elementary functions of registers, written once for all kinds of them.
 
-use crate::scalar::{Lanes, Scalar};
+mod exponential;
+mod logarithm;
+mod pair;
+mod root;
+mod trigonometric;
+
+use crate::scalar::{Lanes, Piece};
 use bytemuck::Zeroable;
 
 /// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are written as
@@ -21,10 +27,10 @@ pub trait Double: Lanes {
     fn add_bits(self, other: Self) -> Self;
     /// The difference of both as 64-bit integers.
     fn sub_bits(self, other: Self) -> Self;
-    /// The 12 lowest bits moved to the top.
-    fn shift_left_52(self) -> Self;
-    /// The 12 highest bits moved to the bottom.
-    fn shift_right_52(self) -> Self;
+    /// The bits moved up, zeros below.
+    fn shift_left<const BITS: i32>(self) -> Self;
+    /// The bits moved down, zeros above.
+    fn shift_right<const BITS: i32>(self) -> Self;
     /// The lanes of a mask, one bit each.
     fn bits_of(mask: Self::Mask) -> u32;
 }
@@ -70,69 +76,47 @@ fn each<D: Double, F: Copy>(rare: D::Mask, a: D, b: D, result: &mut D, f: F, app
     *result = D::load(&values);
 }
 
-macro_rules! by_lane {
-    ($($unary:ident)*; $($binary:ident)*) => {
-        $(
-            #[inline(always)]
-            pub fn $unary<D: Double>(a: D) -> D {
-                let mut result = a;
-                repair(a.eq(a), a, &mut result, <f64 as Scalar>::$unary);
-                result
-            }
-        )*
-        $(
-            #[inline(always)]
-            pub fn $binary<D: Double>((a, b): (D, D)) -> D {
-                let mut result = a;
-                let all = a.eq(a);
-                repair2(D::or(all, D::not(all)), a, b, &mut result, <f64 as Scalar>::$binary);
-                result
-            }
-        )*
-    };
+/// A function, called with what it is applied to. (A trait, because what is called through a value of type `fn`
+/// is not certain to be inlined.)
+pub trait Call<A> {
+    /// Its result.
+    type Output;
+    /// `#[inline(always)]`
+    fn call(argument: A) -> Self::Output;
 }
 
-/// Functions of registers of doubles.
-pub mod doubles {
-    use super::*;
-    by_lane!(cbrt exp exp2 exp_m1 ln ln_1p log2 log10 sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh;
-        atan2 hypot powf);
-
+/// A piece of code as a function.
+pub struct Run;
+impl<P: Piece> Call<P> for Run {
+    type Output = ();
     #[inline(always)]
-    pub fn sin_cos<D: Double>(a: D) -> (D, D) {
-        (sin(a), cos(a))
+    fn call(piece: P) {
+        piece.run();
     }
 }
 
-/// Functions of registers of `f32`: those of doubles, rounded.
-pub mod singles {
-    use super::{Single, doubles};
-
-    macro_rules! rounded {
-        ($($unary:ident)*; $($binary:ident)*) => {
-            $(
-                #[inline(always)]
-                pub fn $unary<S: Single>(a: S) -> S {
-                    let [low, high] = a.widen();
-                    S::narrow(doubles::$unary(low), doubles::$unary(high))
-                }
-            )*
-            $(
-                #[inline(always)]
-                pub fn $binary<S: Single>((a, b): (S, S)) -> S {
-                    let ([a_low, a_high], [b_low, b_high]) = (a.widen(), b.widen());
-                    S::narrow(doubles::$binary((a_low, b_low)), doubles::$binary((a_high, b_high)))
-                }
-            )*
-        };
+/// Elementary functions under the names of their methods.
+macro_rules! calls {
+    ($($module:ident { $($name:ident($argument:ty) -> $result:ty),* })*) => { $( $(
+        #[allow(non_camel_case_types)]
+        pub struct $name;
+        impl<D: Double> Call<$argument> for $name {
+            type Output = $result;
+            #[inline(always)]
+            fn call(argument: $argument) -> $result {
+                $module::$name(argument)
+            }
+        }
+    )* )* };
+}
+calls! {
+    exponential {
+        exp(D) -> D, exp2(D) -> D, exp_m1(D) -> D, sinh(D) -> D, cosh(D) -> D, tanh(D) -> D, powf((D, D)) -> D
     }
-    rounded!(cbrt exp exp2 exp_m1 ln ln_1p log2 log10 sin cos tan asin acos atan sinh cosh tanh asinh acosh
-        atanh; atan2 hypot powf);
-
-    #[inline(always)]
-    pub fn sin_cos<S: Single>(a: S) -> (S, S) {
-        let [low, high] = a.widen();
-        let ((sin_low, cos_low), (sin_high, cos_high)) = (doubles::sin_cos(low), doubles::sin_cos(high));
-        (S::narrow(sin_low, sin_high), S::narrow(cos_low, cos_high))
+    logarithm { ln(D) -> D, ln_1p(D) -> D, log2(D) -> D, log10(D) -> D, asinh(D) -> D, acosh(D) -> D, atanh(D) -> D }
+    trigonometric {
+        sin(D) -> D, cos(D) -> D, tan(D) -> D, asin(D) -> D, acos(D) -> D, atan(D) -> D, sin_cos(D) -> (D, D),
+        atan2((D, D)) -> D
     }
+    root { cbrt(D) -> D, hypot((D, D)) -> D }
 }

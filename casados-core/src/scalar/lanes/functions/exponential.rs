@@ -1,0 +1,198 @@
+//! `eᵃ` and what is made of it.
+//!
+//! `a = n ln 2 + r` with `|r| ≤ ln 2 / 2` (Cody and Waite), `eʳ = 1 + r + r² Q(r)` with a minimax polynomial, whose
+//! leading terms are added as a pair.
+
+use super::pair::{Pair, c, ordered_sum, polynomial, product, sum};
+use super::{Double, repair2};
+use crate::scalar::Scalar;
+
+/// `1.5 · 2⁵²`: added and subtracted, it rounds to an integer; added, it leaves the integer in the last bits.
+pub const ROUND: f64 = 6_755_399_441_055_744.0;
+/// The first 42 bits of ln 2, and the next 53.
+pub const LN_2: [f64; 2] =
+    [0.693147180559890330187045037746429443359375, 5.4979230187083711552420206887059365096458e-14];
+/// ln 2 as a pair.
+const LN_2_PAIR: [f64; 2] = [core::f64::consts::LN_2, 2.3190468138462995584177710797133615750740e-17];
+
+/// `(eʳ − 1 − r)/r²` for `|r| ≤ 0.35`; `eʳ` to 2.7e-19
+const Q: [f64; 11] = [
+    0.5,
+    0.1666666666666667129259593593815225,
+    4.166666666666667823148983984538063e-2,
+    8.333333333325662270474332160574704e-3,
+    1.388888888887678755429400112557542e-3,
+    1.984126987656895948174129440388925e-4,
+    2.480158734321863888642317741428656e-5,
+    2.755725312628787346117594653227556e-6,
+    2.755725600593143762107668955085860e-7,
+    2.510617467419994988126511978061145e-8,
+    2.092074736490386620890982098501520e-9,
+];
+
+/// `2ⁿ` for an integer `−1022 ≤ n ≤ 1023`
+#[inline(always)]
+pub fn power_of_two<D: Double>(n: D) -> D {
+    (n + c(ROUND + 1023.0)).shift_left::<52>()
+}
+
+/// The nearest integer, `|a| < 2⁵¹`.
+#[inline(always)]
+pub fn nearest<D: Double>(a: D) -> D {
+    (a + c(ROUND)) - c(ROUND)
+}
+
+/// `a` between bounds; NaN stays.
+#[inline(always)]
+pub fn clamp<D: Double>(a: D, low: f64, high: f64) -> D {
+    let a = D::select(c::<D>(high).lt(a), c(high), a);
+    D::select(a.lt(c(low)), c(low), a)
+}
+
+/// `(n, r)` with `a = n ln 2 + r`, for `|a| < 1500`
+#[inline(always)]
+fn reduce<D: Double>(a: D) -> (D, Pair<D>) {
+    let n = nearest(a * c(core::f64::consts::LOG2_E));
+    // Both exact: the first constant leaves eleven bits for n.
+    let first = a - n * c(LN_2[0]);
+    let second = n * c(LN_2[1]);
+    (n, ordered_sum(first, -second))
+}
+
+/// What `eʳ − 1` gains by the lower part of `r`.
+#[inline(always)]
+fn gain<D: Double>(r: Pair<D>) -> D {
+    r.low.mul_add(r.high, r.low)
+}
+
+/// `eʳ` to about 57 bits.
+#[inline(always)]
+fn near_one<D: Double>(r: Pair<D>) -> Pair<D> {
+    let one = ordered_sum(c(1.0), r.high);
+    let square = r.high * r.high;
+    Pair { high: one.high, low: one.low + square.mul_add(polynomial(r.high, Q), gain(r)) }
+}
+
+/// `eʳ − 1` to about 57 bits.
+#[inline(always)]
+fn above_one<D: Double>(r: Pair<D>) -> Pair<D> {
+    let [_, rest @ ..] = Q;
+    let square = product(r.high, r.high).shift(c(0.5));
+    let e = ordered_sum(r.high, square.high);
+    let cube = (r.high * square.high) * c(2.0);
+    Pair { high: e.high, low: e.low + cube.mul_add(polynomial(r.high, rest), square.low + gain(r)) }
+}
+
+/// `a 2ⁿ`, rounded once, for a normal `a` near 1 and `|n| < 2000`
+#[inline(always)]
+fn times_power<D: Double>(a: D, n: D) -> D {
+    let half = nearest(n * c(0.5));
+    (a * power_of_two(half)) * power_of_two(n - half)
+}
+
+/// `eᵃ`
+#[inline(always)]
+pub fn exp<D: Double>(a: D) -> D {
+    let (n, r) = reduce(clamp(a, -746.0, 710.0));
+    times_power(near_one(r).round(), n)
+}
+
+/// `2ᵃ`
+#[inline(always)]
+pub fn exp2<D: Double>(a: D) -> D {
+    let a = clamp(a, -1076.0, 1025.0);
+    let n = nearest(a);
+    let r = Pair::constant(LN_2_PAIR[0], LN_2_PAIR[1]).scale(a - n).tidy();
+    times_power(near_one(r).round(), n)
+}
+
+/// Half of `eᵃ − 1`, for `−60 ≤ a ≤ 709.9`
+#[inline(always)]
+fn half_exp_m1<D: Double>(a: D) -> Pair<D> {
+    let (n, r) = reduce(a);
+    let power = power_of_two(n - c(1.0));
+    let e = above_one(r);
+    let first = sum(power, c(-0.5));
+    let second = sum(first.high, power * e.high);
+    Pair { high: second.high, low: second.low + (first.low + power * e.low) }.tidy()
+}
+
+/// `eᵃ − 1`
+#[inline(always)]
+pub fn exp_m1<D: Double>(a: D) -> D {
+    let half = half_exp_m1(clamp(a, -60.0, 709.9)).round();
+    // Of a tiny number only the number itself, with its sign, is left.
+    D::select(a.abs().lt(c(1e-20)), a, half + half)
+}
+
+/// `(sinh r − r)/r³` in `r²`, `|r| ≤ 1`; `sinh r` to 9.2e-19
+const SINH: [f64; 7] = [
+    0.16666666666666665741480812812369550,
+    8.3333333333335674043585354704503939e-3,
+    1.9841269841110008168363898488184158e-4,
+    2.7557319264769368486107416205133092e-6,
+    2.5052105469960145743521685987240111e-8,
+    1.6058657399468798615074715201129314e-10,
+    7.7161000811531498479074230530384827e-13,
+];
+
+/// Half of `e^|a|` and half of its reciprocal.
+#[inline(always)]
+fn half_exponentials<D: Double>(magnitude: D) -> (Pair<D>, Pair<D>) {
+    let (n, r) = reduce(clamp(magnitude, 0.0, 711.0));
+    let near = near_one(r).tidy();
+    // In two steps, because 2¹⁰²⁴ is no double. What falls below 2⁻¹⁰⁰⁰ counts for nothing.
+    let rising = near.shift(power_of_two(n - c(2.0))).shift(c(2.0));
+    let falling = Pair::new(c(0.5)).div(near).shift(power_of_two(-clamp(n, 0.0, 1000.0)));
+    (rising, falling)
+}
+
+/// `sinh a`
+#[inline(always)]
+pub fn sinh<D: Double>(a: D) -> D {
+    let magnitude = a.abs();
+    let (rising, falling) = half_exponentials(magnitude);
+    let far = D::select(rising.high.is_finite(), rising.add_smaller(falling.negate()).round(), rising.high);
+    let square = magnitude * magnitude;
+    let near = (magnitude * square).mul_add(polynomial(square, SINH), magnitude);
+    copy_sign(D::select(magnitude.lt(c(1.0)), near, far), a)
+}
+
+/// `cosh a`
+#[inline(always)]
+pub fn cosh<D: Double>(a: D) -> D {
+    let (rising, falling) = half_exponentials(a.abs());
+    D::select(rising.high.is_finite(), rising.add_smaller(falling).round(), rising.high)
+}
+
+/// `tanh a = (e²ᵃ − 1)/(e²ᵃ + 1)`
+#[inline(always)]
+pub fn tanh<D: Double>(a: D) -> D {
+    let magnitude = a.abs();
+    let half = half_exp_m1(clamp(magnitude + magnitude, 0.0, 44.0));
+    let above = ordered_sum(half.high, half.low);
+    let quotient = above.div(Pair::new(c(1.0)).add(above)).round();
+    let tiny = magnitude.lt(c(1e-9));
+    copy_sign(D::select(tiny, magnitude, quotient), a)
+}
+
+/// A magnitude with the sign of `a`.
+#[inline(always)]
+pub fn copy_sign<D: Double>(magnitude: D, a: D) -> D {
+    magnitude.or_bits(a.and_bits(c(-0.0)))
+}
+
+/// `aᵇ = exp(b ln a)`, the logarithm to about 70 bits. Unusual arguments are left to the function of one number.
+#[inline(always)]
+pub fn powf<D: Double>((a, b): (D, D)) -> D {
+    let usual = D::and(c::<D>(f64::MIN_POSITIVE).le(a), a.le(c(f64::MAX)));
+    let logarithm = super::logarithm::ln_pair(D::select(usual, a, c(1.0)));
+    let exponent = product(logarithm.high, b);
+    let low = logarithm.low.mul_add(b, exponent.low);
+    let fits = exponent.high.abs().lt(c(700.0));
+    let (n, r) = reduce(clamp(exponent.high, -700.0, 700.0));
+    let r = ordered_sum(r.high, r.low + low);
+    let mut result = near_one(r).round() * power_of_two(n);
+    repair2(D::not(D::and(usual, fits)), a, b, &mut result, <f64 as Scalar>::powf);
+    result
+}

@@ -1,0 +1,194 @@
+//! Logarithms.
+//!
+//! `a = 2ᵏ m` with `√½ ≤ m < √2`, and `ln m = 2 artanh s` with `s = (m − 1)/(m + 1)`, a minimax polynomial in `s²`.
+
+use super::exponential::{LN_2, copy_sign};
+use super::pair::{Pair, c, ordered_sum, pattern, polynomial, product, sum};
+use super::{Double, repair};
+use crate::scalar::Scalar;
+
+/// `(2 artanh(s)/s − 2)/s²` in `s²`, `|s| ≤ 0.1716`; the logarithm to 4.5e-18
+const L: [f64; 7] = [
+    0.66666666666666696272613990004174411,
+    0.39999999999899277236536931923183147,
+    0.28571428626210204626545419159810995,
+    0.22222211090523236176608179448521696,
+    0.18182892462869118536782671948997537,
+    0.15331610842023538077150135450131,
+    0.14617797125892503795618893036589725,
+];
+
+/// `(2 artanh(s)/s − 2 − 2/3 s² − 2/5 s⁴)/s⁶` in `s²`; the logarithm to 9.6e-24
+const M: [f64; 8] = [
+    0.28571428571428569842538536249376371,
+    0.22222222222224755072694790669629583,
+    0.18181818180636122317395120262517593,
+    0.15384615632666301388020713107852803,
+    0.13333305713086029964387080326559953,
+    0.11766449266919558662789275296974361,
+    0.10463849026513971640639510951586998,
+    0.10699178259914263189322980453184155,
+];
+
+const SQRT_HALF: u64 = 0x3FE6_A09E_667F_3BCD;
+const MANTISSA: u64 = 0x000F_FFFF_FFFF_FFFF;
+
+/// `(k, m)` of a normal positive number.
+#[inline(always)]
+fn split<D: Double>(a: D) -> (D, D) {
+    let shifted = a.add_bits(pattern(1.0_f64.to_bits() - SQRT_HALF));
+    let biased = shifted.shift_right::<52>();
+    // An integer below 2⁵² is a double when it is put into the last bits of 2⁵².
+    let k = biased.or_bits(c(4_503_599_627_370_496.0)) - c(4_503_599_627_370_496.0 + 1023.0);
+    (k, shifted.and_bits(pattern(MANTISSA)).add_bits(pattern(SQRT_HALF)))
+}
+
+/// `2⁻ᵏ`
+#[inline(always)]
+fn inverse_power<D: Double>(k: D) -> D {
+    super::exponential::power_of_two(-k)
+}
+
+/// `ln(1 + f)` to about 70 bits, for `−0.3 ≤ f ≤ 0.42`
+#[inline(always)]
+fn fraction<D: Double>(f: Pair<D>) -> Pair<D> {
+    let s = f.div(Pair::new(c(2.0)).add_smaller(f));
+    let z = s.mul(s);
+    let inner = ordered_sum(c(0.4), z.high * polynomial(z.high, M));
+    let inner = Pair { high: inner.high, low: inner.low + c(-2.2204460492503132e-17) };
+    let outer = Pair::constant(0.66666666666666662966, 3.7007434154171883e-17).add_smaller(z.mul(inner));
+    s.shift(c(2.0)).add_smaller(s.mul(z.mul(outer)))
+}
+
+/// `k ln 2 + fraction`
+#[inline(always)]
+fn with_exponent<D: Double>(k: D, fraction: Pair<D>) -> Pair<D> {
+    Pair { high: k * c(LN_2[0]), low: k * c(LN_2[1]) }.add_smaller(fraction).tidy()
+}
+
+/// `ln a` of a normal positive number, to about 70 bits.
+#[inline(always)]
+pub fn ln_pair<D: Double>(a: D) -> Pair<D> {
+    let (k, m) = split(a);
+    with_exponent(k, fraction(Pair::new(m - c(1.0))))
+}
+
+/// `ln(1 + a)` to about 70 bits, for `1 + a` normal.
+#[inline(always)]
+fn ln_1p_pair<D: Double>(a: Pair<D>) -> Pair<D> {
+    let one = sum(c(1.0), a.high);
+    let (k, m) = split(one.high);
+    let power = inverse_power(k);
+    let f = sum(m - c(1.0), one.low * power);
+    with_exponent(k, fraction(Pair { high: f.high, low: f.low + a.low * power }))
+}
+
+/// What is not a normal positive number.
+#[inline(always)]
+fn unusual<D: Double>(a: D) -> D::Mask {
+    D::not(D::and(c::<D>(f64::MIN_POSITIVE).le(a), a.le(c(f64::MAX))))
+}
+
+/// natural logarithm
+#[inline(always)]
+pub fn ln<D: Double>(a: D) -> D {
+    let (k, m) = split(a);
+    let f = m - c(1.0);
+    let s = f / (c::<D>(2.0) + f);
+    let z = s * s;
+    // ln(1 + f) = f − f²/2 + s (f²/2 + z L(z)): the large terms are exact.
+    let half_square = product(f * c(0.5), f);
+    let rest = s * z.mul_add(polynomial(z, L), half_square.high) - half_square.low;
+    let first = ordered_sum(k * c(LN_2[0]), f);
+    let second = sum(first.high, -half_square.high);
+    let mut result = second.high + (second.low + (first.low + k.mul_add(c(LN_2[1]), rest)));
+    repair(unusual(a), a, &mut result, <f64 as Scalar>::ln);
+    result
+}
+
+/// `ln(1 + a)`
+#[inline(always)]
+pub fn ln_1p<D: Double>(a: D) -> D {
+    let usual = D::and(c::<D>(-1.0).lt(a), a.le(c(1e300)));
+    let tiny = a.abs().lt(c(1e-20));
+    let mut result = D::select(tiny, a, ln_1p_pair(Pair::new(D::select(usual, a, c(1.0)))).round());
+    repair(D::not(usual), a, &mut result, <f64 as Scalar>::ln_1p);
+    result
+}
+
+/// logarithm to base 2
+#[inline(always)]
+pub fn log2<D: Double>(a: D) -> D {
+    let (k, m) = split(a);
+    let fraction = fraction(Pair::new(m - c(1.0)));
+    let log = fraction.mul(Pair::constant(core::f64::consts::LOG2_E, 2.0355273740931033e-17)).tidy();
+    let mut result = Pair::new(k).add_smaller(log).round();
+    repair(unusual(a), a, &mut result, <f64 as Scalar>::log2);
+    result
+}
+
+/// logarithm to base 10
+#[inline(always)]
+pub fn log10<D: Double>(a: D) -> D {
+    let (k, m) = split(a);
+    let fraction = fraction(Pair::new(m - c(1.0)));
+    let log = fraction.mul(Pair::constant(core::f64::consts::LOG10_E, 1.0983196502167651e-17)).tidy();
+    // The first constant leaves eleven bits for k.
+    let exponent =
+        Pair { high: k * c(0.3010299956639528318191878497600555), low: k * c(2.836339455104496415e-14) };
+    let mut result = exponent.add_smaller(log).round();
+    repair(unusual(a), a, &mut result, <f64 as Scalar>::log10);
+    result
+}
+
+/// Beyond this, `√(a² ± 1)` is `a`.
+const LARGE: f64 = 1152921504606846976.0;
+
+/// `ln 2a` for large `a`, else `ln(1 + f)`
+#[inline(always)]
+fn ln_2a_or_1p<D: Double>(a: D, f: Pair<D>) -> D {
+    let large = c::<D>(LARGE).lt(a);
+    let ln_2 = Pair { high: c(LN_2[0]), low: c(LN_2[1]) };
+    let far = ln_pair(D::select(large, a, c(1.0))).add(ln_2).round();
+    D::select(large, far, ln_1p_pair(f).round())
+}
+
+/// `arsinh a = ln(1 + a + a²/(1 + √(1 + a²)))`
+#[inline(always)]
+pub fn asinh<D: Double>(a: D) -> D {
+    let magnitude = a.abs();
+    let bounded = D::select(magnitude.lt(c(LARGE)), magnitude, c(1.0));
+    let square = product(bounded, bounded);
+    let root = Pair::new(c(1.0)).add(square).sqrt();
+    let f = Pair::new(bounded).add(square.div(Pair::new(c(1.0)).add(root)));
+    let result = copy_sign(ln_2a_or_1p(magnitude, f), a);
+    let ordinary = D::and(c::<D>(1e-9).lt(magnitude), a.is_finite());
+    D::select(ordinary, result, a)
+}
+
+/// `arcosh a = ln(1 + t + √(t² + 2t))`, `t = a − 1`
+#[inline(always)]
+pub fn acosh<D: Double>(a: D) -> D {
+    let bounded = D::select(a.lt(c(LARGE)), a, c(1.0));
+    let bounded = D::select(c::<D>(1.0).le(a), bounded, c(1.0));
+    let minus = Pair::new(c(-1.0));
+    let root = product(bounded, bounded).add(minus).sqrt();
+    let f = Pair::new(bounded).add(minus).add(root);
+    let result = ln_2a_or_1p(a, f);
+    let result = D::select(a.le(c(f64::MAX)), result, a);
+    D::select(a.lt(c(1.0)), c(f64::NAN), result)
+}
+
+/// `artanh a = ½ ln(1 + 2a/(1 − a))`
+#[inline(always)]
+pub fn atanh<D: Double>(a: D) -> D {
+    let magnitude = a.abs();
+    let usual = magnitude.lt(c(1.0));
+    let bounded = D::select(usual, magnitude, c(0.5));
+    let f = Pair::new(bounded + bounded).div(sum(c(1.0), -bounded));
+    let result = ln_1p_pair(f).round() * c(0.5);
+    let result = D::select(magnitude.lt(c(1e-9)), magnitude, result);
+    let mut result = copy_sign(result, a);
+    repair(D::not(usual), a, &mut result, <f64 as Scalar>::atanh);
+    result
+}

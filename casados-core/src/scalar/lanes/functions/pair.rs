@@ -1,0 +1,147 @@
+//! Unevaluated sums `high + low` of two doubles, about 106 bits: Dekker, "A floating-point technique for extending
+//! the available precision" (1971); Ogita, Rump and Oishi, "Accurate sum and dot product" (2005).
+
+use super::Double;
+
+/// `high + low`, with `|low|` at most a few units in the last place of `high`.
+#[derive(Clone, Copy)]
+pub struct Pair<D> {
+    pub high: D,
+    pub low: D,
+}
+
+/// A constant.
+#[inline(always)]
+pub fn c<D: Double>(value: f64) -> D {
+    D::from_f64(value)
+}
+
+/// A bit pattern.
+#[inline(always)]
+pub fn pattern<D: Double>(bits: u64) -> D {
+    D::from_f64(f64::from_bits(bits))
+}
+
+/// `a + b`, exactly.
+#[inline(always)]
+pub fn sum<D: Double>(a: D, b: D) -> Pair<D> {
+    let high = a + b;
+    let from_b = high - a;
+    Pair { high, low: (a - (high - from_b)) + (b - from_b) }
+}
+
+/// `a + b`, exactly where `a = 0` or `|a| ≥ |b|`.
+#[inline(always)]
+pub fn ordered_sum<D: Double>(a: D, b: D) -> Pair<D> {
+    let high = a + b;
+    Pair { high, low: b - (high - a) }
+}
+
+/// `a b`, exactly as long as nothing overflows or underflows.
+#[inline(always)]
+pub fn product<D: Double>(a: D, b: D) -> Pair<D> {
+    let high = a * b;
+    if D::FUSED {
+        return Pair { high, low: a.mul_add(b, -high) };
+    }
+    let ((a1, a2), (b1, b2)) = (halves(a), halves(b));
+    Pair { high, low: a2 * b2 - (((high - a1 * b1) - a2 * b1) - a1 * b2) }
+}
+
+/// The upper and the lower half of the digits (Veltkamp).
+#[inline(always)]
+fn halves<D: Double>(a: D) -> (D, D) {
+    let scaled = a * c(134_217_729.0);
+    let upper = scaled - (scaled - a);
+    (upper, a - upper)
+}
+
+impl<D: Double> Pair<D> {
+    /// `a` itself.
+    #[inline(always)]
+    pub fn new(a: D) -> Self {
+        Self { high: a, low: c(0.0) }
+    }
+    /// A constant and what it lacks.
+    #[inline(always)]
+    pub fn constant(high: f64, low: f64) -> Self {
+        Self { high: c(high), low: c(low) }
+    }
+    /// `mask ? a : b`
+    #[inline(always)]
+    pub fn select(mask: D::Mask, a: Self, b: Self) -> Self {
+        Self { high: D::select(mask, a.high, b.high), low: D::select(mask, a.low, b.low) }
+    }
+    /// Rounded.
+    #[inline(always)]
+    pub fn round(self) -> D {
+        self.high + self.low
+    }
+    /// The same number with the least `low`.
+    #[inline(always)]
+    pub fn tidy(self) -> Self {
+        ordered_sum(self.high, self.low)
+    }
+    /// Another sign.
+    #[inline(always)]
+    pub fn negate(self) -> Self {
+        Self { high: -self.high, low: -self.low }
+    }
+    /// The sum.
+    #[inline(always)]
+    pub fn add(self, other: Self) -> Self {
+        let s = sum(self.high, other.high);
+        Self { high: s.high, low: s.low + (self.low + other.low) }.tidy()
+    }
+    /// The sum, where `self` is zero or the larger one.
+    #[inline(always)]
+    pub fn add_smaller(self, other: Self) -> Self {
+        let s = ordered_sum(self.high, other.high);
+        Self { high: s.high, low: s.low + (self.low + other.low) }
+    }
+    /// The product.
+    #[inline(always)]
+    pub fn mul(self, other: Self) -> Self {
+        let p = product(self.high, other.high);
+        Self { high: p.high, low: self.low.mul_add(other.high, self.high.mul_add(other.low, p.low)) }
+    }
+    /// The product with a double.
+    #[inline(always)]
+    pub fn scale(self, factor: D) -> Self {
+        let p = product(self.high, factor);
+        Self { high: p.high, low: self.low.mul_add(factor, p.low) }
+    }
+    /// The product with a power of two, or with ½ or such.
+    #[inline(always)]
+    pub fn shift(self, power: D) -> Self {
+        Self { high: self.high * power, low: self.low * power }
+    }
+    /// The quotient.
+    #[inline(always)]
+    pub fn div(self, other: Self) -> Self {
+        let quotient = self.high / other.high;
+        let p = product(quotient, other.high);
+        let rest = ((self.high - p.high) - p.low) + (self.low - quotient * other.low);
+        Self { high: quotient, low: rest / other.high }
+    }
+    /// The square root; of zero it is zero.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        let root = self.high.sqrt();
+        let p = product(root, root);
+        let rest = ((self.high - p.high) - p.low) + self.low;
+        let low = rest / (root + root);
+        Self { high: root, low: D::select(root.eq(c(0.0)), root, low) }
+    }
+}
+
+/// `c[0] + c[1] x + ..`, the even and the odd powers side by side.
+#[inline(always)]
+pub fn polynomial<D: Double, const K: usize>(x: D, coefficients: [f64; K]) -> D {
+    let square = x * x;
+    let mut sums: [D; 2] = [c(coefficients[K - 1]), c(coefficients[K - 2])];
+    for k in (0..K - 2).rev() {
+        sums = [sums[1], sums[0].mul_add(square, c(coefficients[k]))];
+    }
+    sums[0].mul_add(x, sums[1])
+}

@@ -1,0 +1,57 @@
+//! Cube roots and lengths.
+
+use super::exponential::{copy_sign, nearest, power_of_two};
+use super::pair::{c, ordered_sum, pattern, polynomial, product};
+use super::{Double, repair, repair2};
+use crate::scalar::Scalar;
+
+/// `∛m`, `1 ≤ m ≤ 2`, to 1.2e-6
+const CUBE_ROOT: [f64; 6] = [
+    0.473330678811939631334126943329465575516223907470703125,
+    0.83816003431589347627550523611716926097869873046875,
+    -0.469228720654114861421390969553613103926181793212890625,
+    0.2027772301470197324757549495188868604600429534912109375,
+    -5.0386539243734151938269860693253576755523681640625e-2,
+    5.34854758454895475028312290532994666136801242828369140625e-3,
+];
+
+/// `∛a`: a polynomial and two steps of Newton's method, the second with the exact cube.
+#[inline(always)]
+pub fn cbrt<D: Double>(a: D) -> D {
+    let magnitude = a.abs();
+    let usual = D::and(c::<D>(f64::MIN_POSITIVE).le(magnitude), magnitude.le(c(f64::MAX)));
+    let exponent = magnitude.shift_right::<52>().or_bits(c(4_503_599_627_370_496.0))
+        - c(4_503_599_627_370_496.0 + 1023.0);
+    let mantissa = magnitude.and_bits(pattern(0x000F_FFFF_FFFF_FFFF)).or_bits(c(1.0));
+    // |a| = 2^(3k + j) m, j = 0, 1, 2
+    let k = nearest((exponent - c(1.0)) * c(1.0 / 3.0));
+    let j = exponent - k * c(3.0);
+    let (one, two) = (j.eq(c(1.0)), j.eq(c(2.0)));
+    let choose = |if_one: f64, if_two: f64| D::select(one, c(if_one), D::select(two, c(if_two), c(1.0)));
+    let cube = mantissa * choose(2.0, 4.0);
+    let t = polynomial(mantissa, CUBE_ROOT) * choose(1.2599210498948732, 1.5874010519681995);
+    let square = t * t;
+    let t = t - (square * t - cube) / (square * c(3.0));
+    let square = product(t, t);
+    let third = product(square.high, t);
+    let rest = (cube - third.high) - square.low.mul_add(t, third.low);
+    let root = t + rest / (square.high * c(3.0));
+    let mut result = copy_sign(root * power_of_two(k), a);
+    repair(D::not(usual), a, &mut result, <f64 as Scalar>::cbrt);
+    result
+}
+
+/// `√(a² + b²)`
+#[inline(always)]
+pub fn hypot<D: Double>((a, b): (D, D)) -> D {
+    let (a_, b_) = (a.abs(), b.abs());
+    let larger = a_.lt(b_);
+    let (long, short) = (D::select(larger, b_, a_), D::select(larger, a_, b_));
+    let usual = D::and(D::and(c::<D>(1e-130).lt(long), long.lt(c(1e130))), short.le(long));
+    let (p, q) = (product(long, long), product(short, short));
+    let s = ordered_sum(p.high, q.high);
+    let root = super::pair::Pair { high: s.high, low: s.low + (p.low + q.low) }.sqrt();
+    let mut result = root.round();
+    repair2(D::not(usual), a, b, &mut result, <f64 as Scalar>::hypot);
+    result
+}
