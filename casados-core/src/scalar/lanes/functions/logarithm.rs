@@ -9,25 +9,25 @@ use crate::scalar::Scalar;
 
 /// `(2 artanh(s)/s − 2)/s²` in `s²`, `|s| ≤ 0.1716`; the logarithm to 4.5e-18
 const L: [f64; 7] = [
-    0.66666666666666696272613990004174411,
-    0.39999999999899277236536931923183147,
-    0.28571428626210204626545419159810995,
-    0.22222211090523236176608179448521696,
-    0.18182892462869118536782671948997537,
-    0.15331610842023538077150135450131,
-    0.14617797125892503795618893036589725,
+    0.666666666666667,
+    0.3999999999989928,
+    0.28571428626210205,
+    0.22222211090523236,
+    0.18182892462869119,
+    0.15331610842023538,
+    0.14617797125892504,
 ];
 
 /// `(2 artanh(s)/s − 2 − 2/3 s² − 2/5 s⁴)/s⁶` in `s²`; the logarithm to 9.6e-24
 const M: [f64; 8] = [
-    0.28571428571428569842538536249376371,
-    0.22222222222224755072694790669629583,
-    0.18181818180636122317395120262517593,
-    0.15384615632666301388020713107852803,
-    0.13333305713086029964387080326559953,
-    0.11766449266919558662789275296974361,
-    0.10463849026513971640639510951586998,
-    0.10699178259914263189322980453184155,
+    0.2857142857142857,
+    0.22222222222224755,
+    0.18181818180636122,
+    0.15384615632666301,
+    0.1333330571308603,
+    0.11766449266919558,
+    0.10463849026513972,
+    0.10699178259914263,
 ];
 
 const SQRT_HALF: u64 = 0x3FE6_A09E_667F_3BCD;
@@ -56,7 +56,7 @@ fn fraction<D: Double>(f: Pair<D>) -> Pair<D> {
     let z = s.mul(s);
     let inner = ordered_sum(c(0.4), z.high * polynomial(z.high, M));
     let inner = Pair { high: inner.high, low: inner.low + c(-2.2204460492503132e-17) };
-    let outer = Pair::constant(0.66666666666666662966, 3.7007434154171883e-17).add_smaller(z.mul(inner));
+    let outer = Pair::constant(0.6666666666666666, 3.700743415417188e-17).add_smaller(z.mul(inner));
     s.shift(c(2.0)).add_smaller(s.mul(z.mul(outer)))
 }
 
@@ -132,17 +132,16 @@ pub fn log2<D: Double>(a: D) -> D {
 pub fn log10<D: Double>(a: D) -> D {
     let (k, m) = split(a);
     let fraction = fraction(Pair::new(m - c(1.0)));
-    let log = fraction.mul(Pair::constant(core::f64::consts::LOG10_E, 1.0983196502167651e-17)).tidy();
+    let log = fraction.mul(Pair::constant(core::f64::consts::LOG10_E, 1.098319650216765e-17)).tidy();
     // The first constant leaves eleven bits for k.
-    let exponent =
-        Pair { high: k * c(0.3010299956639528318191878497600555), low: k * c(2.836339455104496415e-14) };
+    let exponent = Pair { high: k * c(0.30102999566395283), low: k * c(2.8363394551044964e-14) };
     let mut result = exponent.add_smaller(log).round();
     repair(unusual(a), a, &mut result, <f64 as Scalar>::log10);
     result
 }
 
 /// Beyond this, `√(a² ± 1)` is `a`.
-const LARGE: f64 = 1152921504606846976.0;
+const LARGE: f64 = 1.152921504606847e+18;
 
 /// `ln 2a` for large `a`, else `ln(1 + f)`
 #[inline(always)]

@@ -7,12 +7,12 @@ use crate::scalar::Scalar;
 
 /// `∛m`, `1 ≤ m ≤ 2`, to 1.2e-6
 const CUBE_ROOT: [f64; 6] = [
-    0.473330678811939631334126943329465575516223907470703125,
-    0.83816003431589347627550523611716926097869873046875,
-    -0.469228720654114861421390969553613103926181793212890625,
-    0.2027772301470197324757549495188868604600429534912109375,
-    -5.0386539243734151938269860693253576755523681640625e-2,
-    5.34854758454895475028312290532994666136801242828369140625e-3,
+    0.47333067881193963,
+    0.8381600343158935,
+    -0.46922872065411486,
+    0.20277723014701973,
+    -0.05038653924373415,
+    0.005348547584548955,
 ];
 
 /// `∛a`: a polynomial and two steps of Newton's method, the second with the exact cube.
@@ -29,7 +29,7 @@ pub fn cbrt<D: Double>(a: D) -> D {
     let (one, two) = (j.eq(c(1.0)), j.eq(c(2.0)));
     let choose = |if_one: f64, if_two: f64| D::select(one, c(if_one), D::select(two, c(if_two), c(1.0)));
     let cube = mantissa * choose(2.0, 4.0);
-    let t = polynomial(mantissa, CUBE_ROOT) * choose(1.2599210498948732, 1.5874010519681995);
+    let t = polynomial(mantissa, CUBE_ROOT) * choose(1.2599210498948732, 1.5874010519681996);
     let square = t * t;
     let t = t - (square * t - cube) / (square * c(3.0));
     let square = product(t, t);
