@@ -8,7 +8,7 @@ mod data;
 mod models;
 
 use data::Record;
-use models::chemistry::{AkzoNobel, E5, Hires, Oregonator, Robertson, RobertsonConserved};
+use models::chemistry::{AkzoNobel, E5, E5Conserved, Hires, Oregonator, Robertson, RobertsonConserved};
 use models::circuits::{RingModulator, TransistorAmplifier, TransistorCapacitors};
 use models::mechanics::{Pleiades, Squeezer};
 use models::oscillators::{VanDerPol, VanDerPolScaled};
@@ -25,6 +25,7 @@ fn derivatives_of_chemistry() {
     derivatives::<Hires>(&Points::random(8).all(0.0..=1.0));
     derivatives::<Oregonator>(&Points::random(8).all(0.1..=3.0));
     derivatives::<E5>(&Points::random(8).all(0.0..=1.0));
+    derivatives::<E5Conserved>(&Points::random(8).all(0.0..=1.0));
     derivatives::<AkzoNobel>(&Points::random(8).all(0.1..=1.0));
 }
 

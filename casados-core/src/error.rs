@@ -75,6 +75,22 @@ pub enum Error {
         /// The unknown `(ẋ, z)`, or the element of the result in column-major order.
         index: usize,
     },
+    /// No step size was short enough: an adaptive integrator cannot get beyond this time.
+    StepSizeUnderflow {
+        /// The time that was reached.
+        t: f64,
+        /// The step that would be next.
+        h: f64,
+        /// Why the one before was refused.
+        reason: Refusal,
+    },
+    /// An adaptive integrator needs more steps than its options allow.
+    TooManySteps {
+        /// The time that was reached.
+        t: f64,
+        /// How many steps were tried.
+        steps: usize,
+    },
     /// A time outside the interval of the last successful call.
     OutsideInterval {
         /// The time.
@@ -94,6 +110,20 @@ pub enum Error {
         /// Its size; the largest number if that is not even a number.
         bytes: usize,
     },
+}
+
+/// Why a step was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// Its estimated error was too large.
+    Error,
+    /// Newton's method did not converge.
+    NotConverged,
+    /// The Newton matrix was singular.
+    Singular,
+    /// The model returned an infinite value or NaN, or the numbers overflowed.
+    NotFinite,
 }
 
 /// Where in a run: all counted from zero.
@@ -220,6 +250,18 @@ impl fmt::Display for Error {
                     f,
                     "the numbers overflow in step {step}, at element {index} of the unknowns or of a result"
                 )
+            }
+            Error::StepSizeUnderflow { t, h, reason } => {
+                let reason = match reason {
+                    Refusal::Error => "the estimated error stays above the tolerance",
+                    Refusal::NotConverged => "Newton's method does not converge",
+                    Refusal::Singular => "the Newton matrix is singular",
+                    Refusal::NotFinite => "the model is not finite",
+                };
+                write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
+            }
+            Error::TooManySteps { t, steps } => {
+                write!(f, "t = {t} was reached after {steps} steps, and more are not allowed")
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")

@@ -19,6 +19,8 @@ compile_error!(
     "casados needs elementary functions: enable the feature `std`, or `libm` for targets without it"
 );
 
+#[cfg(feature = "alloc")]
+pub mod adaptive;
 #[cfg(feature = "num-dual")]
 pub mod dual;
 pub mod erk;
@@ -37,6 +39,8 @@ pub mod tableau;
 #[cfg(feature = "testing")]
 pub mod testing;
 
+#[cfg(feature = "alloc")]
+pub use adaptive::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Radau};
 pub use erk::Erk;
 pub use error::Error;
 pub use irk::Irk;
@@ -55,6 +59,8 @@ pub use tableau::{
 
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {
+    #[cfg(feature = "alloc")]
+    pub use crate::adaptive::{Adaptive, AdaptiveOptions, Radau};
     #[cfg(feature = "alloc")]
     pub use crate::memory::Heap;
     pub use crate::options::{Jacobian, Newton, Options, Start};

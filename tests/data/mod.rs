@@ -45,6 +45,17 @@ impl Record {
         Ok(SVector::from_column_slice(&self.numbers(key, N)?))
     }
 
+    /// A list of numbers of any length.
+    pub fn list(&self, key: &str) -> Result<Vec<f64>, String> {
+        let list = self.0[key].as_array().ok_or_else(|| format!("`{key}` is not a list"))?;
+        let numbers: Vec<f64> = list.iter().filter_map(Value::as_f64).collect();
+        if numbers.len() == list.len() {
+            Ok(numbers)
+        } else {
+            Err(format!("`{key}` is not a list of numbers"))
+        }
+    }
+
     /// A list of rows.
     pub fn matrix<const R: usize, const C: usize>(&self, key: &str) -> Result<SMatrix<f64, R, C>, String> {
         Ok(SMatrix::from_row_slice(&self.numbers(key, R * C)?))

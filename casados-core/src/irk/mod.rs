@@ -32,6 +32,16 @@ pub use adjoint::AdjointMemory;
 pub use forward::{DirectionalMemory, ForwardMemory};
 pub use integrator::Integrator;
 
+// What steps of variable size are made of too.
+#[cfg(feature = "alloc")]
+pub(crate) use self::{
+    assemble::unknown_name,
+    evaluate::{dot, not_finite},
+    record::{Coefficients, Step, Work},
+    run::check,
+    step::From,
+};
+
 use crate::memory::Memory;
 use crate::model::Dae;
 use crate::scalar::Real;

@@ -80,6 +80,7 @@ impl<T: Real, const L: usize> Mul for Complex<T, L> {
 impl<T: Real, const L: usize> Div for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
+    #[allow(clippy::suspicious_arithmetic_impl)] // There is no other quotient.
     fn div(self, other: Self) -> Self {
         self * other.reciprocal()
     }

@@ -17,7 +17,7 @@ use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse;
 use crate::model::{ArrayK, Assembly, Dae};
-use crate::scalar::{Field, Real};
+use crate::scalar::Real;
 use crate::shape::Plain;
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -216,9 +216,10 @@ fn direction<const S: usize>(mut matrix: [[Number; S]; S], mut b: [Number; S]) -
         matrix.swap(k, best);
         b.swap(k, best);
         for i in k + 1..S {
-            let factor = matrix[i][k] / matrix[k][k];
-            for j in k..S {
-                matrix[i][j] = matrix[i][j] - factor * matrix[k][j];
+            let row = matrix[k];
+            let factor = matrix[i][k] / row[k];
+            for (element, above) in matrix[i].iter_mut().zip(row) {
+                *element = *element - factor * above;
             }
             b[i] = b[i] - factor * b[k];
         }

@@ -9,18 +9,19 @@
 //! [`EigenFactors`] is the same for stages that share one Jacobian, in the eigenbasis of the tableau.
 
 mod block;
+#[cfg(feature = "alloc")]
 mod complex;
 mod dense;
-#[allow(dead_code)] // Methods that share one Jacobian among stages use it.
+#[cfg(feature = "alloc")]
 mod eigen;
 mod factors;
 mod fused;
 mod kernels;
 mod sparse;
 
-#[allow(unused_imports)]
+#[cfg(feature = "alloc")]
 pub(crate) use complex::Complex;
-#[allow(unused_imports)]
+#[cfg(feature = "alloc")]
 pub(crate) use eigen::{EigenFactors, Eigenbasis, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};

@@ -1,0 +1,54 @@
+//! The step size: from the estimated error of a step to the length of the next one.
+//!
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; K. Gustafsson, Control-theoretic
+//! techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans. Math. Softw. 20 (1994).
+
+use crate::scalar::Scalar;
+
+/// What the controller may do, of one method.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// A step is this much shorter than the one that would just be accepted.
+    pub safety: f64,
+    /// The most by which a step is shorter than the one before.
+    pub shrink: f64,
+    /// The most by which a step is longer than the one before.
+    pub grow: f64,
+}
+
+/// Of implicit methods.
+pub(super) const IMPLICIT: Limits = Limits { safety: 0.9, shrink: 0.2, grow: 8.0 };
+
+/// What is remembered of the last accepted step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Predictive {
+    last: Option<(f64, f64)>,
+}
+
+impl Predictive {
+    /// The factor for the step size after a step of size `h` with the estimated error `error`, relative to the tolerance,
+    /// that behaves like `h^(1/exponent)`. `effort` is one, or less if the step took many iterations.
+    pub fn factor(&mut self, h: f64, error: f64, exponent: f64, effort: f64, limits: &Limits) -> f64 {
+        let safety = limits.safety * effort;
+        let (least, most) = (1.0 / limits.grow, 1.0 / limits.shrink);
+        let mut quotient = (power(error, exponent) / safety).clamp(least, most);
+        if error < 1.0 {
+            if let Some((step, before)) = self.last {
+                let predicted = step / h * power(error * error / before, exponent) / limits.safety;
+                quotient = quotient.max(predicted.clamp(least, most));
+            }
+            self.last = Some((h, error.max(1e-2)));
+        }
+        1.0 / quotient
+    }
+
+    /// Forgets the last step: the next one is of another method.
+    pub fn forget(&mut self) {
+        self.last = None;
+    }
+}
+
+/// `aᵇ`, by square roots where these are enough.
+fn power(a: f64, b: f64) -> f64 {
+    if b == 0.25 { Scalar::sqrt(Scalar::sqrt(a)) } else { Scalar::powf(a, b) }
+}

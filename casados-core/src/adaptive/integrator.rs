@@ -1,0 +1,280 @@
+//! The adaptive integrator as its users see it.
+
+use super::consistent::Consistent;
+use super::options::{AdaptiveOptions, check_absolute, check_relative};
+use super::run::{Accepted, Base, Levels, Run, Span};
+use super::sealed::Family;
+use super::stages::{MOST, Stages};
+use super::statistics::AdaptiveStatistics;
+use super::tape::Tape;
+use crate::error::{Argument, Error};
+use crate::irk::check;
+use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::result::{Dense, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use alloc::boxed::Box;
+use bytemuck::allocation::try_zeroed_box;
+use core::marker::PhantomData;
+
+/// An adaptive integrator of the method `B` for the model `M`; see [`Adaptive`](super::Adaptive).
+///
+/// All calls take the state at the start of the interval, the control, and the time at its end, which may lie before
+/// the start. They return a reference to results in the memory of the integrator.
+///
+/// # Errors
+/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`]; [`Error::Singular`] and
+/// [`Error::NotConverged`] if there are no consistent `ẋ` and `z` at the start; [`Error::NonFiniteModel`] if the
+/// model has no finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
+/// [`Error::OutOfMemory`]. Then the integrator is usable.
+pub struct Integrator<M: Dae, B, T: Real> {
+    options: AdaptiveOptions,
+    base: Box<Base<M, T>>,
+    consistent: Consistent<M, T>,
+    levels: Levels<M, T>,
+    tape: Tape<T>,
+    statistics: AdaptiveStatistics,
+    parameters: bool,
+    start: T,
+    /// The interval of the last successful call.
+    last: Option<Span<T>>,
+    method: PhantomData<fn() -> B>,
+}
+
+impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
+    /// An integrator with its memory on the heap.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`], [`Error::OutOfMemory`]
+    pub fn new(options: AdaptiveOptions) -> Result<Self, Error> {
+        options.check(T::EPSILON.to_f64())?;
+        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Base<M, T>>() };
+        let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
+        base.rtol.as_mut().fill(T::from_f64(options.rtol));
+        base.atol.as_mut().fill(T::from_f64(options.atol));
+        Ok(Self {
+            options,
+            base,
+            consistent: Consistent::default(),
+            levels: Levels::default(),
+            tape: Tape::default(),
+            statistics: AdaptiveStatistics::default(),
+            parameters: M::Shape::NP == 0,
+            start: T::ZERO,
+            last: None,
+            method: PhantomData,
+        })
+    }
+
+    /// The parameters `p` of all following calls.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]: then the last parameters stay.
+    pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        check(Argument::P, p.as_slice())?;
+        self.base.parameters = *p;
+        self.parameters = true;
+        Ok(())
+    }
+
+    /// The time at the start of the interval of all following calls; zero if never set.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]: then the last time stays.
+    pub fn set_time(&mut self, t: T) -> Result<(), Error> {
+        check(Argument::T, &[t])?;
+        self.start = t;
+        Ok(())
+    }
+
+    /// Start values `ẋ` and `z` from which consistent ones are found; zero if never set. Where there are several
+    /// solutions they decide for one.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]: then the last values stay.
+    pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
+        check(Argument::StartXdot, xdot.as_slice())?;
+        check(Argument::StartZ, z.as_slice())?;
+        stack::<M, T>(&mut self.base.given, xdot, z);
+        Ok(())
+    }
+
+    /// The relative tolerance of each state, instead of that of the options.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`]: then the last ones stay.
+    pub fn set_relative_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
+        for rtol in x.as_slice().iter().chain(z.as_slice()) {
+            check_relative(rtol.to_f64(), T::EPSILON.to_f64())?;
+        }
+        stack::<M, T>(&mut self.base.rtol, x, z);
+        Ok(())
+    }
+
+    /// The absolute tolerance of each state, instead of that of the options.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`]: then the last ones stay.
+    pub fn set_absolute_tolerances(&mut self, x: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
+        for atol in x.as_slice().iter().chain(z.as_slice()) {
+            check_absolute(atol.to_f64())?;
+        }
+        stack::<M, T>(&mut self.base.atol, x, z);
+        Ok(())
+    }
+
+    /// The options.
+    #[must_use]
+    pub fn options(&self) -> &AdaptiveOptions {
+        &self.options
+    }
+
+    /// What the last call did, successful or not.
+    #[must_use]
+    pub fn statistics(&self) -> &AdaptiveStatistics {
+        &self.statistics
+    }
+
+    /// The times between the accepted steps of the last call, the start first, if steps are remembered.
+    pub fn times(&self) -> impl Iterator<Item = T> {
+        let end = self.last.map(|span| span.end);
+        self.tape.entries().iter().map(|entry| entry.t).chain(end)
+    }
+
+    /// `x` and `z` at the end, and the consistent `z` at the start.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn solve(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.run(x0, u, t_end, |_, _| Ok(()))?;
+        Ok(&self.base.result)
+    }
+
+    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times while the integration
+    /// passes them; steps need not be remembered for it.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::OutsideInterval`] of a time that is outside or before the one that precedes it.
+    pub fn solve_at(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        times: &[T],
+        mut output: impl FnMut(T, &Dense<M, T>),
+    ) -> Result<&Nominal<M, T>, Error> {
+        check(Argument::T, times)?;
+        let (start, end) = (self.start, t_end);
+        let mut before = start;
+        for t in times {
+            if !inside(*t, before, end) {
+                let (t, start, end) = (t.to_f64(), before.to_f64(), end.to_f64());
+                return Err(Error::OutsideInterval { t, start, end });
+            }
+            before = *t;
+        }
+        let mut times = times.iter().copied().peekable();
+        self.run(x0, u, t_end, |step, dense| {
+            while let Some(t) = times.next_if(|t| inside(*t, start, step.end)) {
+                interpolate::<M, T>(step.stages, step.x, step.stages.accepted(), t - step.t, step.h, dense);
+                output(t, dense);
+            }
+            Ok(())
+        })?;
+        // Of an interval without length.
+        let Base { result, dense, .. } = &mut *self.base;
+        (dense.x, dense.z) = (result.x, result.z);
+        for t in times {
+            output(t, dense);
+        }
+        Ok(&self.base.result)
+    }
+
+    /// The solution at a time inside the interval of the last successful call.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`], also if steps are not remembered; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
+        check(Argument::T, &[t])?;
+        let span = self.last.ok_or(Error::NoResult)?;
+        if !inside(t, span.start, span.end) {
+            let (t, start, end) = (t.to_f64(), span.start.to_f64(), span.end.to_f64());
+            return Err(Error::OutsideInterval { t, start, end });
+        }
+        let step = self.tape.find(t);
+        let Base { result, dense, .. } = &mut *self.base;
+        match self.tape.entries().get(step) {
+            Some(entry) => {
+                let stages = self.levels.get::<B>(entry.level)?;
+                let (x, y) = self.tape.numbers(step, M::Shape::NX);
+                interpolate::<M, T>(stages, x, y, t - entry.t, entry.h, dense);
+            }
+            None if span.start == span.end => (dense.x, dense.z) = (result.x, result.z),
+            None => return Err(Error::NoResult),
+        }
+        Ok(dense)
+    }
+
+    fn run(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        after: impl FnMut(&Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.last = None;
+        self.statistics = AdaptiveStatistics::default();
+        check(Argument::X0, x0.as_slice())?;
+        check(Argument::U, u.as_slice())?;
+        check(Argument::T, &[t_end, t_end - self.start])?;
+        if !self.parameters {
+            return Err(Error::ParametersNotSet);
+        }
+        self.base.u = *u;
+        let span = Span { start: self.start, end: t_end };
+        let Self { options, base, consistent, levels, tape, statistics, .. } = self;
+        Run { options, base, consistent, tape, statistics }.integrate::<B>(levels, x0, span, after)?;
+        self.last = Some(span);
+        Ok(())
+    }
+}
+
+/// Whether a time lies in an interval of any direction.
+fn inside<T: Real>(t: T, start: T, end: T) -> bool {
+    if start <= end { start <= t && t <= end } else { end <= t && t <= start }
+}
+
+/// `(x, z)` as one array.
+fn stack<M: Dae, T: Real>(to: &mut ArrayK<M, T>, x: &VectorX<M, T>, z: &VectorZ<M, T>) {
+    for (to, from) in to.as_mut().iter_mut().zip(x.as_slice().iter().chain(z.as_slice())) {
+        *to = *from;
+    }
+}
+
+/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
+fn interpolate<M: Dae, T: Real>(
+    stages: &dyn Stages<M, T>,
+    x: &[T],
+    y: &[T],
+    passed: T,
+    h: T,
+    dense: &mut Dense<M, T>,
+) {
+    let theta = (passed / h).to_f64();
+    let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
+    let sum = |weights: &[f64; MOST], y: &[T]| {
+        weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
+    };
+    let mut unknowns = y.chunks_exact(stages.count());
+    for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
+        *to = *x + h * sum(&weights, k);
+    }
+    for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
+        *to = sum(&lagrange, z);
+    }
+}

@@ -1,0 +1,87 @@
+//! What can be chosen about an adaptive integrator.
+
+use crate::error::Error;
+
+/// What can be chosen about an adaptive integrator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdaptiveOptions {
+    /// Relative tolerance of the error of one step.
+    pub rtol: f64,
+    /// Absolute tolerance of the error of one step.
+    pub atol: f64,
+    /// The first step; chosen if it is not given.
+    pub initial_step: Option<f64>,
+    /// No step is longer.
+    pub max_step: f64,
+    /// A step that would have to be shorter is the error `StepSizeUnderflow`.
+    pub min_step: f64,
+    /// More steps than these, refused ones included, are the error `TooManySteps`.
+    pub max_steps: usize,
+    /// Whether steps are remembered: dense output over the whole interval and sensitivities need them.
+    pub keep_steps: bool,
+}
+
+impl Default for AdaptiveOptions {
+    /// Six digits, nine for values below `1e-3`; all steps are remembered.
+    fn default() -> Self {
+        Self {
+            rtol: 1e-6,
+            atol: 1e-9,
+            initial_step: None,
+            max_step: f64::INFINITY,
+            min_step: 0.0,
+            max_steps: 100_000,
+            keep_steps: true,
+        }
+    }
+}
+
+/// The smallest relative tolerance, in ε: below, rounding errors are taken for errors of the method.
+const FINEST: f64 = 10.0;
+
+impl AdaptiveOptions {
+    /// # Errors
+    /// [`Error::InvalidOption`] for the first value that makes no sense. `epsilon` is that of the number type.
+    pub fn check(&self, epsilon: f64) -> Result<(), Error> {
+        let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
+        check_relative(self.rtol, epsilon)?;
+        check_absolute(self.atol)?;
+        if let Some(step) = self.initial_step
+            && !(step > 0.0 && step.is_finite())
+        {
+            return invalid("initial_step", step, "a step has a positive length");
+        }
+        if self.max_step.is_nan() || self.max_step <= 0.0 {
+            return invalid("max_step", self.max_step, "a step has a positive length");
+        }
+        if !(self.min_step >= 0.0 && self.min_step <= self.max_step) {
+            return invalid("min_step", self.min_step, "it is not between zero and the longest step");
+        }
+        if self.max_steps == 0 {
+            return invalid("max_steps", 0.0, "an interval has at least one step");
+        }
+        Ok(())
+    }
+}
+
+/// # Errors
+/// [`Error::InvalidOption`]
+pub(super) fn check_relative(rtol: f64, epsilon: f64) -> Result<(), Error> {
+    if rtol >= FINEST * epsilon && rtol <= 1.0 {
+        return Ok(());
+    }
+    Err(Error::InvalidOption {
+        option: "rtol",
+        value: rtol,
+        reason: "a relative tolerance is between ten units of rounding and one",
+    })
+}
+
+/// # Errors
+/// [`Error::InvalidOption`]
+pub(super) fn check_absolute(atol: f64) -> Result<(), Error> {
+    if atol > 0.0 && atol.is_finite() {
+        return Ok(());
+    }
+    Err(Error::InvalidOption { option: "atol", value: atol, reason: "an absolute tolerance is above zero" })
+}

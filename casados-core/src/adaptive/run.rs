@@ -1,0 +1,491 @@
+//! The steps of an interval.
+
+use super::consistent::{Consistent, place_inputs};
+use super::control::{IMPLICIT, Predictive};
+use super::norm::norm;
+use super::options::AdaptiveOptions;
+use super::sealed::Family;
+use super::stages::{Convergence, FAST, Failure, Stages, Start};
+use super::statistics::AdaptiveStatistics;
+use super::tape::Tape;
+use crate::error::{Error, Place, Quantity, Refusal};
+use crate::irk::not_finite;
+use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
+use crate::result::{Dense, Nominal};
+use crate::scalar::{Real, Scalar};
+use crate::shape::{Matrix, Plain, Shape};
+use crate::statistics::Statistics;
+use alloc::boxed::Box;
+use bytemuck::Zeroable;
+
+/// The number of stages grows where Newton's method converges at this rate or faster,
+const EASY: f64 = 0.002;
+/// and falls where it converges at this rate or slower,
+const HARD: f64 = 0.8;
+/// but grows only if the step size hardly changes,
+const STEADY: (f64, f64) = (0.8, 1.2);
+/// and not before so many steps have been taken with it.
+const SETTLED: usize = 10;
+/// A step is not made longer by less than this: the factors of its matrix are worth more.
+const WORTHWHILE: f64 = 1.2;
+/// After so many singular matrices in a row the problem is.
+const SINGULAR: usize = 5;
+
+/// Memory of a run.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+pub(super) struct Base<M: Dae, T: Plain> {
+    /// The variables at the time that was reached.
+    pub point: ArrayV<M, T>,
+    pub jacobian: M::Jacobian<T>,
+    pub f: ArrayK<M, T>,
+    /// `(ẋ, z)` at the start.
+    pub start: ArrayK<M, T>,
+    /// Start values for them, as they were given.
+    pub given: ArrayK<M, T>,
+    /// Tolerances of `(x, z)` as they were asked for,
+    pub rtol: ArrayK<M, T>,
+    pub atol: ArrayK<M, T>,
+    /// as the method needs them,
+    tight: ArrayK<M, (T, T)>,
+    /// and the reciprocals of the errors that they tolerate.
+    scale: ArrayK<M, T>,
+    pub result: Nominal<M, T>,
+    pub dense: Dense<M, T>,
+    pub parameters: VectorP<M, T>,
+    pub u: VectorU<M, T>,
+    /// Whether the constant entries of the Jacobian are there.
+    ready: bool,
+}
+
+/// What has to be done before a step can be tried.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+enum Need {
+    Nothing,
+    Factors,
+    Jacobian,
+}
+
+/// An interval.
+#[derive(Clone, Copy)]
+pub(super) struct Span<T> {
+    pub start: T,
+    pub end: T,
+}
+
+/// The levels of a family that are in use.
+pub(super) struct Levels<M: Dae, T: Real> {
+    open: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
+}
+
+impl<M: Dae, T: Real> Default for Levels<M, T> {
+    fn default() -> Self {
+        Self { open: [None, None, None] }
+    }
+}
+
+impl<M: Dae, T: Real> Levels<M, T> {
+    pub fn get<B: Family>(&mut self, level: usize) -> Result<&mut dyn Stages<M, T>, Error> {
+        let missing = Error::OutOfMemory { bytes: 0 };
+        let place = self.open.get_mut(level).ok_or(missing)?;
+        if place.is_none() {
+            *place = Some(B::open::<M, T>(level)?);
+        }
+        match place {
+            Some(stages) => Ok(&mut **stages),
+            None => Err(missing),
+        }
+    }
+
+    /// The last accepted step of one level becomes that of another.
+    fn change<B: Family>(&mut self, from: usize, to: usize) -> Result<(), Error> {
+        self.get::<B>(from)?;
+        self.get::<B>(to)?;
+        let [first, second, third] = &mut self.open;
+        let (old, new) = match (from, to) {
+            (0, 1) => (first, second),
+            (1, 0) => (second, first),
+            (1, 2) => (second, third),
+            (2, 1) => (third, second),
+            _ => return Ok(()),
+        };
+        if let (Some(old), Some(new)) = (old, new) {
+            new.adopt(&**old);
+        }
+        Ok(())
+    }
+}
+
+/// What a run works with.
+pub(super) struct Run<'a, M: Dae, T: Real> {
+    pub options: &'a AdaptiveOptions,
+    pub base: &'a mut Base<M, T>,
+    pub consistent: &'a mut Consistent<M, T>,
+    pub tape: &'a mut Tape<T>,
+    pub statistics: &'a mut AdaptiveStatistics,
+}
+
+/// An accepted step, for those who want to know its polynomial.
+pub(super) struct Accepted<'a, M: Dae, T: Real> {
+    pub stages: &'a dyn Stages<M, T>,
+    pub x: &'a [T],
+    pub t: T,
+    pub h: T,
+    /// The time at its end.
+    pub end: T,
+}
+
+impl<M: Dae, T: Real> Run<'_, M, T> {
+    /// Integrates the interval from `x0`; `after` is called after each accepted step.
+    ///
+    /// # Errors
+    /// No consistent start, and whatever ends a run early.
+    pub fn integrate<B: Family>(
+        &mut self,
+        levels: &mut Levels<M, T>,
+        x0: &VectorX<M, T>,
+        span: Span<T>,
+        mut after: impl FnMut(&Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        self.tape.clear();
+        self.prepare(x0, span)?;
+        let mut level = 0;
+        self.tighten(B::STAGES.0);
+        let mut stages = levels.get::<B>(level)?;
+        let length = span.end - span.start;
+        let direction = if length < T::ZERO { -1.0 } else { 1.0 };
+        let longest = length.to_f64().abs().min(self.options.max_step);
+        let mut t = span.start;
+        let mut h = T::from_f64(direction * self.first_step(span, longest)?);
+        if length == T::ZERO {
+            self.finish();
+            return Ok(());
+        }
+        let mut last = false;
+        if ((t + h * T::from_f64(1.0001) - span.end) * T::from_f64(direction)).to_f64() >= 0.0 {
+            (h, last) = (span.end - t, true);
+        }
+        let mut accepted_h: Option<T> = None;
+        let mut need = Need::Jacobian;
+        let (mut current, mut rejected) = (false, false);
+        let (mut unexpected, mut much_shorter, mut same_matrix) = (false, false, false);
+        let (mut rate, mut settled, mut singular, mut troubles) = (0.0f64, 0usize, 0, 0);
+        let mut convergence = Convergence::default();
+        let mut controller = Predictive::default();
+        let mut refusal = Refusal::Error;
+        let mut tried = 0;
+        let mut pivoted = false;
+        loop {
+            if need == Need::Jacobian {
+                self.evaluate_jacobian(tried)?;
+                current = true;
+            }
+            let mut changed = false;
+            if need >= Need::Factors {
+                settled += 1;
+                rate = convergence.rate.max(0.5 * rate).min(10.0);
+                let ratio = accepted_h.map_or(1.0, |before| (h / before).to_f64());
+                let mut next = level;
+                let steady = ratio > STEADY.0 && ratio < STEADY.1;
+                if convergence.iterations > 1 && rate <= EASY && steady && settled > SETTLED {
+                    next = (level + 1).min(B::LEVELS - 1);
+                }
+                if rate >= HARD || unexpected || much_shorter {
+                    next = level.saturating_sub(1);
+                }
+                (unexpected, much_shorter) = (false, false);
+                if next != level {
+                    levels.change::<B>(level, next)?;
+                    (level, settled, changed) = (next, 1, true);
+                    stages = levels.get::<B>(level)?;
+                    self.tighten(stages.count());
+                    controller.forget();
+                }
+                stages.set_pivoted(pivoted);
+                self.statistics.factorizations += 1;
+                match stages.factor(&self.base.jacobian, h) {
+                    Ok(planned) => {
+                        singular = 0;
+                        self.statistics.dense += usize::from(!planned);
+                    }
+                    Err(unknown) => {
+                        singular += 1;
+                        if singular >= SINGULAR {
+                            let at = Place { step: tried, stage: 0, iteration: 0 };
+                            return Err(Error::Singular {
+                                unknown: crate::irk::unknown_name::<M>(unknown),
+                                at,
+                            });
+                        }
+                        refusal = Refusal::Singular;
+                        self.statistics.failed += 1;
+                        h = h * T::from_f64(0.5);
+                        (unexpected, rejected, last) = (true, true, false);
+                        need = if current { Need::Factors } else { Need::Jacobian };
+                        self.check_step(t, h, refusal)?;
+                        continue;
+                    }
+                }
+            } else if same_matrix {
+                same_matrix = false;
+                settled += 1;
+                if settled >= SETTLED && level + 1 < B::LEVELS {
+                    need = Need::Factors;
+                    continue;
+                }
+            }
+            if tried >= self.options.max_steps {
+                return Err(Error::TooManySteps { t: t.to_f64(), steps: tried });
+            }
+            self.check_step(t, h, refusal)?;
+            tried += 1;
+            match accepted_h {
+                Some(before) => stages.continue_from_last((h / before).to_f64()),
+                None => stages.begin(&self.base.point),
+            }
+            let start = Start { point: &self.base.point, scale: &self.base.scale, h };
+            let tolerance = newton_tolerance(self.options.rtol, stages.count());
+            let residuals = &mut self.statistics.residuals;
+            let outcome = stages.solve(&start, tolerance, &mut convergence, residuals);
+            self.statistics.iterations += convergence.iterations;
+            let outcome = outcome.and_then(|()| {
+                stages
+                    .error(&start, accepted_h.is_none() || rejected, residuals)
+                    .and_then(|error| if error.is_finite() { Ok(error) } else { Err(Failure::Diverges) })
+            });
+            let error = match outcome {
+                Ok(error) => error,
+                Err(failure) => {
+                    self.statistics.failed += 1;
+                    troubles += 1;
+                    let factor = match failure {
+                        Failure::Slow(factor) => {
+                            refusal = Refusal::NotConverged;
+                            much_shorter = factor <= 0.5;
+                            factor
+                        }
+                        Failure::Diverges => {
+                            refusal = Refusal::NotConverged;
+                            unexpected = true;
+                            0.5
+                        }
+                        Failure::NotFinite => {
+                            refusal = Refusal::NotFinite;
+                            unexpected = true;
+                            0.5
+                        }
+                    };
+                    // The planned elimination may be to blame.
+                    pivoted = troubles > 1;
+                    h = h * T::from_f64(factor);
+                    (rejected, last) = (true, false);
+                    need = if current { Need::Factors } else { Need::Jacobian };
+                    continue;
+                }
+            };
+            let order = stages.count() as f64 + 1.0;
+            let most = 2.0 * convergence.most as f64;
+            let effort = (1.0 + most) / (convergence.iterations as f64 + most);
+            if changed {
+                controller.forget();
+            }
+            let factor = controller.factor(h.to_f64(), error, 1.0 / order, effort, &IMPLICIT);
+            if error >= 1.0 {
+                self.statistics.rejected += 1;
+                refusal = Refusal::Error;
+                h = h * T::from_f64(if accepted_h.is_none() { 0.1 } else { factor });
+                (rejected, last) = (true, false);
+                need = if current { Need::Factors } else { Need::Jacobian };
+                continue;
+            }
+
+            // The step is accepted.
+            self.statistics.steps += 1;
+            (troubles, pivoted) = (0, false);
+            stages.accept();
+            if self.options.keep_steps {
+                let x = &self.base.point.as_ref()[nx..2 * nx];
+                self.tape.push(t, h, level, x, stages.accepted())?;
+            }
+            let end = if last { span.end } else { t + h };
+            let x = &self.base.point.as_ref()[nx..2 * nx];
+            after(&Accepted { stages, x, t, h, end }, &mut self.base.dense)?;
+            self.base.point = *stages.end();
+            t = end;
+            if let Some(time) = self.base.point.as_mut().last_mut() {
+                *time = t;
+            }
+            accepted_h = Some(h);
+            current = false;
+            if last {
+                self.finish();
+                return Ok(());
+            }
+            self.measure();
+            let mut next = (h.to_f64().abs() * factor).min(longest);
+            if rejected {
+                next = next.min(h.to_f64().abs());
+            }
+            rejected = false;
+            let fast = convergence.rate <= FAST;
+            let next_h = T::from_f64(direction * next);
+            if ((t + next_h - span.end) * T::from_f64(direction)).to_f64() >= 0.0 {
+                (h, last) = (span.end - t, true);
+            } else {
+                let ratio = next / h.to_f64().abs();
+                if fast && (1.0..=WORTHWHILE).contains(&ratio) {
+                    (need, same_matrix) = (Need::Nothing, true);
+                    continue;
+                }
+                h = next_h;
+            }
+            need = if fast { Need::Factors } else { Need::Jacobian };
+        }
+    }
+
+    /// Everything at the start of the interval.
+    fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let Base { point, start, given, u, parameters, jacobian, result, ready, .. } = &mut *self.base;
+        if !*ready {
+            M::jacobian_constants::<T>(jacobian);
+            *ready = true;
+        }
+        *start = *given;
+        let mut statistics = Statistics::default();
+        let solved = self.consistent.solve(x0.as_slice(), u, parameters, span.start, start, &mut statistics);
+        self.statistics.residuals += statistics.residuals + statistics.jacobians;
+        match solved {
+            Ok(()) => {}
+            // Without algebraic states all equations may still be solvable: the matrix of ẋ has not full rank.
+            Err(Error::Singular { .. }) if M::Shape::NZ == 0 => *start = Zeroable::zeroed(),
+            Err(error) => return Err(error),
+        }
+        let numbers = point.as_mut();
+        for (index, value) in start.as_ref().iter().enumerate() {
+            numbers[if index < nx { index } else { index + nx }] = *value;
+        }
+        numbers[nx..2 * nx].copy_from_slice(x0.as_slice());
+        place_inputs::<M, T>(numbers, u, parameters);
+        if let Some(time) = numbers.last_mut() {
+            *time = span.start;
+        }
+        result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[nx..]);
+        Ok(())
+    }
+
+    /// The solution at the end.
+    fn finish(&mut self) {
+        let nx = M::Shape::NX;
+        let Base { point, result, .. } = &mut *self.base;
+        let states = &point.as_ref()[nx..];
+        result.x.as_mut_slice().copy_from_slice(&states[..nx]);
+        result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
+    }
+
+    /// Tolerances of the estimate: it is of lower order than the method, `s` instead of `2s − 1`.
+    fn tighten(&mut self, stages: usize) {
+        let s = stages as f64;
+        let exponent = (s + 1.0) / (2.0 * s);
+        let Base { tight, rtol, atol, .. } = &mut *self.base;
+        let mut before = (T::ZERO, T::ZERO);
+        for ((tight, rtol), atol) in tight.as_mut().iter_mut().zip(rtol.as_ref()).zip(atol.as_ref()) {
+            // Mostly they are all the same.
+            if before.0 != *rtol {
+                before = (*rtol, T::from_f64(0.1 * Scalar::powf(rtol.to_f64(), exponent)));
+            }
+            *tight = (before.1, before.1 / *rtol * *atol);
+        }
+        self.measure();
+    }
+
+    /// What is tolerated at the time that was reached.
+    fn measure(&mut self) {
+        let Base { tight, scale, point, .. } = &mut *self.base;
+        let states = &point.as_ref()[M::Shape::NX..];
+        for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tight.as_ref()).zip(states) {
+            *scale = T::ONE / (*atol + *rtol * state.abs());
+        }
+    }
+
+    /// # Errors
+    /// A value that is not finite.
+    fn evaluate_jacobian(&mut self, step: usize) -> Result<(), Error> {
+        let Base { point, f, jacobian, .. } = &mut *self.base;
+        self.statistics.jacobians += 1;
+        M::residual_jacobian::<T>(point, f, jacobian);
+        let at = Place { step, stage: 0, iteration: 0 };
+        if let Some((equation, value)) = not_finite(f.as_ref()) {
+            return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });
+        }
+        if let Some((entry, value)) = not_finite(jacobian.as_ref()) {
+            let equation = M::STRUCTURE.jacobian.at(entry).0;
+            return Err(Error::NonFiniteModel { quantity: Quantity::Jacobian, equation, value, at });
+        }
+        Ok(())
+    }
+
+    /// # Errors
+    /// [`Error::StepSizeUnderflow`]
+    fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
+        let size = h.to_f64().abs();
+        let tenth = T::from_f64(0.1) * h;
+        if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + tenth == t {
+            return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason });
+        }
+        Ok(())
+    }
+
+    /// The length of the first step: that in which an explicit Euler step changes the solution, and its derivative, by
+    /// a hundredth of their size (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I,
+    /// section II.4).
+    fn first_step(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
+        if let Some(step) = self.options.initial_step {
+            return Ok(step.min(longest));
+        }
+        let nx = M::Shape::NX;
+        let Base { point, rtol, atol, scale, parameters, u, start, .. } = &mut *self.base;
+        let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
+        let states = &point.as_ref()[nx..2 * nx];
+        for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tolerances).zip(states) {
+            *scale = T::ONE / (*atol + *rtol * state.abs());
+        }
+        let scale = &scale.as_ref()[..nx];
+        let xdot = &start.as_ref()[..nx];
+        let (size, slope) = (norm(states, scale), norm(xdot, scale));
+        let mut step = if size < 1e-5 || slope < 1e-5 { 1e-6 } else { 0.01 * size / slope };
+        step = step.min(longest);
+        // A second point, if there is a consistent one.
+        let h = T::from_f64(if span.end < span.start { -step } else { step });
+        let mut x = VectorX::<M, T>::zeroed();
+        for ((to, x), xdot) in x.as_mut_slice().iter_mut().zip(states).zip(xdot) {
+            *to = *x + h * *xdot;
+        }
+        let mut y = *start;
+        let mut statistics = Statistics::default();
+        let t = span.start + h;
+        let solved = self.consistent.solve(x.as_slice(), u, parameters, t, &mut y, &mut statistics);
+        self.statistics.residuals += statistics.residuals + statistics.jacobians;
+        let mut curvature = 0.0;
+        if solved.is_ok() {
+            for (y, xdot) in y.as_mut().iter_mut().zip(xdot) {
+                *y = *y - *xdot;
+            }
+            curvature = norm(&y.as_ref()[..nx], scale) / step;
+        }
+        let largest = slope.max(curvature);
+        let second =
+            if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { Scalar::powf(0.01 / largest, 0.25) };
+        self.measure();
+        Ok((100.0 * step).min(second).min(longest))
+    }
+}
+
+/// Where Newton's method may stop: its error is then small beside that of the step.
+fn newton_tolerance(rtol: f64, stages: usize) -> f64 {
+    let s = stages as f64;
+    let tight = 0.1 * Scalar::powf(rtol, (s + 1.0) / (2.0 * s));
+    let wanted = Scalar::powf(tight, (s - 1.0) / (s + 1.0)).min(0.03);
+    wanted.max(10.0 * f64::EPSILON / tight)
+}

@@ -1,0 +1,22 @@
+//! What the last call did.
+
+/// What the last call of an adaptive integrator did, successful or not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AdaptiveStatistics {
+    /// Steps that were accepted.
+    pub steps: usize,
+    /// Steps whose error was too large.
+    pub rejected: usize,
+    /// Steps whose stages were not found: Newton's method was slow or failed.
+    pub failed: usize,
+    /// Evaluations of the residual at one point.
+    pub residuals: usize,
+    /// Evaluations of the Jacobian.
+    pub jacobians: usize,
+    /// Factorisations of the Newton matrix, all eigenvalues together.
+    pub factorizations: usize,
+    /// Those of them in which the planned elimination was not good enough.
+    pub dense: usize,
+    /// Iterations of Newton's method, all steps together.
+    pub iterations: usize,
+}

@@ -1,0 +1,72 @@
+//! The accepted steps, as many as there are.
+
+use crate::error::Error;
+use crate::scalar::Real;
+use alloc::vec::Vec;
+
+/// An accepted step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry<T> {
+    /// Its start.
+    pub t: T,
+    /// Its length.
+    pub h: T,
+    /// Which method of the family took it.
+    pub level: usize,
+    /// Where its numbers begin.
+    begin: usize,
+}
+
+/// Steps one after the other, with the numbers of each: the states at its start, then the unknowns of its stages.
+#[derive(Debug)]
+pub(super) struct Tape<T> {
+    entries: Vec<Entry<T>>,
+    numbers: Vec<T>,
+}
+
+impl<T> Default for Tape<T> {
+    fn default() -> Self {
+        Self { entries: Vec::new(), numbers: Vec::new() }
+    }
+}
+
+impl<T: Real> Tape<T> {
+    pub fn clear(&mut self) {
+        self.entries.clear();
+        self.numbers.clear();
+    }
+
+    pub fn entries(&self) -> &[Entry<T>] {
+        &self.entries
+    }
+
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn push(&mut self, t: T, h: T, level: usize, x: &[T], stages: &[T]) -> Result<(), Error> {
+        let length = x.len() + stages.len();
+        let bytes = (self.numbers.len() + length).saturating_mul(size_of::<T>());
+        let out_of_memory = Error::OutOfMemory { bytes };
+        self.entries.try_reserve(1).map_err(|_| out_of_memory)?;
+        self.numbers.try_reserve(length).map_err(|_| out_of_memory)?;
+        let begin = self.numbers.len();
+        self.numbers.extend_from_slice(x);
+        self.numbers.extend_from_slice(stages);
+        self.entries.push(Entry { t, h, level, begin });
+        Ok(())
+    }
+
+    /// The states at the start of a step, and the unknowns of its stages.
+    pub fn numbers(&self, step: usize, states: usize) -> (&[T], &[T]) {
+        let begin = self.entries.get(step).map_or(self.numbers.len(), |entry| entry.begin);
+        let end = self.entries.get(step + 1).map_or(self.numbers.len(), |entry| entry.begin);
+        let numbers = self.numbers.get(begin..end).unwrap_or_default();
+        numbers.split_at(states.min(numbers.len()))
+    }
+
+    /// The step that contains a time; the last one that begins before it.
+    pub fn find(&self, t: T) -> usize {
+        let forward = self.entries.first().is_none_or(|entry| entry.h >= T::ZERO);
+        let after = self.entries.partition_point(|entry| if forward { entry.t <= t } else { entry.t >= t });
+        after.saturating_sub(1)
+    }
+}
