@@ -244,8 +244,9 @@ fn costs_without_a_plan() {
                 for i in k + 1..n {
                     let factor = a[i][k] / a[k][k];
                     a[i][k] = factor;
-                    for j in k + 1..n {
-                        a[i][j] = a[i][j] - factor * a[k][j];
+                    let (above, below) = a.split_at_mut(i);
+                    for (entry, pivot) in below[0].iter_mut().zip(&above[k]).skip(k + 1) {
+                        *entry = *entry - factor * *pivot;
                     }
                 }
             }

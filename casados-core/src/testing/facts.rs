@@ -18,15 +18,14 @@ pub(super) fn compare<M: Dae>(
     let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
     let (end_z, time) = (2 * nx + nz, M::Shape::NV - 1);
     let matrix = structure.blocks[3];
-    let jacobian = |v: &ArrayV<M, f64>| {
-        let (_, jacobian) = evaluate::jacobian::<M, f64>(v);
-        Vec::from(jacobian.as_ref())
-    };
+    let jacobian = |v: &ArrayV<M, f64>| evaluate::jacobian::<M, f64>(v).1;
     let mut unchanged = |what: &'static str, entries: &[usize], moved: &dyn Fn(usize) -> bool| {
         let v2 = <ArrayV<M, f64> as Array<f64>>::from_fn(|i| if moved(i) { other[i] } else { v[i] });
         let (here, there) = (jacobian(v), jacobian(&v2));
-        let found =
-            entries.iter().map(|&e| (e, Entry { value: there[e], expected: here[e], tolerance: 0.0 }));
+        let found = entries.iter().map(|&e| {
+            let at = structure.jacobian.at(e);
+            (e, Entry { value: there[at], expected: here[at], tolerance: 0.0 })
+        });
         let name = |e: usize| {
             let (row, column) = structure.jacobian.at(e);
             format!("of equation {row} by {}", structure.variable(column as u32))
