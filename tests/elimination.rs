@@ -133,6 +133,34 @@ fn the_whole_matrix_is_pivoted_where_the_plan_fails() {
     assert!(pivoted > 0, "no static order is right for all of these");
 }
 
+/// An algebraic part that was planned for a range, and is used outside of it, where the coefficient of `z₀` vanishes:
+/// `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`.
+#[dae(range(u = 40.0..=60.0), nominal(x = 0.5))]
+fn out_of_range(xdot: f64, x: f64, z: [f64; 2], u: f64) -> [f64; 3] {
+    [xdot + x - z[0], (u - 30.0) * z[0] + 2.0 * z[1] - 1.0, 2.0 * z[0] + 3.0 * z[1] - u]
+}
+
+#[test]
+fn a_range_is_no_promise() {
+    let plan = OutOfRange::STRUCTURE.elimination;
+    assert_eq!(plan.slot_of_equation, [0, 1, 2], "z₀ is found from the second equation");
+    for u in [30.0, 30.0 + 1e-14, 30.0 - 1e-9, 29.0, 50.0, -100.0] {
+        let mut irk = Irk::<OutOfRange, RadauIIA<2>>::new(Options::default()).unwrap();
+        let step = irk.forward(&vector![1.0], &vector![u], 0.1).unwrap();
+        let (delta, determinant) = (u - 30.0, 3.0 * (u - 30.0) - 4.0);
+        let z = [(3.0 - 2.0 * u) / determinant, (delta * u - 2.0) / determinant];
+        let by_u = [(-3.0 * z[0] - 2.0) / determinant, (delta + 2.0 * z[0]) / determinant];
+        // Largest element of the matrix times that of its inverse, ε, and eight operations.
+        let condition = delta.abs().max(3.0).powi(2) / determinant.abs();
+        let bound = |size: [f64; 2]| 8.0 * f64::EPSILON * condition * size[0].abs().max(size[1].abs());
+        for i in 0..2 {
+            assert!((step.z[i] - z[i]).abs() <= bound(z), "u = {u}: {} {}", step.z[i], z[i]);
+            let found = step.dz_du[(i, 0)];
+            assert!((found - by_u[i]).abs() <= 4.0 * bound(by_u), "u = {u}: {found} {}", by_u[i]);
+        }
+    }
+}
+
 /// A matrix that is singular is an error that names the unknown, and the integrator goes on.
 #[test]
 fn singular_matrices_are_refused() {
