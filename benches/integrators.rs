@@ -1,73 +1,31 @@
-//! Time of one call: simulation, Jacobian, adjoint, Hessian, from start values of zero.
+//! Time of one call by criterion: simulation, forward, adjoint, Hessian, from start values of zero, to rounding.
 //!
-//! "s4n4" is a method of 4 stages with 4 steps. `cargo bench --bench integrators -- chain` runs a part.
+//! `cargo bench --manifest-path benches/Cargo.toml -- 'chain 5'` runs a part. "s4n4" is a method of 4 stages with 4 steps.
 
-#[path = "../examples/models/awe.rs"]
-mod awe;
-#[path = "../examples/models/chain.rs"]
-mod chain;
-#[path = "../tests/data/mod.rs"]
-mod data;
-#[path = "../examples/models/pendulum.rs"]
-mod pendulum;
-
-use awe::Awe;
-use casados::prelude::*;
-use chain::{Chain, stretched};
+use casados::prelude::Start;
+use casados_benches::calls::{open, options};
+use casados_benches::case::{Case, Family, Mode};
 use criterion::{Criterion, criterion_group, criterion_main};
-use data::Record;
-use nalgebra::{SVector, vector};
-use pendulum::Pendulum;
-use std::hint::black_box;
 use std::time::Duration;
 
-fn cold(steps: usize) -> Options {
-    Options { steps, start: Start::Zero, ..Default::default() }
+fn cases() -> Vec<Case> {
+    let mut cases = vec![Case::pendulum(Family::Gauss, 2, 1), Case::pendulum(Family::Gauss, 4, 4)];
+    for masses in [3, 5, 7, 9, 13] {
+        cases.extend([(2, 1), (4, 4)].map(|(s, n)| Case::chain(masses, Family::Gauss, s, n)));
+    }
+    cases.push(Case::awe().expect("the data are part of the repository"));
+    cases
 }
 
-/// The four questions to one integrator.
-macro_rules! questions {
-    ($criterion:ident, $name:expr, $integrator:ty, $steps:expr, $x0:expr, $u:expr, $h:expr, $lambda:expr) => {{
-        let (x0, u, h, lambda) = ($x0, $u, $h, $lambda);
-        let mut irk = <$integrator>::new(cold($steps)).expect("the options are valid");
-        let mut group = $criterion.benchmark_group($name);
-        group.bench_function("simulation", |b| b.iter(|| irk.solve(black_box(&x0), &u, h).map(drop)));
-        group.bench_function("jacobian", |b| b.iter(|| irk.forward(black_box(&x0), &u, h).map(drop)));
-        group.bench_function("adjoint", |b| b.iter(|| irk.adjoint(black_box(&x0), &u, h, &lambda).map(drop)));
-        group.bench_function("hessian", |b| b.iter(|| irk.hessian(black_box(&x0), &u, h, &lambda).map(drop)));
+fn integrators(c: &mut Criterion) {
+    for case in cases() {
+        let mut integrator = open(&case, options(&case, 0.0, Start::Zero)).expect("the case is compiled in");
+        let mut group = c.benchmark_group(&case.name);
+        for mode in Mode::ALL {
+            group.bench_function(mode.name(), |b| b.iter(|| integrator.call(mode, 0)));
+        }
         group.finish();
-    }};
-}
-
-fn pendulum(c: &mut Criterion) {
-    let x0 = vector![0.0, 3.441592653589793, 0.5, -0.7];
-    let lambda = SVector::repeat(1.0);
-    questions!(c, "pendulum s2n1", Irk<Pendulum, Gauss<2>>, 1, x0, vector![1.5], 0.05, lambda);
-    questions!(c, "pendulum s4n4", Irk<Pendulum, Gauss<4>>, 4, x0, vector![1.5], 0.05, lambda);
-}
-
-macro_rules! chains {
-    ($criterion:ident, $($nx:literal),*) => {$(
-        let (x0, u, h) = (stretched::<$nx>(), vector![-1.0, 1.0, 1.0], 0.2);
-        let lambda = SVector::repeat(1.0);
-        let masses = ($nx - 3) / 6 + 2;
-        questions!($criterion, format!("chain {masses} s2n1"), Irk<Chain<$nx>, Gauss<2>>, 1, x0, u, h, lambda);
-        questions!($criterion, format!("chain {masses} s4n4"), Irk<Chain<$nx>, Gauss<4>>, 4, x0, u, h, lambda);
-    )*};
-}
-
-fn chain(c: &mut Criterion) {
-    chains!(c, 9, 21, 33, 45, 69);
-}
-
-/// The first interval of the optimal orbit.
-fn awe(c: &mut Criterion) {
-    let reference = Record::load("awe/intervals.json").expect("the file is part of the repository");
-    let h = reference.number("T").expect("a number");
-    let interval = &reference.records("intervals").expect("a list")[0];
-    let (x0, u) = (interval.vector("x0").expect("23 numbers"), interval.vector("u").expect("4 numbers"));
-    let lambda = reference.vector("lambda").expect("23 numbers");
-    questions!(c, "awe radau s4n1", Irk<Awe, RadauIIA<4>>, 1, x0, u, h, lambda);
+    }
 }
 
 criterion_group! {
@@ -77,6 +35,6 @@ criterion_group! {
         .measurement_time(Duration::from_millis(500))
         .sample_size(20)
         .without_plots();
-    targets = pendulum, chain, awe
+    targets = integrators
 }
 criterion_main!(benches);

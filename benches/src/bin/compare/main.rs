@@ -1,0 +1,175 @@
+//! casados beside its peers, in one run: times and errors of simulation, forward and adjoint sensitivities and Hessians
+//! of a pendulum, of chains of masses and of an aircraft on a tether.
+//!
+//! CasADi takes part where `python3`, or the interpreter that `CASADOS_PYTHON` names, has it; diffsol with the feature
+//! of that name. Nothing is installed.
+
+mod adaptive;
+mod anchors;
+mod casadi;
+#[cfg(feature = "diffsol")]
+mod diffsol;
+mod growth;
+mod json;
+mod machine;
+mod plots;
+mod report;
+mod rows;
+
+use anchors::Anchors;
+use casadi::Casadi;
+use casados_benches::case::{Case, Family};
+use casados_benches::record::{insert, repository};
+use casados_benches::time::pin;
+use growth::Growth;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+type Failure = Box<dyn std::error::Error>;
+
+const USAGE: &str = "\
+usage: cargo run --release --manifest-path benches/Cargo.toml [--features diffsol] [-- OPTIONS]
+    --only TEXT      cases whose name contains TEXT, such as `awe` or `chain 5`; no growth, no work-precision
+    --seconds S      budget of one measurement, default 0.3; of each of CasADi's two, the same
+    --no-peers       casados alone
+    --out FOLDER     where compare.md, compare.json and the plots go, default plots/compare
+    --write FILE     the tables go into FILE too, between the lines `<!-- compare -->` and `<!-- end of compare -->`";
+
+/// How long a measurement lasts.
+#[derive(Clone, Copy)]
+pub struct Effort {
+    /// Seconds.
+    pub seconds: f64,
+}
+
+impl Effort {
+    fn budget(self) -> Duration {
+        Duration::from_secs_f64(self.seconds)
+    }
+}
+
+struct Arguments {
+    only: Option<String>,
+    effort: Effort,
+    peers: bool,
+    out: PathBuf,
+    write: Option<PathBuf>,
+}
+
+fn arguments() -> Result<Arguments, Failure> {
+    let mut all = Arguments {
+        only: None,
+        effort: Effort { seconds: 0.3 },
+        peers: true,
+        out: repository("plots/compare"),
+        write: None,
+    };
+    let mut words = std::env::args().skip(1);
+    while let Some(word) = words.next() {
+        let mut value = || words.next().ok_or(USAGE);
+        match word.as_str() {
+            "--only" => all.only = Some(value()?),
+            "--seconds" => all.effort.seconds = value()?.parse()?,
+            "--no-peers" => all.peers = false,
+            "--out" => all.out = value()?.into(),
+            "--write" => all.write = Some(value()?.into()),
+            _ => return Err(USAGE.into()),
+        }
+    }
+    Ok(all)
+}
+
+fn cases() -> Result<Vec<Case>, String> {
+    use Family::{Gauss, Rk4};
+    let mut cases = vec![
+        Case::pendulum(Gauss, 2, 1).with("pendulum/pendulum_T005_irk_s2n1.json")?,
+        Case::pendulum(Gauss, 4, 4),
+    ];
+    for masses in [3, 5, 7, 9, 13, 33] {
+        for (stages, steps) in [(2, 1), (4, 4)] {
+            let case = Case::chain(masses, Gauss, stages, steps);
+            let file = format!("chain/chain_{masses}_irk_s{stages}n{steps}.json");
+            let known = repository("tests/data").join(&file).exists();
+            cases.push(if known { case.with(&file)? } else { case });
+        }
+    }
+    cases.push(Case::awe()?);
+    cases.push(Case::pendulum(Rk4, 4, 1).with("pendulum/pendulum_T005_erk4n1.json")?);
+    cases.push(Case::chain(5, Rk4, 4, 1).with("chain/chain_5_erk4n1.json")?);
+    cases.push(Case::chain(9, Rk4, 4, 1));
+    Ok(cases)
+}
+
+/// Everything that was measured.
+#[derive(Default)]
+pub struct Results {
+    machine: Vec<String>,
+    rows: Vec<rows::Row>,
+    scale: f64,
+    adaptive: Vec<adaptive::Line>,
+    growth: Vec<Growth>,
+    precision: Option<(Vec<growth::Precision>, f64)>,
+}
+
+fn run() -> Result<(), Failure> {
+    let arguments = arguments()?;
+    let effort = arguments.effort;
+    let pinned = pin();
+    let anchors = Anchors::load()?;
+    let mut casadi = match Casadi::start() {
+        _ if !arguments.peers => Err("not asked for".into()),
+        other => other,
+    };
+    let peer = casadi.as_ref().map_or_else(|e| format!("without CasADi: {e}"), |c| c.versions.clone());
+    eprintln!("{peer}");
+    let mut results = Results { machine: machine::describe(pinned, &peer), ..Default::default() };
+
+    for case in cases()? {
+        if arguments.only.as_ref().is_some_and(|text| !case.name.contains(text)) {
+            continue;
+        }
+        eprintln!("{}", case.name);
+        results.rows.extend(rows::measure_case(&case, casadi.as_mut().ok(), effort)?);
+        for row in results.rows.iter().rev().take(4).rev() {
+            eprintln!("    {:<11} {:10.2} µs", row.mode.name(), 1e6 * row.cold.time.median);
+        }
+    }
+    rows::carry(&mut results.rows, &anchors);
+    results.scale = anchors.general_scale(&results.rows);
+
+    if arguments.only.is_none() {
+        if let Ok(casadi) = casadi.as_mut() {
+            eprintln!("solvers with step-size control");
+            results.adaptive = adaptive::measure(casadi, effort)?;
+            eprintln!("work-precision");
+            results.precision = Some(growth::work_precision(casadi, effort)?);
+        }
+        eprintln!("growth");
+        for (stages, steps) in [(2, 1), (4, 4)] {
+            results.growth.push(Growth::measure(&[9, 13, 17, 33, 65], stages, steps, effort)?);
+        }
+    }
+
+    let text = report::markdown(&results);
+    println!("{text}");
+    std::fs::create_dir_all(&arguments.out)?;
+    std::fs::write(arguments.out.join("compare.md"), &text)?;
+    std::fs::write(arguments.out.join("compare.json"), json::of(&results).to_string() + "\n")?;
+    plots::draw(&results, &arguments.out)?;
+    if let Some(file) = &arguments.write {
+        insert(file, "compare", &text)?;
+    }
+    eprintln!("tables, JSON and plots are in {}", arguments.out.display());
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("compare: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! The tables.
+
+use super::Results;
+use super::rows::{Measured, Row};
+use casados_benches::case::Mode;
+use std::fmt::Write;
+
+/// Three digits.
+pub fn three(value: f64) -> String {
+    match value {
+        v if !v.is_finite() => "–".into(),
+        v if v < 0.995 => format!("{v:.3}"),
+        v if v < 9.95 => format!("{v:.2}"),
+        v if v < 99.5 => format!("{v:.1}"),
+        v => format!("{v:.0}"),
+    }
+}
+
+fn optional(value: Option<f64>, show: impl Fn(f64) -> String) -> String {
+    value.map_or_else(|| "–".into(), show)
+}
+
+fn microseconds(seconds: f64) -> String {
+    three(1e6 * seconds)
+}
+
+/// Median and quartiles.
+fn spread(m: &Measured) -> String {
+    format!("{} [{}, {}]", microseconds(m.time.median), microseconds(m.time.q1), microseconds(m.time.q3))
+}
+
+fn error(m: &Measured) -> String {
+    optional(m.error, |e| format!("{e:.0e}"))
+}
+
+fn times(ratio: f64) -> String {
+    format!("{}×", three(ratio))
+}
+
+/// All tables as Markdown.
+pub fn markdown(results: &Results) -> String {
+    let mut text = String::new();
+    write(&mut text, results).expect("a string takes everything");
+    text
+}
+
+fn write(text: &mut String, results: &Results) -> std::fmt::Result {
+    writeln!(text, "### The run\n")?;
+    for line in &results.machine {
+        writeln!(text, "- {line}")?;
+    }
+    let (implicit, explicit): (Vec<_>, Vec<_>) =
+        results.rows.iter().partition(|row| !row.case.contains("erk4"));
+    if results.scale.is_finite() {
+        let s = three(results.scale);
+        writeln!(
+            text,
+            "- CasADi's simulations took {s} times (median) what they took where acados was measured beside them"
+        )?;
+    }
+    if !implicit.is_empty() {
+        single(text, &implicit)?;
+        peers(text, &implicit)?;
+        forty(text, &implicit)?;
+    }
+    if !explicit.is_empty() {
+        writeln!(text, "\n### Explicit: RK4, one step, one call\n")?;
+        single_table(text, &explicit)?;
+        peers_table(text, &explicit)?;
+    }
+    adaptive(text, results)?;
+    growth(text, results)?;
+    precision(text, results)
+}
+
+fn single(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+    writeln!(text, "\n### One call\n")?;
+    writeln!(
+        text,
+        "Microseconds, median [quartiles]. Cold: from zero. 1e-8: Newton's method to 1e-8 / steps, as acados; rounding: the default."
+    )?;
+    writeln!(
+        text,
+        "Warm: two intervals in turn whose inputs are 1e-2 apart. Error: largest, relative to the largest element of the reference.\n"
+    )?;
+    single_table(text, rows)
+}
+
+fn single_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "| case | nx | mode | cold 1e-8 | error | cold, rounding | error | warm 1e-8 | reference |"
+    )?;
+    writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
+    for row in rows {
+        writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            row.case,
+            row.nx,
+            row.mode.name(),
+            spread(&row.cold),
+            error(&row.cold),
+            spread(&row.rounding),
+            error(&row.rounding),
+            row.warm.as_ref().map_or_else(|| "–".into(), spread),
+            row.reference
+        )?;
+    }
+    Ok(())
+}
+
+fn peers(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+    writeln!(text, "\n### One call beside CasADi and acados\n")?;
+    writeln!(
+        text,
+        "Microseconds; cold, tolerance 1e-8 / steps. CasADi before and after casados; acados' IRK and GNSF carried over by ratio."
+    )?;
+    writeln!(text, "The last columns say how many times faster casados is.\n")?;
+    peers_table(text, rows)
+}
+
+fn peers_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "\n| case | mode | casados | CasADi | error | drift | acados IRK | GNSF | than CasADi | than IRK | than GNSF |"
+    )?;
+    writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
+    for row in rows {
+        let own = row.cold.time.median;
+        let ratio = |time: Option<f64>| optional(time, |t| times(t / own));
+        writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            row.case,
+            row.mode.name(),
+            microseconds(own),
+            optional(row.casadi_time(), microseconds),
+            // Its own values are no reference for it.
+            row.casadi
+                .as_ref()
+                .filter(|_| row.reference != "CasADi")
+                .map_or_else(|| "–".into(), |[a, _]| error(a)),
+            optional(row.casadi.map(|[a, b]| b.time.median / a.time.median), |d| format!("{d:.2}")),
+            optional(row.acados[0], microseconds),
+            optional(row.acados[1], microseconds),
+            ratio(row.casadi_time()),
+            ratio(row.acados[0]),
+            ratio(row.acados[1])
+        )?;
+    }
+    Ok(())
+}
+
+fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+    writeln!(text, "\n### Forty intervals\n")?;
+    writeln!(text, "Microseconds of one of 40 different intervals; cold, tolerance 1e-8 / steps.\n")?;
+    writeln!(text, "| case | mode | one call after the other | than acados IRK |")?;
+    writeln!(text, "| --- | --- | --- | --- |")?;
+    for row in rows {
+        let Some(forty) = &row.forty else { continue };
+        let ratio = row.acados[0].map(|t| t / forty.time.median);
+        writeln!(
+            text,
+            "| {} | {} | {} | {} |",
+            row.case,
+            row.mode.name(),
+            spread(forty),
+            optional(ratio, times)
+        )?;
+    }
+    Ok(())
+}
+
+fn adaptive(text: &mut String, results: &Results) -> std::fmt::Result {
+    if results.adaptive.is_empty() {
+        return Ok(());
+    }
+    writeln!(text, "\n### Beside solvers with step-size control\n")?;
+    writeln!(
+        text,
+        "Peers at relative and absolute tolerance 1e-8, default settings; microseconds of one call, error against the exact flow. The"
+    )?;
+    writeln!(text, "adjoint and the Hessian have no exact flow to compare with.\n")?;
+    writeln!(text, "| problem | nx | mode | solver | time | error |\n| --- | --- | --- | --- | --- | --- |")?;
+    for line in &results.adaptive {
+        let (time, error) = match &line.measured {
+            Ok(m) => (spread(m), error(m)),
+            Err(failure) => (failure.clone(), "–".into()),
+        };
+        writeln!(
+            text,
+            "| {} | {} | {} | {} | {time} | {error} |",
+            line.problem,
+            line.nx,
+            line.mode.name(),
+            line.solver
+        )?;
+    }
+    Ok(())
+}
+
+fn growth(text: &mut String, results: &Results) -> std::fmt::Result {
+    for growth in &results.growth {
+        writeln!(text, "\n### Growth, s = {}, {} steps\n", growth.stages, growth.steps)?;
+        writeln!(
+            text,
+            "Microseconds of one call, cold, for chains of 9 to 65 masses; the exponent is the slope of log time over log nx.\n"
+        )?;
+        writeln!(text, "| nx | simulation | forward | adjoint | Hessian |\n| --- | --- | --- | --- | --- |")?;
+        for (nx, measured) in &growth.points {
+            let [a, b, c, d] = measured.map(|m| microseconds(m.time.median));
+            writeln!(text, "| {nx} | {a} | {b} | {c} | {d} |")?;
+        }
+        let [a, b, c, d] = [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.exponent(mode, 0)));
+        writeln!(text, "| exponent | {a} | {b} | {c} | {d} |")?;
+    }
+    Ok(())
+}
+
+fn precision(text: &mut String, results: &Results) -> std::fmt::Result {
+    let Some((all, uncertainty)) = &results.precision else { return Ok(()) };
+    writeln!(text, "\n### What accuracy costs\n")?;
+    writeln!(
+        text,
+        "Chain of 5 masses, 0.2 s, Gauss-Legendre; microseconds of one call, error against the exact flow (itself known to {uncertainty:.0e}).\n"
+    )?;
+    writeln!(
+        text,
+        "| s | steps | simulation | error | forward | error |\n| --- | --- | --- | --- | --- | --- |"
+    )?;
+    for p in all {
+        let (a, b) = (microseconds(p.simulation.time.median), microseconds(p.forward.time.median));
+        writeln!(
+            text,
+            "| {} | {} | {a} | {} | {b} | {} |",
+            p.stages,
+            p.steps,
+            error(&p.simulation),
+            error(&p.forward)
+        )?;
+    }
+    Ok(())
+}
+
+/// The name of a mode, as in plots.
+pub fn label(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Simulation => "simulation",
+        Mode::Forward => "forward",
+        Mode::Adjoint => "adjoint",
+        Mode::Hessian => "Hessian",
+    }
+}

@@ -1,0 +1,232 @@
+//! Calls of an integrator whose types are chosen by the name of a case.
+
+use crate::case::{Case, Family, Mode, Values};
+use crate::models::{Awe, Chain, Pendulum};
+use casados::model::{VectorU, VectorX};
+use casados::prelude::*;
+use casados::result::{Adjoint, Forward, Hessian, Nominal};
+use casados::shape::{Matrix, Shape};
+use casados::{Error, Statistics};
+use std::hint::black_box;
+
+/// An integrator with its inputs in place.
+pub trait Calls {
+    /// One call with an input of the case.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error>;
+    /// What one call gives.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn values(&mut self, mode: Mode, input: usize) -> Result<Values, Error>;
+    /// What the last call did.
+    fn statistics(&self) -> Statistics;
+}
+
+/// Options as in the tables: iterations end at a tolerance for the whole interval, zero for rounding.
+#[must_use]
+pub fn options(case: &Case, tolerance: f64, start: Start) -> Options {
+    let newton = Newton { tolerance: tolerance / case.steps as f64, ..Default::default() };
+    Options { steps: case.steps, newton, start, ..Default::default() }
+}
+
+/// The integrator of a case.
+///
+/// # Errors
+/// A case that was not compiled in; or the error of the integrator.
+pub fn open(case: &Case, options: Options) -> Result<Box<dyn Calls>, String> {
+    use Family::{Gauss as G, Radau, Rk4 as Explicit};
+    macro_rules! choose {
+        ($($model:literal, $nx:literal, $family:pat, $stages:pat => $type:ty, $integrator:ty;)*) => {
+            match (case.model, case.nx, case.family, case.stages) {
+                $(($model, $nx, $family, $stages) => {
+                    let integrator = <$integrator>::new(options).map_err(|e| e.to_string())?;
+                    Ok(Box::new(Typed::<$type, _>::new(case, integrator)))
+                })*
+                _ => Err(format!("{} is not compiled in", case.name)),
+            }
+        };
+    }
+    choose! {
+        "pendulum", 4, G, 2 => Pendulum, Irk<Pendulum, Gauss<2>>;
+        "pendulum", 4, G, 4 => Pendulum, Irk<Pendulum, Gauss<4>>;
+        "pendulum", 4, Explicit, _ => Pendulum, Erk<Pendulum, casados::Rk4>;
+        "awe", 23, Radau, 4 => Awe, Irk<Awe, RadauIIA<4>>;
+        "chain", 9, G, 2 => Chain<9>, Irk<Chain<9>, Gauss<2>>;
+        "chain", 9, G, 4 => Chain<9>, Irk<Chain<9>, Gauss<4>>;
+        "chain", 21, G, 1 => Chain<21>, Irk<Chain<21>, Gauss<1>>;
+        "chain", 21, G, 2 => Chain<21>, Irk<Chain<21>, Gauss<2>>;
+        "chain", 21, G, 3 => Chain<21>, Irk<Chain<21>, Gauss<3>>;
+        "chain", 21, G, 4 => Chain<21>, Irk<Chain<21>, Gauss<4>>;
+        "chain", 21, G, 5 => Chain<21>, Irk<Chain<21>, Gauss<5>>;
+        "chain", 21, Explicit, _ => Chain<21>, Erk<Chain<21>, casados::Rk4>;
+        "chain", 33, G, 2 => Chain<33>, Irk<Chain<33>, Gauss<2>>;
+        "chain", 33, G, 4 => Chain<33>, Irk<Chain<33>, Gauss<4>>;
+        "chain", 45, G, 2 => Chain<45>, Irk<Chain<45>, Gauss<2>>;
+        "chain", 45, G, 4 => Chain<45>, Irk<Chain<45>, Gauss<4>>;
+        "chain", 45, Explicit, _ => Chain<45>, Erk<Chain<45>, casados::Rk4>;
+        "chain", 69, G, 2 => Chain<69>, Irk<Chain<69>, Gauss<2>>;
+        "chain", 69, G, 4 => Chain<69>, Irk<Chain<69>, Gauss<4>>;
+        "chain", 93, G, 2 => Chain<93>, Irk<Chain<93>, Gauss<2>>;
+        "chain", 93, G, 4 => Chain<93>, Irk<Chain<93>, Gauss<4>>;
+        "chain", 189, G, 2 => Chain<189>, Irk<Chain<189>, Gauss<2>>;
+        "chain", 189, G, 4 => Chain<189>, Irk<Chain<189>, Gauss<4>>;
+        "chain", 381, G, 2 => Chain<381>, Irk<Chain<381>, Gauss<2>>;
+        "chain", 381, G, 4 => Chain<381>, Irk<Chain<381>, Gauss<4>>;
+    }
+}
+
+/// The calls that implicit and explicit integrators have in common.
+trait Integrator<M: Dae> {
+    fn solve(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Nominal<M>, Error>;
+    fn forward(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Forward<M>, Error>;
+    fn adjoint(
+        &mut self,
+        x0: &VectorX<M, f64>,
+        u: &VectorU<M, f64>,
+        h: f64,
+        lambda: &VectorX<M, f64>,
+    ) -> Result<&Adjoint<M>, Error>;
+    fn hessian(
+        &mut self,
+        x0: &VectorX<M, f64>,
+        u: &VectorU<M, f64>,
+        h: f64,
+        lambda: &VectorX<M, f64>,
+    ) -> Result<&Hessian<M>, Error>;
+    fn statistics(&self) -> Statistics;
+}
+
+macro_rules! integrator {
+    ($module:ident, $model:ident) => {
+        impl<M: $model, B, const S: usize> Integrator<M>
+            for casados::$module::Integrator<M, B, S, f64, Heap>
+        {
+            fn solve(
+                &mut self,
+                x0: &VectorX<M, f64>,
+                u: &VectorU<M, f64>,
+                h: f64,
+            ) -> Result<&Nominal<M>, Error> {
+                self.solve(x0, u, h)
+            }
+            fn forward(
+                &mut self,
+                x0: &VectorX<M, f64>,
+                u: &VectorU<M, f64>,
+                h: f64,
+            ) -> Result<&Forward<M>, Error> {
+                self.forward(x0, u, h)
+            }
+            fn adjoint(
+                &mut self,
+                x0: &VectorX<M, f64>,
+                u: &VectorU<M, f64>,
+                h: f64,
+                lambda: &VectorX<M, f64>,
+            ) -> Result<&Adjoint<M>, Error> {
+                self.adjoint(x0, u, h, lambda)
+            }
+            fn hessian(
+                &mut self,
+                x0: &VectorX<M, f64>,
+                u: &VectorU<M, f64>,
+                h: f64,
+                lambda: &VectorX<M, f64>,
+            ) -> Result<&Hessian<M>, Error> {
+                self.hessian(x0, u, h, lambda)
+            }
+            fn statistics(&self) -> Statistics {
+                self.statistics().to_owned()
+            }
+        }
+    };
+}
+integrator!(irk, Dae);
+integrator!(erk, Ode);
+
+struct Typed<M: Dae, I> {
+    integrator: I,
+    inputs: Vec<(VectorX<M, f64>, VectorU<M, f64>)>,
+    lambda: VectorX<M, f64>,
+    h: f64,
+}
+
+/// A vector of the model's own type.
+fn vector<V: Matrix<f64>>(numbers: &[f64]) -> V {
+    let mut vector = V::zeroed();
+    vector.as_mut_slice().copy_from_slice(numbers);
+    vector
+}
+
+/// The elements by rows.
+fn rows<V: Matrix<f64>>(matrix: &V, row: usize) -> impl Iterator<Item = f64> {
+    (0..V::COLUMNS).map(move |j| matrix[(row, j)])
+}
+
+impl<M: Dae, I: Integrator<M>> Typed<M, I> {
+    fn new(case: &Case, integrator: I) -> Self {
+        let inputs = case.inputs.iter().map(|(x0, u)| (vector(x0), vector(u))).collect();
+        Self { integrator, inputs, lambda: vector(&case.lambda), h: case.t }
+    }
+}
+
+fn jacobian<M: Dae>(result: &Forward<M>) -> Vec<f64> {
+    (0..M::Shape::NX).flat_map(|i| rows(&result.dx_dx0, i).chain(rows(&result.dx_du, i))).collect()
+}
+
+fn triangle<M: Dae>(result: &Hessian<M>) -> Vec<f64> {
+    let (nx, nw) = (M::Shape::NX, M::Shape::NX + M::Shape::NU);
+    let lower = |i: usize, j: usize| match (i < nx, j < nx) {
+        (true, _) => result.h_xx[(i, j)],
+        (false, true) => result.h_xu[(j, i - nx)],
+        (false, false) => result.h_uu[(i - nx, j - nx)],
+    };
+    (0..nw).flat_map(|i| (0..=i).map(move |j| lower(i, j))).collect()
+}
+
+impl<M: Dae, I: Integrator<M>> Calls for Typed<M, I> {
+    fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error> {
+        let (x0, u) = black_box(&self.inputs[input]);
+        let lambda = black_box(&self.lambda);
+        match mode {
+            Mode::Simulation => drop(black_box(self.integrator.solve(x0, u, self.h)?)),
+            Mode::Forward => drop(black_box(self.integrator.forward(x0, u, self.h)?)),
+            Mode::Adjoint => drop(black_box(self.integrator.adjoint(x0, u, self.h, lambda)?)),
+            Mode::Hessian => drop(black_box(self.integrator.hessian(x0, u, self.h, lambda)?)),
+        }
+        Ok(())
+    }
+
+    fn values(&mut self, mode: Mode, input: usize) -> Result<Values, Error> {
+        let (x0, u) = &self.inputs[input];
+        let mut values = Values::default();
+        match mode {
+            Mode::Simulation => values.x = self.integrator.solve(x0, u, self.h)?.x.as_slice().to_vec(),
+            Mode::Forward => {
+                let result = self.integrator.forward(x0, u, self.h)?;
+                values.x = result.x.as_slice().to_vec();
+                values.forward = jacobian(result);
+            }
+            Mode::Adjoint => {
+                let result = self.integrator.adjoint(x0, u, self.h, &self.lambda)?;
+                values.x = result.x.as_slice().to_vec();
+                values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
+            }
+            Mode::Hessian => {
+                let result = self.integrator.hessian(x0, u, self.h, &self.lambda)?;
+                values.x = result.x.as_slice().to_vec();
+                values.forward = jacobian(result);
+                values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
+                values.hessian = triangle(result);
+            }
+        }
+        Ok(values)
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.integrator.statistics()
+    }
+}
