@@ -163,3 +163,15 @@ fn integrators_can_move_to_other_threads() {
     fn check<T: Send>(_: &T) {}
     check(&Irk::<Nonlinear, Gauss<2>>::new(Options::default()).unwrap());
 }
+
+/// What the models of these tests say about themselves is true.
+#[cfg(feature = "testing")]
+#[test]
+fn patterns_and_facts() {
+    use casados_core::testing::{Points, check_pattern};
+    check_pattern::<Nonlinear>(&Points::random(4)).assert();
+    check_pattern::<Linear>(&Points::random(4)).assert();
+    check_pattern::<models::Fragile>(&Points::random(4).all(0.1..=0.5)).assert();
+    check_pattern::<Algebraic>(&Points::random(4)).assert();
+    check_pattern::<models::pendulum::Pendulum>(&Points::random(4)).assert();
+}
