@@ -35,6 +35,11 @@ impl Record {
         }
     }
 
+    /// A text.
+    pub fn text(&self, key: &str) -> Result<&str, String> {
+        self.0[key].as_str().ok_or_else(|| format!("`{key}` is not a text"))
+    }
+
     /// A number.
     pub fn number(&self, key: &str) -> Result<f64, String> {
         self.0[key].as_f64().ok_or_else(|| format!("`{key}` is not a number"))

@@ -3,73 +3,77 @@
 //! It is one stage of the explicit Euler method, whose stage is at the start of the step.
 
 use crate::error::Error;
-use crate::irk::{Coefficients, From, Step, Work};
-use crate::model::{ArrayK, Dae, VectorP, VectorU};
-use crate::options::Options;
+use crate::irk::Integrator;
+use crate::memory::Heap;
+use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
+use crate::options::{Options, Start};
+use crate::result::Forward;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
-use crate::statistics::Statistics;
-use crate::tableau::{Euler, Method};
-use alloc::boxed::Box;
-use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
+use crate::tableau::{Custom, Euler, Method};
 
 /// Solves for `(ẋ, z)`.
 pub(super) struct Consistent<M: Dae, T: Real> {
-    coefficients: Coefficients<T, 1>,
-    memory: Option<Box<Memory<M, T>>>,
-}
-
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-struct Memory<M: Dae, T: Real> {
-    work: Work<M, T, 1>,
-    step: [Step<M, T, 1>; 1],
+    euler: Option<Integrator<M, Custom<1>, 1, T, Heap>>,
 }
 
 impl<M: Dae, T: Real> Default for Consistent<M, T> {
     fn default() -> Self {
-        Self { coefficients: Coefficients::new(Euler::TABLEAU), memory: None }
+        Self { euler: None }
     }
+}
+
+/// A point in time at which the state is known.
+pub(super) struct At<'a, M: Dae, T: Real> {
+    pub x: &'a VectorX<M, T>,
+    pub u: &'a VectorU<M, T>,
+    pub p: &'a VectorP<M, T>,
+    pub t: T,
 }
 
 impl<M: Dae, T: Real> Consistent<M, T> {
-    /// From the start values in `y`: `(ẋ, z)` there.
+    fn euler(
+        &mut self,
+        at: &At<'_, M, T>,
+        y: &ArrayK<M, T>,
+    ) -> Result<&mut Integrator<M, Custom<1>, 1, T, Heap>, Error> {
+        let euler = match &mut self.euler {
+            Some(euler) => euler,
+            none => {
+                let options = Options { start: Start::Warm, ..Options::default() };
+                none.insert(Integrator::with_tableau(options, Euler::TABLEAU)?)
+            }
+        };
+        if M::Shape::NP > 0 {
+            euler.set_parameters(at.p)?;
+        }
+        euler.set_time(at.t)?;
+        euler.set_stages(y.as_ref())?;
+        Ok(euler)
+    }
+
+    /// From the start values in `y`: `(ẋ, z)` there; the number of points at which the model was evaluated.
     ///
     /// # Errors
     /// Those of Newton's method, which name the equation or the unknown.
-    pub fn solve(
-        &mut self,
-        x: &[T],
-        u: &VectorU<M, T>,
-        p: &VectorP<M, T>,
-        t: T,
-        y: &mut ArrayK<M, T>,
-        statistics: &mut Statistics,
-    ) -> Result<(), Error> {
-        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
-        if self.memory.is_none() {
-            self.memory = Some(try_zeroed_box().map_err(|()| out_of_memory)?);
-        }
-        let Memory { work, step } = self.memory.as_deref_mut().ok_or(out_of_memory)?;
-        work.prepare();
-        work.inputs.u = *u;
-        work.inputs.p = *p;
-        work.inputs.time.start = t;
-        work.inputs.time.interval = T::ZERO;
-        work.inputs.time.step = T::ZERO;
-        work.given = *y;
-        work.x.as_mut().copy_from_slice(x);
-        let options = Options::default();
-        work.integrate(&self.coefficients, &options, &From::Given, step, statistics, |_, _, _, _, _| Ok(()))?;
-        for (to, [from]) in y.as_mut().iter_mut().zip(step[0].y.as_ref()) {
-            *to = *from;
-        }
-        Ok(())
+    pub fn solve(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
+        let euler = self.euler(at, y)?;
+        euler.solve(at.x, at.u, T::ZERO)?;
+        y.as_mut().copy_from_slice(euler.stages()?);
+        let statistics = euler.statistics();
+        Ok(statistics.residuals + statistics.jacobians)
+    }
+
+    /// The derivatives of `z`, from `(ẋ, z)`.
+    ///
+    /// # Errors
+    /// As [`Consistent::solve`].
+    pub fn forward(&mut self, at: &At<'_, M, T>, y: &ArrayK<M, T>) -> Result<&Forward<M, T>, Error> {
+        self.euler(at, y)?.forward(at.x, at.u, T::ZERO)
     }
 }
 
-/// Whether `u` and `p` of a model lie where they should: after `(ẋ, x, z)`.
+/// Writes `u` and `p` to where they lie in the variables of a model: after `(ẋ, x, z)`.
 pub(super) fn place_inputs<M: Dae, T: Real>(point: &mut [T], u: &VectorU<M, T>, p: &VectorP<M, T>) {
     let begin = 2 * M::Shape::NX + M::Shape::NZ;
     for (to, from) in point.iter_mut().skip(begin).zip(u.as_slice().iter().chain(p.as_slice())) {

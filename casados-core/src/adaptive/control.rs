@@ -48,7 +48,16 @@ impl Predictive {
     }
 }
 
-/// `aᵇ`, by square roots where these are enough.
+/// `aᵇ`, by roots where these are enough: those of methods with 3, 5 and 7 stages.
 fn power(a: f64, b: f64) -> f64 {
-    if b == 0.25 { Scalar::sqrt(Scalar::sqrt(a)) } else { Scalar::powf(a, b) }
+    let root = Scalar::sqrt(a);
+    if b == 0.25 {
+        Scalar::sqrt(root)
+    } else if b == 1.0 / 6.0 {
+        Scalar::cbrt(root)
+    } else if b == 0.125 {
+        Scalar::sqrt(Scalar::sqrt(root))
+    } else {
+        Scalar::powf(a, b)
+    }
 }

@@ -4,16 +4,18 @@ use super::consistent::Consistent;
 use super::options::{AdaptiveOptions, check_absolute, check_relative};
 use super::run::{Accepted, Base, Levels, Run, Span};
 use super::sealed::Family;
+use super::sensitivities::{Frozen, Memory};
 use super::stages::{MOST, Stages};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use crate::error::{Argument, Error};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
-use crate::result::{Dense, Nominal};
+use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
@@ -38,6 +40,11 @@ pub struct Integrator<M: Dae, B, T: Real> {
     start: T,
     /// The interval of the last successful call.
     last: Option<Span<T>>,
+    /// The interval of the steps that are kept for following calls.
+    frozen: Option<Span<T>>,
+    memory: Option<Box<Memory<M, T>>>,
+    /// Derivatives at the start of each step.
+    history: Vec<T>,
     method: PhantomData<fn() -> B>,
 }
 
@@ -62,6 +69,9 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
             parameters: M::Shape::NP == 0,
             start: T::ZERO,
             last: None,
+            frozen: None,
+            memory: None,
+            history: Vec::new(),
             method: PhantomData,
         })
     }
@@ -151,7 +161,15 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
         u: &VectorU<M, T>,
         t_end: T,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.run(x0, u, t_end, |_, _| Ok(()))?;
+        if self.frozen.is_some() {
+            let span = self.begin(x0, u, t_end)?;
+            self.check_frozen(span)?;
+            let Self { base, consistent, tape, levels, .. } = self;
+            Frozen { base, consistent, tape, span }.solve::<B>(levels, x0)?;
+        } else {
+            let record = self.options.keep_steps;
+            self.run(x0, u, t_end, record, |_, _| Ok(()))?;
+        }
         Ok(&self.base.result)
     }
 
@@ -178,8 +196,16 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
             }
             before = *t;
         }
+        if self.frozen.is_some() {
+            self.solve(x0, u, t_end)?;
+            for t in times {
+                output(*t, self.dense(*t)?);
+            }
+            return Ok(&self.base.result);
+        }
         let mut times = times.iter().copied().peekable();
-        self.run(x0, u, t_end, |step, dense| {
+        let record = self.options.keep_steps;
+        self.run(x0, u, t_end, record, |step, dense| {
             while let Some(t) = times.next_if(|t| inside(*t, start, step.end)) {
                 interpolate::<M, T>(step.stages, step.x, step.stages.accepted(), t - step.t, step.h, dense);
                 output(t, dense);
@@ -220,14 +246,84 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
         Ok(dense)
     }
 
-    fn run(
+    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`: of the steps that were taken, exactly.
+    ///
+    /// The steps are chosen as in [`Integrator::solve`], then kept, and their stages solved to rounding.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; those of Newton's method with steps that are kept.
+    pub fn forward(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         t_end: T,
-        after: impl FnMut(&Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        self.last = None;
+    ) -> Result<&Forward<M, T>, Error> {
+        self.steps(x0, u, t_end)?;
+        let (mut frozen, levels, memory, _) = self.parts()?;
+        frozen.forward::<B>(levels, x0, memory, None)?;
+        Ok(&memory.hessian.first.forward)
+    }
+
+    /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as [`Integrator::forward`].
+    ///
+    /// # Errors
+    /// As [`Integrator::forward`].
+    pub fn adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.steps(x0, u, t_end)?;
+        let (mut frozen, levels, memory, _) = self.parts()?;
+        frozen.solve::<B>(levels, x0)?;
+        frozen.adjoint::<B>(levels, lambda, memory)?;
+        Ok(&memory.adjoint)
+    }
+
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as [`Integrator::forward`].
+    ///
+    /// # Errors
+    /// As [`Integrator::forward`].
+    pub fn hessian(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.steps(x0, u, t_end)?;
+        let (mut frozen, levels, memory, history) = self.parts()?;
+        history.clear();
+        frozen.forward::<B>(levels, x0, memory, Some(history))?;
+        frozen.hessian::<B>(levels, lambda, memory, history)?;
+        Ok(&memory.hessian)
+    }
+
+    /// Following calls take the steps of the last successful one, whatever they are given, and solve them to rounding:
+    /// one smooth function of `x₀`, `u` and `p`. Their interval has to be the same.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`], also if steps were not remembered.
+    pub fn freeze(&mut self) -> Result<(), Error> {
+        let span = self.last.ok_or(Error::NoResult)?;
+        if self.tape.entries().is_empty() && span.start != span.end {
+            return Err(Error::NoResult);
+        }
+        self.frozen = Some(span);
+        Ok(())
+    }
+
+    /// Following calls choose their steps again.
+    pub fn thaw(&mut self) {
+        self.frozen = None;
+    }
+
+    /// What every call begins with.
+    fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
         self.statistics = AdaptiveStatistics::default();
         check(Argument::X0, x0.as_slice())?;
         check(Argument::U, u.as_slice())?;
@@ -236,9 +332,59 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
             return Err(Error::ParametersNotSet);
         }
         self.base.u = *u;
-        let span = Span { start: self.start, end: t_end };
+        Ok(Span { start: self.start, end: t_end })
+    }
+
+    /// The steps that derivatives are taken of: chosen now, or frozen.
+    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+        if self.memory.is_none() {
+            let bytes = size_of::<Memory<M, T>>();
+            self.memory = Some(try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?);
+        }
+        if self.frozen.is_some() {
+            let span = self.begin(x0, u, t_end)?;
+            return self.check_frozen(span);
+        }
+        self.run(x0, u, t_end, true, |_, _| Ok(()))
+    }
+
+    /// # Errors
+    /// [`Error::OutsideInterval`] if the interval is not that of the frozen steps.
+    fn check_frozen(&self, span: Span<T>) -> Result<(), Error> {
+        let Some(frozen) = self.frozen else { return Ok(()) };
+        let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());
+        for (t, expected) in [(span.start, frozen.start), (span.end, frozen.end)] {
+            if t != expected {
+                return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
+            }
+        }
+        Ok(())
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn parts(
+        &mut self,
+    ) -> Result<(Frozen<'_, M, T>, &mut Levels<M, T>, &mut Memory<M, T>, &mut Vec<T>), Error> {
+        let Self { base, consistent, tape, last, levels, memory, history, .. } = self;
+        let span = last.ok_or(Error::NoResult)?;
+        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
+        let memory = memory.as_deref_mut().ok_or(missing)?;
+        Ok((Frozen { base, consistent, tape, span }, levels, memory, history))
+    }
+
+    fn run(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        record: bool,
+        after: impl FnMut(&Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.last = None;
+        let span = self.begin(x0, u, t_end)?;
         let Self { options, base, consistent, levels, tape, statistics, .. } = self;
-        Run { options, base, consistent, tape, statistics }.integrate::<B>(levels, x0, span, after)?;
+        Run { options, base, consistent, tape, record, statistics }
+            .integrate::<B>(levels, x0, span, after)?;
         self.last = Some(span);
         Ok(())
     }

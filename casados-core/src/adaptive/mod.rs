@@ -7,14 +7,16 @@
 //! implicit equations.
 //!
 //! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
-//! remembered of them, `consistent` the start, `integrator` what users see.
+//! remembered of them, `consistent` the start, `replay` and `sensitivities` their derivatives, `integrator` what users see.
 
 mod consistent;
 mod control;
 mod integrator;
 mod norm;
 mod options;
+mod replay;
 mod run;
+mod sensitivities;
 mod stages;
 mod statistics;
 mod tape;
@@ -84,14 +86,14 @@ impl AdaptiveMethod for Radau {
 }
 
 macro_rules! single {
-    ($($stages:literal),*) => {
+    ($($stages:literal: $lanes:literal),*) => {
         $(
             impl Family for RadauIIA<$stages> {
                 const LEVELS: usize = 1;
                 const STAGES: (usize, usize) = ($stages, 0);
                 #[allow(private_interfaces)]
                 fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-                    Ok(Box::new(stages::Radau::<M, T, $stages, { usize::div_ceil($stages, 2) }>::new()?))
+                    Ok(Box::new(stages::Radau::<M, T, $stages, $lanes>::new()?))
                 }
             }
             impl AdaptiveMethod for RadauIIA<$stages> {
@@ -100,4 +102,4 @@ macro_rules! single {
         )*
     };
 }
-single!(3, 5, 7);
+single!(3: 2, 5: 4, 7: 4);

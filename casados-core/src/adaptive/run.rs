@@ -1,6 +1,6 @@
 //! The steps of an interval.
 
-use super::consistent::{Consistent, place_inputs};
+use super::consistent::{At, Consistent, place_inputs};
 use super::control::{IMPLICIT, Predictive};
 use super::norm::norm;
 use super::options::AdaptiveOptions;
@@ -14,7 +14,6 @@ use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Matrix, Plain, Shape};
-use crate::statistics::Statistics;
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
 
@@ -30,6 +29,9 @@ const SETTLED: usize = 10;
 const WORTHWHILE: f64 = 1.2;
 /// After so many singular matrices in a row the problem is.
 const SINGULAR: usize = 5;
+
+/// After so many iterations in a row that did not converge the planned elimination may be to blame.
+const TROUBLES: usize = 3;
 
 /// Memory of a run.
 #[derive(Zeroable)]
@@ -56,6 +58,8 @@ pub(super) struct Base<M: Dae, T: Plain> {
     pub u: VectorU<M, T>,
     /// Whether the constant entries of the Jacobian are there.
     ready: bool,
+    /// Where Newton's method may stop.
+    newton_tolerance: f64,
 }
 
 /// What has to be done before a step can be tried.
@@ -122,6 +126,8 @@ pub(super) struct Run<'a, M: Dae, T: Real> {
     pub base: &'a mut Base<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
+    /// Whether steps are to be remembered.
+    pub record: bool,
     pub statistics: &'a mut AdaptiveStatistics,
 }
 
@@ -245,9 +251,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 None => stages.begin(&self.base.point),
             }
             let start = Start { point: &self.base.point, scale: &self.base.scale, h };
-            let tolerance = newton_tolerance(self.options.rtol, stages.count());
             let residuals = &mut self.statistics.residuals;
-            let outcome = stages.solve(&start, tolerance, &mut convergence, residuals);
+            let outcome = stages.solve(&start, self.base.newton_tolerance, &mut convergence, residuals);
             self.statistics.iterations += convergence.iterations;
             let outcome = outcome.and_then(|()| {
                 stages
@@ -258,7 +263,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 Ok(error) => error,
                 Err(failure) => {
                     self.statistics.failed += 1;
-                    troubles += 1;
                     let factor = match failure {
                         Failure::Slow(factor) => {
                             refusal = Refusal::NotConverged;
@@ -267,17 +271,18 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                         }
                         Failure::Diverges => {
                             refusal = Refusal::NotConverged;
+                            troubles += 1;
                             unexpected = true;
                             0.5
                         }
                         Failure::NotFinite => {
                             refusal = Refusal::NotFinite;
+                            troubles += 1;
                             unexpected = true;
                             0.5
                         }
                     };
-                    // The planned elimination may be to blame.
-                    pivoted = troubles > 1;
+                    pivoted = troubles >= TROUBLES;
                     h = h * T::from_f64(factor);
                     (rejected, last) = (true, false);
                     need = if current { Need::Factors } else { Need::Jacobian };
@@ -304,7 +309,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             self.statistics.steps += 1;
             (troubles, pivoted) = (0, false);
             stages.accept();
-            if self.options.keep_steps {
+            if self.record {
                 let x = &self.base.point.as_ref()[nx..2 * nx];
                 self.tape.push(t, h, level, x, stages.accepted())?;
             }
@@ -353,11 +358,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             *ready = true;
         }
         *start = *given;
-        let mut statistics = Statistics::default();
-        let solved = self.consistent.solve(x0.as_slice(), u, parameters, span.start, start, &mut statistics);
-        self.statistics.residuals += statistics.residuals + statistics.jacobians;
-        match solved {
-            Ok(()) => {}
+        let at = At { x: x0, u, p: parameters, t: span.start };
+        match self.consistent.solve(&at, start) {
+            Ok(points) => self.statistics.residuals += points,
             // Without algebraic states all equations may still be solvable: the matrix of ẋ has not full rank.
             Err(Error::Singular { .. }) if M::Shape::NZ == 0 => *start = Zeroable::zeroed(),
             Err(error) => return Err(error),
@@ -388,7 +391,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     fn tighten(&mut self, stages: usize) {
         let s = stages as f64;
         let exponent = (s + 1.0) / (2.0 * s);
-        let Base { tight, rtol, atol, .. } = &mut *self.base;
+        let Base { tight, rtol, atol, newton_tolerance, .. } = &mut *self.base;
+        let mut finest: f64 = 1.0;
         let mut before = (T::ZERO, T::ZERO);
         for ((tight, rtol), atol) in tight.as_mut().iter_mut().zip(rtol.as_ref()).zip(atol.as_ref()) {
             // Mostly they are all the same.
@@ -396,7 +400,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 before = (*rtol, T::from_f64(0.1 * Scalar::powf(rtol.to_f64(), exponent)));
             }
             *tight = (before.1, before.1 / *rtol * *atol);
+            finest = finest.min(before.1.to_f64());
         }
+        // Where the error of the iteration is small beside that of the step, and above rounding.
+        let wanted = Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03);
+        *newton_tolerance = wanted.max(10.0 * T::EPSILON.to_f64() / finest);
         self.measure();
     }
 
@@ -463,10 +471,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             *to = *x + h * *xdot;
         }
         let mut y = *start;
-        let mut statistics = Statistics::default();
-        let t = span.start + h;
-        let solved = self.consistent.solve(x.as_slice(), u, parameters, t, &mut y, &mut statistics);
-        self.statistics.residuals += statistics.residuals + statistics.jacobians;
+        let at = At { x: &x, u, p: parameters, t: span.start + h };
+        let solved = self.consistent.solve(&at, &mut y);
+        self.statistics.residuals += solved.as_ref().copied().unwrap_or(0);
         let mut curvature = 0.0;
         if solved.is_ok() {
             for (y, xdot) in y.as_mut().iter_mut().zip(xdot) {
@@ -480,12 +487,4 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.measure();
         Ok((100.0 * step).min(second).min(longest))
     }
-}
-
-/// Where Newton's method may stop: its error is then small beside that of the step.
-fn newton_tolerance(rtol: f64, stages: usize) -> f64 {
-    let s = stages as f64;
-    let tight = 0.1 * Scalar::powf(rtol, (s + 1.0) / (2.0 * s));
-    let wanted = Scalar::powf(tight, (s - 1.0) / (s + 1.0)).min(0.03);
-    wanted.max(10.0 * f64::EPSILON / tight)
 }

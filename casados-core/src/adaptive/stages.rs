@@ -4,6 +4,7 @@
 //! `k_i`, `z_i` instead of increments of `y`.
 
 use super::norm::{mean, norm};
+use super::replay::{Replay, Single, single};
 use crate::error::Error;
 use crate::irk::not_finite;
 use crate::linalg::{Arithmetic, Complex, EigenFactors, Eigenbasis, Kernel, Rows, dispatch, slot};
@@ -109,6 +110,11 @@ pub(super) trait Stages<M: Dae, T: Real> {
     fn lagrange(&self, theta: f64) -> [f64; MOST];
     /// Their integrals from zero to `theta`.
     fn weights(&self, theta: f64) -> [f64; MOST];
+    /// What takes a step again.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error>;
 }
 
 /// Memory of a step.
@@ -134,7 +140,10 @@ struct Memory<M: Dae, T: Plain, const S: usize, const L: usize> {
 }
 
 /// A step of the Radau IIA method with `S` stages, of which `L = ⌈S/2⌉` eigenvalues count.
-pub(super) struct Radau<M: Dae, T: Real, const S: usize, const L: usize> {
+pub(super) struct Radau<M: Dae, T: Real, const S: usize, const L: usize>
+where
+    RadauIIA<S>: Method<S>,
+{
     tableau: Tableau<S>,
     /// Column after column.
     a: [[T; S]; S],
@@ -143,6 +152,7 @@ pub(super) struct Radau<M: Dae, T: Real, const S: usize, const L: usize> {
     lagrange: [T; S],
     basis: Eigenbasis<T, S, L>,
     memory: Box<Memory<M, T, S, L>>,
+    replay: Option<Box<Single<M, T, S>>>,
 }
 
 impl<M: Dae, T: Real, const S: usize, const L: usize> Radau<M, T, S, L>
@@ -164,6 +174,7 @@ where
             basis: Eigenbasis::new(&tableau).ok_or(out_of_memory)?,
             tableau,
             memory,
+            replay: None,
         })
     }
 
@@ -302,9 +313,10 @@ where
                 }
                 if convergence.rate.is_finite() {
                     convergence.factor = convergence.rate / (1.0 - convergence.rate);
-                    let left = (most - 1 - iteration) as f64;
+                    let left = (most - 1 - iteration) as i32;
                     let expected =
-                        convergence.factor * increment * Scalar::powf(convergence.rate, left) / tolerance;
+                        convergence.factor * increment * Scalar::powi(convergence.rate, left) / tolerance;
+                    let left = f64::from(left);
                     if expected >= 1.0 {
                         let excess = expected.clamp(1e-4, 20.0);
                         return Err(Failure::Slow(0.8 * Scalar::powf(excess, -1.0 / (4.0 + left))));
@@ -359,9 +371,19 @@ where
     fn weights(&self, theta: f64) -> [f64; MOST] {
         padded(self.tableau.weights(theta))
     }
+
+    fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error> {
+        Ok(match &mut self.replay {
+            Some(replay) => &mut **replay,
+            none => &mut **none.insert(Box::new(single()?)),
+        })
+    }
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize> Radau<M, T, S, L> {
+impl<M: Dae, T: Real, const S: usize, const L: usize> Radau<M, T, S, L>
+where
+    RadauIIA<S>: Method<S>,
+{
     /// `y ← y − Δ` with `Δ` where the residual was, and the stages moved there: the sum of the squares of the changes
     /// of `(ξ, z)` relative to what is tolerated.
     fn advance(&mut self, point: &ArrayV<M, T>, scale: &ArrayK<M, T>, h: T) -> f64 {

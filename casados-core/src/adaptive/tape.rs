@@ -22,11 +22,13 @@ pub(super) struct Entry<T> {
 pub(super) struct Tape<T> {
     entries: Vec<Entry<T>>,
     numbers: Vec<T>,
+    /// The numbers of steps that are being taken again.
+    again: Vec<T>,
 }
 
 impl<T> Default for Tape<T> {
     fn default() -> Self {
-        Self { entries: Vec::new(), numbers: Vec::new() }
+        Self { entries: Vec::new(), numbers: Vec::new(), again: Vec::new() }
     }
 }
 
@@ -61,6 +63,31 @@ impl<T: Real> Tape<T> {
         let end = self.entries.get(step + 1).map_or(self.numbers.len(), |entry| entry.begin);
         let numbers = self.numbers.get(begin..end).unwrap_or_default();
         numbers.split_at(states.min(numbers.len()))
+    }
+
+    /// The steps are taken again:
+    pub fn rewrite(&mut self) {
+        self.again.clear();
+    }
+
+    /// one after the other, all of the same lengths as before;
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn write(&mut self, x: &[T], stages: &[T]) -> Result<(), Error> {
+        let length = x.len() + stages.len();
+        let bytes = (self.again.len() + length).saturating_mul(size_of::<T>());
+        self.again.try_reserve(length).map_err(|_| Error::OutOfMemory { bytes })?;
+        self.again.extend_from_slice(x);
+        self.again.extend_from_slice(stages);
+        Ok(())
+    }
+
+    /// and then they count.
+    pub fn commit(&mut self) {
+        if self.again.len() == self.numbers.len() {
+            core::mem::swap(&mut self.again, &mut self.numbers);
+        }
     }
 
     /// The step that contains a time; the last one that begins before it.

@@ -12,7 +12,7 @@ use super::step::check;
 use crate::error::Error;
 use crate::linalg::{axpy, slot};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
-use crate::result::{DenseForward, Directional, ForwardAdjoint, Seeds};
+use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Plain, Shape};
 use bytemuck::Zeroable;
@@ -175,23 +175,28 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
     /// # Errors
     /// [`Error::Overflow`]
     pub(crate) fn finish(&mut self, work: &Work<M, T, S>, step: usize) -> Result<(), Error> {
-        let result = &mut self.result.forward;
-        result.nominal = work.result;
-        for values in [
-            result.dx_dx0.as_slice(),
-            result.dx_du.as_slice(),
-            result.dx_dp.as_slice(),
-            result.dz_dx0.as_slice(),
-            result.dz_du.as_slice(),
-            result.dz_dp.as_slice(),
-            result.dz0_dx0.as_slice(),
-            result.dz0_du.as_slice(),
-            result.dz0_dp.as_slice(),
-        ] {
-            check(values, step)?;
-        }
-        Ok(())
+        self.result.forward.nominal = work.result;
+        check_result(&self.result.forward, step)
     }
+}
+
+/// # Errors
+/// [`Error::Overflow`] of the first derivative that is not finite.
+pub(crate) fn check_result<M: Dae, T: Real>(result: &Forward<M, T>, step: usize) -> Result<(), Error> {
+    for values in [
+        result.dx_dx0.as_slice(),
+        result.dx_du.as_slice(),
+        result.dx_dp.as_slice(),
+        result.dz_dx0.as_slice(),
+        result.dz_du.as_slice(),
+        result.dz_dp.as_slice(),
+        result.dz0_dx0.as_slice(),
+        result.dz0_du.as_slice(),
+        result.dz0_dp.as_slice(),
+    ] {
+        check(values, step)?;
+    }
+    Ok(())
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {

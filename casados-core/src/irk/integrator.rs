@@ -158,6 +158,19 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         &self.run.statistics
     }
 
+    /// Start values of the stages of the first step, for an integrator with a warm start.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
+        self.run.set_stages(y)
+    }
+
+    /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages innermost.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn stages(&mut self) -> Result<&[T], Error> {
+        let steps = self.run.last()?.steps;
+        Ok(steps.first().map_or(&[], |step| step.y.as_ref().as_flattened()))
+    }
+
     /// Allocates what `solve` needs, so that no call of it will.
     ///
     /// # Errors

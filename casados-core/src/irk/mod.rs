@@ -37,9 +37,8 @@ pub use integrator::Integrator;
 pub(crate) use self::{
     assemble::unknown_name,
     evaluate::{dot, not_finite},
-    record::{Coefficients, Step, Work},
+    forward::{check_result, split},
     run::check,
-    step::From,
 };
 
 use crate::memory::Memory;

@@ -159,6 +159,20 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         Ok(Parts { work, coefficients, steps, statistics })
     }
 
+    /// Start values of the stages of the first step, as a warm start: the unknowns `(k, z)`, stages innermost.
+    #[cfg(feature = "alloc")]
+    pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
+        let [first, second] = &mut self.tapes;
+        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        if let Some(step) = steps.first_mut() {
+            for (to, from) in step.y.as_mut().as_flattened_mut().iter_mut().zip(y) {
+                *to = *from;
+            }
+            self.warm = true;
+        }
+        Ok(())
+    }
+
     /// Everything succeeded: the record of this call is the one to keep.
     pub fn keep(&mut self) -> Result<&Work<M, T, S>, Error> {
         let work = W::nominal(&mut self.work)?;

@@ -9,7 +9,8 @@
 //!
 //! of which complex conjugate ones need to be solved only once (J. C. Butcher 1976; E. Hairer, G. Wanner, Solving
 //! Ordinary Differential Equations II, section IV.8). All have the pattern and the elimination plan of the model, so they
-//! are solved side by side, `L = ⌈S/2⌉` complex numbers at a time; a real eigenvalue takes part as a complex one.
+//! are solved side by side, `L ≥ ⌈S/2⌉` complex numbers at a time; a real eigenvalue takes part as a complex one, and what
+//! is left of a register repeats the last.
 
 use super::complex::Complex;
 use super::dense::Dense;
@@ -37,7 +38,7 @@ pub struct Eigenbasis<T, const S: usize, const L: usize> {
 impl<T: Real, const S: usize, const L: usize> Eigenbasis<T, S, L> {
     /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than `1e-10`.
     pub fn new(tableau: &Tableau<S>) -> Option<Self> {
-        const { assert!(L == S.div_ceil(2), "L must be S / 2, rounded up") };
+        const { assert!(L >= S.div_ceil(2), "L must be S / 2 at least, rounded up") };
         let basis = Eigenbasis::<f64, S, L>::compute(tableau.a())?;
         let cast = |z: Complex<f64, L>| Complex { re: z.re.map(T::from_f64), im: z.im.map(T::from_f64) };
         Some(Self { values: cast(basis.values), left: basis.left.map(cast), right: basis.right.map(cast) })
@@ -87,7 +88,7 @@ impl<const S: usize, const L: usize> Eigenbasis<f64, S, L> {
             let start = if is_real { Complex::real(root.re) } else { root };
             let (value, left, right) = eigenvectors(a, start)?;
             let lane = if is_real { reals } else { pairs };
-            if lane >= if is_real { S % 2 } else { L } {
+            if lane >= if is_real { S % 2 } else { S.div_ceil(2) } {
                 return None;
             }
             let (counter, weight) = if is_real { (&mut reals, 1.0) } else { (&mut pairs, 2.0) };
@@ -99,7 +100,11 @@ impl<const S: usize, const L: usize> Eigenbasis<f64, S, L> {
                 set(&mut basis.right[stage], right[stage].scaled(weight));
             }
         }
-        (pairs == L && basis.reproduces(a)).then_some(basis)
+        for lane in pairs..L {
+            basis.values.re[lane] = basis.values.re[pairs.saturating_sub(1)];
+            basis.values.im[lane] = basis.values.im[pairs.saturating_sub(1)];
+        }
+        (reals == S % 2 && pairs == S.div_ceil(2) && basis.reproduces(a)).then_some(basis)
     }
 
     /// Whether `V diag(μ) V⁻¹` is `A`.
@@ -430,6 +435,7 @@ mod tests {
         check::<5, 3>(&RadauIIA::<5>::TABLEAU);
         check::<6, 3>(&RadauIIA::<6>::TABLEAU);
         check::<7, 4>(&RadauIIA::<7>::TABLEAU);
+        check::<5, 4>(&RadauIIA::<5>::TABLEAU);
         check::<8, 4>(&RadauIIA::<8>::TABLEAU);
         check::<9, 5>(&RadauIIA::<9>::TABLEAU);
     }

@@ -1,0 +1,131 @@
+//! A step that is known is taken again, to rounding, and differentiated: it is an interval of one step for the integrator
+//! with steps of equal size.
+
+use super::consistent::At;
+use crate::error::Error;
+use crate::irk::Integrator;
+use crate::memory::Heap;
+use crate::model::{Dae, VectorX};
+use crate::options::{Options, Start};
+use crate::result::{Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use crate::tableau::{Method, RadauIIA};
+
+/// Takes steps of given size.
+pub(super) trait Replay<M: Dae, T: Real> {
+    /// From the unknowns `y` of its stages, or near them.
+    ///
+    /// # Errors
+    /// Those of Newton's method.
+    fn solve(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Nominal<M, T>, Error>;
+    /// The same with derivatives.
+    ///
+    /// # Errors
+    /// Those of Newton's method; a singular matrix.
+    fn forward(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Forward<M, T>, Error>;
+    /// The same with second derivatives of `λᵀx` at its end.
+    ///
+    /// # Errors
+    /// Those of Newton's method; a singular matrix.
+    fn hessian(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error>;
+    /// The gradient of `λᵀx` at its end with respect to `(x, u, p)`, written one after the other.
+    ///
+    /// # Errors
+    /// Those of Newton's method; a singular matrix.
+    fn adjoint(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        lambda: &VectorX<M, T>,
+        gradient: &mut [T],
+    ) -> Result<(), Error>;
+    /// The unknowns of the stages that were found.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`]
+    fn stages(&mut self) -> Result<&[T], Error>;
+}
+
+/// The integrator of one step of the Radau IIA method with `S` stages.
+pub(super) type Single<M, T, const S: usize> = Integrator<M, RadauIIA<S>, S, T, Heap>;
+
+/// # Errors
+/// None for methods that have a tableau.
+pub(super) fn single<M: Dae, T: Real, const S: usize>() -> Result<Single<M, T, S>, Error>
+where
+    RadauIIA<S>: Method<S>,
+{
+    Integrator::new(Options { steps: 1, start: Start::Warm, ..Options::default() })
+}
+
+/// Goes to the start of a step.
+fn go<M: Dae, T: Real, const S: usize>(
+    single: &mut Single<M, T, S>,
+    at: &At<'_, M, T>,
+    y: &[T],
+) -> Result<(), Error>
+where
+    RadauIIA<S>: Method<S>,
+{
+    if M::Shape::NP > 0 {
+        single.set_parameters(at.p)?;
+    }
+    single.set_time(at.t)?;
+    single.set_stages(y)
+}
+
+impl<M: Dae, T: Real, const S: usize> Replay<M, T> for Single<M, T, S>
+where
+    RadauIIA<S>: Method<S>,
+{
+    fn solve(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Nominal<M, T>, Error> {
+        go(self, at, y)?;
+        Integrator::solve(self, at.x, at.u, h)
+    }
+
+    fn forward(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Forward<M, T>, Error> {
+        go(self, at, y)?;
+        Integrator::forward(self, at.x, at.u, h)
+    }
+
+    fn hessian(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        go(self, at, y)?;
+        Integrator::hessian(self, at.x, at.u, h, lambda)
+    }
+
+    fn adjoint(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        lambda: &VectorX<M, T>,
+        gradient: &mut [T],
+    ) -> Result<(), Error> {
+        use crate::shape::Matrix;
+        go(self, at, y)?;
+        let adjoint = Integrator::adjoint(self, at.x, at.u, h, lambda)?;
+        let parts = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
+        for (to, from) in gradient.iter_mut().zip(parts.into_iter().flatten()) {
+            *to = *from;
+        }
+        Ok(())
+    }
+
+    fn stages(&mut self) -> Result<&[T], Error> {
+        Integrator::stages(self)
+    }
+}

@@ -1,0 +1,351 @@
+//! Derivatives of a run: the accepted steps are kept as they are, and each is differentiated exactly.
+//!
+//! ```text
+//! x_{n+1} = Φ_n(x_n, u, p)        V_{n+1} = ∂Φ_n/∂x V_n + ∂Φ_n/∂(u, p)        λ_n = (∂Φ_n/∂x)ᵀ λ_{n+1}
+//! d²(λᵀ x_N)/dw² = Σ_n D_nᵀ ∇²(λ_{n+1}ᵀ Φ_n) D_n        D_n = d(x_n, u, p)/dw
+//! ```
+
+use super::consistent::{At, Consistent};
+use super::replay::Replay;
+use super::run::{Base, Levels, Span};
+use super::sealed::Family;
+use super::tape::Tape;
+use crate::error::Error;
+use crate::irk::{check_result, not_finite, split};
+use crate::linalg::axpy;
+use crate::model::{ArrayW, ArrayX, Dae, VectorX, VectorZ};
+use crate::result::{Adjoint, Forward, Hessian};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain, Shape};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// Memory of derivatives.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+pub(super) struct Memory<M: Dae, T: Plain> {
+    pub hessian: Hessian<M, T>,
+    pub adjoint: Adjoint<M, T>,
+    /// `V_n`, and `V_{n+1}`.
+    v: [ArrayX<M, ArrayW<M, T>>; 2],
+    lambda: VectorX<M, T>,
+    /// The gradient of one step, and that of all.
+    gradient: [ArrayW<M, T>; 2],
+    /// The Hessian of one step, its product with `D`, and the sum of all.
+    step: ArrayW<M, ArrayW<M, T>>,
+    product: ArrayW<M, ArrayW<M, T>>,
+    sum: ArrayW<M, ArrayW<M, T>>,
+    row: ArrayW<M, T>,
+}
+
+/// What derivatives are taken of.
+pub(super) struct Frozen<'a, M: Dae, T: Real> {
+    pub base: &'a mut Base<M, T>,
+    pub consistent: &'a mut Consistent<M, T>,
+    pub tape: &'a mut Tape<T>,
+    pub span: Span<T>,
+}
+
+impl<M: Dae, T: Real> Frozen<'_, M, T> {
+    /// Takes all steps from `x0` again, to rounding; `each` is called to take one, and returns what it gave.
+    fn steps<B: Family>(
+        &mut self,
+        levels: &mut Levels<M, T>,
+        x0: &VectorX<M, T>,
+        mut each: impl FnMut(
+            &mut dyn Replay<M, T>,
+            &At<'_, M, T>,
+            T,
+            &[T],
+            usize,
+        ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
+    ) -> Result<(), Error> {
+        let mut x = *x0;
+        let Base { u, parameters, result, start, given, .. } = &mut *self.base;
+        *start = *given;
+        let at = At { x: x0, u, p: parameters, t: self.span.start };
+        match self.consistent.solve(&at, start) {
+            Ok(_) => {}
+            Err(Error::Singular { .. }) if M::Shape::NZ == 0 => {}
+            Err(error) => return Err(error),
+        }
+        result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[M::Shape::NX..]);
+        (result.x, result.z) = (*x0, result.z0);
+        self.tape.rewrite();
+        for step in 0..self.tape.entries().len() {
+            let Some(entry) = self.tape.entries().get(step).copied() else { break };
+            let replay = levels.get::<B>(entry.level)?.replay()?;
+            let (_, y) = self.tape.numbers(step, M::Shape::NX);
+            let at = At { x: &x, u, p: parameters, t: entry.t };
+            let (end, z) = each(replay, &at, entry.h, y, step).map_err(|error| in_step(error, step))?;
+            self.tape.write(x.as_slice(), replay.stages()?)?;
+            (x, result.z) = (end, z);
+            result.x = x;
+        }
+        self.tape.commit();
+        Ok(())
+    }
+
+    /// The solution alone.
+    ///
+    /// # Errors
+    /// Those of Newton's method.
+    pub fn solve<B: Family>(&mut self, levels: &mut Levels<M, T>, x0: &VectorX<M, T>) -> Result<(), Error> {
+        self.steps::<B>(levels, x0, |replay, at, h, y, _| {
+            let nominal = replay.solve(at, h, y)?;
+            Ok((nominal.x, nominal.z))
+        })
+    }
+
+    /// The solution and its derivatives; `history` takes `V_n` of each step, if it is wanted.
+    ///
+    /// # Errors
+    /// Those of Newton's method; a singular matrix; [`Error::Overflow`].
+    pub fn forward<B: Family>(
+        &mut self,
+        levels: &mut Levels<M, T>,
+        x0: &VectorX<M, T>,
+        memory: &mut Memory<M, T>,
+        mut history: Option<&mut Vec<T>>,
+    ) -> Result<(), Error> {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        let Memory { v: [v, next], hessian, row, .. } = memory;
+        let result = &mut hessian.first.forward;
+        for (index, row) in v.as_mut().iter_mut().enumerate() {
+            row.as_mut().fill(T::ZERO);
+            row.as_mut()[index] = T::ONE;
+        }
+        let count = self.tape.entries().len();
+        self.steps::<B>(levels, x0, |replay, at, h, y, step| {
+            if let Some(history) = &mut history {
+                let bytes = history.len().saturating_mul(size_of::<T>());
+                history.try_reserve(nx * M::Shape::NW).map_err(|_| Error::OutOfMemory { bytes })?;
+                for row in v.as_ref() {
+                    history.extend_from_slice(row.as_ref());
+                }
+            }
+            let forward = replay.forward(at, h, y)?;
+            let at = |i: usize, w: usize| {
+                if w < nx {
+                    T::ZERO
+                } else if w < nx + M::Shape::NU {
+                    forward.dx_du[(i, w - nx)]
+                } else {
+                    forward.dx_dp[(i, w - nx - M::Shape::NU)]
+                }
+            };
+            for (i, row) in next.as_mut().iter_mut().enumerate() {
+                for (w, element) in row.as_mut().iter_mut().enumerate() {
+                    *element = at(i, w);
+                }
+                for (j, v) in v.as_ref().iter().enumerate() {
+                    axpy(forward.dx_dx0[(i, j)], v.as_ref(), row.as_mut());
+                }
+            }
+            if step + 1 == count {
+                algebraic(forward, v, row, |row, i| {
+                    split(row, i, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
+                });
+            }
+            *v = *next;
+            Ok((forward.nominal.x, forward.nominal.z))
+        })?;
+        for (i, row) in v.as_ref().iter().enumerate() {
+            split(row.as_ref(), i, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
+        }
+        if nz > 0 {
+            let Base { u, parameters, start, .. } = &mut *self.base;
+            let at = At { x: x0, u, p: parameters, t: self.span.start };
+            let forward = self.consistent.forward(&at, start)?;
+            (result.dz0_dx0, result.dz0_du, result.dz0_dp) = (forward.dz_dx0, forward.dz_du, forward.dz_dp);
+            if count == 0 {
+                (result.dz_dx0, result.dz_du, result.dz_dp) = (forward.dz_dx0, forward.dz_du, forward.dz_dp);
+            }
+        }
+        result.nominal = self.base.result;
+        check_result(result, count)
+    }
+
+    /// The gradient of `λᵀx`, after the solution: backwards over the steps.
+    ///
+    /// # Errors
+    /// Those of Newton's method; a singular matrix; [`Error::Overflow`].
+    pub fn adjoint<B: Family>(
+        &mut self,
+        levels: &mut Levels<M, T>,
+        lambda: &VectorX<M, T>,
+        memory: &mut Memory<M, T>,
+    ) -> Result<(), Error> {
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        let Memory { lambda: now, gradient: [step_gradient, gradient], adjoint, .. } = memory;
+        *now = *lambda;
+        gradient.as_mut().fill(T::ZERO);
+        let Base { u, parameters, result, .. } = &mut *self.base;
+        for (step, entry) in self.tape.entries().iter().enumerate().rev() {
+            let (states, y) = self.tape.numbers(step, nx);
+            let mut x = VectorX::<M, T>::zeroed();
+            x.as_mut_slice().copy_from_slice(states);
+            let at = At { x: &x, u, p: parameters, t: entry.t };
+            let replay = levels.get::<B>(entry.level)?.replay()?;
+            replay
+                .adjoint(&at, entry.h, y, now, step_gradient.as_mut())
+                .map_err(|error| in_step(error, step))?;
+            let (states, others) = step_gradient.as_ref().split_at(nx);
+            now.as_mut_slice().copy_from_slice(states);
+            for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(others) {
+                *sum = *sum + *part;
+            }
+        }
+        adjoint.nominal = *result;
+        adjoint.grad_x0.as_mut_slice().copy_from_slice(now.as_slice());
+        let others = &gradient.as_ref()[nx..];
+        adjoint.grad_u.as_mut_slice().copy_from_slice(&others[..nu]);
+        adjoint.grad_p.as_mut_slice().copy_from_slice(&others[nu..]);
+        finite(now.as_slice())?;
+        finite(others)
+    }
+
+    /// The gradient and the Hessian of `λᵀx`, after [`Frozen::forward`] with its history.
+    ///
+    /// # Errors
+    /// Those of Newton's method; a singular matrix; a second derivative that is not finite; [`Error::Overflow`].
+    pub fn hessian<B: Family>(
+        &mut self,
+        levels: &mut Levels<M, T>,
+        lambda: &VectorX<M, T>,
+        memory: &mut Memory<M, T>,
+        history: &[T],
+    ) -> Result<(), Error> {
+        let (nx, nu, np, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NP, M::Shape::NW);
+        let Memory { lambda: now, gradient: [_, gradient], hessian, step: local, product, sum, .. } = memory;
+        *now = *lambda;
+        gradient.as_mut().fill(T::ZERO);
+        for row in sum.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        let Base { u, parameters, .. } = &mut *self.base;
+        for (step, entry) in self.tape.entries().iter().enumerate().rev() {
+            let (states, y) = self.tape.numbers(step, nx);
+            let mut x = VectorX::<M, T>::zeroed();
+            x.as_mut_slice().copy_from_slice(states);
+            let at = At { x: &x, u, p: parameters, t: entry.t };
+            let replay = levels.get::<B>(entry.level)?.replay()?;
+            let second = replay.hessian(&at, entry.h, y, now).map_err(|error| in_step(error, step))?;
+            *now = second.first.grad_x0;
+            let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());
+            for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(parts) {
+                *sum = *sum + *part;
+            }
+            place(second, local);
+            // G = H D, then sum += Dᵀ G.
+            let v = history.get(step * nx * nw..).unwrap_or_default();
+            for (to, from) in product.as_mut().iter_mut().zip(local.as_ref()) {
+                to.as_mut().fill(T::ZERO);
+                to.as_mut()[nx..].copy_from_slice(&from.as_ref()[nx..]);
+                for (v, factor) in v.chunks_exact(nw.max(1)).zip(&from.as_ref()[..nx]) {
+                    axpy(*factor, v, to.as_mut());
+                }
+            }
+            let (product_x, product_w) = product.as_ref().split_at(nx);
+            for (v, row) in v.chunks_exact(nw.max(1)).zip(product_x) {
+                for (sum, factor) in sum.as_mut().iter_mut().zip(v) {
+                    axpy(*factor, row.as_ref(), sum.as_mut());
+                }
+            }
+            for (sum, row) in sum.as_mut()[nx..].iter_mut().zip(product_w) {
+                axpy(T::ONE, row.as_ref(), sum.as_mut());
+            }
+        }
+        let sum = sum.as_ref();
+        // To the last bit symmetric: of the two that differ by rounding the lower one.
+        let at = |r: usize, c: usize| if r >= c { sum[r].as_ref()[c] } else { sum[c].as_ref()[r] };
+        fill(&mut hessian.h_xx, at);
+        fill(&mut hessian.h_xu, |r, c| at(r, nx + c));
+        fill(&mut hessian.h_uu, |r, c| at(nx + r, nx + c));
+        fill(&mut hessian.h_xp, |r, c| at(r, nx + nu + c));
+        fill(&mut hessian.h_up, |r, c| at(nx + r, nx + nu + c));
+        fill(&mut hessian.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
+        let others = &gradient.as_ref()[nx..];
+        hessian.first.grad_x0 = *now;
+        hessian.first.grad_u.as_mut_slice().copy_from_slice(&others[..nu]);
+        hessian.first.grad_p.as_mut_slice().copy_from_slice(&others[nu..nu + np]);
+        finite(now.as_slice())?;
+        finite(others)?;
+        for row in sum {
+            finite(row.as_ref())?;
+        }
+        Ok(())
+    }
+}
+
+/// Derivatives of `z` at the end of a step in all directions, row by row.
+fn algebraic<M: Dae, T: Real>(
+    forward: &Forward<M, T>,
+    v: &ArrayX<M, ArrayW<M, T>>,
+    row: &mut ArrayW<M, T>,
+    mut write: impl FnMut(&[T], usize),
+) {
+    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    for i in 0..M::Shape::NZ {
+        for (w, element) in row.as_mut().iter_mut().enumerate() {
+            *element = if w < nx {
+                T::ZERO
+            } else if w < nx + nu {
+                forward.dz_du[(i, w - nx)]
+            } else {
+                forward.dz_dp[(i, w - nx - nu)]
+            };
+        }
+        for (j, v) in v.as_ref().iter().enumerate() {
+            axpy(forward.dz_dx0[(i, j)], v.as_ref(), row.as_mut());
+        }
+        write(row.as_ref(), i);
+    }
+}
+
+/// The blocks of a Hessian as one matrix.
+fn place<M: Dae, T: Real>(from: &Hessian<M, T>, to: &mut ArrayW<M, ArrayW<M, T>>) {
+    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    for (r, row) in to.as_mut().iter_mut().enumerate() {
+        for (c, element) in row.as_mut().iter_mut().enumerate() {
+            let (i, j) = (r.min(c), r.max(c));
+            *element = if j < nx {
+                from.h_xx[(i, j)]
+            } else if j < nx + nu {
+                if i < nx { from.h_xu[(i, j - nx)] } else { from.h_uu[(i - nx, j - nx)] }
+            } else if i < nx {
+                from.h_xp[(i, j - nx - nu)]
+            } else if i < nx + nu {
+                from.h_up[(i - nx, j - nx - nu)]
+            } else {
+                from.h_pp[(i - nx - nu, j - nx - nu)]
+            };
+        }
+    }
+}
+
+fn fill<T, A: Matrix<T>>(matrix: &mut A, element: impl Fn(usize, usize) -> T) {
+    for c in 0..A::COLUMNS {
+        for r in 0..A::ROWS {
+            matrix[(r, c)] = element(r, c);
+        }
+    }
+}
+
+/// # Errors
+/// [`Error::Overflow`]
+fn finite<T: Real>(values: &[T]) -> Result<(), Error> {
+    not_finite(values).map_or(Ok(()), |(index, _)| Err(Error::Overflow { step: 0, index }))
+}
+
+/// An error of a step is one of the run.
+fn in_step(mut error: Error, number: usize) -> Error {
+    match &mut error {
+        Error::NonFiniteModel { at, .. } | Error::Singular { at, .. } | Error::NotConverged { at, .. } => {
+            at.step = number;
+        }
+        Error::Overflow { step, .. } => *step = number,
+        _ => {}
+    }
+    error
+}

@@ -1,0 +1,279 @@
+//! Derivatives of adaptive runs: against the references of the IVP set, against each other, and as those of one smooth
+//! function.
+
+use casados::shape::Shape;
+use casados::{Adaptive, AdaptiveOptions, Dae, Error, Radau};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+mod data;
+#[path = "../examples/models/ivp/mod.rs"]
+mod models;
+
+use data::Record;
+use models::chemistry::{AkzoNobel, Oregonator, Robertson};
+use models::oscillators::{VanDerPol, VanDerPolScaled};
+
+fn problem(name: &str) -> (Vec<f64>, Vec<f64>) {
+    // Of this one there are derivatives only.
+    if name == "van_der_pol_5" {
+        return (vec![2.0, 0.0], vec![5.0]);
+    }
+    let set = Record::load("ivp/ends.json").expect("the reference is there");
+    let record = set.record(name).expect("a problem");
+    (record.list("x0").expect("x0"), record.list("p").expect("p"))
+}
+
+/// References of this order whose name is this.
+fn references(order: &str, name: &str) -> Vec<Record> {
+    let set = Record::load("ivp/sensitivities.json").expect("the reference is there");
+    let mut records = set.records(order).expect("references");
+    records.retain(|record| record.text("name").is_ok_and(|found| found == name));
+    assert!(!records.is_empty());
+    records
+}
+
+fn integrator<M, const NP: usize>(p: &[f64], rtol: f64, atol: f64) -> Adaptive<M, Radau>
+where
+    M: Dae,
+    M::Shape: Shape<VectorP<f64> = SVector<f64, NP>>,
+{
+    let options = AdaptiveOptions { rtol, atol, ..Default::default() };
+    let mut adaptive = Adaptive::<M, Radau>::new(options).expect("valid");
+    adaptive.set_parameters(&SVector::from_column_slice(p)).expect("finite");
+    adaptive
+}
+
+/// First derivatives by `(x₀, p)`; rows of `z` below those of `x`.
+macro_rules! first {
+    ($model:ty, $name:literal, $nx:literal, $nz:literal, $np:literal, $rtol:expr, $atol:expr, $bound:expr) => {
+        let (x0, p) = problem($name);
+        let mut before = SVector::<f64, { $nx + $np }>::zeros();
+        for reference in references("first", $name) {
+            let mut adaptive = integrator::<$model, $np>(&p, $rtol, $atol);
+            let t = reference.number("t").expect("t");
+            let x0 = SVector::<f64, $nx>::from_column_slice(&x0);
+            let result = adaptive.forward(&x0, &SVector::zeros(), t).expect("derivatives");
+            let rows = $nx + $nz;
+            let mut found = DMatrix::zeros(rows, $nx + $np);
+            found.view_mut((0, 0), ($nx, $nx)).copy_from(&result.dx_dx0);
+            found.view_mut((0, $nx), ($nx, $np)).copy_from(&result.dx_dp);
+            found.view_mut(($nx, 0), ($nz, $nx)).copy_from(&result.dz_dx0);
+            found.view_mut(($nx, $nx), ($nz, $np)).copy_from(&result.dz_dp);
+            let list = |key, columns| {
+                DMatrix::from_row_slice(
+                    rows,
+                    columns,
+                    &reference.numbers(key, rows * columns).expect("a matrix"),
+                )
+            };
+            let mut expected = DMatrix::zeros(rows, $nx + $np);
+            expected.view_mut((0, 0), (rows, $nx)).copy_from(&list("dx_dx0", $nx));
+            expected.view_mut((0, $nx), (rows, $np)).copy_from(&list("dx_dp", $np));
+            for (column, before) in before.iter_mut().enumerate() {
+                let size = expected.column(column).norm();
+                let error = (found.column(column) - expected.column(column)).norm();
+                *before = size.max(*before);
+                let bound = $bound * size + 500.0 * f64::EPSILON * *before;
+                assert!(error <= bound, "{} at {t:e}, column {column}: {error:e} of {size:e}", $name);
+            }
+        }
+    };
+}
+
+/// At a tight tolerance the discrete map is the flow, and so are their derivatives. A column that decays keeps the rounding
+/// errors of each of some hundred steps, from when it was large: those of Robertson's rates fall by a factor of four
+/// million. Those of Van der Pol are products of factors `exp ∫ J dt` whose exponent, the integral of `μ (1 − y1²)`, has
+/// terms of 3000 · 2000 in both scalings, and with it their rounding errors: `6e6 ε = 1.3e-9`.
+#[test]
+fn first_order() {
+    first!(Robertson, "robertson", 3, 0, 3, 1e-12, 1e-20, 1e-10);
+    first!(AkzoNobel, "akzo_nobel", 5, 1, 9, 1e-12, 1e-16, 1e-10);
+    first!(Oregonator, "oregonator", 3, 0, 4, 1e-14, 1e-15, 1e-10);
+    first!(VanDerPol, "van_der_pol_1e3", 2, 0, 1, 1e-13, 1e-16, 2e-9);
+    first!(VanDerPolScaled, "van_der_pol_scaled_1e-6", 2, 0, 1, 1e-13, 1e-13, 2e-9);
+}
+
+/// The gradient and the Hessian over `(x₀, p)` of `λᵀx`.
+fn second<M, const NX: usize, const NP: usize>(
+    adaptive: &mut Adaptive<M, Radau>,
+    x0: &SVector<f64, NX>,
+    t: f64,
+    lambda: &SVector<f64, NX>,
+) -> (DVector<f64>, DMatrix<f64>)
+where
+    M: Dae,
+    M::Shape: Shape<
+            VectorX<f64> = SVector<f64, NX>,
+            VectorU<f64> = SVector<f64, 0>,
+            VectorP<f64> = SVector<f64, NP>,
+            MatrixXX<f64> = SMatrix<f64, NX, NX>,
+            MatrixXP<f64> = SMatrix<f64, NX, NP>,
+            MatrixPP<f64> = SMatrix<f64, NP, NP>,
+        >,
+{
+    let result = adaptive.hessian(x0, &SVector::zeros(), t, lambda).expect("second derivatives");
+    let mut gradient = DVector::zeros(NX + NP);
+    gradient.rows_mut(0, NX).copy_from(&result.grad_x0);
+    gradient.rows_mut(NX, NP).copy_from(&result.grad_p);
+    let mut hessian = DMatrix::zeros(NX + NP, NX + NP);
+    hessian.view_mut((0, 0), (NX, NX)).copy_from(&result.h_xx);
+    hessian.view_mut((0, NX), (NX, NP)).copy_from(&result.h_xp);
+    hessian.view_mut((NX, 0), (NP, NX)).copy_from(&result.h_xp.transpose());
+    hessian.view_mut((NX, NX), (NP, NP)).copy_from(&result.h_pp);
+    (gradient, hessian)
+}
+
+fn expected(reference: &Record, n: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let gradient = DVector::from_vec(reference.numbers("gradient", n).expect("a gradient"));
+    let hessian = DMatrix::from_row_slice(n, n, &reference.numbers("hessian", n * n).expect("a Hessian"));
+    (gradient, hessian)
+}
+
+/// Elements relative to the geometric mean of the diagonal, as parameters have very different units.
+fn close(found: &DMatrix<f64>, expected: &DMatrix<f64>, bound: f64) {
+    let scale = |i: usize| expected.row(i).amax();
+    for i in 0..expected.nrows() {
+        for j in 0..expected.ncols() {
+            let error = (found[(i, j)] - expected[(i, j)]).abs();
+            let size = scale(i).min(scale(j));
+            assert!(error <= bound * size, "({i}, {j}): {} instead of {}", found[(i, j)], expected[(i, j)]);
+        }
+    }
+}
+
+macro_rules! second_order {
+    ($model:ty, $name:literal, $nx:literal, $np:literal, $rtol:expr, $atol:expr, $bound:expr) => {
+        let (x0, p) = problem($name);
+        for reference in references("second", $name) {
+            let mut adaptive = integrator::<$model, $np>(&p, $rtol, $atol);
+            let t = reference.number("t").expect("t");
+            let lambda = reference.vector("lambda").expect("lambda");
+            let (gradient, hessian) =
+                second::<$model, $nx, $np>(&mut adaptive, &SVector::from_column_slice(&x0), t, &lambda);
+            let (expected_gradient, expected_hessian) = expected(&reference, $nx + $np);
+            for (found, expected) in gradient.iter().zip(&expected_gradient) {
+                assert!((found - expected).abs() <= $bound * expected.abs(), "{}: {found} {expected}", $name);
+            }
+            assert_eq!(hessian, hessian.transpose());
+            close(&hessian, &expected_hessian, $bound);
+        }
+    };
+}
+
+#[test]
+fn second_order() {
+    second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, 1e-8);
+    second_order!(Oregonator, "oregonator", 3, 4, 1e-12, 1e-13, 1e-8);
+    second_order!(VanDerPol, "van_der_pol_5", 2, 1, 1e-12, 1e-12, 1e-8);
+}
+
+/// The reference has the algebraic state in its sum: `y6 = Ks y1 y4`, whose derivatives follow by the product rule.
+#[test]
+fn second_order_of_a_product() {
+    let (x0, p) = problem("akzo_nobel");
+    let reference = references("second", "akzo_nobel").remove(0);
+    let mut adaptive = integrator::<AkzoNobel, 9>(&p, 1e-12, 1e-16);
+    let t = reference.number("t").expect("t");
+    let x0 = SVector::<f64, 5>::from_column_slice(&x0);
+    let forward = *adaptive.forward(&x0, &SVector::zeros(), t).expect("derivatives");
+    let (y1, y4, solubility, index) = (forward.x[0], forward.x[3], p[6], 5 + 6);
+    let mut lambda = SVector::<f64, 5>::repeat(1.0);
+    lambda[0] += solubility * y4;
+    lambda[3] += solubility * y1;
+    let row = |i: usize| {
+        let columns = forward.dx_dx0.row(i).iter().chain(forward.dx_dp.row(i).iter()).copied().collect();
+        DVector::from_vec(columns)
+    };
+    let (d1, d4) = (row(0), row(3));
+    let mut unit = DVector::zeros(14);
+    unit[index] = 1.0;
+    let (mut gradient, mut hessian) = second::<AkzoNobel, 5, 9>(&mut adaptive, &x0, t, &lambda);
+    gradient += &unit * (y1 * y4);
+    let product = &d1 * y4 + &d4 * y1;
+    hessian += (&d1 * d4.transpose() + &d4 * d1.transpose()) * solubility;
+    hessian += &unit * product.transpose() + &product * unit.transpose();
+    let (expected_gradient, expected_hessian) = expected(&reference, 14);
+    for (found, expected) in gradient.iter().zip(&expected_gradient) {
+        assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{found} {expected}");
+    }
+    close(&hessian, &expected_hessian, 1e-8);
+}
+
+/// All derivatives at a coarse tolerance are those of one discrete map, exactly: the adjoint is the product with the
+/// forward derivatives, and both follow the frozen map by complex or real differences.
+#[test]
+fn derivatives_of_the_frozen_map() {
+    let (x0, p) = problem("akzo_nobel");
+    let x0 = SVector::<f64, 5>::from_column_slice(&x0) + SVector::repeat(0.01);
+    let (u, t) = (SVector::zeros(), 20.0);
+    let mut adaptive = integrator::<AkzoNobel, 9>(&p, 1e-4, 1e-8);
+    let lambda = SVector::<f64, 5>::from([1.0, -2.0, 0.5, 3.0, 1.5]);
+    let hessian = *adaptive.hessian(&x0, &u, t, &lambda).expect("second derivatives");
+    adaptive.freeze().expect("steps are remembered");
+    let times: Vec<f64> = adaptive.times().collect();
+    assert!(times.len() > 5);
+
+    // Rounding of Newton's method, ε, times the condition of sums of a few dozen terms.
+    let forward = *adaptive.forward(&x0, &u, t).expect("derivatives");
+    let adjoint = *adaptive.adjoint(&x0, &u, t, &lambda).expect("a gradient");
+    let same = |a: f64, b: f64, size: f64| assert!((a - b).abs() <= 1e-12 * size, "{a} {b}");
+    for w in 0..5 {
+        let column = forward.dx_dx0.column(w);
+        let size = column.component_mul(&lambda).abs().sum();
+        same(adjoint.grad_x0[w], lambda.dot(&column), size);
+        same(hessian.grad_x0[w], adjoint.grad_x0[w], size);
+    }
+    for w in 0..9 {
+        let column = forward.dx_dp.column(w);
+        let size = column.component_mul(&lambda).abs().sum();
+        same(adjoint.grad_p[w], lambda.dot(&column), size);
+        same(hessian.grad_p[w], adjoint.grad_p[w], size);
+    }
+
+    // Central differences of the frozen map: the error is δ² times a third derivative, and ε/δ.
+    let delta = 1e-4;
+    for w in 0..5 {
+        let mut step = SVector::<f64, 5>::zeros();
+        step[w] = delta * x0[w];
+        let above = *adaptive.hessian(&(x0 + step), &u, t, &lambda).expect("the frozen map");
+        assert_eq!(adaptive.times().collect::<Vec<_>>(), times);
+        let below = *adaptive.hessian(&(x0 - step), &u, t, &lambda).expect("the frozen map");
+        let width = 2.0 * step[w];
+        let difference = (above.x - below.x) / width;
+        let error = (difference - forward.dx_dx0.column(w)).amax();
+        assert!(error <= 1e-6 * forward.dx_dx0.column(w).amax(), "x0[{w}]: {error:e}");
+        let error = ((above.z - below.z) / width - forward.dz_dx0.column(w)).amax();
+        assert!(error <= 1e-6 * forward.dz_dx0.column(w).amax().max(1e-3), "x0[{w}]: {error:e} of z");
+        let difference = (above.z0 - below.z0) / width;
+        let error = (difference - forward.dz0_dx0.column(w)).amax();
+        assert!(error <= 1e-6 * forward.dz0_dx0.column(w).amax().max(1e-3), "x0[{w}]: {error:e} of z0");
+        let difference = (above.grad_x0 - below.grad_x0) / width;
+        let error = (difference - hessian.h_xx.column(w)).amax();
+        assert!(error <= 1e-5 * hessian.h_xx.amax(), "x0[{w}]: {error:e} of the gradient");
+        let difference = (above.grad_p - below.grad_p) / width;
+        let error = (difference - hessian.h_xp.row(w).transpose()).amax();
+        assert!(error <= 1e-5 * hessian.h_xp.amax(), "x0[{w}]: {error:e} of the gradient by p");
+    }
+
+    // Another interval is not that of the steps.
+    assert!(matches!(adaptive.solve(&x0, &u, 21.0), Err(Error::OutsideInterval { .. })));
+    adaptive.thaw();
+    assert!(adaptive.solve(&x0, &u, 21.0).is_ok());
+}
+
+/// An interval without length: the identity.
+#[test]
+fn no_time() {
+    let (x0, p) = problem("akzo_nobel");
+    let x0 = SVector::<f64, 5>::from_column_slice(&x0);
+    let mut adaptive = integrator::<AkzoNobel, 9>(&p, 1e-6, 1e-9);
+    let lambda = SVector::<f64, 5>::repeat(2.0);
+    let result = adaptive.hessian(&x0, &SVector::zeros(), 0.0, &lambda).expect("nothing to do");
+    assert_eq!(result.x, x0);
+    assert_eq!(result.dx_dx0, SMatrix::<f64, 5, 5>::identity());
+    assert_eq!(result.grad_x0, lambda);
+    assert_eq!(result.h_xx, SMatrix::<f64, 5, 5>::zeros());
+    // z = Ks y1 y4
+    assert!((result.dz_dx0[(0, 0)] - p[6] * x0[3]).abs() <= 1e-14);
+    assert_eq!(result.dz_dx0, result.dz0_dx0);
+}
