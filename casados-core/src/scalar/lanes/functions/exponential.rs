@@ -188,7 +188,8 @@ pub fn powf<D: Double>((a, b): (D, D)) -> D {
     let logarithm = super::logarithm::ln_pair(D::select(usual, a, c(1.0)));
     let exponent = product(logarithm.high, b);
     let low = logarithm.low.mul_add(b, exponent.low);
-    let fits = exponent.high.abs().lt(c(700.0));
+    // The product of a logarithm of zero and a large number has no lower part.
+    let fits = D::and(exponent.high.abs().lt(c(700.0)), b.abs().lt(c(1e100)));
     let (n, r) = reduce(clamp(exponent.high, -700.0, 700.0));
     let r = ordered_sum(r.high, r.low + low);
     let mut result = near_one(r).round() * power_of_two(n);

@@ -1,4 +1,35 @@
 //! Elementary functions of registers, written once for all kinds of them.
+//!
+//! No branch depends on the numbers, but for one: where a lane is *rare* (listed below), the function of one number
+//! is called for that lane, and only that lane takes its result and its accuracy. A zero keeps its sign, and
+//! infinities and NaN come out where they do for one number.
+//!
+//! Bounds of the error in units in the last place of the exact result, for all registers of `f64`, with fused
+//! products or without. They are measured, not proved: the largest error in 2 million arguments of each function and each kind of
+//! register, of all magnitudes, dense where the reductions change, was below them; the tests repeat it on fewer.
+//!
+//! | function | bound | rare |
+//! | --- | --- | --- |
+//! | `sqrt` | 0.5 | |
+//! | `sin`, `cos`, `sin_cos` | 0.80 | `|a| > 1.6 · 10⁶` |
+//! | `tan` | 0.90 | the same |
+//! | `exp`, `exp2`, `cosh` | 0.70 | |
+//! | `exp_m1` | 0.65 | |
+//! | `sinh` | 0.90 | |
+//! | `tanh` | 0.60 | |
+//! | `ln` | 0.65 | not normal and positive |
+//! | `log2`, `log10` | 0.51 | the same |
+//! | `ln_1p` | 0.51 | `a ≤ −1`, `a > 10³⁰⁰` |
+//! | `powf` | 0.70 | a base that is not normal and positive, a result beyond `e^±700`, an exponent beyond `10¹⁰⁰` |
+//! | `asin` | 0.70 | |
+//! | `acos`, `atan` | 0.65 | |
+//! | `atan2` | 0.65 | both zero, or one beyond `10^±130` and not zero |
+//! | `asinh`, `acosh` | 0.51 | |
+//! | `atanh` | 0.51 | `|a| ≥ 1` |
+//! | `cbrt` | 0.51 | zero, not normal |
+//! | `hypot` | 0.51 | the larger one beyond `10^±130` |
+//!
+//! Functions of `f32` are those of `f64`, rounded: 0.5 + 2⁻²⁹ units.
 
 mod exponential;
 mod logarithm;

@@ -1,5 +1,8 @@
 //! Registers against single numbers, lane by lane, on all kinds of registers that the machine has.
 
+mod elementary;
+mod reference;
+
 use super::*;
 use crate::scalar::{Lanes, Piece, Scalar};
 use std::vec::Vec;
@@ -121,7 +124,7 @@ fn products<L: Lanes>(fused: bool) {
     });
 }
 
-/// Checks each kind of register that the machine has.
+/// Checks each kind of register that the machine has, with the numbers of lanes that are listed.
 macro_rules! on_every_register {
     ($check:ident) => {
         if is_there(Level::Base) {
@@ -140,6 +143,8 @@ macro_rules! on_every_register {
         }
     };
 }
+
+use on_every_register;
 
 #[test]
 fn arithmetic_has_the_bits_of_single_numbers() {
@@ -164,6 +169,12 @@ fn products_are_subtracted_with_one_rounding_where_the_machine_can() {
 
 #[test]
 fn the_level_is_one_that_the_machine_has_and_the_limit_allows() {
-    assert!(is_there(level()));
-    assert!(level() >= Level::Base);
+    let widest = level();
+    assert!(is_there(widest) && widest >= Level::Base);
+    for lower in [Level::Base, Level::Single] {
+        limit(lower);
+        assert_eq!(level(), lower);
+    }
+    limit(Level::Avx512);
+    assert_eq!(level(), widest);
 }

@@ -1,0 +1,289 @@
+//! Elementary functions of registers against references of 100 bits, and where they are special.
+
+use super::reference::{self, Function};
+use super::{cell, inside, on_every_register, same, specials};
+use crate::scalar::lanes::*;
+use crate::scalar::{Lanes, Scalar};
+use std::vec::Vec;
+
+/// xorshift64*, Vigna 2016
+struct Random(u64);
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    }
+    /// between two bounds
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+    /// `±10ᵏ` with `k` between two bounds
+    fn magnitude(&mut self, low: f64, high: f64) -> f64 {
+        let magnitude = 10.0_f64.powf(self.between(low, high));
+        if self.bits() & 1 == 0 { magnitude } else { -magnitude }
+    }
+}
+
+/// An elementary function: its name, on registers, its reference, where it is tried, and the bound of its error
+/// (units in the last place) that is documented.
+struct Case<L> {
+    name: &'static str,
+    of_lanes: fn(L, L) -> L,
+    of_one: fn(f64, f64) -> f64,
+    reference: Function,
+    argument: fn(&mut Random) -> (f64, f64),
+    bound: f64,
+}
+
+/// Not too large for the reduction, often close to a multiple of π/2.
+fn angle(random: &mut Random) -> (f64, f64) {
+    let a = match random.bits() % 4 {
+        0 => random.magnitude(-300.0, 6.2),
+        1 => random.between(-10.0, 10.0),
+        2 => random.between(-1.6e6, 1.6e6),
+        _ => random.between(0.0, 1e6).floor() * core::f64::consts::FRAC_PI_2 * (1.0 + f64::EPSILON),
+    };
+    (a, 0.0)
+}
+fn exponent(random: &mut Random) -> (f64, f64) {
+    let a = if random.bits() & 1 == 0 { random.magnitude(-20.0, 2.85) } else { random.between(-2.0, 2.0) };
+    (a, 0.0)
+}
+fn positive(random: &mut Random) -> (f64, f64) {
+    let a = match random.bits() % 3 {
+        0 => random.magnitude(-307.0, 308.0),
+        1 => random.between(0.5, 2.0),
+        _ => 1.0 + random.magnitude(-16.0, -2.0),
+    };
+    (a.abs(), 0.0)
+}
+fn above_minus_one(random: &mut Random) -> (f64, f64) {
+    let a = if random.bits() & 1 == 0 { random.magnitude(-290.0, -0.01) } else { random.between(-0.99, 3.0) };
+    (if random.bits() % 4 == 0 { random.magnitude(0.0, 290.0).abs() } else { a }, 0.0)
+}
+fn within_one(random: &mut Random) -> (f64, f64) {
+    let a = match random.bits() % 3 {
+        0 => random.magnitude(-140.0, -0.01),
+        1 => random.between(-1.0, 1.0),
+        _ => 1.0 - random.magnitude(-15.0, -1.0).abs(),
+    };
+    (a, 0.0)
+}
+fn any(random: &mut Random) -> (f64, f64) {
+    let a =
+        if random.bits() & 1 == 0 { random.magnitude(-120.0, 120.0) } else { random.magnitude(-2.0, 2.0) };
+    let b = if random.bits() & 1 == 0 {
+        random.magnitude(-3.0, 3.0) * a
+    } else {
+        random.magnitude(-120.0, 120.0)
+    };
+    (a, b)
+}
+fn above_one(random: &mut Random) -> (f64, f64) {
+    (1.0 + random.magnitude(-15.0, 140.0).abs(), 0.0)
+}
+/// Powers between 1e-290 and 1e290.
+fn power(random: &mut Random) -> (f64, f64) {
+    let (a, _) = positive(random);
+    (a, random.between(-650.0, 650.0) / a.ln().abs().max(1e-3))
+}
+
+fn cases<L: Lanes>() -> Vec<Case<L>> {
+    macro_rules! cases {
+        ($($name:ident $($second:ident)?, $argument:ident, $bound:literal;)*) => {
+            std::vec![$(Case {
+                name: stringify!($name),
+                of_lanes: |a, _b| a.$name($(cases!(_b $second))?),
+                of_one: |a, _b| Scalar::$name(a $(, cases!(_b $second))?),
+                reference: reference::$name,
+                argument: $argument,
+                bound: $bound,
+            }),*]
+        };
+        ($b:ident and) => { $b };
+    }
+    // The bounds are those of the table in `functions`.
+    cases! {
+        sin, angle, 0.80; cos, angle, 0.80; tan, angle, 0.90;
+        exp, exponent, 0.70; exp2, exponent, 0.70; exp_m1, exponent, 0.65;
+        sinh, exponent, 0.90; cosh, exponent, 0.70; tanh, exponent, 0.60;
+        ln, positive, 0.65; log2, positive, 0.51; log10, positive, 0.51; ln_1p, above_minus_one, 0.51;
+        powf and, power, 0.70;
+        asin, within_one, 0.70; acos, within_one, 0.65; atan, any, 0.65; atan2 and, any, 0.65;
+        asinh, any, 0.51; acosh, above_one, 0.51; atanh, within_one, 0.51;
+        cbrt, any, 0.51; hypot and, any, 0.51;
+    }
+}
+
+/// `a 2ⁿ`, exactly if it is normal.
+fn scaled(a: f64, n: i32) -> f64 {
+    a * 2.0_f64.powi(n / 2) * 2.0_f64.powi(n - n / 2)
+}
+
+/// The error of a result in units in the last place of the exact one, for a type of so many bits.
+fn error(result: f64, (exact, n): (reference::Long, i32), bits: i32) -> f64 {
+    let unit = 2.0_f64.powi(exact.high.abs().log2().floor() as i32 + 1 - bits);
+    (scaled(result, -n) - exact.high - exact.low).abs() / unit
+}
+
+/// Errors stay below the bounds for `f64`; `f32` is rounded from them: half a unit, and what an error of one unit
+/// of `f64` may add to that.
+fn accuracy<L: Lanes>(bits: i32) {
+    let count = if cfg!(debug_assertions) { 1500 } else { 50_000 };
+    for case in cases::<L>() {
+        let mut random = Random(0x9E37_79B9_7F4A_7C15);
+        let mut points: Vec<(f64, f64)> = (0..count).map(|_| (case.argument)(&mut random)).collect();
+        let single = bits == 24;
+        if single {
+            points = points.iter().map(|&(a, b)| (f64::from(a as f32), f64::from(b as f32))).collect();
+        }
+        let bound = if single { 0.5 + 2.0_f64.powi(24 - 53) } else { case.bound };
+        let (first, second): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+        inside::<L>(|| {
+            for start in (0..count).step_by(L::LANES) {
+                let (a, b) = (cell::<L>(&first, start, 1), cell::<L>(&second, start, 1));
+                let mut out = a;
+                (case.of_lanes)(L::load(&a), L::load(&b)).store(&mut out);
+                for lane in 0..L::LANES {
+                    let (a, b, result) = (L::lane(&a, lane), L::lane(&b, lane), L::lane(&out, lane));
+                    let one = (case.of_one)(a, b);
+                    let limits = if single {
+                        f64::from(f32::MIN_POSITIVE)..f64::from(f32::MAX)
+                    } else {
+                        // Beyond, the reference has no digits left to lose.
+                        1e-290..1e307
+                    };
+                    if ![a, one].iter().all(|a| limits.contains(&a.abs())) || b.abs() > limits.end {
+                        continue;
+                    }
+                    let exact = (case.reference)(a, b);
+                    let error = error(result, exact, bits);
+                    assert!(error <= bound, "{}({a:e}, {b:e}) = {result:e}: {error} units", case.name);
+                }
+            }
+        });
+    }
+}
+
+#[test]
+fn errors_are_below_the_documented_bounds() {
+    macro_rules! check {
+        (F32x4, $single:ident, $($lanes:literal),*) => {
+            accuracy::<F32x4<4>>(24);
+        };
+        (F32x8, $single:ident, $($lanes:literal),*) => {
+            accuracy::<F32x8<8>>(24);
+        };
+        (F32x16, $single:ident, $($lanes:literal),*) => {
+            accuracy::<F32x16<16>>(24);
+        };
+        (F64x2, $single:ident, $($lanes:literal),*) => {
+            accuracy::<F64x2<2>>(53);
+        };
+        (F64x4, $single:ident, $($lanes:literal),*) => {
+            accuracy::<F64x4<4>>(53);
+        };
+        (F64x8, $single:ident, $($lanes:literal),*) => {
+            accuracy::<F64x8<8>>(53);
+        };
+    }
+    on_every_register!(check);
+}
+
+/// Zeros keep their sign, infinities and NaN are where they are for one number, and all else is finite and close to
+/// what `f64` gives. How close, the other test says; here are all magnitudes.
+fn special<L: Lanes>() {
+    let values = specials();
+    for case in cases::<L>() {
+        // The standard library loses all digits of these at both ends of the range, and overflows.
+        let poor = matches!(case.name, "asinh" | "acosh" | "atanh");
+        inside::<L>(|| {
+            for i in 0..values.len() {
+                for j in (0..values.len()).step_by(L::LANES) {
+                    let (a, b) = (cell::<L>(&values, i, 0), cell::<L>(&values, j, 1));
+                    let mut out = a;
+                    (case.of_lanes)(L::load(&a), L::load(&b)).store(&mut out);
+                    for lane in 0..L::LANES {
+                        let (a, b, result) = (L::lane(&a, lane), L::lane(&b, lane), L::lane(&out, lane));
+                        let one = (case.of_one)(a, b);
+                        let close = (result - one).abs() <= 2.0 * f64::EPSILON * one.abs() + 5e-324;
+                        let poor = poor && a.is_finite() && result.is_finite() && a != 0.0;
+                        assert!(
+                            same(result, one) || one != 0.0 && close || poor,
+                            "{}({a:e}, {b:e}) = {result:e}, not {one:e}",
+                            case.name
+                        );
+                    }
+                }
+            }
+        });
+    }
+}
+
+#[test]
+fn special_arguments_are_as_for_one_number() {
+    macro_rules! check {
+        (F64x2, $single:ident, $($lanes:literal),*) => { $( special::<F64x2<$lanes>>(); )* };
+        (F64x4, $single:ident, $($lanes:literal),*) => { $( special::<F64x4<$lanes>>(); )* };
+        (F64x8, $single:ident, $($lanes:literal),*) => { $( special::<F64x8<$lanes>>(); )* };
+        ($single_type:ident, $single:ident, $($lanes:literal),*) => {};
+    }
+    on_every_register!(check);
+}
+
+/// Whatever is in one lane, the others have the same bits.
+fn independence<L: Lanes>() {
+    let strange = [f64::NAN, f64::INFINITY, -0.0, 1e300, -3.0, 5e-324, f64::NEG_INFINITY];
+    for case in cases::<L>() {
+        let mut random = Random(88172645463325252);
+        inside::<L>(|| {
+            for round in 0..20 {
+                let points: Vec<(f64, f64)> = (0..L::LANES).map(|_| (case.argument)(&mut random)).collect();
+                let (first, second): (Vec<_>, Vec<_>) = points.into_iter().unzip();
+                let (a, b) = (cell::<L>(&first, 0, 1), cell::<L>(&second, 0, 1));
+                let (mut expected, mut out) = (a, a);
+                (case.of_lanes)(L::load(&a), L::load(&b)).store(&mut expected);
+                for lane in 0..L::LANES {
+                    let mut disturbed = a;
+                    L::set_lane(&mut disturbed, lane, strange[round % strange.len()]);
+                    (case.of_lanes)(L::load(&disturbed), L::load(&b)).store(&mut out);
+                    for other in (0..L::LANES).filter(|&other| other != lane) {
+                        let (one, two) = (L::lane(&expected, other), L::lane(&out, other));
+                        assert!(same(one, two), "{} changed in lane {other} by lane {lane}", case.name);
+                    }
+                }
+            }
+        });
+    }
+}
+
+#[test]
+fn lanes_do_not_disturb_each_other() {
+    macro_rules! check {
+        ($name:ident, $single:ident, $($lanes:literal),*) => { $( independence::<$name<$lanes>>(); )* };
+    }
+    on_every_register!(check);
+}
+
+#[test]
+fn sine_and_cosine_together_are_what_they_are_alone() {
+    macro_rules! check {
+        ($name:ident, $single:ident, $($lanes:literal),*) => { $( {
+            let mut random = Random(362436069);
+            let values: Vec<f64> = (0..100).map(|_| angle(&mut random).0).chain(specials()).collect();
+            inside::<$name<$lanes>>(|| {
+                for start in 0..values.len() {
+                    let a = $name::<$lanes>::load(&cell::<$name<$lanes>>(&values, start, 1));
+                    let (sin, cos) = a.sin_cos();
+                    let pairs = [(sin.to_array(), a.sin().to_array()), (cos.to_array(), a.cos().to_array())];
+                    for (one, two) in pairs {
+                        assert!(one.iter().zip(&two).all(|(&a, &b)| same(a as f64, b as f64)), "{a:?}");
+                    }
+                }
+            });
+        } )* };
+    }
+    on_every_register!(check);
+}
