@@ -13,7 +13,8 @@
 //! | `sqrt` | 0.5 | |
 //! | `sin`, `cos`, `sin_cos` | 0.80 | `|a| > 1.6 · 10⁶` |
 //! | `tan` | 0.90 | the same |
-//! | `exp`, `exp2`, `cosh` | 0.70 | |
+//! | `exp`, `exp2` | 0.80 | |
+//! | `cosh` | 0.70 | |
 //! | `exp_m1` | 0.65 | |
 //! | `sinh` | 0.90 | |
 //! | `tanh` | 0.60 | |
@@ -21,9 +22,8 @@
 //! | `log2`, `log10` | 0.51 | the same |
 //! | `ln_1p` | 0.51 | `a ≤ −1`, `a > 10³⁰⁰` |
 //! | `powf` | 0.70 | a base that is not normal and positive, a result beyond `e^±700`, an exponent beyond `10¹⁰⁰` |
-//! | `asin` | 0.70 | |
-//! | `acos`, `atan` | 0.65 | |
-//! | `atan2` | 0.65 | both zero, or one beyond `10^±130` and not zero |
+//! | `asin`, `acos`, `atan` | 0.70 | |
+//! | `atan2` | 0.70 | both zero, or one beyond `10^±130` and not zero |
 //! | `asinh`, `acosh` | 0.51 | |
 //! | `atanh` | 0.51 | `|a| ≥ 1` |
 //! | `cbrt` | 0.51 | zero, not normal |

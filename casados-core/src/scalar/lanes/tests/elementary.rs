@@ -61,7 +61,7 @@ fn positive(random: &mut Random) -> (f64, f64) {
 }
 fn above_minus_one(random: &mut Random) -> (f64, f64) {
     let a = if random.bits() & 1 == 0 { random.magnitude(-290.0, -0.01) } else { random.between(-0.99, 3.0) };
-    (if random.bits() % 4 == 0 { random.magnitude(0.0, 290.0).abs() } else { a }, 0.0)
+    (if random.bits() & 3 == 0 { random.magnitude(0.0, 290.0).abs() } else { a }, 0.0)
 }
 fn within_one(random: &mut Random) -> (f64, f64) {
     let a = match random.bits() % 3 {
@@ -107,11 +107,11 @@ fn cases<L: Lanes>() -> Vec<Case<L>> {
     // The bounds are those of the table in `functions`.
     cases! {
         sin, angle, 0.80; cos, angle, 0.80; tan, angle, 0.90;
-        exp, exponent, 0.70; exp2, exponent, 0.70; exp_m1, exponent, 0.65;
+        exp, exponent, 0.80; exp2, exponent, 0.80; exp_m1, exponent, 0.65;
         sinh, exponent, 0.90; cosh, exponent, 0.70; tanh, exponent, 0.60;
         ln, positive, 0.65; log2, positive, 0.51; log10, positive, 0.51; ln_1p, above_minus_one, 0.51;
         powf and, power, 0.70;
-        asin, within_one, 0.70; acos, within_one, 0.65; atan, any, 0.65; atan2 and, any, 0.65;
+        asin, within_one, 0.70; acos, within_one, 0.70; atan, any, 0.70; atan2 and, any, 0.70;
         asinh, any, 0.51; acosh, above_one, 0.51; atanh, within_one, 0.51;
         cbrt, any, 0.51; hypot and, any, 0.51;
     }
@@ -131,7 +131,7 @@ fn error(result: f64, (exact, n): (reference::Long, i32), bits: i32) -> f64 {
 /// Errors stay below the bounds for `f64`; `f32` is rounded from them: half a unit, and what an error of one unit
 /// of `f64` may add to that.
 fn accuracy<L: Lanes>(bits: i32) {
-    let count = if cfg!(debug_assertions) { 1500 } else { 50_000 };
+    let count = if cfg!(debug_assertions) { 1000 } else { 50_000 };
     for case in cases::<L>() {
         let mut random = Random(0x9E37_79B9_7F4A_7C15);
         let mut points: Vec<(f64, f64)> = (0..count).map(|_| (case.argument)(&mut random)).collect();
@@ -200,9 +200,10 @@ fn special<L: Lanes>() {
         // The standard library loses all digits of these at both ends of the range, and overflows.
         let poor = matches!(case.name, "asinh" | "acosh" | "atanh");
         inside::<L>(|| {
-            for i in 0..values.len() {
+            let seconds = if matches!(case.name, "atan2" | "hypot" | "powf") { values.len() } else { 1 };
+            for i in 0..seconds {
                 for j in (0..values.len()).step_by(L::LANES) {
-                    let (a, b) = (cell::<L>(&values, i, 0), cell::<L>(&values, j, 1));
+                    let (a, b) = (cell::<L>(&values, j, 1), cell::<L>(&values, i, 0));
                     let mut out = a;
                     (case.of_lanes)(L::load(&a), L::load(&b)).store(&mut out);
                     for lane in 0..L::LANES {

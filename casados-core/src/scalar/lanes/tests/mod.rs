@@ -51,7 +51,7 @@ fn arithmetic<L: Lanes, S: Lanes<Mask = bool>>() {
     let values = specials();
     inside::<L>(|| {
         for i in 0..values.len() {
-            for j in 0..values.len() {
+            for j in (i % 5..values.len()).step_by(5) {
                 let (a_cell, b_cell) = (cell::<L>(&values, i, 1), cell::<L>(&values, j, 3));
                 let (a, b) = (L::load(&a_cell), L::load(&b_cell));
                 let less = [a.lt(b), a.le(b), a.eq(b), a.is_smaller(b), a.is_finite()];
@@ -106,7 +106,8 @@ fn arithmetic<L: Lanes, S: Lanes<Mask = bool>>() {
                         "all {index} of {a:?}, {b:?}"
                     );
                 }
-                assert_eq!(a == a, (0..L::LANES).all(|lane| !L::lane(&a_cell, lane).is_nan()));
+                let twin = L::load(&a_cell);
+                assert_eq!(a == twin, (0..L::LANES).all(|lane| !L::lane(&a_cell, lane).is_nan()));
             }
         }
     });
