@@ -14,7 +14,7 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// One step; full Newton to rounding, from zero.
+    /// One step; Newton to rounding, from zero.
     fn default() -> Self {
         Self { steps: 1, newton: Newton::default(), start: Start::default() }
     }
@@ -37,15 +37,19 @@ pub struct Newton {
 
 impl Default for Newton {
     fn default() -> Self {
-        Self { tolerance: 0.0, max_iterations: 50, jacobian: Jacobian::Full, fixed_iterations: None }
+        Self { tolerance: 0.0, max_iterations: 50, jacobian: Jacobian::Auto, fixed_iterations: None }
     }
 }
 
 /// The Jacobian in Newton's method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Jacobian {
-    /// Evaluated and factorised in every iteration.
+    /// That of the start values in the first step, that of the last step in later ones; evaluated and factorised anew as
+    /// soon as the iterations that are still expected with it cost more (by the counts of operations in the model's
+    /// structure, and the rate at which increments shrink). With a fixed number of iterations as `Full`.
     #[default]
+    Auto,
+    /// Evaluated and factorised in every iteration.
     Full,
     /// Evaluated and factorised once in each step, at the start values.
     Frozen,
@@ -54,10 +58,11 @@ pub enum Jacobian {
 /// Where Newton's method starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// `ẋ = 0`, `z = 0` in every step: the same input gives the same bits in every call.
+    /// `ẋ = 0`, `z = 0` in the first step, the polynomial of the step before in the others: the same input gives the
+    /// same bits in every call.
     #[default]
     Zero,
-    /// The values given with `set_start`, in every step.
+    /// The values given with `set_start` in the first step, the polynomial of the step before in the others.
     Given,
     /// The stages of the same step in the last successful call; zero (or the given values, if there
     /// are any) in the first one.

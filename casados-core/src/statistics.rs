@@ -15,8 +15,4 @@ pub struct Statistics {
     pub factorizations: usize,
     /// Those of them in which the planned elimination was not good enough, so that the whole matrix was pivoted.
     pub dense: usize,
-    /// The residual of an equation relative to the magnitude of its terms, the largest of all steps; of each
-    /// step as it was evaluated last. With sensitivities this is at the solution. Without, it is one
-    /// iteration before if that one was expected to be enough, and zero with a fixed number of iterations.
-    pub residual: f64,
 }

@@ -8,12 +8,14 @@ use super::evaluate::entries;
 use super::record::{Coefficients, Linearization, Work, copy};
 use super::step::check;
 use crate::error::Error;
-use crate::linalg::{axpy, slot};
+use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::Adjoint;
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape};
+use crate::statistics::Statistics;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// The adjoint of `C` seeds while it goes backwards.
 #[derive(Zeroable)]
@@ -28,35 +30,103 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] Backward<M, T, S, C>);
 
-impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     /// `λ_N`: seeds in column-major order.
-    pub(crate) fn start(&mut self, seeds: &[T]) {
+    pub(crate) fn start(&mut self, seeds: &[E]) {
         let nx = M::Shape::NX;
         for (state, row) in self.lambda.as_mut().iter_mut().enumerate() {
             *row = core::array::from_fn(|column| seeds[column * nx + state]);
         }
-        self.gradient.as_mut().fill([T::ZERO; C]);
+        self.gradient.as_mut().fill([E::from_f64(0.0); C]);
     }
 
-    /// `λ_n` from `λ_{n+1}`.
-    pub(crate) fn step(&mut self, linear: &Linearization<M, T, S>, coefficients: &Coefficients<T, S>, h: T) {
-        let (blocks, nx) = (M::STRUCTURE.blocks, M::Shape::NX);
-        let shift = nx + M::Shape::NZ;
-        let Self { lambda, gradient, mu } = self;
-        mu.as_mut().fill([[T::ZERO; C]; S]);
+    /// `μ` of a step that is linearised, by the factors that are there; whether it satisfies its equations.
+    pub(crate) fn stages(&mut self, work: &mut Work<M, E, S>, coefficients: &Coefficients<E, S>) -> E::Mask {
+        self.solve(&work.linear, coefficients, work.inputs.time.step);
+        work.verify_adjoint(self, coefficients)
+    }
+
+    /// `μ`
+    pub(crate) fn solve(&mut self, linear: &Linearization<M, E, S>, coefficients: &Coefficients<E, S>, h: E) {
+        let Self { lambda, mu, .. } = self;
+        mu.as_mut().fill([[E::from_f64(0.0); C]; S]);
         for (mu, lambda) in mu.as_mut().iter_mut().zip(lambda.as_ref()) {
-            for (mu, b) in mu.iter_mut().zip(&coefficients.b) {
-                axpy(h * *b, lambda, mu);
+            for (mu, &b) in mu.iter_mut().zip(&coefficients.b) {
+                *mu = lambda.map(|lambda| h * b * lambda);
             }
         }
         linear.factors.solve_transposed(mu);
-        for (stage, jacobian) in linear.jacobian.iter().enumerate() {
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
-                axpy(-value, &mu[slot::<M>(r)][stage], &mut lambda[c - nx]);
+    }
+
+    /// `λ_n` from `λ_{n+1}` and `μ`.
+    pub(crate) fn advance(&mut self, linear: &Linearization<M, E, S>) {
+        let Self { lambda, gradient, mu } = self;
+        let (jacobian, mu) = (linear.jacobian.as_ref(), mu.as_ref());
+        let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
+        dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda, gradient, model: PhantomData });
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
+    /// `λ_n` from `λ_{n+1}` over a step that is linearised.
+    ///
+    /// # Errors
+    /// [`Error::Singular`]
+    pub(crate) fn step(
+        &mut self,
+        work: &mut Work<M, T, S>,
+        coefficients: &Coefficients<T, S>,
+        n: usize,
+        statistics: &mut Statistics,
+    ) -> Result<(), Error> {
+        if !self.stages(work, coefficients) && work.linear.factors.is_planned() {
+            work.factor_pivoted(coefficients, n, 0, statistics)?;
+            self.stages(work, coefficients);
+        }
+        self.advance(&work.linear);
+        Ok(())
+    }
+}
+
+/// `λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i`, `λ_w −= Σ_i f_w,iᵀ μ_i`
+struct Advance<'a, M, E, const S: usize, const C: usize> {
+    jacobian: &'a [[E; S]],
+    mu: &'a [[[E; C]; S]],
+    lambda: &'a mut [[E; C]],
+    gradient: &'a mut [[E; C]],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M, E, S, C> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, mu, lambda, gradient, .. } = self;
+        let (structure, nx) = (&M::STRUCTURE, M::Shape::NX);
+        let (blocks, shift) = (structure.blocks, nx + M::Shape::NZ);
+        for (r, c, values) in entries(structure, jacobian, blocks[1], blocks[2]) {
+            if let (Some(lambda), Some(mu)) = (lambda.get_mut(c - nx), mu.get(slot::<M>(r))) {
+                subtract::<A, E, S, C>(lambda, values, mu);
             }
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[3], blocks[5]) {
-                axpy(-value, &mu[slot::<M>(r)][stage], &mut gradient[c - shift]);
+        }
+        for (r, c, values) in entries(structure, jacobian, blocks[3], blocks[5]) {
+            if let (Some(gradient), Some(mu)) = (gradient.get_mut(c - shift), mu.get(slot::<M>(r))) {
+                subtract::<A, E, S, C>(gradient, values, mu);
             }
+        }
+    }
+}
+
+/// `to −= Σ_i value_i μ_i`
+#[inline(always)]
+fn subtract<A: Arithmetic, E: Lanes, const S: usize, const C: usize>(
+    to: &mut [E; C],
+    values: &[E; S],
+    mu: &[[E; C]; S],
+) {
+    for (&value, mu) in values.iter().zip(mu) {
+        for (to, &mu) in to.iter_mut().zip(mu) {
+            *to = A::subtract(*to, value, mu);
         }
     }
 }

@@ -1,21 +1,21 @@
 //! The model at the stages of a step.
+//!
+//! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
+//! has registers of that many numbers, one call of the model computes them all.
 
-use super::record::{Coefficients, Work};
-use crate::error::{Error, Place, Quantity};
-use crate::linalg::slot;
-use crate::model::{ArrayK, ArrayX, Dae, Pattern};
-use crate::scalar::Real;
+use super::record::{Coefficients, Stage, Work};
+use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
+use crate::scalar::{Field, Lanes, Real, SideBySide};
 use crate::shape::{Matrix, Shape};
 
-impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     /// Writes `u` and `p`, which are the same at all points of an interval.
     pub(crate) fn place_inputs(&mut self) {
         let u = 2 * M::Shape::NX + M::Shape::NZ;
-        let p = u + M::Shape::NU;
-        for point in &mut self.points {
-            let point = point.as_mut();
-            point[u..p].copy_from_slice(self.inputs.u.as_slice());
-            point[p..p + M::Shape::NP].copy_from_slice(self.inputs.p.as_slice());
+        let inputs = self.inputs.u.as_slice().iter().chain(self.inputs.p.as_slice());
+        for (point, input) in self.points.as_mut()[u..].iter_mut().zip(inputs) {
+            *point = [*input; S];
         }
     }
 
@@ -23,121 +23,153 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     #[inline]
     pub(crate) fn place(
         &mut self,
-        coefficients: &Coefficients<T, S>,
+        coefficients: &Coefficients<E, S>,
         step: usize,
-        x: &ArrayX<M, T>,
-        y: &ArrayK<M, [T; S]>,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
     ) {
-        let (nx, h) = (M::Shape::NX, self.inputs.time.step);
-        let start = T::from_f64(step as f64);
-        for (i, point) in self.points.iter_mut().enumerate() {
-            let (a, point) = (&coefficients.a[i], point.as_mut());
-            for (j, (k, x)) in y.as_ref().iter().zip(x.as_ref()).enumerate() {
-                point[j] = k[i];
-                point[nx + j] = *x + h * dot(a, k);
-            }
-            for (z, y) in point[2 * nx..].iter_mut().zip(&y.as_ref()[nx..]) {
-                *z = y[i];
-            }
-            if let Some(t) = point.last_mut() {
-                *t = self.inputs.time.start + h * (start + coefficients.c[i]);
-            }
+        let time = self.inputs.time;
+        if let Some(t) = self.points.as_mut().last_mut() {
+            let start = E::from_f64(step as f64);
+            *t = coefficients.c.map(|c| time.start + time.step * (start + c));
         }
+        let (points, x, y) = (self.points.as_mut(), x.as_ref(), y.as_ref());
+        dispatch(Place { points, x, y, a: &coefficients.a, h: time.step });
     }
 
     /// The residual at all stages.
-    ///
-    /// # Errors
-    /// An element that is not finite.
-    pub(crate) fn evaluate_residual(&mut self, step: usize, iteration: usize) -> Result<(), Error> {
-        for stage in 0..S {
-            M::residual::<T>(&self.points[stage], &mut self.f);
-            self.store_residual(Place { step, stage, iteration })?;
+    pub(crate) fn evaluate_residual(&mut self) {
+        let Self { points, f, stage, .. } = self;
+        if let Err(call) = E::side_by_side(Residual::<M, E, S> { points, f, stage }) {
+            let Residual { points, f, stage } = call;
+            for i in 0..S {
+                take::<E, S>(stage.v.as_mut(), points.as_ref(), i);
+                M::residual::<E>(&stage.v, &mut stage.f);
+                give::<E, S>(stage.f.as_ref(), f.as_mut(), i);
+            }
         }
-        Ok(())
     }
 
     /// The residual and the Jacobian at all stages.
-    ///
-    /// # Errors
-    /// An element that is not finite.
-    pub(crate) fn evaluate_jacobian(&mut self, step: usize, iteration: usize) -> Result<(), Error> {
-        for stage in 0..S {
-            let jacobian = &mut self.linear.jacobian[stage];
-            M::residual_jacobian::<T>(&self.points[stage], &mut self.f, jacobian);
-            let at = Place { step, stage, iteration };
-            if let Some((entry, value)) = not_finite(jacobian.as_ref()) {
-                // The residual may well be finite; if it is not, it is the better message.
-                self.store_residual(at)?;
-                let equation = M::STRUCTURE.jacobian.at(entry).0;
-                return Err(Error::NonFiniteModel { quantity: Quantity::Jacobian, equation, value, at });
+    pub(crate) fn evaluate_jacobian(&mut self) {
+        let Self { points, f, stage, linear, .. } = self;
+        let jacobian = &mut linear.jacobian;
+        if let Err(call) = E::side_by_side(ResidualJacobian::<M, E, S> { points, f, jacobian, stage }) {
+            let ResidualJacobian { points, f, jacobian, stage } = call;
+            for i in 0..S {
+                take::<E, S>(stage.v.as_mut(), points.as_ref(), i);
+                M::residual_jacobian::<E>(&stage.v, &mut stage.f, &mut stage.jacobian);
+                give::<E, S>(stage.f.as_ref(), f.as_mut(), i);
+                give::<E, S>(stage.jacobian.as_ref(), jacobian.as_mut(), i);
             }
-            self.store_residual(at)?;
         }
-        Ok(())
     }
+}
 
-    fn store_residual(&mut self, at: Place) -> Result<(), Error> {
-        if let Some((equation, value)) = not_finite(self.f.as_ref()) {
-            return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });
-        }
-        for (equation, f) in self.f.as_ref().iter().enumerate() {
-            self.residual[slot::<M>(equation)][at.stage] = [*f];
-        }
-        Ok(())
+/// The value of every variable at stage `i`.
+#[inline(always)]
+pub(crate) fn take<E: Lanes, const S: usize>(cells: &mut [E::Cell], from: &[[E; S]], i: usize) {
+    for (cell, from) in cells.iter_mut().zip(from) {
+        from[i].store(cell);
     }
+}
 
-    /// The largest residual relative to the magnitude of its terms, `|f_r| / Σ_c |∂f_r/∂v_c v_c|`, and its
-    /// equation and stage. Rounding errors of the model are a few ε of this, however equations and
-    /// variables are scaled.
-    pub(crate) fn relative_residual(&mut self) -> (T, usize, usize) {
-        let Pattern { rows, columns } = M::STRUCTURE.jacobian;
-        let mut largest = (T::ZERO, 0, 0);
-        for stage in 0..S {
-            let point = self.points[stage].as_ref();
-            let magnitude = self.magnitude.as_mut();
-            magnitude.fill(T::ZERO);
-            for ((row, column), entry) in rows.iter().zip(columns).zip(self.linear.jacobian[stage].as_ref()) {
-                let term = (*entry * point[*column as usize]).abs();
-                magnitude[*row as usize] = magnitude[*row as usize] + term;
+/// What was computed at stage `i`.
+#[inline(always)]
+pub(crate) fn give<E: Lanes, const S: usize>(cells: &[E::Cell], to: &mut [[E; S]], i: usize) {
+    for (cell, to) in cells.iter().zip(to) {
+        to[i] = E::load(cell);
+    }
+}
+
+/// `f` at all stages in one call.
+struct Residual<'a, M: Dae, E: Lanes, const S: usize> {
+    points: &'a ArrayV<M, [E; S]>,
+    f: &'a mut ArrayK<M, [E; S]>,
+    stage: &'a mut Stage<M, E::Cell>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Residual<'_, M, E, S> {
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [E; S]>>(self) {
+        M::residual::<R>(self.points, self.f);
+    }
+}
+
+/// `f` and its Jacobian at all stages in one call.
+struct ResidualJacobian<'a, M: Dae, E: Lanes, const S: usize> {
+    points: &'a ArrayV<M, [E; S]>,
+    f: &'a mut ArrayK<M, [E; S]>,
+    jacobian: &'a mut M::Jacobian<[E; S]>,
+    stage: &'a mut Stage<M, E::Cell>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for ResidualJacobian<'_, M, E, S> {
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [E; S]>>(self) {
+        M::residual_jacobian::<R>(self.points, self.f, self.jacobian);
+    }
+}
+
+/// See [`Work::place`].
+struct Place<'a, E, const S: usize> {
+    points: &'a mut [[E; S]],
+    x: &'a [E],
+    y: &'a [[E; S]],
+    a: &'a [[E; S]; S],
+    h: E,
+}
+
+impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { points, x, y, a, h } = self;
+        let nx = x.len();
+        if y.len() < nx || points.len() < nx + y.len() {
+            return;
+        }
+        let ((k, z), (xdot, points)) = (y.split_at(nx), points.split_at_mut(nx));
+        xdot.copy_from_slice(k);
+        let (xi, points) = points.split_at_mut(nx);
+        points[..z.len()].copy_from_slice(z);
+        // Columns of −hA.
+        let mut ha = [[h; S]; S];
+        for (i, row) in a.iter().enumerate() {
+            for (column, &a) in ha.iter_mut().zip(row) {
+                column[i] = -(h * a);
             }
-            for (r, magnitude) in magnitude.iter().enumerate() {
-                let [f] = self.residual[slot::<M>(r)][stage];
-                // A residual of zero is zero even where all terms are. Terms that overflow say nothing.
-                let relative = if f == T::ZERO {
-                    T::ZERO
-                } else if magnitude.is_finite() {
-                    f.abs() / *magnitude
-                } else {
-                    T::ONE
-                };
-                if relative > largest.0 || !relative.is_finite() {
-                    largest = (relative, r, stage);
+        }
+        for ((xi, &x), k) in xi.iter_mut().zip(x).zip(k) {
+            let mut sum = [x; S];
+            for (column, &k) in ha.iter().zip(k) {
+                for (sum, &element) in sum.iter_mut().zip(column) {
+                    *sum = A::subtract(*sum, element, k);
                 }
             }
+            *xi = sum;
         }
-        largest
     }
 }
 
 /// The entries from `begin` to `end` of a Jacobian: row, column, value.
 #[inline(always)]
-pub(crate) fn entries<M: Dae, T: Real>(
-    jacobian: &M::Jacobian<T>,
+pub(crate) fn entries<'a, V>(
+    structure: &Structure,
+    jacobian: &'a [V],
     begin: usize,
     end: usize,
-) -> impl Iterator<Item = (usize, usize, T)> {
-    let Pattern { rows, columns } = M::STRUCTURE.jacobian;
-    let places = rows[begin..end].iter().zip(&columns[begin..end]);
-    places
-        .zip(&jacobian.as_ref()[begin..end])
-        .map(|((row, column), value)| (*row as usize, *column as usize, *value))
+) -> impl Iterator<Item = (usize, usize, &'a V)> + use<'a, V> {
+    let Pattern { rows, columns } = structure.jacobian;
+    let places = rows.get(begin..end).unwrap_or_default().iter().zip(columns.get(begin..end).unwrap_or_default());
+    let values = jacobian.get(begin..end).unwrap_or_default();
+    places.zip(values).map(|((row, column), value)| (*row as usize, *column as usize, value))
 }
 
 /// `Σ_j a_j b_j`
 #[inline(always)]
-pub(crate) fn dot<T: Real, const S: usize>(a: &[T; S], b: &[T; S]) -> T {
-    let mut sum = T::ZERO;
+pub(crate) fn dot<E: Field, const S: usize>(a: &[E; S], b: &[E; S]) -> E {
+    let mut sum = E::from_f64(0.0);
     for (a, b) in a.iter().zip(b) {
         sum = sum + *a * *b;
     }

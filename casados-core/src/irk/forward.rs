@@ -10,12 +10,14 @@ use super::evaluate::entries;
 use super::record::{Coefficients, Work, copy};
 use super::step::check;
 use crate::error::Error;
-use crate::linalg::{axpy, slot};
+use crate::linalg::{Arithmetic, Kernel, axpy, dispatch, slot};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Real};
 use crate::shape::{Array, Matrix, Plain, Shape};
+use crate::statistics::Statistics;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// Derivatives of one step in directions that are the elements of `R`.
 #[derive(Zeroable)]
@@ -29,27 +31,29 @@ pub struct Sweep<M: Dae, R: Plain, const S: usize> {
 copy!([M: Dae, R: Plain, const S: usize] Sweep<M, R, S>);
 
 /// How the directions depend on `w`.
-pub(crate) trait Directions<T, R> {
+pub(crate) trait Directions<E, R> {
     /// `row += factor · dw_index`
-    fn add(&self, index: usize, factor: T, row: &mut R);
+    fn add(&self, index: usize, factor: E, row: &mut R);
 }
 
 /// One direction for each element of `w`.
 pub(crate) struct Identity;
 
-impl<T: Real, R: Array<T>> Directions<T, R> for Identity {
+impl<E: Lanes, R: Array<E>> Directions<E, R> for Identity {
     #[inline(always)]
-    fn add(&self, index: usize, factor: T, row: &mut R) {
-        row[index] = row[index] + factor;
+    fn add(&self, index: usize, factor: E, row: &mut R) {
+        if let Some(element) = row.as_mut().get_mut(index) {
+            *element = *element + factor;
+        }
     }
 }
 
 /// The rows of a matrix: each direction is a column.
 pub(crate) struct Rows<'a, R>(pub &'a [R]);
 
-impl<T: Real, R: Array<T>> Directions<T, R> for Rows<'_, R> {
+impl<E: Lanes, R: Array<E>> Directions<E, R> for Rows<'_, R> {
     #[inline(always)]
-    fn add(&self, index: usize, factor: T, row: &mut R) {
+    fn add(&self, index: usize, factor: E, row: &mut R) {
         if let Some(direction) = self.0.get(index) {
             axpy(factor, direction.as_ref(), row.as_mut());
         }
@@ -58,55 +62,43 @@ impl<T: Real, R: Array<T>> Directions<T, R> for Rows<'_, R> {
 
 impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
     /// `V_0`
-    pub(crate) fn start<T: Real>(&mut self, directions: &impl Directions<T, R>)
+    pub(crate) fn start<E: Lanes>(&mut self, directions: &impl Directions<E, R>)
     where
-        R: Array<T>,
+        R: Array<E>,
     {
         for (index, row) in self.v.as_mut().iter_mut().enumerate() {
-            row.as_mut().fill(T::ZERO);
-            directions.add(index, T::ONE, row);
+            row.as_mut().fill(E::from_f64(0.0));
+            directions.add(index, E::from_f64(1.0), row);
         }
     }
 
-    /// `dK` of a step that is linearised.
-    pub(crate) fn stages<T: Real>(&mut self, work: &Work<M, T, S>, directions: &impl Directions<T, R>)
-    where
-        R: Array<T>,
+    /// `dK` of a step that is linearised, the `first` of the interval or a later one.
+    pub(crate) fn stages<E: Lanes>(
+        &mut self,
+        work: &Work<M, E, S>,
+        directions: &impl Directions<E, R>,
+        first: bool,
+    ) where
+        R: Array<E>,
     {
-        let (blocks, nx) = (M::STRUCTURE.blocks, M::Shape::NX);
-        // Of the first variable that is a direction, `u_0`: columns of the Jacobian minus this are `w`.
-        let shift = nx + M::Shape::NZ;
         let Self { v, dy } = self;
-        for row in dy.as_mut().as_flattened_mut() {
-            row.as_mut().fill(T::ZERO);
-        }
-        for (stage, jacobian) in work.linear.jacobian.iter().enumerate() {
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[1], blocks[2]) {
-                axpy(-value, v[c - nx].as_ref(), dy[slot::<M>(r)][stage].as_mut());
-            }
-            for (r, c, value) in entries::<M, T>(jacobian, blocks[3], blocks[5]) {
-                directions.add(c - shift, -value, &mut dy[slot::<M>(r)][stage]);
-            }
-        }
+        let (v, jacobian) = (v.as_ref(), work.linear.jacobian.as_ref());
+        dispatch(RightHandSide::<M, E, R, _, S> { v, jacobian, directions, first, dy: dy.as_mut(), model: PhantomData });
         work.linear.factors.solve(dy);
     }
 
     /// `V_{n+1}`
-    pub(crate) fn advance<T: Real>(&mut self, coefficients: &Coefficients<T, S>, h: T)
+    pub(crate) fn advance<E: Lanes>(&mut self, coefficients: &Coefficients<E, S>, h: E)
     where
-        R: Array<T>,
+        R: Array<E>,
     {
-        for (v, dk) in self.v.as_mut().iter_mut().zip(self.dy.as_ref()) {
-            for (b, dk) in coefficients.b.iter().zip(dk) {
-                axpy(h * *b, dk.as_ref(), v.as_mut());
-            }
-        }
+        dispatch(Combine { to: self.v.as_mut(), dy: self.dy.as_ref(), weights: &coefficients.b.map(|b| h * b) });
     }
 
     /// Derivatives `row` of `x` at the point of the step where the weights are `weights`.
-    pub(crate) fn differential<T: Real>(&self, state: usize, h: T, weights: &[T; S], row: &mut R)
+    pub(crate) fn differential<E: Lanes>(&self, state: usize, h: E, weights: &[E; S], row: &mut R)
     where
-        R: Array<T>,
+        R: Array<E>,
     {
         *row = self.v[state];
         for (b, dk) in weights.iter().zip(&self.dy[state]) {
@@ -115,13 +107,82 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
     }
 
     /// Derivatives `row` of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
-    pub(crate) fn algebraic<T: Real>(&self, state: usize, lagrange: &[T; S], row: &mut R)
+    pub(crate) fn algebraic<E: Lanes>(&self, state: usize, lagrange: &[E; S], row: &mut R)
     where
-        R: Array<T>,
+        R: Array<E>,
     {
-        row.as_mut().fill(T::ZERO);
+        row.as_mut().fill(E::from_f64(0.0));
         for (l, dz) in lagrange.iter().zip(&self.dy[M::Shape::NX + state]) {
             axpy(*l, dz.as_ref(), row.as_mut());
+        }
+    }
+}
+
+/// `−(f_x,i V_n + f_w,i)`, equations in their slots.
+struct RightHandSide<'a, M, E, R, D, const S: usize> {
+    v: &'a [R],
+    jacobian: &'a [[E; S]],
+    directions: &'a D,
+    first: bool,
+    dy: &'a mut [[R; S]],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, D: Directions<E, R>, const S: usize> Kernel
+    for RightHandSide<'_, M, E, R, D, S>
+{
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { v, jacobian, directions, first, dy, .. } = self;
+        let (structure, nx) = (&M::STRUCTURE, M::Shape::NX);
+        let blocks = structure.blocks;
+        // Of the first variable that is a direction, `u_0`: columns of the Jacobian minus this are `w`.
+        let shift = nx + M::Shape::NZ;
+        for row in dy.as_flattened_mut() {
+            row.as_mut().fill(E::from_f64(0.0));
+        }
+        for (r, c, values) in entries(structure, jacobian, blocks[1], blocks[2]) {
+            let Some(rows) = dy.get_mut(slot::<M>(r)) else { continue };
+            if first {
+                // The rows of V_0 are the directions.
+                for (row, &value) in rows.iter_mut().zip(values) {
+                    directions.add(c - nx, -value, row);
+                }
+            } else if let Some(v) = v.get(c - nx) {
+                for (row, &value) in rows.iter_mut().zip(values) {
+                    for (to, &from) in row.as_mut().iter_mut().zip(v.as_ref()) {
+                        *to = A::subtract(*to, value, from);
+                    }
+                }
+            }
+        }
+        for (r, c, values) in entries(structure, jacobian, blocks[3], blocks[5]) {
+            let Some(rows) = dy.get_mut(slot::<M>(r)) else { continue };
+            for (row, &value) in rows.iter_mut().zip(values) {
+                directions.add(c - shift, -value, row);
+            }
+        }
+    }
+}
+
+/// `to += Σ_i weight_i dy_i`, row after row.
+struct Combine<'a, E, R, const S: usize> {
+    to: &'a mut [R],
+    dy: &'a [[R; S]],
+    weights: &'a [E; S],
+}
+
+impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Combine<'_, E, R, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (to, dy) in self.to.iter_mut().zip(self.dy) {
+            for (&weight, dy) in self.weights.iter().zip(dy) {
+                for (to, &dy) in to.as_mut().iter_mut().zip(dy.as_ref()) {
+                    *to = A::subtract(*to, -weight, dy);
+                }
+            }
         }
     }
 }
@@ -137,21 +198,35 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
-impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
-    /// After a step that is linearised.
-    pub(crate) fn step(
-        &mut self,
-        work: &Work<M, T, S>,
-        coefficients: &Coefficients<T, S>,
-        n: usize,
-        count: usize,
-    ) {
+impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
+    /// `V_n`
+    pub(crate) fn begin(&mut self, work: &Work<M, E, S>, coefficients: &Coefficients<E, S>, n: usize) {
         if n == 0 {
             self.sweep.start(&Identity);
         } else {
             self.sweep.advance(coefficients, work.inputs.time.step);
         }
-        self.sweep.stages(work, &Identity);
+    }
+
+    /// The derivatives of the stages, by the factors that are there; whether they satisfy their equations.
+    pub(crate) fn stages(
+        &mut self,
+        work: &mut Work<M, E, S>,
+        coefficients: &Coefficients<E, S>,
+        n: usize,
+    ) -> E::Mask {
+        self.sweep.stages(work, &Identity, n == 0);
+        work.verify_forward(&self.sweep, coefficients, &Identity)
+    }
+
+    /// What a step contributes to the result.
+    pub(crate) fn collect(
+        &mut self,
+        work: &Work<M, E, S>,
+        coefficients: &Coefficients<E, S>,
+        n: usize,
+        count: usize,
+    ) {
         let Self { result, sweep, row, .. } = self;
         let result = &mut result.forward;
         if n == 0 {
@@ -170,6 +245,29 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
                 split(row.as_ref(), state, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
             }
         }
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
+    /// After a step that is linearised.
+    ///
+    /// # Errors
+    /// [`Error::Singular`]
+    pub(crate) fn step(
+        &mut self,
+        work: &mut Work<M, T, S>,
+        coefficients: &Coefficients<T, S>,
+        n: usize,
+        count: usize,
+        statistics: &mut Statistics,
+    ) -> Result<(), Error> {
+        self.begin(work, coefficients, n);
+        if !self.stages(work, coefficients, n) && work.linear.factors.is_planned() {
+            work.factor_pivoted(coefficients, n, 0, statistics)?;
+            self.stages(work, coefficients, n);
+        }
+        self.collect(work, coefficients, n, count);
+        Ok(())
     }
 
     /// # Errors
@@ -227,7 +325,7 @@ fn product<T: Real>(lambda: &[T], matrix: &[T], gradient: &mut [T]) {
 }
 
 /// A row over the directions `(x₀, u, p)`, written to row `r` of three matrices.
-pub(crate) fn split<T: Real>(
+pub(crate) fn split<T: Plain>(
     row: &[T],
     r: usize,
     x: &mut impl Matrix<T>,
@@ -240,7 +338,7 @@ pub(crate) fn split<T: Real>(
     copy_row(&mut values, r, p);
 }
 
-fn copy_row<'a, T: Real, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
+fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
     for column in 0..A::COLUMNS {
         if let Some(value) = values.next() {
             to[(r, column)] = *value;
@@ -276,13 +374,17 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
     }
 
     /// After a step that is linearised.
+    ///
+    /// # Errors
+    /// [`Error::Singular`]
     pub(crate) fn step(
         &mut self,
-        work: &Work<M, T, S>,
+        work: &mut Work<M, T, S>,
         coefficients: &Coefficients<T, S>,
         n: usize,
         count: usize,
-    ) {
+        statistics: &mut Statistics,
+    ) -> Result<(), Error> {
         let Self { result, sweep, seeds } = self;
         let directions = Rows(seeds.as_ref());
         if n == 0 {
@@ -290,7 +392,11 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         } else {
             sweep.advance(coefficients, work.inputs.time.step);
         }
-        sweep.stages(work, &directions);
+        sweep.stages(work, &directions, n == 0);
+        if !work.verify_forward(sweep, coefficients, &directions) && work.linear.factors.is_planned() {
+            work.factor_pivoted(coefficients, n, 0, statistics)?;
+            sweep.stages(work, &directions, n == 0);
+        }
         let mut row = [T::ZERO; C];
         for state in 0..M::Shape::NZ {
             if n == 0 {
@@ -308,6 +414,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
                 copy_row(&mut row.iter(), state, &mut result.dx);
             }
         }
+        Ok(())
     }
 
     /// # Errors

@@ -8,16 +8,18 @@
 //! the middle comes first, `G = H D`, then the lower triangle of `Dᵀ G`.
 
 use super::adjoint::Backward;
+use super::evaluate::{give, not_finite, take};
 use super::forward::{ForwardMemory, Sweep};
-use super::record::{Coefficients, Linearization, Step, Work, copy};
+use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, Pattern};
 use crate::result::{ForwardAdjoint, Hessian};
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Real, SideBySide};
 use crate::shape::assign;
 use crate::shape::{Array, Matrix, Plain, Shape};
+use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
 /// Memory of second-order sensitivities.
@@ -32,10 +34,10 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     g: ArrayV<M, ArrayW<M, T>>,
     /// The Hessian over `w`, its lower triangle.
     sum: ArrayW<M, ArrayW<M, T>>,
-    /// `μ` at one stage.
-    mu: ArrayK<M, T>,
-    /// Entries of `∇²(μᵀ f)` at one stage.
-    entries: M::Hessian<T>,
+    /// `μ` at all stages, in the order of the equations.
+    mu: ArrayK<M, [T; S]>,
+    /// Entries of `∇²(μᵀ f)` at all stages.
+    entries: M::Hessian<[T; S]>,
 }
 copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 
@@ -48,11 +50,16 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize] HessianStep<M, T, S>);
 
-impl<M: Dae, T: Real, const S: usize> HessianStep<M, T, S> {
+impl<M: Dae, E: Lanes, const S: usize> HessianStep<M, E, S> {
     /// Remembers a step on the way forth.
-    pub(crate) fn record(&mut self, work: &Work<M, T, S>, forward: &ForwardMemory<M, T, S>) {
+    pub(crate) fn record(&mut self, work: &Work<M, E, S>, forward: &ForwardMemory<M, E, S>) {
         self.linear.copy_from(&work.linear);
         assign(&mut self.sweep, &forward.sweep);
+    }
+
+    /// Brings back what was remembered.
+    pub(crate) fn recall(&self, work: &mut Work<M, E, S>) {
+        work.linear.copy_from(&self.linear);
     }
 }
 
@@ -60,7 +67,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     /// The way back.
     ///
     /// # Errors
-    /// A second derivative of the model that is not finite.
+    /// A second derivative of the model that is not finite, a singular matrix.
     pub(crate) fn run(
         &mut self,
         work: &mut Work<M, T, S>,
@@ -68,64 +75,105 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
         steps: &[Step<M, T, S>],
         records: &[HessianStep<M, T, S>],
         seed: &[T],
+        statistics: &mut Statistics,
     ) -> Result<(), Error> {
-        self.backward.start(seed);
-        for row in self.sum.as_mut() {
-            row.as_mut().fill(T::ZERO);
-        }
+        self.begin(seed);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            self.backward.step(&record.linear, coefficients, work.inputs.time.step);
-            work.place(coefficients, n, &step.x, &step.y);
-            for stage in 0..S {
-                for (equation, to) in self.mu.as_mut().iter_mut().enumerate() {
-                    [*to] = self.backward.mu[slot::<M>(equation)][stage];
-                }
-                M::hessian::<T>(&work.points[stage], &self.mu, &mut self.entries);
-                if let Some((entry, value)) = super::evaluate::not_finite(self.entries.as_ref()) {
-                    return Err(Error::NonFiniteModel {
-                        quantity: Quantity::Hessian,
-                        equation: M::STRUCTURE.hessian.at(entry).0,
-                        value,
-                        at: Place { step: n, stage, iteration: 0 },
-                    });
-                }
-                self.place_directions(&record.sweep, coefficients, work.inputs.time.step, stage);
-                self.subtract();
+            // What belongs to the last step is still there.
+            if n + 1 < steps.len() {
+                record.recall(work);
             }
+            self.backward.step(work, coefficients, n, statistics)?;
+            self.curvature(work, coefficients, n, step);
+            if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
+                return Err(Error::NonFiniteModel {
+                    quantity: Quantity::Hessian,
+                    equation: M::STRUCTURE.hessian.at(entry / S).0,
+                    value,
+                    at: Place { step: n, stage: entry % S, iteration: 0 },
+                });
+            }
+            self.subtract(&record.sweep, coefficients, work.inputs.time.step);
         }
         Ok(())
     }
+}
 
-    /// `D` at a stage.
-    fn place_directions(
+impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
+    /// Before the last step.
+    pub(crate) fn begin(&mut self, seed: &[E]) {
+        self.backward.start(seed);
+        for row in self.sum.as_mut() {
+            row.as_mut().fill(E::from_f64(0.0));
+        }
+    }
+
+    /// `∇²(μ_iᵀ f)` at all stages of a step.
+    pub(crate) fn curvature(
         &mut self,
-        sweep: &Sweep<M, ArrayW<M, T>, S>,
-        coefficients: &Coefficients<T, S>,
-        h: T,
-        stage: usize,
+        work: &mut Work<M, E, S>,
+        coefficients: &Coefficients<E, S>,
+        n: usize,
+        step: &Step<M, E, S>,
     ) {
-        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        for state in 0..nx {
-            self.d[state] = sweep.dy[state][stage];
-            sweep.differential(state, h, &coefficients.a[stage], &mut self.d[nx + state]);
+        let Self { backward, mu, entries, .. } = self;
+        for (equation, to) in mu.as_mut().iter_mut().enumerate() {
+            *to = backward.mu[slot::<M>(equation)].map(|[mu]| mu);
         }
-        for state in 0..nz {
-            self.d[2 * nx + state] = sweep.dy[nx + state][stage];
-        }
-        for w in nx..M::Shape::NW {
-            let row = self.d[nx + nz + w].as_mut();
-            row.fill(T::ZERO);
-            row[w] = T::ONE;
+        work.place(coefficients, n, &step.x, &step.y);
+        let Work { points, stage, .. } = work;
+        if let Err(call) = E::side_by_side(Curvature::<M, E, S> { points, mu, entries, stage }) {
+            let Curvature { points, mu, entries, stage } = call;
+            for i in 0..S {
+                take::<E, S>(stage.v.as_mut(), points.as_ref(), i);
+                take::<E, S>(stage.mu.as_mut(), mu.as_ref(), i);
+                M::hessian::<E>(&stage.v, &stage.mu, &mut stage.hessian);
+                give::<E, S>(stage.hessian.as_ref(), entries.as_mut(), i);
+            }
         }
     }
 
-    /// `sum −= Dᵀ H D`, the lower triangle.
-    fn subtract(&mut self) {
+    /// `sum −= Σ_i D_iᵀ H_i D_i`
+    pub(crate) fn subtract(
+        &mut self,
+        sweep: &Sweep<M, ArrayW<M, E>, S>,
+        coefficients: &Coefficients<E, S>,
+        h: E,
+    ) {
         let Self { d, g, sum, entries, .. } = self;
-        let (d, g, sum) = (d.as_ref(), g.as_mut(), sum.as_mut());
-        dispatch(Subtract { pattern: M::STRUCTURE.hessian, entries: entries.as_ref(), d, g, sum });
+        let curved = M::STRUCTURE.curved;
+        for stage in 0..S {
+            let (v, dy, nx, nz) = (sweep.v.as_ref(), sweep.dy.as_ref(), M::Shape::NX, M::Shape::NZ);
+            dispatch(Rows { curved, nx, nz, v, dy, a: &coefficients.a[stage], h, stage, d: d.as_mut() });
+            dispatch(Subtract {
+                pattern: M::STRUCTURE.hessian,
+                curved,
+                entries: entries.as_ref(),
+                stage,
+                d: d.as_ref(),
+                g: g.as_mut(),
+                sum: sum.as_mut(),
+            });
+        }
     }
+}
 
+/// `∇²(μᵀ f)` at all stages in one call.
+struct Curvature<'a, M: Dae, E: Lanes, const S: usize> {
+    points: &'a ArrayV<M, [E; S]>,
+    mu: &'a ArrayK<M, [E; S]>,
+    entries: &'a mut M::Hessian<[E; S]>,
+    stage: &'a mut Stage<M, E::Cell>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, S> {
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [E; S]>>(self) {
+        M::hessian::<R>(self.points, self.mu, self.entries);
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     /// # Errors
     /// [`Error::Overflow`]
     pub(crate) fn finish(&mut self, forward: &ForwardMemory<M, T, S>) -> Result<(), Error> {
@@ -176,60 +224,155 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     }
 }
 
-/// `sum −= Dᵀ H D`, the lower triangle, with `H` given by its own.
-struct Subtract<'a, T, R> {
-    pattern: Pattern,
-    entries: &'a [T],
-    d: &'a [R],
-    g: &'a mut [R],
-    sum: &'a mut [R],
+/// The rows of `D` at a stage that enter second derivatives.
+struct Rows<'a, E, R, const S: usize> {
+    curved: &'static [u32],
+    nx: usize,
+    nz: usize,
+    v: &'a [R],
+    dy: &'a [[R; S]],
+    a: &'a [E; S],
+    h: E,
+    stage: usize,
+    d: &'a mut [R],
 }
 
-impl<T: Real, R: Array<T>> Kernel for Subtract<'_, T, R> {
+impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Rows<'_, E, R, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { pattern, entries, d, g, sum } = self;
-        for row in g.iter_mut() {
-            row.as_mut().fill(T::ZERO);
-        }
-        // G = −H D
-        let mut add = |value: T, from: usize, to: usize| {
-            if let (Some(from), Some(to)) = (d.get(from), g.get_mut(to)) {
-                for (to, from) in to.as_mut().iter_mut().zip(from.as_ref()) {
-                    *to = A::subtract(*to, value, *from);
+        let Self { curved, nx, nz, v, dy, a, h, stage, d } = self;
+        for &variable in curved {
+            let variable = variable as usize;
+            let Some(row) = d.get_mut(variable) else { continue };
+            if variable < nx {
+                if let Some(dk) = dy.get(variable) {
+                    *row = dk[stage];
                 }
-            }
-        };
-        let places = pattern.rows.iter().zip(pattern.columns);
-        for ((&row, &column), &value) in places.zip(entries) {
-            add(value, column as usize, row as usize);
-            if row != column {
-                add(value, row as usize, column as usize);
-            }
-        }
-        // Rows of variables that no equation is curved in are zero: only the others count, four at a time.
-        let mut rows = d.iter().zip(g.iter()).filter(|(_, g)| g.as_ref().iter().any(|g| *g != T::ZERO));
-        let zero = R::from_fn(|_| T::ZERO);
-        while let Some(first) = rows.next() {
-            let mut next = || rows.next().unwrap_or((&zero, &zero));
-            let four = [first, next(), next(), next()];
-            let [(d0, g0), (d1, g1), (d2, g2), (d3, g3)] = four.map(|(d, g)| (d.as_ref(), g.as_ref()));
-            let g = g0.iter().zip(g1).zip(g2).zip(g3);
-            let d = d0.iter().zip(d1).zip(d2).zip(d3);
-            for (w, (sum, (((&d0, &d1), &d2), &d3))) in sum.iter_mut().zip(d).enumerate() {
-                for (sum, (((&g0, &g1), &g2), &g3)) in sum.as_mut().iter_mut().zip(g.clone()).take(w + 1) {
-                    // G has the other sign, so that this adds −D G.
-                    let sums = A::subtract(A::subtract(*sum, -d0, g0), -d1, g1);
-                    *sum = A::subtract(A::subtract(sums, -d2, g2), -d3, g3);
+            } else if variable < 2 * nx {
+                let (Some(dk), Some(v)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
+                *row = *v;
+                for (&a, dk) in a.iter().zip(dk) {
+                    for (to, &dk) in row.as_mut().iter_mut().zip(dk.as_ref()) {
+                        *to = A::subtract(*to, -(h * a), dk);
+                    }
+                }
+            } else if variable < 2 * nx + nz {
+                if let Some(dz) = dy.get(variable - nx) {
+                    *row = dz[stage];
+                }
+            } else {
+                row.as_mut().fill(E::from_f64(0.0));
+                if let Some(element) = row.as_mut().get_mut(variable - nx - nz) {
+                    *element = E::from_f64(1.0);
                 }
             }
         }
     }
 }
 
+/// `sum −= Dᵀ H D` at a stage, the lower triangle, with `H` given by its own.
+struct Subtract<'a, E, R, const S: usize> {
+    pattern: Pattern,
+    curved: &'static [u32],
+    entries: &'a [[E; S]],
+    stage: usize,
+    d: &'a [R],
+    g: &'a mut [R],
+    sum: &'a mut [R],
+}
+
+impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { pattern, curved, entries, stage, d, g, sum } = self;
+        for &row in curved {
+            if let Some(row) = g.get_mut(row as usize) {
+                row.as_mut().fill(E::from_f64(0.0));
+            }
+        }
+        // G = H D
+        let places = pattern.rows.iter().zip(pattern.columns);
+        for ((&row, &column), values) in places.zip(entries) {
+            let Some(&value) = values.get(stage) else { continue };
+            add::<A, E, R>(value, d, column, g, row);
+            if row != column {
+                add::<A, E, R>(value, d, row, g, column);
+            }
+        }
+        // Tiles of the triangle, each over all curved variables while it is in registers.
+        let mut row = 0;
+        while row + 4 <= R::LEN {
+            let mut column = 0;
+            while column < row + 4 {
+                if column + 8 <= R::LEN {
+                    tile::<A, E, R, 4, 8>(curved, d, g, sum, row, column);
+                    column += 8;
+                } else {
+                    tile::<A, E, R, 4, 1>(curved, d, g, sum, row, column);
+                    column += 1;
+                }
+            }
+            row += 4;
+        }
+        while row < R::LEN {
+            let mut column = 0;
+            while column <= row {
+                if column + 8 <= R::LEN {
+                    tile::<A, E, R, 1, 8>(curved, d, g, sum, row, column);
+                    column += 8;
+                } else {
+                    tile::<A, E, R, 1, 1>(curved, d, g, sum, row, column);
+                    column += 1;
+                }
+            }
+            row += 1;
+        }
+    }
+}
+
+/// `g_to += value · d_from`
+#[inline(always)]
+fn add<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &mut [R], to: u32) {
+    let (Some(from), Some(to)) = (d.get(from as usize), g.get_mut(to as usize)) else { return };
+    let value = -value;
+    for (to, &from) in to.as_mut().iter_mut().zip(from.as_ref()) {
+        *to = A::subtract(*to, value, from);
+    }
+}
+
+/// A tile of `sum −= Dᵀ G`; above the diagonal it may write what nobody reads.
+#[inline(always)]
+fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
+    curved: &[u32],
+    d: &[R],
+    g: &[R],
+    sum: &mut [R],
+    row: usize,
+    column: usize,
+) {
+    let mut tile = [[E::from_f64(0.0); COLUMNS]; ROWS];
+    for &variable in curved {
+        let (Some(d), Some(g)) = (d.get(variable as usize), g.get(variable as usize)) else { continue };
+        let d = d.as_ref().get(row..).and_then(|d| d.first_chunk::<ROWS>());
+        let g = g.as_ref().get(column..).and_then(|g| g.first_chunk::<COLUMNS>());
+        let (Some(d), Some(g)) = (d, g) else { continue };
+        for (tile, &d) in tile.iter_mut().zip(d) {
+            for (tile, &g) in tile.iter_mut().zip(g) {
+                *tile = A::subtract(*tile, d, g);
+            }
+        }
+    }
+    for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)) {
+        for (&tile, sum) in tile.iter().zip(sum.as_mut().iter_mut().skip(column)) {
+            *sum = *sum + tile;
+        }
+    }
+}
+
 /// A block on the diagonal, from its lower triangle.
-fn symmetric<T: Real, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
+fn symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
     for r in 0..A::ROWS {
         for c in 0..=r {
             let value = lower[offset + r][offset + c];

@@ -259,9 +259,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.sweep = None;
         let forward = W::forward(&mut self.forward)?;
         let count = self.run.options.steps;
-        let parts = self.run.steps(arguments, |parts, n, step, current| {
-            parts.linearize(n, step, current)?;
-            forward.step(parts.work, parts.coefficients, n, count);
+        let parts = self.run.steps(arguments, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
             Ok(())
         })?;
         forward.finish(parts.work, count - 1)?;
@@ -295,7 +295,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let first = done.map_or(0, |done| done + 1);
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;
-            forward.step(parts.work, parts.coefficients, n, usize::MAX);
+            forward.step(parts.work, parts.coefficients, n, usize::MAX, parts.statistics)?;
         }
         self.sweep = Some(point.step);
         let h = parts.work.kept.time.step;
@@ -340,10 +340,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let memory = W::directional(&mut self.directional)?;
         memory.seed(seeds);
         let count = self.run.options.steps;
-        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, current| {
-            parts.linearize(n, step, current)?;
-            memory.step(parts.work, parts.coefficients, n, count);
-            Ok(())
+        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            memory.step(parts.work, parts.coefficients, n, count, parts.statistics)
         })?;
         memory.finish(parts.work, count - 1)?;
         self.sweep = None;
@@ -409,15 +408,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let memory = W::adjoint(&mut self.adjoint)?;
         let count = self.run.options.steps;
         // On the way forth only the last step is linearised: it is where the way back begins.
-        let mut parts = self.run.steps(arguments, |parts, n, step, current| {
-            if n + 1 == count { parts.linearize(n, step, current) } else { Ok(()) }
+        let mut parts = self.run.steps(arguments, |parts, n, step, exact| {
+            if n + 1 == count { parts.linearize(n, step, exact) } else { Ok(()) }
         })?;
         memory.backward.start(seeds);
         for (n, step) in parts.steps.iter().enumerate().rev() {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
             }
-            memory.backward.step(&parts.work.linear, parts.coefficients, parts.work.inputs.time.step);
+            memory.backward.step(parts.work, parts.coefficients, n, parts.statistics)?;
         }
         memory.finish(parts.work)?;
         self.sweep = None;
@@ -460,16 +459,16 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let forward = W::forward(&mut self.forward)?;
         let memory = W::hessian(&mut self.hessian)?;
         let records = W::hessian_tape(&mut self.hessian_tape, count)?;
-        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, current| {
-            parts.linearize(n, step, current)?;
-            forward.step(parts.work, parts.coefficients, n, count);
+        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
             if let Some(record) = records.get_mut(n) {
                 record.record(parts.work, forward);
             }
             Ok(())
         })?;
         forward.finish(parts.work, count - 1)?;
-        memory.run(parts.work, parts.coefficients, parts.steps, records, lambda.as_slice())?;
+        memory.run(parts.work, parts.coefficients, parts.steps, records, lambda.as_slice(), parts.statistics)?;
         memory.finish(forward)?;
         self.run.keep()?;
         self.sweep = Some(count - 1);

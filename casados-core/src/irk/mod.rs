@@ -12,21 +12,22 @@
 //! iteration took. `z` at the ends of an interval is the polynomial through the stages; for stiffly
 //! accurate methods its value at the end is the last stage.
 //!
-//! One file for each thing: `evaluate` the model at the stages, `assemble` the Newton matrix, `newton`, `step`,
-//! `forward`, `adjoint`, `hessian`, `dense`; `record` is the memory, `run` what all calls share, `integrator`
-//! what users see.
+//! One file for each thing: `evaluate` the model at the stages, `newton` and, where that does not arrive, `pivoted`,
+//! `step`, `forward`, `adjoint`, `hessian`, `verify` what was solved, `dense`; `record` is the memory, `run` what all
+//! calls share, `integrator` what users see.
 
 mod adjoint;
-mod assemble;
 mod dense;
 mod evaluate;
 mod forward;
 mod hessian;
 mod integrator;
 mod newton;
+mod pivoted;
 mod record;
 mod run;
 mod step;
+mod verify;
 
 pub use adjoint::AdjointMemory;
 pub use forward::{DirectionalMemory, ForwardMemory};
@@ -35,7 +36,7 @@ pub use integrator::Integrator;
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
-    assemble::unknown_name,
+    pivoted::unknown_name,
     evaluate::{dot, not_finite},
     forward::{check_result, split},
     run::check,

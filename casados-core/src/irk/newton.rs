@@ -4,144 +4,342 @@
 //! J Δ = −f(y),   y ← y + Δ
 //! ```
 //!
-//! It has converged as soon as one of these holds, both of them invariant under scaling of equations
-//! and of variables:
-//! - the residual of every equation is at rounding level, `|f_r| ≤ 4 ε Σ_c |∂f_r/∂v_c v_c|`;
-//! - the increment that would come next is expected below the tolerance relative to the size of each
-//!   unknown. The increments `‖Δ‖ = max_c |Δ_c| / |y_c|` shrink by `θ`, so the next one is `θ ‖Δ‖/(1−θ)` with a
-//!   frozen Jacobian (Hairer and Wanner, Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since
-//!   then `θ` squares too.
+//! Increments are measured relative to the size of each unknown, `‖Δ‖ = max_c max_i |Δ_ci| / max_i |y_ci|`: however
+//! equations and unknowns are scaled. (For a derivative `ẋ` a change that rounds to none in `x` is none.) They shrink
+//! by `θ`, so that the next one is expected to be `θ ‖Δ‖/(1−θ)` with a Jacobian that was kept (Hairer and Wanner,
+//! Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since then `θ` squares too. Both are asked unknown by
+//! unknown: a norm of all would let a linear one, corrected at once, speak for a nonlinear one. It has converged as
+//! soon as the next increment is below the tolerance. Where increments stop shrinking because the rounding errors of the model are
+//! larger than expected, it has converged too if they are small: more cannot be known.
 //!
-//! Where rounding errors of the model are larger than expected, residual and increments stop shrinking. Then
-//! it has converged too if either is small: more cannot be known.
+//! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
+//! values is kept as long as the iterations that are still expected with it cost less than a new one.
+//!
+//! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
-use super::assemble::{Purpose, unknown_name};
 use super::record::{Coefficients, Work};
-use crate::error::{Error, Place};
+use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton};
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Scalar};
 use crate::statistics::Statistics;
+use bytemuck::Zeroable;
 
-/// Residuals below this many ε of their terms are rounding errors.
+/// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 4.0;
-/// Residuals that no longer shrink are rounding errors of the model below this many ε of their terms.
-const NOISE: f64 = 256.0;
 
-impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
-    /// Solves the stages of a step from the start values in `y`; whether the Jacobian that is stored is
-    /// that of the solution.
-    ///
-    /// # Errors
-    /// A value of the model that is not finite, a singular matrix, no convergence.
-    pub(crate) fn newton(
-        &mut self,
-        coefficients: &Coefficients<T, S>,
-        options: &Newton,
-        step: usize,
-        x: &ArrayX<M, T>,
-        y: &mut ArrayK<M, [T; S]>,
-        statistics: &mut Statistics,
-    ) -> Result<bool, Error> {
-        let rounding = T::EPSILON * T::from_f64(ROUNDING);
-        let noise = T::EPSILON * T::from_f64(NOISE);
-        // Increments that no longer shrink are rounding errors below this, ε^(2/3).
-        let small = T::EPSILON.cbrt() * T::EPSILON.cbrt();
-        let tolerance = T::from_f64(options.tolerance).max(rounding);
-        let full = options.jacobian == Jacobian::Full;
-        let most = options.fixed_iterations.unwrap_or(options.max_iterations);
-        let test = options.fixed_iterations.is_none();
-        let mut last = Increment { size: T::ZERO, unknown: 0 };
-        let mut iteration = 0;
-        loop {
-            self.place(coefficients, step, x, y);
-            let current = full || iteration == 0;
-            if current {
-                statistics.jacobians += 1;
-                self.evaluate_jacobian(step, iteration)?;
-            } else {
-                statistics.residuals += 1;
-                self.evaluate_residual(step, iteration)?;
+/// How an iteration ended.
+pub(crate) struct Solved<E: Lanes> {
+    /// Which lanes have converged.
+    pub converged: E::Mask,
+    /// Whether the factors that are there are those of the solution.
+    pub exact: bool,
+}
+
+/// What every lane is judged by.
+struct Rule {
+    tolerance: f64,
+    /// Increments that no longer shrink are rounding errors below this.
+    stagnation: f64,
+    /// Every Jacobian is the current one.
+    full: bool,
+    /// The equations are linear, and the factors are theirs.
+    exact: bool,
+}
+
+/// How far one lane is.
+#[derive(Clone, Copy)]
+struct Progress {
+    state: State,
+    /// The increment before.
+    last: f64,
+    /// How fast increments shrink, if that is known.
+    rate: Option<f64>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum State {
+    Active,
+    Converged,
+    Failed,
+}
+
+impl Progress {
+    /// After an increment, and what is expected of the next one: with factors that are `new` or older ones, the first
+    /// in this step or a later one.
+    fn judge(&mut self, rule: &Rule, [increment, next]: [f64; 2], new: bool, first: bool) {
+        if !(increment <= f64::MAX) {
+            self.state = State::Failed;
+            return;
+        }
+        let mut expected = increment;
+        if first {
+            // What the last step found out holds for its factors only, and roughly.
+            self.rate = self.rate.filter(|_| !new);
+            if let Some(rate) = self.rate.filter(|rate| *rate < 0.1) {
+                expected = 10.0 * rate * increment;
             }
-            if test {
-                let before = self.relative.0;
-                self.relative = self.relative_residual();
-                let (residual, equation, stage) = self.relative;
-                let stuck = iteration > 1 && residual >= before;
-                if residual <= rounding || stuck && residual <= noise {
-                    return Ok(current);
-                }
-                if iteration == most {
-                    return Err(Error::NotConverged {
-                        residual: residual.to_f64(),
-                        equation,
-                        unknown: unknown_name::<M>(last.unknown),
-                        increment: last.size.to_f64(),
-                        at: Place { step, stage, iteration },
-                    });
-                }
-            }
-            if current {
-                let h = self.inputs.time.step;
-                self.linear.factor(coefficients, h, step, iteration, Purpose::Iteration, statistics)?;
-            }
-            self.linear.factors.solve(&mut self.residual);
-            let increment = self.update(y);
-            iteration += 1;
-            statistics.iterations += 1;
-            if !increment.size.is_finite() {
-                return Err(Error::Overflow { step, index: increment.unknown });
-            }
-            if test {
-                if iteration > 1 {
-                    let rate = increment.size / last.size;
-                    let next = if full {
-                        rate * rate * increment.size
-                    } else {
-                        rate / (T::ONE - rate) * increment.size
-                    };
-                    // A rate near one says nothing about the next increment.
-                    let shrinks = rate + rate < T::ONE;
-                    if shrinks && next <= tolerance || !shrinks && increment.size <= small {
-                        return Ok(false);
-                    }
-                }
-                if increment.size == T::ZERO {
-                    return Ok(false);
-                }
-            } else if iteration == most {
-                return Ok(false);
-            }
-            last = increment;
+        } else {
+            self.rate = Some(increment / self.last);
+            expected = if increment <= rule.stagnation && 2.0 * increment >= self.last { 0.0 } else { next };
+        }
+        self.last = increment;
+        if expected <= rule.tolerance || rule.exact {
+            self.state = State::Converged;
         }
     }
 
-    /// `y ← y − Δ` with `Δ` where the residual was; the largest increment relative to the unknown, of
-    /// which the largest stage counts.
-    fn update(&mut self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
-        let mut largest = Increment { size: T::ZERO, unknown: 0 };
-        for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.residual.as_ref()).enumerate() {
-            let (mut size, mut change) = (T::ZERO, T::ZERO);
-            for (y, [delta]) in y.iter_mut().zip(delta) {
-                *y = *y - *delta;
-                size = y.abs().max(size);
-                if delta.abs() > change || !delta.is_finite() {
-                    change = delta.abs();
-                }
-            }
-            // No increment is none, also of zero; an unknown that became zero changed by all it was.
-            let relative = if change == T::ZERO { T::ZERO } else { change / size.max(change) };
-            if relative > largest.size || !relative.is_finite() {
-                largest = Increment { size: relative, unknown };
-            }
+    /// How many more increments are expected until the tolerance.
+    fn remaining(&self, rule: &Rule) -> f64 {
+        let (mut increment, mut count) = (self.last, 0.0);
+        let rate = self.rate.unwrap_or(0.0);
+        while increment > rule.tolerance && count < 64.0 {
+            (increment, count) = (increment * rate, count + 1.0);
         }
-        largest
+        count
     }
 }
 
-/// The largest increment of an iteration.
-struct Increment<T> {
-    /// Relative to the unknown.
-    size: T,
-    unknown: usize,
+/// More lanes than any register has.
+const MOST_LANES: usize = 16;
+
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+    /// The cost of new factors, in iterations with old ones.
+    const RENEWAL: f64 = {
+        let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
+        let (s, blocks, updates) = (S as f64, plan.slots.len() as f64, plan.updates.len() as f64);
+        // What is computed for all stages side by side counts once.
+        let iteration = operations.residual as f64 + blocks * s + 1.0;
+        let factors = operations.residual_jacobian as f64 + (updates + 4.0 * plan.pivots.len() as f64) * s * s;
+        factors / iteration
+    };
+
+    /// Solves the stages of a step from the start values in `y`.
+    pub(crate) fn newton(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        options: &Newton,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &mut ArrayK<M, [E; S]>,
+        statistics: &mut Statistics,
+    ) -> Solved<E> {
+        let test = options.fixed_iterations.is_none();
+        let most = options.fixed_iterations.unwrap_or(options.max_iterations);
+        let rounding = ROUNDING * E::EPSILON;
+        let rule = Rule {
+            tolerance: options.tolerance.max(rounding),
+            stagnation: E::STAGNATION,
+            full: options.jacobian == Jacobian::Full || options.jacobian == Jacobian::Auto && !test,
+            // Of linear equations every step has one matrix, which may be that of all steps.
+            exact: M::STRUCTURE.linear_in_state,
+        };
+        let h = self.inputs.time.step;
+        let rate = Some(self.validity.rate).filter(|rate| *rate > 0.0);
+        let mut lanes = [Progress { state: State::Active, last: 0.0, rate }; MOST_LANES];
+        let lanes = lanes.get_mut(..E::LANES).unwrap_or_default();
+        let mut renew = !(self.validity.factors && M::STRUCTURE.constant_matrix)
+            && (rule.full || rule.exact || !self.validity.factors);
+        let mut iteration = 0;
+        loop {
+            self.place(coefficients, step, x, y);
+            if renew {
+                statistics.jacobians += 1;
+                statistics.factorizations += 1;
+                self.evaluate_jacobian();
+                self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+                self.validity.factors = true;
+            } else {
+                statistics.residuals += 1;
+                self.evaluate_residual();
+            }
+            iteration += 1;
+            statistics.iterations += 1;
+            for (equation, f) in self.f.as_ref().iter().enumerate() {
+                self.increment[slot::<M>(equation)] = f.map(|f| [f]);
+            }
+            self.linear.factors.solve(&mut self.increment);
+            let active = mask::<E>(lanes, State::Active);
+            let floor = E::from_f64(rounding / rule.tolerance);
+            let sizes = dispatch(Update {
+                x: x.as_ref(),
+                y: y.as_mut(),
+                increment: self.increment.as_mut(),
+                weights: self.weights.as_mut(),
+                sizes: self.sizes.as_mut(),
+                active,
+                h,
+                floor,
+                tolerance: E::from_f64(rule.tolerance),
+                full: rule.full,
+                measure: test && iteration == 1,
+            })
+            .map(cell);
+            if !test {
+                if iteration == most {
+                    return Solved { converged: active, exact: false };
+                }
+                continue;
+            }
+            for (lane, progress) in lanes.iter_mut().enumerate() {
+                if progress.state == State::Active {
+                    progress.judge(&rule, [0, 1].map(|i| E::lane(&sizes[i], lane)), renew, iteration == 1);
+                }
+            }
+            if !rule.exact && iteration > 1 && lanes.iter().any(|lane| lane.state == State::Converged) {
+                // Once more, with the sizes that the unknowns have now.
+                let (x, y) = (x.as_ref(), y.as_ref());
+                let (increment, weights) = (self.increment.as_ref(), self.weights.as_mut());
+                let again = cell(dispatch(Measure { x, y, increment, weights, h, floor }));
+                for (lane, progress) in lanes.iter_mut().enumerate() {
+                    let again = E::lane(&again, lane);
+                    if progress.state == State::Converged && again > 2.0 * progress.last {
+                        (progress.state, progress.last) = (State::Active, again);
+                    }
+                }
+            }
+            let slowest = lanes.iter().filter(|lane| lane.state == State::Active);
+            let slowest = slowest.fold(None, |slowest: Option<f64>, lane| {
+                Some(slowest.unwrap_or(0.0).max(lane.remaining(&rule)))
+            });
+            let Some(remaining) = slowest else {
+                let converged = mask::<E>(lanes, State::Converged);
+                let rates = lanes.iter().map(|lane| lane.rate.unwrap_or(0.0));
+                self.validity.rate = rates.fold(0.0, f64::max);
+                self.validity.factors = lanes.iter().all(|lane| lane.state == State::Converged);
+                return Solved { converged, exact: rule.exact };
+            };
+            if iteration == most {
+                self.validity.factors = false;
+                return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
+            }
+            renew = rule.full
+                || options.jacobian == Jacobian::Auto && !rule.exact && remaining > 1.0 + Self::RENEWAL;
+        }
+    }
+}
+
+/// The lanes that are in a state.
+fn mask<E: Lanes>(lanes: &[Progress], state: State) -> E::Mask {
+    let mut cell: E::Cell = Zeroable::zeroed();
+    for (lane, progress) in lanes.iter().enumerate() {
+        E::set_lane(&mut cell, lane, f64::from(u8::from(progress.state == state)));
+    }
+    E::lt(E::from_f64(0.0), E::load(&cell))
+}
+
+/// A number as it lies in memory.
+fn cell<E: Lanes>(value: E) -> E::Cell {
+    let mut cell: E::Cell = Zeroable::zeroed();
+    value.store(&mut cell);
+    cell
+}
+
+/// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
+struct Update<'a, E: Lanes, const S: usize> {
+    x: &'a [E],
+    y: &'a mut [[E; S]],
+    increment: &'a mut [[[E; 1]; S]],
+    weights: &'a mut [E],
+    sizes: &'a mut [E],
+    active: E::Mask,
+    h: E,
+    floor: E,
+    tolerance: E,
+    full: bool,
+    /// Whether weights are to be found, and nothing is known of the increment before.
+    measure: bool,
+}
+
+impl<E: Lanes, const S: usize> Kernel for Update<'_, E, S> {
+    type Output = [E; 2];
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> [E; 2] {
+        let Self { x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } = self;
+        let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
+        for (y, increment) in y.iter_mut().zip(increment.iter_mut()) {
+            for (y, [delta]) in y.iter_mut().zip(increment) {
+                *delta = E::select(active, *delta, zero);
+                *y = *y - *delta;
+            }
+        }
+        if measure {
+            let largest = Measure { x, y, increment, weights, h, floor }.run::<A>();
+            for ((size, increment), &weight) in sizes.iter_mut().zip(increment.iter()).zip(weights.iter()) {
+                *size = largest_of(increment) * weight;
+            }
+            return [largest, infinite];
+        }
+        // The sum of what is not a number is not a number, which a maximum may lose.
+        let (mut largest, mut next, mut sum) = (zero, zero, zero);
+        for ((increment, &weight), old) in increment.iter().zip(weights.iter()).zip(sizes) {
+            let size = largest_of(increment) * weight;
+            for [delta] in increment {
+                sum = sum + *delta;
+            }
+            largest = size.max(largest);
+            let expected = if full { size * size / *old * (size / *old) } else { size * size / (*old - size) };
+            let expected = E::select(E::lt(size + size, *old), expected, infinite);
+            next = E::select(E::le(size, tolerance), zero, expected).max(next);
+            *old = size;
+        }
+        let number = E::le(sum.abs(), E::from_f64(f64::MAX));
+        [E::select(number, largest, sum), next]
+    }
+}
+
+/// The largest of all stages.
+#[inline(always)]
+fn largest_of<E: Lanes, const S: usize>(increment: &[[E; 1]; S]) -> E {
+    let mut largest = E::from_f64(0.0);
+    for [delta] in increment {
+        largest = delta.abs().max(largest);
+    }
+    largest
+}
+
+/// The size of an increment relative to the unknowns as they are now.
+struct Measure<'a, E, const S: usize> {
+    x: &'a [E],
+    y: &'a [[E; S]],
+    increment: &'a [[[E; 1]; S]],
+    weights: &'a mut [E],
+    h: E,
+    floor: E,
+}
+
+impl<E: Lanes, const S: usize> Kernel for Measure<'_, E, S> {
+    type Output = E;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E {
+        let Self { x, y, increment, weights, h, floor } = self;
+        let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
+        // A change of ẋ below this much of x/h rounds to none in x.
+        let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
+        let (mut largest, mut sum) = ([zero; S], [zero; S]);
+        for (unknown, ((y, increment), weight)) in y.iter().zip(increment).zip(weights).enumerate() {
+            let mut size = x.get(unknown).map_or(zero, |x| *x).abs() * per_step;
+            for (y, [delta]) in y.iter().zip(increment) {
+                size = y.abs().max(delta.abs().max(size));
+            }
+            *weight = E::select(Scalar::eq(size, zero), zero, one / size);
+            for ((largest, sum), [delta]) in largest.iter_mut().zip(&mut sum).zip(increment) {
+                let size = delta.abs() * *weight;
+                *largest = size.max(*largest);
+                *sum = *sum + size;
+            }
+        }
+        size_of(largest, sum)
+    }
+}
+
+/// The largest of all stages, or what is not a number.
+#[inline(always)]
+fn size_of<E: Lanes, const S: usize>(largest: [E; S], sum: [E; S]) -> E {
+    let zero = E::from_f64(0.0);
+    let (mut total, mut most) = (zero, zero);
+    for (&largest, &sum) in largest.iter().zip(&sum) {
+        (total, most) = (total + sum, largest.max(most));
+    }
+    E::select(E::le(total, E::from_f64(f64::MAX)), most, total)
 }

@@ -3,8 +3,8 @@
 use crate::linalg::Factors;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
-use crate::scalar::Real;
-use crate::shape::Plain;
+use crate::scalar::{Field, Lanes};
+use crate::shape::{Plain, assign};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
@@ -22,30 +22,35 @@ macro_rules! copy {
 pub(crate) use copy;
 
 /// The coefficients of a tableau in the number type of the integrator.
-pub(crate) struct Coefficients<T, const S: usize> {
-    pub a: [[T; S]; S],
-    pub b: [T; S],
-    pub c: [T; S],
+pub(crate) struct Coefficients<E, const S: usize> {
+    pub a: [[E; S]; S],
+    pub b: [E; S],
+    pub c: [E; S],
     /// Lagrange polynomials at the start of the step.
-    pub start: [T; S],
+    pub start: [E; S],
     /// Lagrange polynomials at its end.
-    pub end: [T; S],
+    pub end: [E; S],
+    /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them; if there are any.
+    pub next: Option<[[E; S]; S]>,
     pub tableau: Tableau<S>,
 }
 
-impl<T: Real, const S: usize> Coefficients<T, S> {
+impl<E: Field, const S: usize> Coefficients<E, S> {
     pub fn new(tableau: Tableau<S>) -> Self {
         let mut end = tableau.lagrange(1.0);
         if tableau.is_stiffly_accurate() {
             // The last stage is the end: not even a rounding error apart.
             end = core::array::from_fn(|i| if i + 1 == S { 1.0 } else { 0.0 });
         }
+        let next = tableau.c().map(|c| tableau.lagrange(1.0 + c));
+        let finite = next.as_flattened().iter().all(|l| l.is_finite());
         Self {
-            a: tableau.a().map(|row| row.map(T::from_f64)),
-            b: tableau.b().map(T::from_f64),
-            c: tableau.c().map(T::from_f64),
-            start: tableau.lagrange(0.0).map(T::from_f64),
-            end: end.map(T::from_f64),
+            a: tableau.a().map(|row| row.map(E::from_f64)),
+            b: tableau.b().map(E::from_f64),
+            c: tableau.c().map(E::from_f64),
+            start: tableau.lagrange(0.0).map(E::from_f64),
+            end: end.map(E::from_f64),
+            next: finite.then(|| next.map(|row| row.map(E::from_f64))),
             tableau,
         }
     }
@@ -85,8 +90,8 @@ pub(crate) struct Times<T> {
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize> {
-    /// Entries of the Jacobian of the model, stage by stage.
-    pub jacobian: [M::Jacobian<T>; S],
+    /// Entries of the Jacobian of the model, each at all stages.
+    pub jacobian: M::Jacobian<[T; S]>,
     /// Factors of the Newton matrix.
     pub factors: Factors<M, T, S>,
 }
@@ -94,7 +99,7 @@ pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize> {
 /// The memory that every call works in.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Work<M: Dae, T: Plain, const S: usize> {
+pub struct Work<M: Dae, T: Lanes, const S: usize> {
     /// The solution of the last call.
     pub(crate) result: Nominal<M, T>,
     /// The solution at the last time that was asked for.
@@ -109,32 +114,70 @@ pub struct Work<M: Dae, T: Plain, const S: usize> {
     pub(crate) given: ArrayK<M, T>,
     /// The state at the start of the step, then at its end.
     pub(crate) x: ArrayX<M, T>,
-    /// Variables of the model at the stages.
-    pub(crate) points: [ArrayV<M, T>; S],
-    /// The residual at one stage.
-    pub(crate) f: ArrayK<M, T>,
-    /// The magnitude of the terms of each equation at one stage: `Σ_c |f_c v_c|`.
-    pub(crate) magnitude: ArrayK<M, T>,
-    /// The residual at all stages, then the increment.
-    pub(crate) residual: ArrayK<M, [[T; 1]; S]>,
-    /// The largest residual relative to its terms where it was computed last, its equation and stage.
-    pub(crate) relative: (T, usize, usize),
+    /// Variables of the model, each at all stages.
+    pub(crate) points: ArrayV<M, [T; S]>,
+    /// The residual at all stages.
+    pub(crate) f: ArrayK<M, [T; S]>,
+    /// The residual in the slots of the equations, then the increment.
+    pub(crate) increment: ArrayK<M, [[T; 1]; S]>,
+    /// Reciprocals of the sizes of the unknowns, which increments are measured by.
+    pub(crate) weights: ArrayK<M, T>,
+    /// The sizes of the last increments.
+    pub(crate) sizes: ArrayK<M, T>,
     pub(crate) linear: Linearization<M, T, S>,
+    /// Where derivatives are tried on their equations: sums, and the sizes of their terms.
+    pub(crate) probe: [ArrayV<M, [T; S]>; 2],
+    pub(crate) sums: [ArrayK<M, [T; S]>; 2],
+    /// One stage, for machines whose registers do not hold all of them.
+    pub(crate) stage: Stage<M, T::Cell>,
+    /// What the factors that are there are good for.
+    pub(crate) validity: Validity,
     /// Whether the constant entries of the Jacobian are there.
     pub(crate) ready: bool,
 }
 
+/// What the model is given and gives back at one stage.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(crate) struct Stage<M: Dae, T: Plain> {
+    pub v: ArrayV<M, T>,
+    pub f: ArrayK<M, T>,
+    pub mu: ArrayK<M, T>,
+    pub jacobian: M::Jacobian<T>,
+    pub hessian: M::Hessian<T>,
+}
+
+/// What factors that are there are good for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Zeroable)]
+pub(crate) struct Validity {
+    /// They belong to this call, and to its size of steps.
+    pub factors: bool,
+    /// How fast Newton's method converged with them, `θ`; zero if it is not known.
+    pub rate: f64,
+}
+
+copy!([M: Dae, T: Plain] Stage<M, T>);
 copy!([M: Dae, T: Plain, const S: usize] Step<M, T, S>);
 copy!([M: Dae, T: Plain] Inputs<M, T>);
 copy!([M: Dae, T: Plain, const S: usize] Linearization<M, T, S>);
-copy!([M: Dae, T: Plain, const S: usize] Work<M, T, S>);
+copy!([M: Dae, T: Lanes, const S: usize] Work<M, T, S>);
 
-impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
+impl<M: Dae, E: Lanes, const S: usize> Linearization<M, E, S> {
+    /// Copies what holds.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        assign(&mut self.jacobian, &other.jacobian);
+        self.factors.copy_from(&other.factors);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     /// To be called before anything else.
     pub(crate) fn prepare(&mut self) {
         if !self.ready {
-            for jacobian in &mut self.linear.jacobian {
-                M::jacobian_constants::<T>(jacobian);
+            M::jacobian_constants::<E>(&mut self.stage.jacobian);
+            let values = self.stage.jacobian.as_ref();
+            for (entry, value) in self.linear.jacobian.as_mut().iter_mut().zip(values) {
+                *entry = [E::load(value); S];
             }
             self.ready = true;
         }

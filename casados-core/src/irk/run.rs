@@ -152,8 +152,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             &from,
             steps,
             statistics,
-            |work, n, step, current, statistics| {
-                after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, current)
+            |work, n, step, exact, statistics| {
+                after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, exact)
             },
         )?;
         Ok(Parts { work, coefficients, steps, statistics })
@@ -197,8 +197,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
 
 impl<M: Dae, T: Real, const S: usize> Parts<'_, M, T, S> {
     /// See [`Work::linearize`].
-    pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, current: bool) -> Result<(), Error> {
-        self.work.linearize(self.coefficients, n, step, current, self.statistics)
+    pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, exact: bool) -> Result<(), Error> {
+        self.work.linearize(self.coefficients, n, step, exact, self.statistics)
     }
 }
 

@@ -1,25 +1,74 @@
 //! The steps of an interval, one after the other.
 
-use super::assemble::Purpose;
 use super::evaluate::{dot, not_finite};
-use super::record::{Coefficients, Step, Work};
+use super::record::{Coefficients, Step, Validity, Work};
 use crate::error::Error;
+use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::model::{ArrayK, Dae};
 use crate::options::Options;
-use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::scalar::{Field, Lanes, Real};
+use crate::shape::{Matrix, Shape, assign};
 use crate::statistics::Statistics;
 
 /// Where the unknowns of the stages start.
-pub(crate) enum From<'a, M: Dae, T: Real, const S: usize> {
+pub(crate) enum From<'a, M: Dae, E: Lanes, const S: usize> {
     Zero,
     Given,
-    Record(&'a [Step<M, T, S>]),
+    Record(&'a [Step<M, E, S>]),
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+    /// What comes before the first step of a call.
+    pub(crate) fn begin(&mut self) {
+        self.place_inputs();
+        // The same input gives the same bits in every call: nothing of the last one is taken over.
+        self.validity = Default::default();
+    }
+
+    /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued.
+    pub(crate) fn start(
+        &self,
+        coefficients: &Coefficients<E, S>,
+        from: &From<'_, M, E, S>,
+        n: usize,
+        before: Option<&Step<M, E, S>>,
+        y: &mut ArrayK<M, [E; S]>,
+    ) {
+        match (from, before, &coefficients.next) {
+            (From::Record(record), ..) => {
+                if let Some(record) = record.get(n) {
+                    assign(y, &record.y);
+                }
+            }
+            (_, Some(before), Some(next)) => {
+                dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
+            }
+            (From::Zero, ..) => y.as_mut().fill([E::from_f64(0.0); S]),
+            (From::Given, ..) => {
+                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
+                    *y = [*given; S];
+                }
+            }
+        }
+    }
+
+    /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
+    pub(crate) fn advance(&mut self, coefficients: &Coefficients<E, S>, step: &Step<M, E, S>, n: usize, count: usize) {
+        let h = self.inputs.time.step;
+        dispatch(Advance { x: self.x.as_mut(), y: step.y.as_ref(), b: &coefficients.b, h });
+        if n == 0 {
+            algebraic::<M, E, S>(self.result.z0.as_mut_slice(), &step.y, &coefficients.start);
+        }
+        if n + 1 == count {
+            algebraic::<M, E, S>(self.result.z.as_mut_slice(), &step.y, &coefficients.end);
+            self.result.x.as_mut_slice().copy_from_slice(self.x.as_ref());
+        }
+    }
 }
 
 impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     /// Integrates the interval: `x` at its start becomes `x` at its end. After each step, `after` is called
-    /// with what is known about it, and whether the Jacobian that is stored is that of its solution.
+    /// with what is known about it, and whether the factors that are there are those of its solution.
     ///
     /// # Errors
     /// Those of Newton's method; [`Error::Overflow`].
@@ -32,63 +81,54 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         statistics: &mut Statistics,
         mut after: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        self.place_inputs();
+        self.begin();
         let count = steps.len();
-        for (n, step) in steps.iter_mut().enumerate() {
+        for n in 0..count {
+            let (done, rest) = steps.split_at_mut(n);
+            let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
             step.x = self.x;
-            self.start(from, n, &mut step.y);
-            let mut solved = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics);
-            if solved.as_ref().is_err_and(lost_digits) && self.linear.factors.is_planned() {
-                // The planned elimination may be to blame: once more, with the whole matrix pivoted.
-                self.linear.factors.set_pivoted(true);
-                self.start(from, n, &mut step.y);
-                solved = self.newton(coefficients, &options.newton, n, &step.x, &mut step.y, statistics);
-                self.linear.factors.set_pivoted(false);
-            }
-            let current = solved?;
-            let h = self.inputs.time.step;
-            for (x, k) in self.x.as_mut().iter_mut().zip(step.y.as_ref()) {
-                *x = *x + h * dot(&coefficients.b, k);
-            }
+            let exact = self.solve(coefficients, options, from, n, before, step, statistics)?;
+            self.advance(coefficients, step, n, count);
             if let Some((index, _)) = not_finite(self.x.as_ref()) {
                 return Err(Error::Overflow { step: n, index });
             }
-            if n == 0 {
-                algebraic::<M, T, S>(self.result.z0.as_mut_slice(), &step.y, &coefficients.start);
-            }
-            if n + 1 == count {
-                algebraic::<M, T, S>(self.result.z.as_mut_slice(), &step.y, &coefficients.end);
-            }
-            after(self, n, step, current, statistics)?;
+            after(self, n, step, exact, statistics)?;
             statistics.steps += 1;
-            statistics.residual = statistics.residual.max(self.relative.0.to_f64());
         }
-        self.result.x.as_mut_slice().copy_from_slice(self.x.as_ref());
         for z in [self.result.z0.as_slice(), self.result.z.as_slice()] {
             check(z, count - 1)?;
         }
         Ok(())
     }
 
-    /// Start values of the stages of a step.
-    fn start(&mut self, from: &From<'_, M, T, S>, n: usize, y: &mut ArrayK<M, [T; S]>) {
-        match from {
-            From::Zero => y.as_mut().fill([T::ZERO; S]),
-            From::Given => {
-                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
-                    *y = [*given; S];
-                }
+    /// The stages of a step, the fast way, and where that does not arrive the careful one; whether the factors
+    /// that are there are those of the solution.
+    #[allow(clippy::too_many_arguments)]
+    fn solve(
+        &mut self,
+        coefficients: &Coefficients<T, S>,
+        options: &Options,
+        from: &From<'_, M, T, S>,
+        n: usize,
+        before: Option<&Step<M, T, S>>,
+        step: &mut Step<M, T, S>,
+        statistics: &mut Statistics,
+    ) -> Result<bool, Error> {
+        self.start(coefficients, from, n, before, &mut step.y);
+        let Step { x, y } = step;
+        if !M::STRUCTURE.elimination.pivots.is_empty() {
+            let solved = self.newton(coefficients, &options.newton, n, x, y, statistics);
+            let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
+            if solved.converged && finite {
+                return Ok(solved.exact);
             }
-            From::Record(record) => {
-                if let Some(record) = record.get(n) {
-                    *y = record.y;
-                }
-            }
+            self.start(coefficients, from, n, None, y);
         }
-        self.relative = (T::ZERO, 0, 0);
+        self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics)?;
+        Ok(false)
     }
 
-    /// The linearisation at the solution of a step: evaluated if it is not there, and factorised.
+    /// The linearisation at the solution of a step, `exact` if the factors that are there are its own.
     ///
     /// # Errors
     /// A value of the model that is not finite, a singular matrix.
@@ -97,33 +137,46 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
-        current: bool,
+        exact: bool,
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
-        if !current {
-            self.place(coefficients, n, &step.x, &step.y);
-            statistics.jacobians += 1;
-            self.evaluate_jacobian(n, 0)?;
-            self.relative = self.relative_residual();
+        self.linearize_planned(coefficients, n, step, exact, statistics);
+        self.check_model(n, 0)?;
+        if M::STRUCTURE.elimination.pivots.is_empty() {
+            self.factor_pivoted(coefficients, n, 0, statistics)?;
         }
-        self.linear.factor(coefficients, self.inputs.time.step, n, 0, Purpose::Sensitivities, statistics)
+        Ok(())
     }
 }
 
-/// Whether an iteration may have failed because its linear systems were solved badly.
-fn lost_digits(error: &Error) -> bool {
-    match error {
-        Error::NotConverged { .. } | Error::Overflow { .. } => true,
-        Error::NonFiniteModel { at, .. } => at.iteration > 0,
-        _ => false,
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+    /// The linearisation at the solution of a step, by the plan if there is one.
+    pub(crate) fn linearize_planned(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        n: usize,
+        step: &Step<M, E, S>,
+        exact: bool,
+        statistics: &mut Statistics,
+    ) {
+        self.place(coefficients, n, &step.x, &step.y);
+        statistics.jacobians += 1;
+        self.evaluate_jacobian();
+        let holds = exact || M::STRUCTURE.constant_matrix && self.validity.factors;
+        if !(holds || M::STRUCTURE.elimination.pivots.is_empty()) {
+            statistics.factorizations += 1;
+            let h = self.inputs.time.step;
+            self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+            self.validity = Validity { factors: true, rate: 0.0 };
+        }
     }
 }
 
 /// Algebraic states at a point of the polynomial through the stages.
-pub(crate) fn algebraic<M: Dae, T: Real, const S: usize>(
-    z: &mut [T],
-    y: &ArrayK<M, [T; S]>,
-    lagrange: &[T; S],
+pub(crate) fn algebraic<M: Dae, E: Lanes, const S: usize>(
+    z: &mut [E],
+    y: &ArrayK<M, [E; S]>,
+    lagrange: &[E; S],
 ) {
     for (z, y) in z.iter_mut().zip(&y.as_ref()[M::Shape::NX..]) {
         *z = dot(lagrange, y);
@@ -136,5 +189,55 @@ pub(crate) fn check<T: Real>(values: &[T], step: usize) -> Result<(), Error> {
     match not_finite(values) {
         Some((index, _)) => Err(Error::Overflow { step, index }),
         None => Ok(()),
+    }
+}
+
+/// The polynomial through the stages at those of the next step.
+struct Continue<'a, E, const S: usize> {
+    from: &'a [[E; S]],
+    next: &'a [[E; S]; S],
+    to: &'a mut [[E; S]],
+}
+
+impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let zero = E::from_f64(0.0);
+        // By columns: the stages of an unknown are a vector.
+        let mut next = [[zero; S]; S];
+        for (i, row) in self.next.iter().enumerate() {
+            for (column, &l) in next.iter_mut().zip(row) {
+                column[i] = -l;
+            }
+        }
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            let mut sum = [zero; S];
+            for (column, &value) in next.iter().zip(from) {
+                for (sum, &element) in sum.iter_mut().zip(column) {
+                    *sum = A::subtract(*sum, element, value);
+                }
+            }
+            *to = sum;
+        }
+    }
+}
+
+/// `x ← x + h Σ_i b_i k_i`
+struct Advance<'a, E, const S: usize> {
+    x: &'a mut [E],
+    y: &'a [[E; S]],
+    b: &'a [E; S],
+    h: E,
+}
+
+impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { x, y, b, h } = self;
+        for (x, k) in x.iter_mut().zip(y) {
+            *x = *x + h * dot(b, k);
+        }
     }
 }

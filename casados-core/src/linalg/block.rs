@@ -1,15 +1,39 @@
 //! Kernels on s×s blocks and on rows of s×C right-hand sides.
 //!
-//! Generic over the scalar, so that the same code serves one number and registers of them.
+//! Generic over the scalar, so that the same code serves one number and registers of them. Blocks lie column after
+//! column: a column is a vector over the stages, which is what one right-hand side wants.
 
 use super::fused::Arithmetic;
 use crate::scalar::Field;
 
-/// An s×s matrix, row by row.
+/// An s×s matrix, column after column.
 pub type Block<E, const S: usize> = [[E; S]; S];
 
-/// `s` rows of `W` columns: the stages of a slot in a right-hand side, or, with `W = s`, a block.
+/// `s` rows of `W` columns, row after row: the stages of a slot in a right-hand side.
 pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
+
+/// `left · right`
+#[inline(always)]
+pub fn product<A: Arithmetic, E: Field, const S: usize>(
+    left: &Block<E, S>,
+    right: &Block<E, S>,
+) -> Block<E, S> {
+    let mut product = [[E::from_f64(0.0); S]; S];
+    let mut negative = *left;
+    negate(&mut negative);
+    A::subtract_blocks(&mut product, &negative, right);
+    product
+}
+
+/// `−packet`
+#[inline(always)]
+pub fn negate<E: Field, const S: usize, const W: usize>(packet: &mut Packet<E, S, W>) {
+    for row in packet {
+        for element in row {
+            *element = -*element;
+        }
+    }
+}
 
 /// `packet − block · other`
 #[inline(always)]
@@ -18,44 +42,46 @@ pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     block: &Block<E, S>,
     other: &Packet<E, S, W>,
 ) {
-    for i in 0..S {
-        for k in 0..S {
-            for w in 0..W {
-                packet[i][w] = A::subtract(packet[i][w], block[i][k], other[k][w]);
+    if const { W == 1 } {
+        let (mut target, mut x) = ([E::from_f64(0.0); S], [E::from_f64(0.0); S]);
+        target.copy_from_slice(packet.as_flattened());
+        x.copy_from_slice(other.as_flattened());
+        A::subtract_columns(&mut target, block, &x);
+        packet.as_flattened_mut().copy_from_slice(&target);
+        return;
+    }
+    for (column, other) in block.iter().zip(other) {
+        for (&element, packet) in column.iter().zip(packet.iter_mut()) {
+            for (packet, &other) in packet.iter_mut().zip(other) {
+                *packet = A::subtract(*packet, element, other);
             }
         }
     }
 }
 
-/// `block · packet`
+/// `packet − blockᵀ · other`
 #[inline(always)]
-pub fn multiply<A: Arithmetic, E: Field, const S: usize, const W: usize>(
+pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
-    packet: &Packet<E, S, W>,
-) -> Packet<E, S, W> {
-    let mut product = [[E::from_f64(0.0); W]; S];
-    for i in 0..S {
-        for k in 0..S {
-            for w in 0..W {
-                product[i][w] = A::subtract(product[i][w], -block[i][k], packet[k][w]);
+    other: &Packet<E, S, W>,
+) {
+    for (column, packet) in block.iter().zip(packet) {
+        for (&element, other) in column.iter().zip(other) {
+            for (packet, &other) in packet.iter_mut().zip(other) {
+                *packet = A::subtract(*packet, element, other);
             }
         }
     }
-    product
 }
 
-/// The rows as columns.
+/// The inverse by Gauss-Jordan elimination with partial pivoting: rows are exchanged lane by lane, where any lane
+/// wants it. A singular block gives elements that are not finite.
 #[inline(always)]
-pub fn transposed<E: Copy, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
-    core::array::from_fn(|i| core::array::from_fn(|j| block[j][i]))
-}
-
-/// The inverse by Gauss-Jordan elimination with partial pivoting, without a branch on the values:
-/// rows are exchanged lane by lane. A singular block gives entries that are not finite.
-#[inline(always)]
-pub fn inverse<A: Arithmetic, E: Field, const S: usize>(a: &Block<E, S>) -> Block<E, S> {
+pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
-    let mut a = *a;
+    // On the transposed matrix, so that what is done to rows is done to vectors of the memory.
+    let mut a = *block;
     let mut inverse = [[zero; S]; S];
     for (i, row) in inverse.iter_mut().enumerate() {
         row[i] = one;
@@ -63,13 +89,15 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(a: &Block<E, S>) -> Bloc
     for k in 0..S {
         for i in k + 1..S {
             let larger = a[k][k].is_smaller(a[i][k]);
-            for j in 0..S {
-                let (p, q) = (a[k][j], a[i][j]);
-                a[k][j] = E::select(larger, q, p);
-                a[i][j] = E::select(larger, p, q);
-                let (p, q) = (inverse[k][j], inverse[i][j]);
-                inverse[k][j] = E::select(larger, q, p);
-                inverse[i][j] = E::select(larger, p, q);
+            if E::any(larger) {
+                for j in 0..S {
+                    let (p, q) = (a[k][j], a[i][j]);
+                    a[k][j] = E::select(larger, q, p);
+                    a[i][j] = E::select(larger, p, q);
+                    let (p, q) = (inverse[k][j], inverse[i][j]);
+                    inverse[k][j] = E::select(larger, q, p);
+                    inverse[i][j] = E::select(larger, p, q);
+                }
             }
         }
         let scale = one / a[k][k];

@@ -125,4 +125,9 @@ impl<T: Real, const L: usize> Field for Complex<T, L> {
             im: from_fn(|l| if mask[l] { a.im[l] } else { b.im[l] }),
         }
     }
+
+    #[inline(always)]
+    fn any(mask: Self::Mask) -> bool {
+        mask.contains(&true)
+    }
 }

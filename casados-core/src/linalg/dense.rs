@@ -2,7 +2,7 @@
 
 use super::kernels::{axpy, divide};
 use crate::model::{ArrayK, Dae};
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Real};
 use crate::shape::{Array, Plain};
 use bytemuck::Zeroable;
 
@@ -79,12 +79,12 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
             let row = row.as_ref().as_flattened();
             let pivot = row[k];
             let singular = !(best > T::ZERO && pivot.is_finite())
-                || best * best < T::EPSILON && {
+                || best * best < T::from_f64(T::EPSILON) && {
                     let sum = above
                         .iter()
                         .zip(row)
                         .fold(T::ZERO, |sum, (above, l)| sum + (*l * above.as_ref().as_flattened()[k]).abs());
-                    pivot.abs() <= T::from_f64(n as f64) * T::EPSILON * sum
+                    pivot.abs() <= T::from_f64(n as f64) * T::from_f64(T::EPSILON) * sum
                 };
             if singular {
                 return Err((k / S, k % S));
@@ -100,10 +100,12 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
         }
         Ok(())
     }
+}
 
+impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
     /// Solves `A X = B` in place, all columns of `B` at once.
-    pub fn solve<R: Array<T>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        let rows = self.rows.as_ref().as_flattened();
+    pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        let (rows, zero) = (self.rows.as_ref().as_flattened(), E::from_f64(0.0));
         let b = b.as_mut().as_flattened_mut();
         for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate() {
             b.swap(k, *pivot as usize);
@@ -112,7 +114,7 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
             let (before, here) = b.split_at_mut(i);
             let Some(here) = here.first_mut() else { return };
             for (l, x) in row.as_ref().as_flattened().iter().zip(before.iter()) {
-                if *l != T::ZERO {
+                if *l != zero {
                     axpy(-*l, x.as_ref(), here.as_mut());
                 }
             }
@@ -122,7 +124,7 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
             let Some(here) = here.last_mut() else { return };
             let row = row.as_ref().as_flattened();
             for (u, x) in row[i + 1..].iter().zip(after.iter()) {
-                if *u != T::ZERO {
+                if *u != zero {
                     axpy(-*u, x.as_ref(), here.as_mut());
                 }
             }
@@ -131,8 +133,8 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
     }
 
     /// Solves `Aᵀ X = B` in place, all columns of `B` at once.
-    pub fn solve_transposed<R: Array<T>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        let rows = self.rows.as_ref().as_flattened();
+    pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        let (rows, zero) = (self.rows.as_ref().as_flattened(), E::from_f64(0.0));
         let b = b.as_mut().as_flattened_mut();
         for (i, row) in rows.iter().enumerate() {
             let (here, after) = b.split_at_mut(i + 1);
@@ -140,7 +142,7 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
             let row = row.as_ref().as_flattened();
             divide(here.as_mut(), row[i]);
             for (u, x) in row[i + 1..].iter().zip(after) {
-                if *u != T::ZERO {
+                if *u != zero {
                     axpy(-*u, here.as_ref(), x.as_mut());
                 }
             }
@@ -149,7 +151,7 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
             let (before, here) = b.split_at_mut(i);
             let Some(here) = here.first() else { return };
             for (l, x) in row.as_ref().as_flattened().iter().zip(before) {
-                if *l != T::ZERO {
+                if *l != zero {
                     axpy(-*l, here.as_ref(), x.as_mut());
                 }
             }

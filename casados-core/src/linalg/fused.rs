@@ -4,12 +4,19 @@
 //! everything in it is inlined, and [`dispatch`] enters it through a function that is compiled for the better
 //! machine if this is one. Results differ by rounding only.
 
+use super::block::Block;
 use crate::scalar::Field;
+#[cfg(target_arch = "x86_64")]
+use crate::scalar::lanes::{Level, level};
 
 /// How `t − a b` is computed.
 pub trait Arithmetic {
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
+    /// `target − left · right`
+    fn subtract_blocks<E: Field, const S: usize>(target: &mut Block<E, S>, left: &Block<E, S>, right: &Block<E, S>);
+    /// `target − block · x`
+    fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]);
 }
 
 /// Rounded twice.
@@ -20,17 +27,39 @@ impl Arithmetic for Separate {
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t - a * b
     }
+    #[inline(always)]
+    fn subtract_blocks<E: Field, const S: usize>(target: &mut Block<E, S>, left: &Block<E, S>, right: &Block<E, S>) {
+        for (target, right) in target.iter_mut().zip(right) {
+            Self::subtract_columns(target, left, right);
+        }
+    }
+    #[inline(always)]
+    fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
+        for (column, &x) in block.iter().zip(x) {
+            for (target, &element) in target.iter_mut().zip(column) {
+                *target = *target - element * x;
+            }
+        }
+    }
 }
 
 /// Rounded once, in one instruction.
-#[cfg(all(feature = "std", any(target_arch = "x86_64", target_arch = "aarch64")))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub struct Fused;
 
-#[cfg(all(feature = "std", any(target_arch = "x86_64", target_arch = "aarch64")))]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 impl Arithmetic for Fused {
     #[inline(always)]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t.subtract_product(a, b)
+    }
+    #[inline(always)]
+    fn subtract_blocks<E: Field, const S: usize>(target: &mut Block<E, S>, left: &Block<E, S>, right: &Block<E, S>) {
+        E::subtract_blocks(target, left, right);
+    }
+    #[inline(always)]
+    fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
+        E::subtract_columns(target, block, x);
     }
 }
 
@@ -43,31 +72,36 @@ pub trait Kernel {
 }
 
 /// Runs a kernel as this machine does it best.
-#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     #[target_feature(enable = "avx2,fma")]
-    fn fused<K: Kernel>(kernel: K) -> K::Output {
+    fn avx2<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Fused>()
     }
-    if std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma") {
-        // SAFETY: the one condition of calling a function with target features is that the machine has
-        // them, which the line above has found out.
-        return unsafe { fused(kernel) };
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
+    fn avx512<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Fused>()
     }
-    kernel.run::<Separate>()
+    match level() {
+        // SAFETY: the one condition of calling a function with target features is that the machine has
+        // them, which is what `level` says.
+        Level::Avx512 => unsafe { avx512(kernel) },
+        Level::Avx2 => unsafe { avx2(kernel) },
+        _ => kernel.run::<Separate>(),
+    }
 }
 
 /// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one instruction.
-#[cfg(all(feature = "std", target_arch = "aarch64"))]
+#[cfg(target_arch = "aarch64")]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Fused>()
 }
 
 /// Runs a kernel in the way that every machine has.
-#[cfg(not(all(feature = "std", any(target_arch = "x86_64", target_arch = "aarch64"))))]
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Separate>()

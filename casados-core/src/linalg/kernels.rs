@@ -1,10 +1,10 @@
 //! The inner loops.
 
-use crate::scalar::Real;
+use crate::scalar::Field;
 
 /// `y += a x`
 #[inline(always)]
-pub(crate) fn axpy<T: Real>(a: T, x: &[T], y: &mut [T]) {
+pub(crate) fn axpy<T: Field>(a: T, x: &[T], y: &mut [T]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y = *y + a * *x;
     }
@@ -12,7 +12,7 @@ pub(crate) fn axpy<T: Real>(a: T, x: &[T], y: &mut [T]) {
 
 /// `x /= a`
 #[inline(always)]
-pub(crate) fn divide<T: Real>(x: &mut [T], a: T) {
+pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
     for x in x {
         *x = *x / a;
     }

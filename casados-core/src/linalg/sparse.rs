@@ -13,7 +13,7 @@
 //! The compiler does not look into the tables of the plan; elements are fetched with `get`, whose
 //! never-taken exit costs nothing beside a block and leaves no panic in the program.
 
-use super::block::{Block, Packet, inverse, multiply, subtract, transposed};
+use super::block::{Block, Packet, inverse, negate, product, subtract, subtract_transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use crate::model::Elimination;
 use crate::scalar::Field;
@@ -64,7 +64,7 @@ impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
                 let inverse = inverse::<A, E, S>(block);
                 *block = inverse;
                 for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
-                    *block = multiply::<A, E, S, S>(block, &inverse);
+                    *block = product::<A, E, S>(block, &inverse);
                 }
             }
             for lower in pivot.lower() {
@@ -72,7 +72,7 @@ impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
                 for (upper, &target) in pivot.upper().zip(&mut updates) {
                     let Some(&upper) = blocks.get(upper) else { continue };
                     let Some(target) = blocks.get_mut(target as usize) else { continue };
-                    subtract::<A, E, S, S>(target, &lower, &upper);
+                    A::subtract_blocks(target, &lower, &upper);
                 }
             }
         }
@@ -135,6 +135,10 @@ fn solve_packet<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, co
 ) {
     for pivot in plan.pivots {
         let packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+        // Directions that have not reached this unknown, as at the start of an interval.
+        if W > 1 && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0)) {
+            continue;
+        }
         for (block, other) in beside(plan, blocks, pivot.lower()) {
             let mut target = load(rows, other, column);
             subtract::<A, E, S, W>(&mut target, block, &packet);
@@ -147,7 +151,10 @@ fn solve_packet<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, co
             subtract::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
         }
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
-            packet = multiply::<A, E, S, W>(inverse, &packet);
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            negate(&mut packet);
+            subtract::<A, E, S, W>(&mut solution, inverse, &packet);
+            packet = solution;
         }
         store(rows, pivot.slot as usize, column, &packet);
     }
@@ -163,19 +170,22 @@ fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S
     for pivot in plan.pivots {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
-            packet = multiply::<A, E, S, W>(&transposed(inverse), &packet);
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            negate(&mut packet);
+            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
+            packet = solution;
             store(rows, pivot.slot as usize, column, &packet);
         }
         for (block, other) in beside(plan, blocks, pivot.upper()) {
             let mut target = load(rows, other, column);
-            subtract::<A, E, S, W>(&mut target, &transposed(block), &packet);
+            subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, column, &target);
         }
     }
     for pivot in plan.pivots.iter().rev() {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         for (block, other) in beside(plan, blocks, pivot.lower()) {
-            subtract::<A, E, S, W>(&mut packet, &transposed(block), &load(rows, other, column));
+            subtract_transposed::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
         }
         store(rows, pivot.slot as usize, column, &packet);
     }

@@ -33,6 +33,9 @@ impl Field for Complex64 {
     fn select(mask: bool, a: Self, b: Self) -> Self {
         if mask { a } else { b }
     }
+    fn any(mask: bool) -> bool {
+        mask
+    }
 }
 
 impl Scalar for Complex64 {

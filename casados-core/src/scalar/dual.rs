@@ -26,6 +26,9 @@ macro_rules! dual {
             fn select(mask: bool, a: Self, b: Self) -> Self {
                 if mask { a } else { b }
             }
+            fn any(mask: bool) -> bool {
+                mask
+            }
         }
 
         impl Scalar for $t {

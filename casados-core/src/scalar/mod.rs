@@ -56,11 +56,33 @@ pub trait Field:
         self - a * b
     }
 
+    /// `target − left · right` of s×s blocks that lie column after column, fused. As
+    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    #[inline(always)]
+    fn subtract_blocks<const S: usize>(target: &mut [[Self; S]; S], left: &[[Self; S]; S], right: &[[Self; S]; S]) {
+        for (target, right) in target.iter_mut().zip(right) {
+            Self::subtract_columns(target, left, right);
+        }
+    }
+
+    /// `target − block · x` of an s×s block that lies column after column, fused. As
+    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    #[inline(always)]
+    fn subtract_columns<const S: usize>(target: &mut [Self; S], block: &[[Self; S]; S], x: &[Self; S]) {
+        for (column, &x) in block.iter().zip(x) {
+            for (target, &element) in target.iter_mut().zip(column) {
+                *target = target.subtract_product(element, x);
+            }
+        }
+    }
+
     /// `|a| < |b|`
     fn is_smaller(self, other: Self) -> Self::Mask;
 
     /// `if mask { a } else { b }`, lane by lane
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Whether it holds in any lane.
+    fn any(mask: Self::Mask) -> bool;
 }
 
 /// A piece of straight-line code on scalars of one type.
@@ -159,10 +181,20 @@ pub trait Scalar: Field {
     fn not(a: Self::Mask) -> Self::Mask;
 }
 
+/// A computation on `S` numbers of type `E` side by side.
+pub trait SideBySide<E, const S: usize> {
+    /// With a register of them. To be `#[inline(always)]`.
+    fn call<R: Lanes<Cell = [E; S]>>(self);
+}
+
 /// One or more real numbers side by side.
 pub trait Lanes: Scalar<Cell: Plain> + Plain {
     /// How many.
     const LANES: usize;
+    /// The distance from one to the next larger number.
+    const EPSILON: f64;
+    /// `ε^(2/3)`: what no longer shrinks below this is a rounding error.
+    const STAGNATION: f64;
     /// One of them. `lane < LANES`
     fn lane(cell: &Self::Cell, lane: usize) -> f64;
     /// One of them set. `lane < LANES`
@@ -172,10 +204,17 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     fn is_finite(self) -> Self::Mask;
     /// The larger one; `other` if one of them is NaN.
     fn max(self, other: Self) -> Self;
-    /// Whether a mask is true in a lane.
-    fn any(mask: Self::Mask) -> bool;
     /// Whether a mask is true in every lane.
     fn all(mask: Self::Mask) -> bool;
+
+    /// Runs a computation on `S` numbers like this one in one register.
+    ///
+    /// # Errors
+    /// The computation, if this machine has no such register.
+    #[inline(always)]
+    fn side_by_side<const S: usize, C: SideBySide<Self, S>>(computation: C) -> Result<(), C> {
+        Err(computation)
+    }
 }
 
 /// One real number: `f32` or `f64`.
@@ -184,8 +223,6 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + PartialOrd + Default {
     const ZERO: Self;
     /// One.
     const ONE: Self;
-    /// The distance from one to the next larger number.
-    const EPSILON: Self;
     /// As `f64`, exactly.
     fn to_f64(self) -> f64;
 }

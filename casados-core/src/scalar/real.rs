@@ -1,10 +1,11 @@
 //! `f32` and `f64`.
 
+use super::lanes::{blocks, side_by_side};
 use super::{Field, Lanes, Real, Scalar, own_cell};
 
 /// The methods of one real type, from `std` where it is there and from `libm` elsewhere.
 macro_rules! real {
-    ($t:ident, $($name:ident = $libm:ident),*; $powf:ident, $atan2:ident, $hypot:ident, $sincos:ident) => {
+    ($t:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $libm:ident),*; $powf:ident, $atan2:ident, $hypot:ident, $sincos:ident) => {
         impl Field for $t {
             type Mask = bool;
 
@@ -17,6 +18,7 @@ macro_rules! real {
             fn subtract_product(self, a: Self, b: Self) -> Self {
                 (-a).mul_add(b, self)
             }
+            blocks!($($registers)*);
             #[inline(always)]
             fn is_smaller(self, other: Self) -> bool {
                 <$t>::abs(self) < <$t>::abs(other)
@@ -24,6 +26,10 @@ macro_rules! real {
             #[inline(always)]
             fn select(mask: bool, a: Self, b: Self) -> Self {
                 if mask { a } else { b }
+            }
+            #[inline(always)]
+            fn any(mask: bool) -> bool {
+                mask
             }
         }
 
@@ -120,7 +126,10 @@ macro_rules! real {
         }
 
         impl Lanes for $t {
+            side_by_side!($($registers)*);
             const LANES: usize = 1;
+            const EPSILON: f64 = <$t>::EPSILON as f64;
+            const STAGNATION: f64 = $stagnation;
             #[inline(always)]
             fn lane(cell: &Self, _: usize) -> f64 {
                 *cell as f64
@@ -138,10 +147,6 @@ macro_rules! real {
                 if self > other { self } else { other }
             }
             #[inline(always)]
-            fn any(mask: bool) -> bool {
-                mask
-            }
-            #[inline(always)]
             fn all(mask: bool) -> bool {
                 mask
             }
@@ -150,7 +155,6 @@ macro_rules! real {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
-            const EPSILON: Self = <$t>::EPSILON;
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 self as f64
@@ -159,11 +163,11 @@ macro_rules! real {
     };
 }
 
-real!(f64, sqrt = sqrt, cbrt = cbrt, exp = exp, exp2 = exp2, exp_m1 = expm1, ln = log, ln_1p = log1p,
+real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = sqrt, cbrt = cbrt, exp = exp, exp2 = exp2, exp_m1 = expm1, ln = log, ln_1p = log1p,
     log2 = log2, log10 = log10, sin = sin, cos = cos, tan = tan, asin = asin, acos = acos, atan = atan,
     sinh = sinh, cosh = cosh, tanh = tanh, asinh = asinh, acosh = acosh, atanh = atanh;
     pow, atan2, hypot, sincos);
-real!(f32, sqrt = sqrtf, cbrt = cbrtf, exp = expf, exp2 = exp2f, exp_m1 = expm1f, ln = logf, ln_1p = log1pf,
+real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = sqrtf, cbrt = cbrtf, exp = expf, exp2 = exp2f, exp_m1 = expm1f, ln = logf, ln_1p = log1pf,
     log2 = log2f, log10 = log10f, sin = sinf, cos = cosf, tan = tanf, asin = asinf, acos = acosf, atan = atanf,
     sinh = sinhf, cosh = coshf, tanh = tanhf, asinh = asinhf, acosh = acoshf, atanh = atanhf;
     powf, atan2f, hypotf, sincosf);

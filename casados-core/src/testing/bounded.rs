@@ -119,6 +119,9 @@ impl Field for Bounded {
     fn select(mask: bool, a: Self, b: Self) -> Self {
         if mask { a } else { b }
     }
+    fn any(mask: bool) -> bool {
+        mask
+    }
 }
 
 impl Scalar for Bounded {
@@ -204,6 +207,8 @@ impl Scalar for Bounded {
 
 impl Lanes for Bounded {
     const LANES: usize = 1;
+    const EPSILON: f64 = f64::EPSILON;
+    const STAGNATION: f64 = <f64 as Lanes>::STAGNATION;
     fn lane(cell: &Self, _: usize) -> f64 {
         cell.value
     }
@@ -216,9 +221,6 @@ impl Lanes for Bounded {
     }
     fn max(self, other: Self) -> Self {
         if self.value > other.value { self } else { other }
-    }
-    fn any(mask: bool) -> bool {
-        mask
     }
     fn all(mask: bool) -> bool {
         mask

@@ -78,6 +78,9 @@ impl<S: Scalar> Field for Forward<S> {
     fn select(mask: S::Mask, a: Self, b: Self) -> Self {
         Self { re: S::select(mask, a.re, b.re), d: S::select(mask, a.d, b.d) }
     }
+    fn any(mask: S::Mask) -> bool {
+        S::any(mask)
+    }
 }
 
 impl<S: Scalar> Scalar for Forward<S> {

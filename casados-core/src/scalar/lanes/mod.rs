@@ -49,23 +49,98 @@ pub enum Level {
     Avx512,
 }
 
-static LIMIT: AtomicU8 = AtomicU8::new(Level::Avx512 as u8);
+/// Runs a computation on `S` numbers side by side in the narrowest register that holds them.
+#[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
+macro_rules! side_by_side {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        #[inline(always)]
+        fn side_by_side<const S: usize, C: crate::scalar::SideBySide<Self, S>>(computation: C) -> Result<(), C> {
+            use crate::scalar::lanes;
+            if const { S > 0 && S <= $few } {
+                computation.call::<lanes::$base<S>>();
+                return Ok(());
+            }
+            #[cfg(target_arch = "x86_64")]
+            if const { S > $few && S <= $more } && lanes::level() >= lanes::Level::Avx2 {
+                computation.call::<lanes::$avx2<S>>();
+                return Ok(());
+            }
+            #[cfg(target_arch = "x86_64")]
+            if const { S > $more && S <= $most } && lanes::level() >= lanes::Level::Avx512 {
+                computation.call::<lanes::$avx512<S>>();
+                return Ok(());
+            }
+            Err(computation)
+        }
+    };
+}
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))))]
+macro_rules! side_by_side {
+    ($($register:tt)*) => {};
+}
+pub(crate) use side_by_side;
+
+/// Products of blocks with their columns in registers. Left to itself the compiler puts rows into registers, and
+/// transposes every block for it.
+#[cfg(target_arch = "x86_64")]
+macro_rules! blocks {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        #[inline(always)]
+        fn subtract_columns<const S: usize>(target: &mut [Self; S], block: &[[Self; S]; S], x: &[Self; S]) {
+            use crate::scalar::lanes::$avx2 as Register;
+            if const { S > 1 && S <= $more } {
+                let mut sum = Register::<S>::load(target);
+                for (column, &x) in block.iter().zip(x) {
+                    sum = sum.subtract_product(Register::<S>::load(column), Register::<S>::splat(x));
+                }
+                sum.store(target);
+                return;
+            }
+            for (column, &x) in block.iter().zip(x) {
+                for (target, &element) in target.iter_mut().zip(column) {
+                    *target = target.subtract_product(element, x);
+                }
+            }
+        }
+    };
+}
+#[cfg(not(target_arch = "x86_64"))]
+macro_rules! blocks {
+    ($($register:tt)*) => {};
+}
+pub(crate) use blocks;
+
+/// The level that is used; [`UNKNOWN`] until somebody asks.
+static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);
+const UNKNOWN: u8 = u8::MAX;
 
 /// For tests: from now on no calculation of the process uses wider registers than these.
-pub fn limit(level: Level) {
-    LIMIT.store(level as u8, Ordering::Relaxed);
+pub fn limit(limit: Level) {
+    LEVEL.store(widest(limit) as u8, Ordering::Relaxed);
 }
 
 /// The widest registers that this machine has and [`limit`] allows.
-#[inline]
+#[inline(always)]
 pub fn level() -> Level {
-    let limit = LIMIT.load(Ordering::Relaxed);
-    for level in [Level::Avx512, Level::Avx2, Level::Base] {
-        if level as u8 <= limit && is_there(level) {
-            return level;
-        }
+    match LEVEL.load(Ordering::Relaxed) {
+        level if level == Level::Single as u8 => Level::Single,
+        level if level == Level::Base as u8 => Level::Base,
+        level if level == Level::Avx2 as u8 => Level::Avx2,
+        level if level == Level::Avx512 as u8 => Level::Avx512,
+        _ => find(),
     }
-    Level::Single
+}
+
+#[cold]
+fn find() -> Level {
+    limit(Level::Avx512);
+    widest(Level::Avx512)
+}
+
+/// The widest registers that this machine has, up to a limit.
+fn widest(limit: Level) -> Level {
+    let levels = [Level::Avx512, Level::Avx2, Level::Base];
+    levels.into_iter().find(|&level| level <= limit && is_there(level)).unwrap_or(Level::Single)
 }
 
 /// Whether the machine has these registers.

@@ -96,10 +96,8 @@ macro_rules! register {
 
         impl<const N: usize> $name<N> {
             /// The lanes that are used, one bit each.
-            const USED: u32 = {
-                assert!(N >= 1 && N <= $ops::WIDTH, "a register with more numbers than it holds");
-                (1 << N) - 1
-            };
+            // Types with more numbers than the register holds are named in code that is never reached.
+            const USED: u32 = if N >= 1 && N <= $ops::WIDTH { ((1u64 << N) - 1) as u32 } else { 0 };
 
             /// A number in every lane.
             #[inline(always)]
@@ -156,6 +154,10 @@ macro_rules! register {
             fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
                 Self($ops::select(mask, a.0, b.0))
             }
+            #[inline(always)]
+            fn any(mask: Self::Mask) -> bool {
+                $ops::bits(mask) & Self::USED != 0
+            }
         }
 
         impl<const N: usize> Scalar for $name<N> {
@@ -163,7 +165,6 @@ macro_rules! register {
 
             #[inline(always)]
             fn load(cell: &Self::Cell) -> Self {
-                const { assert!(Self::USED != 0) };
                 Self($ops::load(cell))
             }
             #[inline(always)]
@@ -234,6 +235,8 @@ macro_rules! register {
 
         impl<const N: usize> Lanes for $name<N> {
             const LANES: usize = N;
+            const EPSILON: f64 = <$element as Lanes>::EPSILON;
+            const STAGNATION: f64 = <$element as Lanes>::STAGNATION;
 
             #[inline(always)]
             fn lane(cell: &Self::Cell, lane: usize) -> f64 {
@@ -250,10 +253,6 @@ macro_rules! register {
             #[inline(always)]
             fn max(self, other: Self) -> Self {
                 Self($ops::max(self.0, other.0))
-            }
-            #[inline(always)]
-            fn any(mask: Self::Mask) -> bool {
-                $ops::bits(mask) & Self::USED != 0
             }
             #[inline(always)]
             fn all(mask: Self::Mask) -> bool {

@@ -1,0 +1,220 @@
+//! Derivatives are tried on their own equations before they are trusted: nothing else would notice an elimination
+//! that lost digits.
+//!
+//! Forward derivatives `D` of all variables satisfy `∂f/∂v D = 0` at every stage, adjoints `μ` satisfy `Jᵀμ = h (b ⊗ λ, 0)`.
+//! One sum over all directions (with weights that are neither equal nor alternating, so that no structure hides an
+//! error) is held against the sizes of its terms, equation by equation: however equations and unknowns are scaled.
+
+use super::adjoint::Backward;
+use super::evaluate::entries;
+use super::forward::{Directions, Sweep};
+use super::record::{Coefficients, Work};
+use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::model::Dae;
+use crate::scalar::{Field, Lanes};
+use crate::shape::{Array, Shape};
+use core::marker::PhantomData;
+
+/// Derivatives are good if they satisfy their equations to this many ε of the terms.
+const ROUNDING: f64 = 4096.0;
+
+/// The weight of a direction.
+#[inline(always)]
+fn weight<E: Field>(direction: usize) -> E {
+    E::from_f64(1.0 + 0.25 * ((3 * direction) % 7) as f64)
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+    /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
+    pub(crate) fn verify_forward<R: Array<E>>(
+        &mut self,
+        sweep: &Sweep<M, R, S>,
+        coefficients: &Coefficients<E, S>,
+        directions: &impl Directions<E, R>,
+    ) -> E::Mask {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        let probe = self.probe[0].as_mut();
+        for (w, probe) in probe[nx + nx + nz..].iter_mut().take(M::Shape::NU + M::Shape::NP).enumerate() {
+            let mut row = R::from_fn(|_| E::from_f64(0.0));
+            directions.add(nx + w, E::from_f64(1.0), &mut row);
+            *probe = [sum(row.as_ref()); S];
+        }
+        let [sums, sizes] = &mut self.sums;
+        dispatch(VerifyForward::<M, E, R, S> {
+            v: sweep.v.as_ref(),
+            dy: sweep.dy.as_ref(),
+            a: &coefficients.a,
+            h: self.inputs.time.step,
+            jacobian: self.linear.jacobian.as_ref(),
+            probe,
+            sums: sums.as_mut(),
+            sizes: sizes.as_mut(),
+            model: PhantomData,
+        })
+    }
+
+    /// Whether the adjoints of a step satisfy their equations, lane by lane, with `λ` at the end of the step.
+    pub(crate) fn verify_adjoint<const C: usize>(
+        &mut self,
+        backward: &Backward<M, E, S, C>,
+        coefficients: &Coefficients<E, S>,
+    ) -> E::Mask {
+        let [sums, sizes] = &mut self.probe;
+        dispatch(VerifyAdjoint::<M, E, S, C> {
+            lambda: backward.lambda.as_ref(),
+            mu: backward.mu.as_ref(),
+            a: &coefficients.a,
+            b: &coefficients.b,
+            h: self.inputs.time.step,
+            jacobian: self.linear.jacobian.as_ref(),
+            sums: sums.as_mut(),
+            sizes: sizes.as_mut(),
+            model: PhantomData,
+        })
+    }
+}
+
+/// The sum over all directions.
+#[inline(always)]
+fn sum<E: Field>(row: &[E]) -> E {
+    // In strands of eight, which a register holds.
+    let zero = E::from_f64(0.0);
+    let mut strands = [zero; 8];
+    let chunks = row.chunks_exact(8);
+    let mut rest = zero;
+    for (w, &value) in chunks.remainder().iter().enumerate() {
+        rest = rest + weight::<E>(w) * value;
+    }
+    for chunk in chunks {
+        for (w, (strand, &value)) in strands.iter_mut().zip(chunk).enumerate() {
+            *strand = *strand + weight::<E>(w) * value;
+        }
+    }
+    for strand in strands {
+        rest = rest + strand;
+    }
+    rest
+}
+
+/// `|sum| ≤ ROUNDING ε size`
+#[inline(always)]
+fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
+    E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size)
+}
+
+struct VerifyForward<'a, M, E, R, const S: usize> {
+    v: &'a [R],
+    dy: &'a [[R; S]],
+    a: &'a [[E; S]; S],
+    h: E,
+    jacobian: &'a [[E; S]],
+    probe: &'a mut [[E; S]],
+    sums: &'a mut [[E; S]],
+    sizes: &'a mut [[E; S]],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for VerifyForward<'_, M, E, R, S> {
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E::Mask {
+        let Self { v, dy, a, h, jacobian, probe, sums, sizes, .. } = self;
+        let (nx, zero) = (v.len(), E::from_f64(0.0));
+        let (xdot, rest) = probe.split_at_mut(nx.min(probe.len()));
+        let (xi, rest) = rest.split_at_mut(nx.min(rest.len()));
+        for (((dy, v), xdot), xi) in dy.iter().zip(v).zip(xdot).zip(xi) {
+            *xi = [sum(v.as_ref()); S];
+            for (xdot, dk) in xdot.iter_mut().zip(dy) {
+                *xdot = sum(dk.as_ref());
+            }
+            for (xi, a) in xi.iter_mut().zip(a) {
+                for (&a, &dk) in a.iter().zip(xdot.iter()) {
+                    *xi = A::subtract(*xi, -(h * a), dk);
+                }
+            }
+        }
+        for (dz, z) in dy.iter().skip(nx).zip(rest) {
+            for (z, dz) in z.iter_mut().zip(dz) {
+                *z = sum(dz.as_ref());
+            }
+        }
+        sums.fill([zero; S]);
+        sizes.fill([zero; S]);
+        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
+            let (Some(sums), Some(sizes), Some(probe)) = (sums.get_mut(r), sizes.get_mut(r), probe.get(c)) else {
+                continue;
+            };
+            for (((sum, size), &value), &direction) in sums.iter_mut().zip(sizes).zip(values).zip(probe) {
+                let term = value * direction;
+                *sum = *sum + term;
+                *size = *size + term.abs();
+            }
+        }
+        let mut good = E::le(zero, zero);
+        for (sums, sizes) in sums.iter().zip(sizes.iter()) {
+            for (&sum, &size) in sums.iter().zip(sizes) {
+                good = E::and(good, is_small(sum, size));
+            }
+        }
+        good
+    }
+}
+
+struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {
+    lambda: &'a [[E; C]],
+    mu: &'a [[[E; C]; S]],
+    a: &'a [[E; S]; S],
+    b: &'a [E; S],
+    h: E,
+    jacobian: &'a [[E; S]],
+    sums: &'a mut [[E; S]],
+    sizes: &'a mut [[E; S]],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<'_, M, E, S, C> {
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E::Mask {
+        let Self { lambda, mu, a, b, h, jacobian, sums, sizes, .. } = self;
+        let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
+        sums.fill([zero; S]);
+        sizes.fill([zero; S]);
+        let end = M::STRUCTURE.blocks[3];
+        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, end) {
+            let (Some(sums), Some(sizes), Some(mu)) = (sums.get_mut(c), sizes.get_mut(c), mu.get(slot::<M>(r)))
+            else {
+                continue;
+            };
+            for (((total, size), &value), mu) in sums.iter_mut().zip(sizes).zip(values).zip(mu) {
+                let term = value * sum(mu);
+                *total = *total + term;
+                *size = *size + term.abs();
+            }
+        }
+        let mut good = E::le(zero, zero);
+        for unknown in 0..nk {
+            // Of `k` what multiplies it at its own stage, and through `ξ` at all.
+            let own = if unknown < nx { unknown } else { unknown + nx };
+            let (Some(total), Some(size)) = (sums.get(own), sizes.get(own)) else { continue };
+            let (mut total, mut size) = (*total, *size);
+            if let (true, Some(xi), Some(xi_size)) = (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown)) {
+                let right = lambda.get(unknown).map_or(zero, |lambda| sum(lambda));
+                for i in 0..S {
+                    let right = h * b[i] * right;
+                    total[i] = total[i] - right;
+                    size[i] = size[i] + right.abs();
+                    for j in 0..S {
+                        let ha = h * a[j][i];
+                        total[i] = A::subtract(total[i], -ha, xi[j]);
+                        size[i] = A::subtract(size[i], -ha.abs(), xi_size[j]);
+                    }
+                }
+            }
+            for (&total, &size) in total.iter().zip(&size) {
+                good = E::and(good, is_small(total, size));
+            }
+        }
+        good
+    }
+}
