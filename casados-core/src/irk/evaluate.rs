@@ -161,7 +161,8 @@ pub(crate) fn entries<'a, V>(
     end: usize,
 ) -> impl Iterator<Item = (usize, usize, &'a V)> + use<'a, V> {
     let Pattern { rows, columns } = structure.jacobian;
-    let places = rows.get(begin..end).unwrap_or_default().iter().zip(columns.get(begin..end).unwrap_or_default());
+    let places =
+        rows.get(begin..end).unwrap_or_default().iter().zip(columns.get(begin..end).unwrap_or_default());
     let values = jacobian.get(begin..end).unwrap_or_default();
     places.zip(values).map(|((row, column), value)| (*row as usize, *column as usize, value))
 }

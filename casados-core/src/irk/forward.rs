@@ -83,7 +83,14 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
     {
         let Self { v, dy } = self;
         let (v, jacobian) = (v.as_ref(), work.linear.jacobian.as_ref());
-        dispatch(RightHandSide::<M, E, R, _, S> { v, jacobian, directions, first, dy: dy.as_mut(), model: PhantomData });
+        dispatch(RightHandSide::<M, E, R, _, S> {
+            v,
+            jacobian,
+            directions,
+            first,
+            dy: dy.as_mut(),
+            model: PhantomData,
+        });
         work.linear.factors.solve(dy);
     }
 
@@ -92,7 +99,11 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
     where
         R: Array<E>,
     {
-        dispatch(Combine { to: self.v.as_mut(), dy: self.dy.as_ref(), weights: &coefficients.b.map(|b| h * b) });
+        dispatch(Combine {
+            to: self.v.as_mut(),
+            dy: self.dy.as_ref(),
+            weights: &coefficients.b.map(|b| h * b),
+        });
     }
 
     /// Derivatives `row` of `x` at the point of the step where the weights are `weights`.

@@ -468,7 +468,14 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             Ok(())
         })?;
         forward.finish(parts.work, count - 1)?;
-        memory.run(parts.work, parts.coefficients, parts.steps, records, lambda.as_slice(), parts.statistics)?;
+        memory.run(
+            parts.work,
+            parts.coefficients,
+            parts.steps,
+            records,
+            lambda.as_slice(),
+            parts.statistics,
+        )?;
         memory.finish(forward)?;
         self.run.keep()?;
         self.sweep = Some(count - 1);

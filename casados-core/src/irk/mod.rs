@@ -36,9 +36,9 @@ pub use integrator::Integrator;
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
-    pivoted::unknown_name,
     evaluate::{dot, not_finite},
     forward::{check_result, split},
+    pivoted::unknown_name,
     run::check,
 };
 

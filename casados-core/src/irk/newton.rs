@@ -15,6 +15,8 @@
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
 //! values is kept as long as the iterations that are still expected with it cost less than a new one.
 //!
+//! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost.
+//!
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::record::{Coefficients, Work};
@@ -27,6 +29,9 @@ use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 4.0;
+
+/// Linear equations are refined so often if one iteration was not enough.
+const REFINEMENTS: usize = 4;
 
 /// How an iteration ended.
 pub(crate) struct Solved<E: Lanes> {
@@ -84,7 +89,8 @@ impl Progress {
             expected = if increment <= rule.stagnation && 2.0 * increment >= self.last { 0.0 } else { next };
         }
         self.last = increment;
-        if expected <= rule.tolerance || rule.exact {
+        // Of linear equations the residual will tell.
+        if expected <= rule.tolerance && !rule.exact {
             self.state = State::Converged;
         }
     }
@@ -110,7 +116,8 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         let (s, blocks, updates) = (S as f64, plan.slots.len() as f64, plan.updates.len() as f64);
         // What is computed for all stages side by side counts once.
         let iteration = operations.residual as f64 + blocks * s + 1.0;
-        let factors = operations.residual_jacobian as f64 + (updates + 4.0 * plan.pivots.len() as f64) * s * s;
+        let factors =
+            operations.residual_jacobian as f64 + (updates + 4.0 * plan.pivots.len() as f64) * s * s;
         factors / iteration
     };
 
@@ -152,6 +159,12 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             } else {
                 statistics.residuals += 1;
                 self.evaluate_residual();
+            }
+            if rule.exact && test && iteration > 0 {
+                let satisfied = self.is_satisfied();
+                if E::all(satisfied) || iteration == REFINEMENTS {
+                    return Solved { converged: satisfied, exact: true };
+                }
             }
             iteration += 1;
             statistics.iterations += 1;
@@ -207,14 +220,14 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 let rates = lanes.iter().map(|lane| lane.rate.unwrap_or(0.0));
                 self.validity.rate = rates.fold(0.0, f64::max);
                 self.validity.factors = lanes.iter().all(|lane| lane.state == State::Converged);
-                return Solved { converged, exact: rule.exact };
+                return Solved { converged, exact: false };
             };
             if iteration == most {
                 self.validity.factors = false;
                 return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
             }
-            renew = rule.full
-                || options.jacobian == Jacobian::Auto && !rule.exact && remaining > 1.0 + Self::RENEWAL;
+            renew = !rule.exact
+                && (rule.full || options.jacobian == Jacobian::Auto && remaining > 1.0 + Self::RENEWAL);
         }
     }
 }
@@ -278,7 +291,8 @@ impl<E: Lanes, const S: usize> Kernel for Update<'_, E, S> {
                 sum = sum + *delta;
             }
             largest = size.max(largest);
-            let expected = if full { size * size / *old * (size / *old) } else { size * size / (*old - size) };
+            let expected =
+                if full { size * size / *old * (size / *old) } else { size * size / (*old - size) };
             let expected = E::select(E::lt(size + size, *old), expected, infinite);
             next = E::select(E::le(size, tolerance), zero, expected).max(next);
             *old = size;

@@ -53,7 +53,13 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     }
 
     /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
-    pub(crate) fn advance(&mut self, coefficients: &Coefficients<E, S>, step: &Step<M, E, S>, n: usize, count: usize) {
+    pub(crate) fn advance(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: &Step<M, E, S>,
+        n: usize,
+        count: usize,
+    ) {
         let h = self.inputs.time.step;
         dispatch(Advance { x: self.x.as_mut(), y: step.y.as_ref(), b: &coefficients.b, h });
         if n == 0 {

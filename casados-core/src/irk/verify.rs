@@ -18,6 +18,9 @@ use core::marker::PhantomData;
 /// Derivatives are good if they satisfy their equations to this many ε of the terms.
 const ROUNDING: f64 = 4096.0;
 
+/// A residual is zero below this many ε of its terms.
+const RESIDUAL: f64 = 16.0;
+
 /// The weight of a direction.
 #[inline(always)]
 fn weight<E: Field>(direction: usize) -> E {
@@ -71,6 +74,51 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             sizes: sizes.as_mut(),
             model: PhantomData,
         })
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+    /// Whether the residual is at the level of the rounding errors of its terms, `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`,
+    /// lane by lane.
+    pub(crate) fn is_satisfied(&mut self) -> E::Mask {
+        dispatch(Satisfied::<M, E, S> {
+            f: self.f.as_ref(),
+            points: self.points.as_ref(),
+            jacobian: self.linear.jacobian.as_ref(),
+            sizes: self.sums[0].as_mut(),
+            model: PhantomData,
+        })
+    }
+}
+
+struct Satisfied<'a, M, E, const S: usize> {
+    f: &'a [[E; S]],
+    points: &'a [[E; S]],
+    jacobian: &'a [[E; S]],
+    sizes: &'a mut [[E; S]],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E::Mask {
+        let Self { f, points, jacobian, sizes, .. } = self;
+        let (zero, bound) = (E::from_f64(0.0), E::from_f64(RESIDUAL * E::EPSILON));
+        sizes.fill([zero; S]);
+        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
+            let (Some(sizes), Some(points)) = (sizes.get_mut(r), points.get(c)) else { continue };
+            for ((size, &value), &point) in sizes.iter_mut().zip(values).zip(points) {
+                *size = *size + (value * point).abs();
+            }
+        }
+        let mut good = E::le(zero, zero);
+        for (f, sizes) in f.iter().zip(sizes.iter()) {
+            for (&f, &size) in f.iter().zip(sizes) {
+                good = E::and(good, E::le(f.abs(), bound * size));
+            }
+        }
+        good
     }
 }
 
@@ -141,7 +189,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for VerifyForward<'_,
         sums.fill([zero; S]);
         sizes.fill([zero; S]);
         for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
-            let (Some(sums), Some(sizes), Some(probe)) = (sums.get_mut(r), sizes.get_mut(r), probe.get(c)) else {
+            let (Some(sums), Some(sizes), Some(probe)) = (sums.get_mut(r), sizes.get_mut(r), probe.get(c))
+            else {
                 continue;
             };
             for (((sum, size), &value), &direction) in sums.iter_mut().zip(sizes).zip(values).zip(probe) {
@@ -182,7 +231,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
         sizes.fill([zero; S]);
         let end = M::STRUCTURE.blocks[3];
         for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, end) {
-            let (Some(sums), Some(sizes), Some(mu)) = (sums.get_mut(c), sizes.get_mut(c), mu.get(slot::<M>(r)))
+            let (Some(sums), Some(sizes), Some(mu)) =
+                (sums.get_mut(c), sizes.get_mut(c), mu.get(slot::<M>(r)))
             else {
                 continue;
             };
@@ -198,7 +248,9 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
             let own = if unknown < nx { unknown } else { unknown + nx };
             let (Some(total), Some(size)) = (sums.get(own), sizes.get(own)) else { continue };
             let (mut total, mut size) = (*total, *size);
-            if let (true, Some(xi), Some(xi_size)) = (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown)) {
+            if let (true, Some(xi), Some(xi_size)) =
+                (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown))
+            {
                 let right = lambda.get(unknown).map_or(zero, |lambda| sum(lambda));
                 for i in 0..S {
                     let right = h * b[i] * right;

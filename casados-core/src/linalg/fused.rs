@@ -14,7 +14,11 @@ pub trait Arithmetic {
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
     /// `target − left · right`
-    fn subtract_blocks<E: Field, const S: usize>(target: &mut Block<E, S>, left: &Block<E, S>, right: &Block<E, S>);
+    fn subtract_blocks<E: Field, const S: usize>(
+        target: &mut Block<E, S>,
+        left: &Block<E, S>,
+        right: &Block<E, S>,
+    );
     /// `target − block · x`
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]);
 }
@@ -28,7 +32,11 @@ impl Arithmetic for Separate {
         t - a * b
     }
     #[inline(always)]
-    fn subtract_blocks<E: Field, const S: usize>(target: &mut Block<E, S>, left: &Block<E, S>, right: &Block<E, S>) {
+    fn subtract_blocks<E: Field, const S: usize>(
+        target: &mut Block<E, S>,
+        left: &Block<E, S>,
+        right: &Block<E, S>,
+    ) {
         for (target, right) in target.iter_mut().zip(right) {
             Self::subtract_columns(target, left, right);
         }
@@ -54,7 +62,11 @@ impl Arithmetic for Fused {
         t.subtract_product(a, b)
     }
     #[inline(always)]
-    fn subtract_blocks<E: Field, const S: usize>(target: &mut Block<E, S>, left: &Block<E, S>, right: &Block<E, S>) {
+    fn subtract_blocks<E: Field, const S: usize>(
+        target: &mut Block<E, S>,
+        left: &Block<E, S>,
+        right: &Block<E, S>,
+    ) {
         E::subtract_blocks(target, left, right);
     }
     #[inline(always)]

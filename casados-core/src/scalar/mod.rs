@@ -59,7 +59,11 @@ pub trait Field:
     /// `target − left · right` of s×s blocks that lie column after column, fused. As
     /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
     #[inline(always)]
-    fn subtract_blocks<const S: usize>(target: &mut [[Self; S]; S], left: &[[Self; S]; S], right: &[[Self; S]; S]) {
+    fn subtract_blocks<const S: usize>(
+        target: &mut [[Self; S]; S],
+        left: &[[Self; S]; S],
+        right: &[[Self; S]; S],
+    ) {
         for (target, right) in target.iter_mut().zip(right) {
             Self::subtract_columns(target, left, right);
         }

@@ -54,7 +54,9 @@ pub enum Level {
 macro_rules! side_by_side {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline(always)]
-        fn side_by_side<const S: usize, C: crate::scalar::SideBySide<Self, S>>(computation: C) -> Result<(), C> {
+        fn side_by_side<const S: usize, C: crate::scalar::SideBySide<Self, S>>(
+            computation: C,
+        ) -> Result<(), C> {
             use crate::scalar::lanes;
             if const { S > 0 && S <= $few } {
                 computation.call::<lanes::$base<S>>();
