@@ -7,7 +7,10 @@
 //! ten.
 
 use casados::shape::Shape;
-use casados::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Dae, Error, Radau, RadauIIA};
+use casados::{
+    Adaptive, AdaptiveOptions, AdaptiveStatistics, Dae, DormandPrince5, DormandPrince8, Error, Ode, Radau,
+    RadauIIA,
+};
 use nalgebra::SVector;
 
 mod data;
@@ -47,7 +50,7 @@ struct Outcome {
 }
 
 macro_rules! runner {
-    ($name:ident, $method:ty) => {
+    ($name:ident, $method:ty, $model:path) => {
         fn $name<M, const NX: usize, const NZ: usize, const NP: usize>(
             problem: &Problem,
             rtol: f64,
@@ -55,7 +58,7 @@ macro_rules! runner {
             values: impl Fn(&[f64], &[f64]) -> Vec<f64>,
         ) -> Result<Vec<Outcome>, Error>
         where
-            M: Dae,
+            M: $model,
             M::Shape: Shape<
                     VectorX<f64> = SVector<f64, NX>,
                     VectorZ<f64> = SVector<f64, NZ>,
@@ -88,8 +91,8 @@ macro_rules! runner {
         }
     };
 }
-runner!(variable, Radau);
-runner!(three, RadauIIA<3>);
+runner!(variable, Radau, Dae);
+runner!(three, RadauIIA<3>, Dae);
 
 /// Errors at these tolerances are below `amplification · rtol`, for all end times; the work of the first end time.
 macro_rules! follows {
@@ -106,9 +109,10 @@ macro_rules! follows {
                     *error <= bound,
                     "t = {t:e}, rtol = {rtol:e}: {error:e} instead of {bound:e}, {work:?}"
                 );
-                // A step takes at least one iteration, and no more Jacobians than were tried.
+                // A step of an implicit method takes at least one iteration, and no more Jacobians than were tried.
                 let tried = work.steps + work.rejected + work.failed;
-                assert!(work.iterations >= work.steps && work.jacobians <= tried, "{work:?}");
+                let iterated = work.iterations >= work.steps || work.jacobians == 0;
+                assert!(iterated && work.jacobians <= tried, "{work:?}");
             }
             work.push(outcomes[0].work);
         }
@@ -301,4 +305,60 @@ fn backwards() {
     let back = adaptive.solve(&there, &SVector::zeros(), 0.0).expect("a solution").x;
     // Backwards its limit cycle repels: over half a turn, errors grow by a few hundred.
     assert!((back - x0).amax() <= 1e-7, "{back}");
+}
+
+runner!(fifth, DormandPrince5, Ode);
+runner!(eighth, DormandPrince8, Ode);
+
+/// Explicit pairs on what is not stiff: the tolerance bounds the estimate of the lower order, so that the better method is
+/// better than asked.
+#[test]
+fn explicit_pairs() {
+    let work =
+        follows!(fifth::<Pleiades, 28, 0, 0>(Problem::load("pleiades", 1.0, 1e4), [1e-4, 1e-7], 5.0, states));
+    assert!(work[1].steps < 600, "{work:?}");
+    let problem = Problem::load("pleiades", 1.0, 1e4);
+    let work = follows!(eighth::<Pleiades, 28, 0, 0>(problem, [1e-4, 1e-7, 1e-10], 5.0, states));
+    assert!(work[2].steps < 300, "{work:?}");
+    // Twelve stages for each step that was tried, the one that is the next step's first included, and few to start.
+    let tried = work[2].steps + work[2].rejected;
+    assert!(work[2].residuals <= 12 * tried + 4, "{work:?}");
+}
+
+/// A circle, whose dense output is known: of order 4 and 7 between steps of orders 5 and 8.
+#[test]
+fn explicit_dense_output() {
+    let x0 = SVector::from([1.0, 0.0]);
+    macro_rules! circle {
+        ($method:ty) => {{
+            let mut errors = [0.0f64; 2];
+            let mut steps = [0; 2];
+            for (index, rtol) in [1e-6, 1e-10].into_iter().enumerate() {
+                let options = AdaptiveOptions { rtol, atol: rtol, ..Default::default() };
+                let mut adaptive = Adaptive::<VanDerPol, $method>::new(options).expect("valid");
+                // Without damping it is a circle.
+                adaptive.set_parameters(&SVector::from([0.0])).expect("finite");
+                let times: Vec<f64> = (0..=60).map(|i| 0.1 * f64::from(i)).collect();
+                let mut passed = Vec::new();
+                adaptive
+                    .solve_at(&x0, &SVector::zeros(), 6.0, &times, |t, dense| passed.push((t, dense.x)))
+                    .expect("a solution");
+                assert_eq!(passed.len(), times.len());
+                steps[index] = adaptive.statistics().steps;
+                for (t, x) in passed {
+                    let error = (x - SVector::from([t.cos(), -t.sin()])).amax();
+                    errors[index] = errors[index].max(error);
+                    let dense = adaptive.dense(t).expect("inside");
+                    assert!((dense.x - x).amax() <= 1e-14);
+                }
+                assert!(errors[index] <= 100.0 * rtol, "{rtol:e}: {errors:?}");
+            }
+            (errors, steps)
+        }};
+    }
+    let (_, steps) = circle!(DormandPrince5);
+    // Four digits more with order 5: 10^(4/5) times the steps.
+    assert!((4.0..9.0).contains(&(steps[1] as f64 / steps[0] as f64)), "{steps:?}");
+    let (_, steps) = circle!(DormandPrince8);
+    assert!((2.0..5.0).contains(&(steps[1] as f64 / steps[0] as f64)), "{steps:?}");
 }

@@ -2,7 +2,7 @@
 //! function.
 
 use casados::shape::Shape;
-use casados::{Adaptive, AdaptiveOptions, Dae, Error, Radau};
+use casados::{Adaptive, AdaptiveOptions, Dae, DormandPrince5, Error, Radau};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 mod data;
@@ -259,6 +259,35 @@ fn derivatives_of_the_frozen_map() {
     assert!(matches!(adaptive.solve(&x0, &u, 21.0), Err(Error::OutsideInterval { .. })));
     adaptive.thaw();
     assert!(adaptive.solve(&x0, &u, 21.0).is_ok());
+}
+
+/// The same of an explicit pair: adjoint and forward derivatives agree, and follow the frozen map.
+#[test]
+fn derivatives_of_frozen_explicit_steps() {
+    let x0 = SVector::from([2.0, 0.5]);
+    let (u, t, lambda) = (SVector::zeros(), 3.0, SVector::from([1.0, -2.0]));
+    let options = AdaptiveOptions { rtol: 1e-5, atol: 1e-5, ..Default::default() };
+    let mut adaptive = Adaptive::<VanDerPol, DormandPrince5>::new(options).expect("valid");
+    adaptive.set_parameters(&SVector::from([2.0])).expect("finite");
+    let solved = *adaptive.solve(&x0, &u, t).expect("a solution");
+    let hessian = *adaptive.hessian(&x0, &u, t, &lambda).expect("second derivatives");
+    // The steps are explicit: taking them again gives the same, but for the order of sums.
+    assert!((solved.x - hessian.x).amax() <= 1e-13);
+    adaptive.freeze().expect("steps are remembered");
+    let adjoint = *adaptive.adjoint(&x0, &u, t, &lambda).expect("a gradient");
+    assert!((adjoint.grad_x0 - hessian.dx_dx0.transpose() * lambda).amax() <= 1e-12 * hessian.dx_dx0.amax());
+    assert!((adjoint.grad_p - hessian.dx_dp.transpose() * lambda).amax() <= 1e-12 * hessian.dx_dp.amax());
+    let delta = 1e-5;
+    for w in 0..2 {
+        let mut step = SVector::<f64, 2>::zeros();
+        step[w] = delta;
+        let above = *adaptive.adjoint(&(x0 + step), &u, t, &lambda).expect("the frozen map");
+        let below = *adaptive.adjoint(&(x0 - step), &u, t, &lambda).expect("the frozen map");
+        let error = ((above.x - below.x) / (2.0 * delta) - hessian.dx_dx0.column(w)).amax();
+        assert!(error <= 1e-7 * hessian.dx_dx0.amax(), "{error:e}");
+        let error = ((above.grad_x0 - below.grad_x0) / (2.0 * delta) - hessian.h_xx.column(w)).amax();
+        assert!(error <= 1e-6 * hessian.h_xx.amax(), "{error:e}");
+    }
 }
 
 /// An interval without length: the identity.

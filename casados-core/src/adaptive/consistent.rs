@@ -13,7 +13,7 @@ use crate::shape::{Matrix, Shape};
 use crate::tableau::{Custom, Euler, Method};
 
 /// Solves for `(ẋ, z)`.
-pub(super) struct Consistent<M: Dae, T: Real> {
+pub struct Consistent<M: Dae, T: Real> {
     euler: Option<Integrator<M, Custom<1>, 1, T, Heap>>,
 }
 
@@ -24,7 +24,7 @@ impl<M: Dae, T: Real> Default for Consistent<M, T> {
 }
 
 /// A point in time at which the state is known.
-pub(super) struct At<'a, M: Dae, T: Real> {
+pub struct At<'a, M: Dae, T: Real> {
     pub x: &'a VectorX<M, T>,
     pub u: &'a VectorU<M, T>,
     pub p: &'a VectorP<M, T>,

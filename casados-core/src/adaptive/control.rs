@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 
 /// What the controller may do, of one method.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limits {
+pub struct Limits {
     /// A step is this much shorter than the one that would just be accepted.
     pub safety: f64,
     /// The most by which a step is shorter than the one before.
@@ -21,7 +21,7 @@ pub(super) const IMPLICIT: Limits = Limits { safety: 0.9, shrink: 0.2, grow: 8.0
 
 /// What is remembered of the last accepted step.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Predictive {
+pub struct Predictive {
     last: Option<(f64, f64)>,
 }
 
@@ -48,8 +48,34 @@ impl Predictive {
     }
 }
 
+/// The controller of explicit methods: what the error of the last step was takes part (K. Gustafsson, Control theoretic
+/// techniques for stepsize selection in explicit Runge-Kutta methods, ACM Trans. Math. Softw. 17 (1991)).
+#[derive(Clone, Copy, Debug)]
+pub struct Proportional {
+    last: f64,
+}
+
+impl Default for Proportional {
+    fn default() -> Self {
+        Self { last: 1e-4 }
+    }
+}
+
+impl Proportional {
+    /// The factor for the step size after a step whose error behaves like `h^(1/exponent)`, within a range.
+    pub fn factor(&mut self, error: f64, exponent: f64, memory: f64, range: (f64, f64)) -> f64 {
+        let present = power(error, exponent - 0.75 * memory);
+        if error > 1.0 {
+            return (0.9 / present).clamp(range.0, range.1);
+        }
+        let past = if memory > 0.0 { power(self.last, memory) } else { 1.0 };
+        self.last = error.max(1e-4);
+        (0.9 * past / present).clamp(range.0, range.1)
+    }
+}
+
 /// `aᵇ`, by roots where these are enough: those of methods with 3, 5 and 7 stages.
-fn power(a: f64, b: f64) -> f64 {
+pub(super) fn power(a: f64, b: f64) -> f64 {
     let root = Scalar::sqrt(a);
     if b == 0.25 {
         Scalar::sqrt(root)

@@ -2,10 +2,9 @@
 
 use super::consistent::Consistent;
 use super::options::{AdaptiveOptions, check_absolute, check_relative};
-use super::run::{Accepted, Base, Levels, Run, Span};
-use super::sealed::Family;
+use super::run::{Accepted, Base, Run, Span};
+use super::sealed::{Engine, Kind};
 use super::sensitivities::{Frozen, Memory};
-use super::stages::{MOST, Stages};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use crate::error::{Argument, Error};
@@ -29,11 +28,11 @@ use core::marker::PhantomData;
 /// [`Error::NotConverged`] if there are no consistent `ẋ` and `z` at the start; [`Error::NonFiniteModel`] if the
 /// model has no finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
 /// [`Error::OutOfMemory`]. Then the integrator is usable.
-pub struct Integrator<M: Dae, B, T: Real> {
+pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     options: AdaptiveOptions,
     base: Box<Base<M, T>>,
     consistent: Consistent<M, T>,
-    levels: Levels<M, T>,
+    state: B::State,
     tape: Tape<T>,
     statistics: AdaptiveStatistics,
     parameters: bool,
@@ -48,7 +47,7 @@ pub struct Integrator<M: Dae, B, T: Real> {
     method: PhantomData<fn() -> B>,
 }
 
-impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
+impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// An integrator with its memory on the heap.
     ///
     /// # Errors
@@ -63,7 +62,7 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
             options,
             base,
             consistent: Consistent::default(),
-            levels: Levels::default(),
+            state: Default::default(),
             tape: Tape::default(),
             statistics: AdaptiveStatistics::default(),
             parameters: M::Shape::NP == 0,
@@ -164,8 +163,8 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
         if self.frozen.is_some() {
             let span = self.begin(x0, u, t_end)?;
             self.check_frozen(span)?;
-            let Self { base, consistent, tape, levels, .. } = self;
-            Frozen { base, consistent, tape, span }.solve::<B>(levels, x0)?;
+            let Self { base, consistent, tape, state, .. } = self;
+            Frozen { base, consistent, tape, span }.solve::<B>(state, x0)?;
         } else {
             let record = self.options.keep_steps;
             self.run(x0, u, t_end, record, |_, _| Ok(()))?;
@@ -207,7 +206,7 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
         let record = self.options.keep_steps;
         self.run(x0, u, t_end, record, |step, dense| {
             while let Some(t) = times.next_if(|t| inside(*t, start, step.end)) {
-                interpolate::<M, T>(step.stages, step.x, step.stages.accepted(), t - step.t, step.h, dense);
+                (step.evaluate)(t, dense)?;
                 output(t, dense);
             }
             Ok(())
@@ -233,12 +232,11 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
             return Err(Error::OutsideInterval { t, start, end });
         }
         let step = self.tape.find(t);
-        let Base { result, dense, .. } = &mut *self.base;
+        let Base { point, result, dense, .. } = &mut *self.base;
         match self.tape.entries().get(step) {
             Some(entry) => {
-                let stages = self.levels.get::<B>(entry.level)?;
-                let (x, y) = self.tape.numbers(step, M::Shape::NX);
-                interpolate::<M, T>(stages, x, y, t - entry.t, entry.h, dense);
+                let numbers = self.tape.numbers(step, M::Shape::NX);
+                B::interpolate(&mut self.state, point.as_ref(), entry, numbers, t, dense)?;
             }
             None if span.start == span.end => (dense.x, dense.z) = (result.x, result.z),
             None => return Err(Error::NoResult),
@@ -259,8 +257,8 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
         t_end: T,
     ) -> Result<&Forward<M, T>, Error> {
         self.steps(x0, u, t_end)?;
-        let (mut frozen, levels, memory, _) = self.parts()?;
-        frozen.forward::<B>(levels, x0, memory, None)?;
+        let (mut frozen, state, memory, _) = self.parts()?;
+        frozen.forward::<B>(state, x0, memory, None)?;
         Ok(&memory.hessian.first.forward)
     }
 
@@ -277,9 +275,9 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
     ) -> Result<&Adjoint<M, T>, Error> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, u, t_end)?;
-        let (mut frozen, levels, memory, _) = self.parts()?;
-        frozen.solve::<B>(levels, x0)?;
-        frozen.adjoint::<B>(levels, lambda, memory)?;
+        let (mut frozen, state, memory, _) = self.parts()?;
+        frozen.solve::<B>(state, x0)?;
+        frozen.adjoint::<B>(state, lambda, memory)?;
         Ok(&memory.adjoint)
     }
 
@@ -296,10 +294,10 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
     ) -> Result<&Hessian<M, T>, Error> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, u, t_end)?;
-        let (mut frozen, levels, memory, history) = self.parts()?;
+        let (mut frozen, state, memory, history) = self.parts()?;
         history.clear();
-        frozen.forward::<B>(levels, x0, memory, Some(history))?;
-        frozen.hessian::<B>(levels, lambda, memory, history)?;
+        frozen.forward::<B>(state, x0, memory, Some(history))?;
+        frozen.hessian::<B>(state, lambda, memory, history)?;
         Ok(&memory.hessian)
     }
 
@@ -362,14 +360,12 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
     }
 
     #[allow(clippy::type_complexity)]
-    fn parts(
-        &mut self,
-    ) -> Result<(Frozen<'_, M, T>, &mut Levels<M, T>, &mut Memory<M, T>, &mut Vec<T>), Error> {
-        let Self { base, consistent, tape, last, levels, memory, history, .. } = self;
+    fn parts(&mut self) -> Result<(Frozen<'_, M, T>, &mut B::State, &mut Memory<M, T>, &mut Vec<T>), Error> {
+        let Self { base, consistent, tape, last, state, memory, history, .. } = self;
         let span = last.ok_or(Error::NoResult)?;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
-        Ok((Frozen { base, consistent, tape, span }, levels, memory, history))
+        Ok((Frozen { base, consistent, tape, span }, state, memory, history))
     }
 
     fn run(
@@ -378,13 +374,14 @@ impl<M: Dae, B: Family, T: Real> Integrator<M, B, T> {
         u: &VectorU<M, T>,
         t_end: T,
         record: bool,
-        after: impl FnMut(&Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+        mut after: impl FnMut(&mut Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         self.last = None;
         let span = self.begin(x0, u, t_end)?;
-        let Self { options, base, consistent, levels, tape, statistics, .. } = self;
-        Run { options, base, consistent, tape, record, statistics }
-            .integrate::<B>(levels, x0, span, after)?;
+        let Self { options, base, consistent, state, tape, statistics, .. } = self;
+        tape.clear();
+        let mut run = Run { options, base, consistent, tape, record, statistics };
+        B::integrate(state, &mut run, x0, span, &mut after)?;
         self.last = Some(span);
         Ok(())
     }
@@ -399,28 +396,5 @@ fn inside<T: Real>(t: T, start: T, end: T) -> bool {
 fn stack<M: Dae, T: Real>(to: &mut ArrayK<M, T>, x: &VectorX<M, T>, z: &VectorZ<M, T>) {
     for (to, from) in to.as_mut().iter_mut().zip(x.as_slice().iter().chain(z.as_slice())) {
         *to = *from;
-    }
-}
-
-/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
-fn interpolate<M: Dae, T: Real>(
-    stages: &dyn Stages<M, T>,
-    x: &[T],
-    y: &[T],
-    passed: T,
-    h: T,
-    dense: &mut Dense<M, T>,
-) {
-    let theta = (passed / h).to_f64();
-    let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
-    let sum = |weights: &[f64; MOST], y: &[T]| {
-        weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
-    };
-    let mut unknowns = y.chunks_exact(stages.count());
-    for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
-        *to = *x + h * sum(&weights, k);
-    }
-    for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
-        *to = sum(&lagrange, z);
     }
 }

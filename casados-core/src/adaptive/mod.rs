@@ -4,16 +4,19 @@
 //! [`Radau`], a number of stages (3, 5 or 7: orders 5, 9 and 13) that follows from how Newton's method converges. The
 //! algorithm is that of the codes RADAU5 and RADAU (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II,
 //! section IV.8; Stiff differential equations solved by Radau methods, J. Comput. Appl. Math. 111 (1999)), for fully
-//! implicit equations.
+//! implicit equations. Explicit pairs of orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that
+//! are not stiff.
 //!
 //! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
-//! remembered of them, `consistent` the start, `replay` and `sensitivities` their derivatives, `integrator` what users see.
+//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `integrator` what users see.
 
 mod consistent;
 mod control;
+mod explicit;
 mod integrator;
 mod norm;
 mod options;
+mod pairs;
 mod replay;
 mod run;
 mod sensitivities;
@@ -28,7 +31,7 @@ pub use statistics::AdaptiveStatistics;
 use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;
-use crate::tableau::RadauIIA;
+use crate::tableau::{DormandPrince5, DormandPrince8, RadauIIA};
 use alloc::boxed::Box;
 use stages::Stages;
 
@@ -38,7 +41,7 @@ pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 /// A method that an adaptive integrator takes.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a method with an estimate of its error",
-    note = "`Radau` and `RadauIIA<3>`, `RadauIIA<5>`, `RadauIIA<7>` are"
+    note = "`Radau`, `RadauIIA<3>`, `RadauIIA<5>` and `RadauIIA<7>` are, and for explicit models `DormandPrince5` and `DormandPrince8`"
 )]
 pub trait AdaptiveMethod {
     /// Its integrator.
@@ -51,18 +54,60 @@ pub struct Radau;
 
 mod sealed {
     use super::*;
+    use crate::model::VectorX;
+    use crate::result::Dense;
+    use replay::Replay;
+    use run::{After, Run, Span};
+    use tape::Entry;
+
+    /// What a method remembers. Nobody outside can name it.
+    pub trait Kind<M: Dae, T: Real>: 'static {
+        /// Its memory.
+        type State: Default + Send + Sync;
+    }
+
+    /// What integrates with steps of variable size, for the models that it can.
+    pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
+        /// Integrates an interval; `after` is called after each accepted step.
+        ///
+        /// # Errors
+        /// Whatever ends a run early.
+        fn integrate(
+            state: &mut Self::State,
+            run: &mut Run<'_, M, T>,
+            x0: &VectorX<M, T>,
+            span: Span<T>,
+            after: After<'_, M, T>,
+        ) -> Result<(), Error>;
+        /// The solution inside a step, from its numbers; `inputs` are variables of the model, of which `u` and `p` count.
+        ///
+        /// # Errors
+        /// A value of the model that is not finite.
+        fn interpolate(
+            state: &mut Self::State,
+            inputs: &[T],
+            entry: &Entry<T>,
+            numbers: (&[T], &[T]),
+            t: T,
+            dense: &mut Dense<M, T>,
+        ) -> Result<(), Error>;
+        /// What takes a step again.
+        ///
+        /// # Errors
+        /// [`Error::OutOfMemory`]
+        fn replay(state: &mut Self::State, level: usize) -> Result<&mut dyn Replay<M, T>, Error>;
+    }
 
     /// The methods that an integrator may change between.
     pub trait Family: 'static {
         /// How many.
         const LEVELS: usize;
-        /// The number of stages of the first, and by how many each has more than the one before.
-        const STAGES: (usize, usize);
+        /// The number of stages of the first.
+        const STAGES: usize;
         /// One of them.
         ///
         /// # Errors
         /// [`Error::OutOfMemory`]
-        #[allow(private_interfaces)] // Nobody outside can name the trait.
         fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error>;
     }
 }
@@ -70,8 +115,7 @@ use sealed::Family;
 
 impl Family for Radau {
     const LEVELS: usize = 3;
-    const STAGES: (usize, usize) = (3, 2);
-    #[allow(private_interfaces)]
+    const STAGES: usize = 3;
     fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
         match level {
             0 => RadauIIA::<3>::open(0),
@@ -81,25 +125,25 @@ impl Family for Radau {
     }
 }
 
-impl AdaptiveMethod for Radau {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, T>;
-}
-
 macro_rules! single {
     ($($stages:literal: $lanes:literal),*) => {
-        $(
-            impl Family for RadauIIA<$stages> {
-                const LEVELS: usize = 1;
-                const STAGES: (usize, usize) = ($stages, 0);
-                #[allow(private_interfaces)]
-                fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-                    Ok(Box::new(stages::Radau::<M, T, $stages, $lanes>::new()?))
-                }
+        $(impl Family for RadauIIA<$stages> {
+            const LEVELS: usize = 1;
+            const STAGES: usize = $stages;
+            fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
+                Ok(Box::new(stages::Radau::<M, T, $stages, $lanes>::new()?))
             }
-            impl AdaptiveMethod for RadauIIA<$stages> {
-                type Integrator<M: Dae, T: Real> = Integrator<M, Self, T>;
-            }
-        )*
+        })*
     };
 }
+// As many lanes as there are eigenvalues, filled up to registers.
 single!(3: 2, 5: 4, 7: 4);
+
+macro_rules! methods {
+    ($($method:ty),*) => {
+        $(impl AdaptiveMethod for $method {
+            type Integrator<M: Dae, T: Real> = Integrator<M, Self, T>;
+        })*
+    };
+}
+methods!(Radau, RadauIIA<3>, RadauIIA<5>, RadauIIA<7>, DormandPrince5, DormandPrince8);

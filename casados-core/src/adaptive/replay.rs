@@ -7,13 +7,13 @@ use crate::irk::Integrator;
 use crate::memory::Heap;
 use crate::model::{Dae, VectorX};
 use crate::options::{Options, Start};
-use crate::result::{Forward, Hessian, Nominal};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::Shape;
+use crate::shape::{Matrix, Shape};
 use crate::tableau::{Method, RadauIIA};
 
 /// Takes steps of given size.
-pub(super) trait Replay<M: Dae, T: Real> {
+pub trait Replay<M: Dae, T: Real> {
     /// From the unknowns `y` of its stages, or near them.
     ///
     /// # Errors
@@ -82,6 +82,14 @@ where
     single.set_stages(y)
 }
 
+/// A gradient with respect to `(x, u, p)` as one array.
+pub(super) fn stack<M: Dae, T: Real>(adjoint: &Adjoint<M, T>, gradient: &mut [T]) {
+    let parts = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
+    for (to, from) in gradient.iter_mut().zip(parts.into_iter().flatten()) {
+        *to = *from;
+    }
+}
+
 impl<M: Dae, T: Real, const S: usize> Replay<M, T> for Single<M, T, S>
 where
     RadauIIA<S>: Method<S>,
@@ -115,13 +123,9 @@ where
         lambda: &VectorX<M, T>,
         gradient: &mut [T],
     ) -> Result<(), Error> {
-        use crate::shape::Matrix;
         go(self, at, y)?;
         let adjoint = Integrator::adjoint(self, at.x, at.u, h, lambda)?;
-        let parts = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
-        for (to, from) in gradient.iter_mut().zip(parts.into_iter().flatten()) {
-            *to = *from;
-        }
+        stack(adjoint, gradient);
         Ok(())
     }
 

@@ -4,10 +4,11 @@ use super::consistent::{At, Consistent, place_inputs};
 use super::control::{IMPLICIT, Predictive};
 use super::norm::norm;
 use super::options::AdaptiveOptions;
-use super::sealed::Family;
-use super::stages::{Convergence, FAST, Failure, Stages, Start};
+use super::replay::Replay;
+use super::sealed::{Engine, Family, Kind};
+use super::stages::{Convergence, FAST, Failure, MOST, Stages, Start};
 use super::statistics::AdaptiveStatistics;
-use super::tape::Tape;
+use super::tape::{Entry, Tape};
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;
 use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
@@ -36,7 +37,7 @@ const TROUBLES: usize = 3;
 /// Memory of a run.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-pub(super) struct Base<M: Dae, T: Plain> {
+pub struct Base<M: Dae, T: Plain> {
     /// The variables at the time that was reached.
     pub point: ArrayV<M, T>,
     pub jacobian: M::Jacobian<T>,
@@ -72,13 +73,13 @@ enum Need {
 
 /// An interval.
 #[derive(Clone, Copy)]
-pub(super) struct Span<T> {
+pub struct Span<T> {
     pub start: T,
     pub end: T,
 }
 
 /// The levels of a family that are in use.
-pub(super) struct Levels<M: Dae, T: Real> {
+pub struct Levels<M: Dae, T: Real> {
     open: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
 }
 
@@ -121,7 +122,7 @@ impl<M: Dae, T: Real> Levels<M, T> {
 }
 
 /// What a run works with.
-pub(super) struct Run<'a, M: Dae, T: Real> {
+pub struct Run<'a, M: Dae, T: Real> {
     pub options: &'a AdaptiveOptions,
     pub base: &'a mut Base<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
@@ -131,12 +132,16 @@ pub(super) struct Run<'a, M: Dae, T: Real> {
     pub statistics: &'a mut AdaptiveStatistics,
 }
 
-/// An accepted step, for those who want to know its polynomial.
-pub(super) struct Accepted<'a, M: Dae, T: Real> {
-    pub stages: &'a dyn Stages<M, T>,
-    pub x: &'a [T],
-    pub t: T,
-    pub h: T,
+/// What is called after each accepted step, with memory for dense output.
+pub type After<'a, M, T> = &'a mut dyn FnMut(&mut Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>;
+
+/// Dense output.
+type Evaluate<'a, M, T> = &'a mut dyn FnMut(T, &mut Dense<M, T>) -> Result<(), Error>;
+
+/// An accepted step.
+pub struct Accepted<'a, M: Dae, T: Real> {
+    /// The solution at a time inside it.
+    pub evaluate: Evaluate<'a, M, T>,
     /// The time at its end.
     pub end: T,
 }
@@ -151,13 +156,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         levels: &mut Levels<M, T>,
         x0: &VectorX<M, T>,
         span: Span<T>,
-        mut after: impl FnMut(&Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
+        after: After<'_, M, T>,
     ) -> Result<(), Error> {
         let nx = M::Shape::NX;
-        self.tape.clear();
         self.prepare(x0, span)?;
         let mut level = 0;
-        self.tighten(B::STAGES.0);
+        self.tighten(B::STAGES);
         let mut stages = levels.get::<B>(level)?;
         let length = span.end - span.start;
         let direction = if length < T::ZERO { -1.0 } else { 1.0 };
@@ -314,8 +318,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 self.tape.push(t, h, level, x, stages.accepted())?;
             }
             let end = if last { span.end } else { t + h };
-            let x = &self.base.point.as_ref()[nx..2 * nx];
-            after(&Accepted { stages, x, t, h, end }, &mut self.base.dense)?;
+            let Base { point, dense, .. } = &mut *self.base;
+            let x = &point.as_ref()[nx..2 * nx];
+            let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
+                interpolate(stages, x, stages.accepted(), time - t, h, dense);
+                Ok(())
+            };
+            after(&mut Accepted { evaluate: &mut evaluate, end }, dense)?;
             self.base.point = *stages.end();
             t = end;
             if let Some(time) = self.base.point.as_mut().last_mut() {
@@ -351,8 +360,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
 
     /// Everything at the start of the interval.
     fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
-        let nx = M::Shape::NX;
-        let Base { point, start, given, u, parameters, jacobian, result, ready, .. } = &mut *self.base;
+        let Base { start, given, u, parameters, jacobian, ready, .. } = &mut *self.base;
         if !*ready {
             M::jacobian_constants::<T>(jacobian);
             *ready = true;
@@ -365,6 +373,15 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             Err(Error::Singular { .. }) if M::Shape::NZ == 0 => *start = Zeroable::zeroed(),
             Err(error) => return Err(error),
         }
+        let start = *start;
+        self.place(x0, &start, span.start);
+        Ok(())
+    }
+
+    /// The variables at the start, from `(ẋ, z)` there.
+    pub fn place(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
+        let nx = M::Shape::NX;
+        let Base { point, u, parameters, result, .. } = &mut *self.base;
         let numbers = point.as_mut();
         for (index, value) in start.as_ref().iter().enumerate() {
             numbers[if index < nx { index } else { index + nx }] = *value;
@@ -372,14 +389,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         numbers[nx..2 * nx].copy_from_slice(x0.as_slice());
         place_inputs::<M, T>(numbers, u, parameters);
         if let Some(time) = numbers.last_mut() {
-            *time = span.start;
+            *time = t;
         }
         result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[nx..]);
-        Ok(())
     }
 
     /// The solution at the end.
-    fn finish(&mut self) {
+    pub fn finish(&mut self) {
         let nx = M::Shape::NX;
         let Base { point, result, .. } = &mut *self.base;
         let states = &point.as_ref()[nx..];
@@ -436,7 +452,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
 
     /// # Errors
     /// [`Error::StepSizeUnderflow`]
-    fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
+    pub fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
         let size = h.to_f64().abs();
         let tenth = T::from_f64(0.1) * h;
         if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + tenth == t {
@@ -486,5 +502,61 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { Scalar::powf(0.01 / largest, 0.25) };
         self.measure();
         Ok((100.0 * step).min(second).min(longest))
+    }
+}
+
+/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
+fn interpolate<M: Dae, T: Real>(
+    stages: &dyn Stages<M, T>,
+    x: &[T],
+    y: &[T],
+    passed: T,
+    h: T,
+    dense: &mut Dense<M, T>,
+) {
+    let theta = (passed / h).to_f64();
+    let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
+    let sum = |weights: &[f64; MOST], y: &[T]| {
+        weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
+    };
+    let mut unknowns = y.chunks_exact(stages.count());
+    for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
+        *to = *x + h * sum(&weights, k);
+    }
+    for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
+        *to = sum(&lagrange, z);
+    }
+}
+
+impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
+    type State = Levels<M, T>;
+}
+
+impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
+    fn integrate(
+        state: &mut Self::State,
+        run: &mut Run<'_, M, T>,
+        x0: &VectorX<M, T>,
+        span: Span<T>,
+        after: After<'_, M, T>,
+    ) -> Result<(), Error> {
+        run.integrate::<B>(state, x0, span, after)
+    }
+
+    fn interpolate(
+        state: &mut Self::State,
+        _: &[T],
+        entry: &Entry<T>,
+        (x, y): (&[T], &[T]),
+        t: T,
+        dense: &mut Dense<M, T>,
+    ) -> Result<(), Error> {
+        let stages = state.get::<B>(entry.level)?;
+        interpolate(stages, x, y, t - entry.t, entry.h, dense);
+        Ok(())
+    }
+
+    fn replay(state: &mut Self::State, level: usize) -> Result<&mut dyn Replay<M, T>, Error> {
+        state.get::<B>(level)?.replay()
     }
 }

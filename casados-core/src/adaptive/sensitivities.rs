@@ -7,8 +7,8 @@
 
 use super::consistent::{At, Consistent};
 use super::replay::Replay;
-use super::run::{Base, Levels, Span};
-use super::sealed::Family;
+use super::run::{Base, Span};
+use super::sealed::Engine;
 use super::tape::Tape;
 use crate::error::Error;
 use crate::irk::{check_result, not_finite, split};
@@ -23,7 +23,7 @@ use bytemuck::Zeroable;
 /// Memory of derivatives.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-pub(super) struct Memory<M: Dae, T: Plain> {
+pub struct Memory<M: Dae, T: Plain> {
     pub hessian: Hessian<M, T>,
     pub adjoint: Adjoint<M, T>,
     /// `V_n`, and `V_{n+1}`.
@@ -39,7 +39,7 @@ pub(super) struct Memory<M: Dae, T: Plain> {
 }
 
 /// What derivatives are taken of.
-pub(super) struct Frozen<'a, M: Dae, T: Real> {
+pub struct Frozen<'a, M: Dae, T: Real> {
     pub base: &'a mut Base<M, T>,
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
@@ -48,9 +48,9 @@ pub(super) struct Frozen<'a, M: Dae, T: Real> {
 
 impl<M: Dae, T: Real> Frozen<'_, M, T> {
     /// Takes all steps from `x0` again, to rounding; `each` is called to take one, and returns what it gave.
-    fn steps<B: Family>(
+    fn steps<B: Engine<M, T>>(
         &mut self,
-        levels: &mut Levels<M, T>,
+        state: &mut B::State,
         x0: &VectorX<M, T>,
         mut each: impl FnMut(
             &mut dyn Replay<M, T>,
@@ -64,17 +64,15 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         let Base { u, parameters, result, start, given, .. } = &mut *self.base;
         *start = *given;
         let at = At { x: x0, u, p: parameters, t: self.span.start };
-        match self.consistent.solve(&at, start) {
-            Ok(_) => {}
-            Err(Error::Singular { .. }) if M::Shape::NZ == 0 => {}
-            Err(error) => return Err(error),
+        if M::Shape::NZ > 0 {
+            self.consistent.solve(&at, start)?;
         }
         result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[M::Shape::NX..]);
         (result.x, result.z) = (*x0, result.z0);
         self.tape.rewrite();
         for step in 0..self.tape.entries().len() {
             let Some(entry) = self.tape.entries().get(step).copied() else { break };
-            let replay = levels.get::<B>(entry.level)?.replay()?;
+            let replay = B::replay(state, entry.level)?;
             let (_, y) = self.tape.numbers(step, M::Shape::NX);
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let (end, z) = each(replay, &at, entry.h, y, step).map_err(|error| in_step(error, step))?;
@@ -90,8 +88,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ///
     /// # Errors
     /// Those of Newton's method.
-    pub fn solve<B: Family>(&mut self, levels: &mut Levels<M, T>, x0: &VectorX<M, T>) -> Result<(), Error> {
-        self.steps::<B>(levels, x0, |replay, at, h, y, _| {
+    pub fn solve<B: Engine<M, T>>(&mut self, state: &mut B::State, x0: &VectorX<M, T>) -> Result<(), Error> {
+        self.steps::<B>(state, x0, |replay, at, h, y, _| {
             let nominal = replay.solve(at, h, y)?;
             Ok((nominal.x, nominal.z))
         })
@@ -101,9 +99,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix; [`Error::Overflow`].
-    pub fn forward<B: Family>(
+    pub fn forward<B: Engine<M, T>>(
         &mut self,
-        levels: &mut Levels<M, T>,
+        state: &mut B::State,
         x0: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         mut history: Option<&mut Vec<T>>,
@@ -116,7 +114,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             row.as_mut()[index] = T::ONE;
         }
         let count = self.tape.entries().len();
-        self.steps::<B>(levels, x0, |replay, at, h, y, step| {
+        self.steps::<B>(state, x0, |replay, at, h, y, step| {
             if let Some(history) = &mut history {
                 let bytes = history.len().saturating_mul(size_of::<T>());
                 history.try_reserve(nx * M::Shape::NW).map_err(|_| Error::OutOfMemory { bytes })?;
@@ -170,9 +168,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix; [`Error::Overflow`].
-    pub fn adjoint<B: Family>(
+    pub fn adjoint<B: Engine<M, T>>(
         &mut self,
-        levels: &mut Levels<M, T>,
+        state: &mut B::State,
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
     ) -> Result<(), Error> {
@@ -186,7 +184,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let replay = levels.get::<B>(entry.level)?.replay()?;
+            let replay = B::replay(state, entry.level)?;
             replay
                 .adjoint(&at, entry.h, y, now, step_gradient.as_mut())
                 .map_err(|error| in_step(error, step))?;
@@ -209,9 +207,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix; a second derivative that is not finite; [`Error::Overflow`].
-    pub fn hessian<B: Family>(
+    pub fn hessian<B: Engine<M, T>>(
         &mut self,
-        levels: &mut Levels<M, T>,
+        state: &mut B::State,
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         history: &[T],
@@ -229,7 +227,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let replay = levels.get::<B>(entry.level)?.replay()?;
+            let replay = B::replay(state, entry.level)?;
             let second = replay.hessian(&at, entry.h, y, now).map_err(|error| in_step(error, step))?;
             *now = second.first.grad_x0;
             let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());

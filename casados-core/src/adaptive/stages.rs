@@ -28,7 +28,7 @@ const MORE_ITERATIONS: f64 = 2.5;
 pub(super) const FAST: f64 = 1e-3;
 
 /// Where a step begins and what it is measured by.
-pub(super) struct Start<'a, M: Dae, T: Real> {
+pub struct Start<'a, M: Dae, T: Real> {
     /// The variables at its start: a solution of the equations.
     pub point: &'a ArrayV<M, T>,
     /// Reciprocals of the tolerated errors of `(x, z)`.
@@ -38,7 +38,7 @@ pub(super) struct Start<'a, M: Dae, T: Real> {
 }
 
 /// How an iteration ended that did not converge.
-pub(super) enum Failure {
+pub enum Failure {
     /// It converges, but not soon enough: the factor by which a shorter step would.
     Slow(f64),
     /// It does not converge.
@@ -49,7 +49,7 @@ pub(super) enum Failure {
 
 /// What is known about the convergence of the last iteration.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Convergence {
+pub struct Convergence {
     /// How many iterations it took.
     pub iterations: usize,
     /// How many it might have taken.
@@ -67,7 +67,7 @@ impl Default for Convergence {
 }
 
 /// A step with any number of stages.
-pub(super) trait Stages<M: Dae, T: Real> {
+pub trait Stages<M: Dae, T: Real> {
     /// How many.
     fn count(&self) -> usize;
     /// Factors of the Newton matrix; whether those of the plan hold.
@@ -140,7 +140,7 @@ struct Memory<M: Dae, T: Plain, const S: usize, const L: usize> {
 }
 
 /// A step of the Radau IIA method with `S` stages, of which `L = ⌈S/2⌉` eigenvalues count.
-pub(super) struct Radau<M: Dae, T: Real, const S: usize, const L: usize>
+pub struct Radau<M: Dae, T: Real, const S: usize, const L: usize>
 where
     RadauIIA<S>: Method<S>,
 {

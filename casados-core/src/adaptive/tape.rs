@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 /// An accepted step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Entry<T> {
+pub struct Entry<T> {
     /// Its start.
     pub t: T,
     /// Its length.
@@ -19,7 +19,7 @@ pub(super) struct Entry<T> {
 
 /// Steps one after the other, with the numbers of each: the states at its start, then the unknowns of its stages.
 #[derive(Debug)]
-pub(super) struct Tape<T> {
+pub struct Tape<T> {
     entries: Vec<Entry<T>>,
     numbers: Vec<T>,
     /// The numbers of steps that are being taken again.

@@ -15,6 +15,9 @@ mod integrator;
 mod step;
 
 pub use integrator::Integrator;
+// What steps of variable size are made of too.
+#[cfg(feature = "alloc")]
+pub(crate) use step::{Grid, Point, Record, Scheme};
 
 use crate::memory::Memory;
 use crate::model::Ode;

@@ -10,13 +10,13 @@ use bytemuck::Zeroable;
 
 /// Which state an equation determines: `ẋ_state = factor · f` where `f` is its residual at `ẋ = 0`.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-pub(super) struct Row<T> {
+pub(crate) struct Row<T> {
     pub state: usize,
     pub factor: T,
 }
 
 /// What is the same in every call: the method in the number type, and the form of the model.
-pub(super) struct Scheme<M: Ode, T: Real, const S: usize> {
+pub(crate) struct Scheme<M: Ode, T: Real, const S: usize> {
     pub a: [[T; S]; S],
     pub b: [T; S],
     pub c: [T; S],
@@ -58,7 +58,7 @@ pub(super) fn directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
 
 /// Equal steps from `start`.
 #[derive(Clone, Copy)]
-pub(super) struct Grid<T> {
+pub(crate) struct Grid<T> {
     pub start: T,
     /// Of one step.
     pub h: T,
@@ -68,7 +68,7 @@ pub(super) struct Grid<T> {
 /// One step: its start and the derivatives at its stages.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Record<M: Ode, T: Real, const S: usize> {
+pub(crate) struct Record<M: Ode, T: Real, const S: usize> {
     pub x: ArrayX<M, T>,
     pub k: [ArrayX<M, T>; S],
 }
@@ -76,7 +76,7 @@ pub(super) struct Record<M: Ode, T: Real, const S: usize> {
 /// Variables and residual of the model at one stage. `ẋ` is zero, always.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Point<M: Ode, T: Real> {
+pub(crate) struct Point<M: Ode, T: Real> {
     pub v: ArrayV<M, T>,
     pub f: ArrayK<M, T>,
     pub counts: Counts,
@@ -84,7 +84,7 @@ pub(super) struct Point<M: Ode, T: Real> {
 
 /// What the last call did.
 #[derive(Clone, Copy, Default, Zeroable)]
-pub(super) struct Counts {
+pub(crate) struct Counts {
     pub steps: usize,
     pub residuals: usize,
     pub jacobians: usize,

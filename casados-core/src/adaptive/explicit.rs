@@ -1,0 +1,474 @@
+//! Explicit pairs for models that are not stiff: the method of higher order advances the solution, the difference to the
+//! other one decides about the step.
+
+use super::consistent::At;
+use super::control::{Proportional, power};
+use super::norm::{mean, norm};
+use super::pairs::Pair;
+use super::replay::Replay;
+use super::run::{Accepted, After, Run, Span};
+use super::sealed::{Engine, Kind};
+use super::tape::Entry;
+use crate::erk::{Grid, Integrator as Erk, Point, Record, Scheme};
+use crate::error::{Error, Place, Refusal};
+use crate::memory::Heap;
+use crate::model::{ArrayK, ArrayX, Dae, Ode, VectorX};
+use crate::options::Options;
+use crate::result::{Dense, Forward, Hessian, Nominal};
+use crate::scalar::{Real, Scalar};
+use crate::shape::{Array, Matrix, Shape};
+use crate::tableau::{DormandPrince5, DormandPrince8};
+use alloc::boxed::Box;
+use bytemuck::Zeroable;
+use bytemuck::allocation::try_zeroed_box;
+use core::marker::PhantomData;
+
+/// Memory of a step.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct Memory<M: Ode, T: Real, const S: usize> {
+    point: Point<M, T>,
+    record: Record<M, T, S>,
+    /// The state at the end of the step, and its derivative there.
+    end: ArrayX<M, T>,
+    end_slope: ArrayX<M, T>,
+    difference: ArrayX<M, T>,
+    scale: ArrayX<M, T>,
+    /// Stages for dense output.
+    more: [ArrayX<M, T>; 3],
+}
+
+/// The method of an explicit pair with `S` stages.
+pub struct Steps<M: Dae, B, T: Real, const S: usize> {
+    engine: Option<Box<dyn Take<M, T> + Send + Sync>>,
+    replay: Option<Box<dyn Replay<M, T> + Send + Sync>>,
+    method: PhantomData<fn() -> B>,
+}
+
+impl<M: Dae, B, T: Real, const S: usize> Default for Steps<M, B, T, S> {
+    fn default() -> Self {
+        Self { engine: None, replay: None, method: PhantomData }
+    }
+}
+
+/// A step of an explicit pair.
+trait Take<M: Dae, T: Real> {
+    /// Goes to the start of a step.
+    fn go(&mut self, inputs: &[T], x: &[T]);
+    /// The derivative at the start.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn slope(&mut self, t: T) -> Result<&[T], Error>;
+    /// All stages of a step whose first is there.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn take(&mut self, t: T, h: T) -> Result<(), Error>;
+    /// The estimated error relative to what is tolerated.
+    fn error(&mut self, h: T, rtol: &[T], atol: &[T]) -> f64;
+    /// The state at the end.
+    fn end(&self) -> &[T];
+    /// The end is the next start.
+    fn advance(&mut self);
+    /// The polynomial of the step that was taken.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error>;
+    /// How often the model was evaluated since this was asked for last.
+    fn count(&mut self) -> usize;
+}
+
+struct Stepper<M: Ode, B, T: Real, const S: usize> {
+    scheme: Scheme<M, T, S>,
+    memory: Box<Memory<M, T, S>>,
+    method: PhantomData<fn() -> B>,
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+    fn new() -> Result<Self, Error> {
+        let bytes = size_of::<Memory<M, T, S>>();
+        let memory = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
+        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, method: PhantomData })
+    }
+
+    /// The derivative at a state.
+    fn evaluate(
+        scheme: &Scheme<M, T, S>,
+        point: &mut Point<M, T>,
+        x: &[T],
+        t: T,
+        slope: &mut ArrayX<M, T>,
+    ) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let numbers = point.v.as_mut();
+        numbers[nx..2 * nx].copy_from_slice(x);
+        if let Some(time) = numbers.last_mut() {
+            *time = t;
+        }
+        point.derivative(scheme, slope, Place { step: 0, stage: 0, iteration: 0 })
+    }
+}
+
+/// `Σ_i e_i k_i`
+fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
+    for (coefficient, stage) in coefficients.iter().zip(stages) {
+        if *coefficient != 0.0 {
+            let coefficient = T::from_f64(*coefficient);
+            for (sum, k) in sum.iter_mut().zip(stage.as_ref()) {
+                *sum = *sum + coefficient * *k;
+            }
+        }
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
+    fn go(&mut self, inputs: &[T], x: &[T]) {
+        let Memory { point, record, .. } = &mut *self.memory;
+        point.v.as_mut().copy_from_slice(inputs);
+        // An explicit model is evaluated at `ẋ = 0`.
+        point.v.as_mut()[..M::Shape::NX].fill(T::ZERO);
+        record.x.as_mut().copy_from_slice(x);
+    }
+
+    fn slope(&mut self, t: T) -> Result<&[T], Error> {
+        let Memory { point, record, .. } = &mut *self.memory;
+        Self::evaluate(&self.scheme, point, record.x.as_ref(), t, &mut record.k[0])?;
+        Ok(record.k[0].as_ref())
+    }
+
+    fn take(&mut self, t: T, h: T) -> Result<(), Error> {
+        let Memory { point, record, end, end_slope, .. } = &mut *self.memory;
+        let grid = Grid { start: t, h, steps: 1 };
+        for stage in 1..S {
+            let at = Place { step: 0, stage, iteration: 0 };
+            point.go(&self.scheme, grid, record, at)?;
+            point.derivative(&self.scheme, &mut record.k[stage], at)?;
+        }
+        record.end(&self.scheme, grid, 0, end)?;
+        Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)
+    }
+
+    fn error(&mut self, h: T, rtol: &[T], atol: &[T]) -> f64 {
+        let Memory { record, end, end_slope, difference, scale, .. } = &mut *self.memory;
+        let states = record.x.as_ref().iter().zip(end.as_ref());
+        for (((scale, (before, after)), rtol), atol) in
+            scale.as_mut().iter_mut().zip(states).zip(rtol).zip(atol)
+        {
+            *scale = h / (*atol + *rtol * before.abs().max(after.abs()));
+        }
+        let (stages, last) = B::DIFFERENCE;
+        difference.as_mut().fill(T::ZERO);
+        combine(&stages, &record.k, difference.as_mut());
+        combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
+        let fine = norm(difference.as_ref(), scale.as_ref());
+        let Some(coarse) = B::COARSE else { return fine };
+        difference.as_mut().fill(T::ZERO);
+        combine(&coarse, &record.k, difference.as_mut());
+        let coarse = norm(difference.as_ref(), scale.as_ref());
+        let both = fine * fine + 0.01 * coarse * coarse;
+        if both > 0.0 { fine * fine / Scalar::sqrt(both) } else { 0.0 }
+    }
+
+    fn end(&self) -> &[T] {
+        self.memory.end.as_ref()
+    }
+
+    fn advance(&mut self) {
+        let Memory { record, end, end_slope, .. } = &mut *self.memory;
+        record.x = *end;
+        record.k[0] = *end_slope;
+    }
+
+    fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error> {
+        let Memory { point, record, end, end_slope, more, difference: x, .. } = &mut *self.memory;
+        let last = core::slice::from_ref(&*end_slope);
+        for index in 0..B::MORE.len().min(more.len()) {
+            let Some(stage) = B::MORE.get(index) else { break };
+            x.as_mut().fill(T::ZERO);
+            combine(&stage.stages, &record.k, x.as_mut());
+            combine(&[stage.end], last, x.as_mut());
+            combine(&stage.more, &more[..index], x.as_mut());
+            for (x, start) in x.as_mut().iter_mut().zip(record.x.as_ref()) {
+                *x = *start + h * *x;
+            }
+            let time = t + h * T::from_f64(stage.node);
+            Self::evaluate(&self.scheme, point, x.as_ref(), time, &mut more[index])?;
+        }
+        // Nested: y + θ (Δ + θ' (b + θ (d + θ' (…)))), θ' = 1 − θ.
+        let rest = T::ONE - theta;
+        let to = dense.x.as_mut_slice();
+        to.fill(T::ZERO);
+        for (power, (stages, end, others)) in B::POLYNOMIAL.iter().enumerate().rev() {
+            x.as_mut().fill(T::ZERO);
+            combine(stages, &record.k, x.as_mut());
+            combine(&[*end], last, x.as_mut());
+            combine(others, more, x.as_mut());
+            let factor = if power % 2 == 0 { rest } else { theta };
+            for (to, x) in to.iter_mut().zip(x.as_ref()) {
+                *to = factor * (h * *x + *to);
+            }
+        }
+        for (index, to) in to.iter_mut().enumerate() {
+            let (start, change) = (record.x[index], end[index] - record.x[index]);
+            let bend = h * record.k[0][index] - change;
+            let cubic = change - h * end_slope[index] - bend;
+            *to = start + theta * (change + rest * (bend + theta * (cubic + *to)));
+        }
+        Ok(())
+    }
+
+    fn count(&mut self) -> usize {
+        core::mem::take(&mut self.memory.point.counts.residuals)
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Erk<M, B, S, T, Heap> {
+    fn solve(&mut self, at: &At<'_, M, T>, h: T, _: &[T]) -> Result<&Nominal<M, T>, Error> {
+        go(self, at)?;
+        Erk::solve(self, at.x, at.u, h)
+    }
+
+    fn forward(&mut self, at: &At<'_, M, T>, h: T, _: &[T]) -> Result<&Forward<M, T>, Error> {
+        go(self, at)?;
+        Erk::forward(self, at.x, at.u, h)
+    }
+
+    fn hessian(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        _: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        go(self, at)?;
+        Erk::hessian(self, at.x, at.u, h, lambda)
+    }
+
+    fn adjoint(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        _: &[T],
+        lambda: &VectorX<M, T>,
+        gradient: &mut [T],
+    ) -> Result<(), Error> {
+        go(self, at)?;
+        let adjoint = Erk::adjoint(self, at.x, at.u, h, lambda)?;
+        super::replay::stack(adjoint, gradient);
+        Ok(())
+    }
+
+    fn stages(&mut self) -> Result<&[T], Error> {
+        Ok(&[])
+    }
+}
+
+/// Goes to the start of a step.
+fn go<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    erk: &mut Erk<M, B, S, T, Heap>,
+    at: &At<'_, M, T>,
+) -> Result<(), Error> {
+    if M::Shape::NP > 0 {
+        erk.set_parameters(at.p)?;
+    }
+    erk.set_time(at.t)
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
+    fn open(&mut self) -> Result<&mut (dyn Take<M, T> + Send + Sync), Error> {
+        Ok(match &mut self.engine {
+            Some(engine) => &mut **engine,
+            none => &mut **none.insert(Box::new(Stepper::<M, B, T, S>::new()?)),
+        })
+    }
+
+    /// Integrates the interval.
+    fn integrate(
+        &mut self,
+        run: &mut Run<'_, M, T>,
+        x0: &VectorX<M, T>,
+        span: Span<T>,
+        after: After<'_, M, T>,
+    ) -> Result<(), Error> {
+        run.place(x0, &ArrayK::<M, T>::zeroed(), span.start);
+        let nx = M::Shape::NX;
+        let step = self.open()?;
+        step.go(run.base.point.as_ref(), x0.as_slice());
+        let result = walk::<M, B, T, S>(step, run, span, after);
+        run.statistics.residuals += step.count();
+        run.base.point.as_mut()[nx..2 * nx].copy_from_slice(match &result {
+            Ok(end) => end.as_slice(),
+            Err(_) => x0.as_slice(),
+        });
+        result?;
+        run.finish();
+        Ok(())
+    }
+}
+
+/// The steps of an interval; the state at its end.
+fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    step: &mut dyn Take<M, T>,
+    run: &mut Run<'_, M, T>,
+    span: Span<T>,
+    after: After<'_, M, T>,
+) -> Result<VectorX<M, T>, Error> {
+    let nx = M::Shape::NX;
+    let mut x = VectorX::<M, T>::zeroed();
+    x.as_mut_slice().copy_from_slice(&run.base.point.as_ref()[nx..2 * nx]);
+    let length = span.end - span.start;
+    let direction = if length < T::ZERO { -1.0 } else { 1.0 };
+    let longest = length.to_f64().abs().min(run.options.max_step);
+    if length == T::ZERO {
+        return Ok(x);
+    }
+    let mut t = span.start;
+    let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
+    let mut controller = Proportional::default();
+    let mut refusal = Refusal::Error;
+    let (mut rejected, mut tried) = (false, 0);
+    loop {
+        let last = ((t + h * T::from_f64(1.01) - span.end) * T::from_f64(direction)).to_f64() >= 0.0;
+        if last {
+            h = span.end - t;
+        }
+        if tried >= run.options.max_steps {
+            return Err(Error::TooManySteps { t: t.to_f64(), steps: tried });
+        }
+        run.check_step(t, h, refusal)?;
+        tried += 1;
+        let error = match step.take(t, h) {
+            Ok(()) => step.error(h, run.base.rtol.as_ref(), run.base.atol.as_ref()),
+            Err(_) => f64::NAN,
+        };
+        if !error.is_finite() {
+            run.statistics.failed += 1;
+            refusal = Refusal::NotFinite;
+            h = h * T::from_f64(0.5);
+            rejected = true;
+            continue;
+        }
+        let factor = controller.factor(error, 1.0 / B::ORDER, B::MEMORY, B::RANGE);
+        if error > 1.0 {
+            run.statistics.rejected += 1;
+            refusal = Refusal::Error;
+            h = h * T::from_f64(factor.min(1.0));
+            rejected = true;
+            continue;
+        }
+        run.statistics.steps += 1;
+        if run.record {
+            run.tape.push(t, h, 0, x.as_slice(), &[])?;
+        }
+        let end = if last { span.end } else { t + h };
+        let (start, length) = (t, h);
+        let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
+            step.interpolate(start, length, (time - start) / length, dense)
+        };
+        after(&mut Accepted { evaluate: &mut evaluate, end }, &mut run.base.dense)?;
+        x.as_mut_slice().copy_from_slice(step.end());
+        step.advance();
+        t = end;
+        if last {
+            return Ok(x);
+        }
+        let mut next = (h.to_f64().abs() * factor).min(longest);
+        if rejected {
+            next = next.min(h.to_f64().abs());
+        }
+        rejected = false;
+        h = T::from_f64(direction * next);
+    }
+}
+
+/// As long as an explicit Euler step changes the solution, and its derivative, by a hundredth of their size.
+fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    step: &mut dyn Take<M, T>,
+    run: &mut Run<'_, M, T>,
+    x: &VectorX<M, T>,
+    t: T,
+    direction: f64,
+    longest: f64,
+) -> Result<f64, Error> {
+    let mut slope = VectorX::<M, T>::zeroed();
+    slope.as_mut_slice().copy_from_slice(step.slope(t)?);
+    if let Some(given) = run.options.initial_step {
+        return Ok(given.min(longest));
+    }
+    let mut scale = VectorX::<M, T>::zeroed();
+    let tolerances = run.base.rtol.as_ref().iter().zip(run.base.atol.as_ref());
+    for ((scale, (rtol, atol)), x) in scale.as_mut_slice().iter_mut().zip(tolerances).zip(x.as_slice()) {
+        *scale = T::ONE / (*atol + *rtol * x.abs());
+    }
+    let scale = scale.as_slice();
+    let (size, speed) = (norm(x.as_slice(), scale), norm(slope.as_slice(), scale));
+    let guess = if size < 1e-5 || speed < 1e-5 { 1e-6 } else { 0.01 * size / speed };
+    let guess = guess.min(longest);
+    let h = T::from_f64(direction * guess);
+    let mut other = *x;
+    for (other, slope) in other.as_mut_slice().iter_mut().zip(slope.as_slice()) {
+        *other = *other + h * *slope;
+    }
+    step.go(run.base.point.as_ref(), other.as_slice());
+    let mut sum = 0.0;
+    if let Ok(second) = step.slope(t + h) {
+        for ((second, slope), scale) in second.iter().zip(slope.as_slice()).zip(scale) {
+            let change = ((*second - *slope) * *scale).to_f64();
+            sum += change * change;
+        }
+    }
+    step.go(run.base.point.as_ref(), x.as_slice());
+    step.slope(t)?;
+    let largest = speed.max(mean(sum, scale.len()) / guess);
+    let second =
+        if largest <= 1e-15 { (guess * 1e-3).max(1e-6) } else { power(0.01 / largest, 1.0 / B::ORDER) };
+    Ok((100.0 * guess).min(second).min(longest))
+}
+
+macro_rules! explicit {
+    ($($method:ty: $stages:literal),*) => {
+        $(impl<M: Dae, T: Real> Kind<M, T> for $method {
+            type State = Steps<M, $method, T, $stages>;
+        }
+
+        impl<M: Ode, T: Real> Engine<M, T> for $method {
+            fn integrate(
+                state: &mut Self::State,
+                run: &mut Run<'_, M, T>,
+                x0: &VectorX<M, T>,
+                span: Span<T>,
+                after: After<'_, M, T>,
+            ) -> Result<(), Error> {
+                state.integrate(run, x0, span, after)
+            }
+
+            fn interpolate(
+                state: &mut Self::State,
+                inputs: &[T],
+                entry: &Entry<T>,
+                numbers: (&[T], &[T]),
+                t: T,
+                dense: &mut Dense<M, T>,
+            ) -> Result<(), Error> {
+                let step = state.open()?;
+                step.go(inputs, numbers.0);
+                step.slope(entry.t)?;
+                step.take(entry.t, entry.h)?;
+                step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
+            }
+
+            fn replay(state: &mut Self::State, _: usize) -> Result<&mut dyn Replay<M, T>, Error> {
+                Ok(match &mut state.replay {
+                    Some(replay) => &mut **replay,
+                    none => {
+                        let erk = Erk::<M, $method, $stages, T, Heap>::new(Options::default())?;
+                        &mut **none.insert(Box::new(erk))
+                    }
+                })
+            }
+        })*
+    };
+}
+explicit!(DormandPrince5: 6, DormandPrince8: 12);

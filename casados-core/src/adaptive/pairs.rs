@@ -1,0 +1,224 @@
+//! Explicit pairs: two methods on the same stages, whose difference estimates the error, and their dense output.
+//!
+//! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5, II.6 and II.10; the
+//! coefficients of the codes DOPRI5 and DOP853.
+
+use crate::tableau::{DormandPrince5, DormandPrince8, Method};
+
+/// What a method of `S` stages needs besides its tableau. A stage follows them whose point is the end of the step.
+pub trait Pair<const S: usize>: Method<S> {
+    /// The difference to the other method: of the stages, and of the one at the end.
+    const DIFFERENCE: ([f64; S], f64);
+    /// The difference to a third one of low order: the estimate is then that of higher order, as far as the two agree.
+    const COARSE: Option<[f64; S]>;
+    /// The error of one step behaves like `h` to this power.
+    const ORDER: f64;
+    /// By how much a step size may shrink and grow.
+    const RANGE: (f64, f64);
+    /// How much of the last error the controller takes into account.
+    const MEMORY: f64;
+    /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one at the end and of the
+    /// ones before it.
+    const MORE: &'static [More<S>];
+    /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end, of those above.
+    const POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
+}
+
+/// A stage for dense output.
+pub struct More<const S: usize> {
+    /// `c`
+    pub node: f64,
+    /// Of the stages.
+    pub stages: [f64; S],
+    /// Of the one at the end.
+    pub end: f64,
+    /// Of the stages for dense output before it.
+    pub more: [f64; 2],
+}
+
+impl Pair<6> for DormandPrince5 {
+    const DIFFERENCE: ([f64; 6], f64) = (
+        [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0],
+        -1.0 / 40.0,
+    );
+    const COARSE: Option<[f64; 6]> = None;
+    const ORDER: f64 = 5.0;
+    const RANGE: (f64, f64) = (0.2, 10.0);
+    const MEMORY: f64 = 0.04;
+    const MORE: &'static [More<6>] = &[];
+    const POLYNOMIAL: &'static [([f64; 6], f64, [f64; 3])] = &[(
+        [
+            -12715105075.0 / 11282082432.0,
+            0.0,
+            87487479700.0 / 32700410799.0,
+            -10690763975.0 / 1880347072.0,
+            701980252875.0 / 199316789632.0,
+            -1453857185.0 / 822651844.0,
+        ],
+        69997945.0 / 29380423.0,
+        [0.0; 3],
+    )];
+}
+
+impl Pair<12> for DormandPrince8 {
+    const DIFFERENCE: ([f64; 12], f64) = (
+        [
+            0.01312004499419488,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            -1.2251564463762044,
+            -0.4957589496572502,
+            1.6643771824549864,
+            -0.35032884874997366,
+            0.3341791187130175,
+            0.08192320648511571,
+            -0.022355307863886294,
+        ],
+        0.0,
+    );
+    const COARSE: Option<[f64; 12]> = {
+        let mut coarse = *<Self as Method<12>>::TABLEAU.b();
+        coarse[0] -= 0.2440944881889764;
+        coarse[8] -= 0.7338466882816118;
+        coarse[11] -= 0.022058823529411766;
+        Some(coarse)
+    };
+    const ORDER: f64 = 8.0;
+    const RANGE: (f64, f64) = (1.0 / 3.0, 6.0);
+    const MEMORY: f64 = 0.0;
+    const MORE: &'static [More<12>] = &[
+        More {
+            node: 0.1,
+            stages: [
+                0.056167502283047954,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.25350021021662483,
+                -0.2462390374708025,
+                -0.12419142326381637,
+                0.15329179827876568,
+                0.00820105229563469,
+                0.007567897660545699,
+            ],
+            end: -0.008298,
+            more: [0.0; 2],
+        },
+        More {
+            node: 0.2,
+            stages: [
+                0.03183464816350214,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.028300909672366776,
+                0.053541988307438566,
+                -0.05492374857139099,
+                0.0,
+                0.0,
+                -0.00010834732869724932,
+                0.0003825710908356584,
+            ],
+            end: -0.00034046500868740456,
+            more: [0.1413124436746325, 0.0],
+        },
+        More {
+            node: 7.0 / 9.0,
+            stages: [
+                -0.42889630158379194,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                -4.697621415361164,
+                7.683421196062599,
+                4.06898981839711,
+                0.3567271874552811,
+                0.0,
+                0.0,
+                0.0,
+            ],
+            end: -0.0013990241651590145,
+            more: [2.9475147891527724, -9.15095847217987],
+        },
+    ];
+    const POLYNOMIAL: &'static [([f64; 12], f64, [f64; 3])] = &[
+        (
+            [
+                -8.428938276109013,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.5667149535193777,
+                -3.0689499459498917,
+                2.38466765651207,
+                2.117034582445028,
+                -0.871391583777973,
+                2.2404374302607883,
+                0.6315787787694688,
+            ],
+            -0.08899033645133331,
+            [18.148505520854727, -9.194632392478356, -4.436036387594894],
+        ),
+        (
+            [
+                10.427508642579134,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                242.28349177525817,
+                165.20045171727028,
+                -374.5467547226902,
+                -22.113666853125306,
+                7.733432668472264,
+                -30.674084731089398,
+                -9.332130526430229,
+            ],
+            15.697238121770845,
+            [-31.139403219565178, -9.35292435884448, 35.81684148639408],
+        ),
+        (
+            [
+                19.985053242002433,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                -387.0373087493518,
+                -189.17813819516758,
+                527.8081592054236,
+                -11.57390253995963,
+                6.8812326946963,
+                -1.0006050966910838,
+                0.7777137798053443,
+            ],
+            -2.778205752353508,
+            [-60.19669523126412, 84.32040550667716, 11.99229113618279],
+        ),
+        (
+            [
+                -25.69393346270375,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                -154.18974869023643,
+                -231.5293791760455,
+                357.6391179106141,
+                93.40532418362432,
+                -37.45832313645163,
+                104.0996495089623,
+                29.8402934266605,
+            ],
+            -43.53345659001114,
+            [96.32455395918828, -39.17726167561544, -149.72683625798564],
+        ),
+    ];
+}
