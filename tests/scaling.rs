@@ -50,6 +50,8 @@ oscillators! {
     mixed_too mixed_too_literal MixedToo MixedTooLiteral [1.0, 1e-150, 1e150];
     mixed_more mixed_more_literal MixedMore MixedMoreLiteral [1e200, 1e-200, 1.0];
     mixed_most mixed_most_literal MixedMost MixedMostLiteral [1e-200, 1e200, 1.0];
+    far far_literal Far FarLiteral [1.0, 1e200, 1e-200];
+    farther farther_literal Farther FartherLiteral [1.0, 1e-200, 1e200];
 }
 
 /// `x₊` alone, and `x₊`, `dx₊/dx₀`, `dx₊/du`, the gradient and the Hessian of `λᵀx₊` by `x₀`, one after the other.

@@ -14,7 +14,7 @@ pub struct Dense<M: Dae, T: Plain, const S: usize> {
     rows: ArrayK<M, [ArrayK<M, [T; S]>; S]>,
     /// The row that was exchanged with row `k` in step `k`.
     pivots: ArrayK<M, [u32; S]>,
-    /// The largest element of each row of `A`.
+    /// What each row is multiplied by: 1 / its largest element, in the order of the pivots.
     scales: ArrayK<M, [T; S]>,
 }
 
@@ -59,13 +59,16 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
         let pivots = self.pivots.as_mut().as_flattened_mut();
         let scales = self.scales.as_mut().as_flattened_mut();
         let n = rows.len();
-        for (scale, row) in scales.iter_mut().zip(rows.iter()) {
-            *scale = row.as_ref().as_flattened().iter().fold(T::ZERO, |m, a| a.abs().max(m));
+        for (scale, row) in scales.iter_mut().zip(rows.iter_mut()) {
+            let row = row.as_mut().as_flattened_mut();
+            let largest = row.iter().fold(T::ZERO, |m, a| a.abs().max(m));
+            *scale = if largest > T::ZERO { T::from_f64(1.0) / largest } else { T::from_f64(1.0) };
+            row.iter_mut().for_each(|a| *a = *a * *scale);
         }
         for k in 0..n {
             let (mut best, mut at) = (T::ZERO, k);
-            for (i, (row, scale)) in rows.iter().zip(scales.iter()).enumerate().skip(k) {
-                let size = row.as_ref().as_flattened()[k].abs() / *scale;
+            for (i, row) in rows.iter().enumerate().skip(k) {
+                let size = row.as_ref().as_flattened()[k].abs();
                 if size > best {
                     (best, at) = (size, i);
                 }
@@ -110,6 +113,7 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
         for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate() {
             b.swap(k, *pivot as usize);
         }
+        self.scale(b);
         for (i, row) in rows.iter().enumerate() {
             let (before, here) = b.split_at_mut(i);
             let Some(here) = here.first_mut() else { return };
@@ -129,6 +133,13 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
                 }
             }
             divide(here.as_mut(), row[i]);
+        }
+    }
+
+    /// Multiplies the rows as those of the matrix were.
+    fn scale<R: Array<T>>(&self, b: &mut [R]) {
+        for (row, scale) in b.iter_mut().zip(self.scales.as_ref().as_flattened()) {
+            row.as_mut().iter_mut().for_each(|b| *b = *b * *scale);
         }
     }
 
@@ -156,6 +167,7 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
                 }
             }
         }
+        self.scale(b);
         for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate().rev() {
             b.swap(k, *pivot as usize);
         }
