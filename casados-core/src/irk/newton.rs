@@ -28,7 +28,7 @@ use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
-const ROUNDING: f64 = 4.0;
+const ROUNDING: f64 = 1.0;
 
 /// Linear equations are refined so often if one iteration was not enough.
 const REFINEMENTS: usize = 4;

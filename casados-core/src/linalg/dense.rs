@@ -137,7 +137,7 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
     }
 
     /// Multiplies the rows as those of the matrix were.
-    fn scale<R: Array<T>>(&self, b: &mut [R]) {
+    fn scale<R: Array<E>>(&self, b: &mut [R]) {
         for (row, scale) in b.iter_mut().zip(self.scales.as_ref().as_flattened()) {
             row.as_mut().iter_mut().for_each(|b| *b = *b * *scale);
         }

@@ -58,18 +58,21 @@ macro_rules! side_by_side {
             computation: C,
         ) -> Result<(), C> {
             use crate::scalar::lanes;
-            if const { S > 0 && S <= $few } {
-                computation.call::<lanes::$base<S>>();
-                return Ok(());
-            }
+            // Two numbers have a register of four where there is one: with fused products, elementary functions in it
+            // take half the time of those in a register of two.
             #[cfg(target_arch = "x86_64")]
-            if const { S > $few && S <= $more } && lanes::level() >= lanes::Level::Avx2 {
+            if const { S > 1 && S <= $more } && lanes::level() >= lanes::Level::Avx2 {
                 computation.call::<lanes::$avx2<S>>();
                 return Ok(());
             }
             #[cfg(target_arch = "x86_64")]
             if const { S > $more && S <= $most } && lanes::level() >= lanes::Level::Avx512 {
                 computation.call::<lanes::$avx512<S>>();
+                return Ok(());
+            }
+            #[cfg(target_arch = "aarch64")]
+            if const { S > 1 && S <= $few } {
+                computation.call::<lanes::$base<S>>();
                 return Ok(());
             }
             Err(computation)
