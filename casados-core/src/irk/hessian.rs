@@ -355,13 +355,10 @@ fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: 
     let mut tile = [[E::from_f64(0.0); COLUMNS]; ROWS];
     for &variable in curved {
         let (Some(d), Some(g)) = (d.get(variable as usize), g.get(variable as usize)) else { continue };
-        let d = d.as_ref().get(row..).and_then(|d| d.first_chunk::<ROWS>());
-        let g = g.as_ref().get(column..).and_then(|g| g.first_chunk::<COLUMNS>());
-        let (Some(d), Some(g)) = (d, g) else { continue };
+        let (Some(d), Some(g)) = (d.as_ref().get(row..), g.as_ref().get(column..)) else { continue };
+        let (Some(d), Some(g)) = (d.first_chunk::<ROWS>(), g.first_chunk::<COLUMNS>()) else { continue };
         for (tile, &d) in tile.iter_mut().zip(d) {
-            for (tile, &g) in tile.iter_mut().zip(g) {
-                *tile = A::subtract(*tile, d, g);
-            }
+            A::subtract_row(tile, d, g);
         }
     }
     for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)) {

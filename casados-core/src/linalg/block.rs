@@ -52,9 +52,7 @@ pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     }
     for (column, other) in block.iter().zip(other) {
         for (&element, packet) in column.iter().zip(packet.iter_mut()) {
-            for (packet, &other) in packet.iter_mut().zip(other) {
-                *packet = A::subtract(*packet, element, other);
-            }
+            A::subtract_row(packet, element, other);
         }
     }
 }
@@ -68,9 +66,7 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
 ) {
     for (column, packet) in block.iter().zip(packet) {
         for (&element, other) in column.iter().zip(other) {
-            for (packet, &other) in packet.iter_mut().zip(other) {
-                *packet = A::subtract(*packet, element, other);
-            }
+            A::subtract_row(packet, element, other);
         }
     }
 }

@@ -21,6 +21,8 @@ pub trait Arithmetic {
     );
     /// `target − block · x`
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]);
+    /// `target − factor · row`
+    fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]);
 }
 
 /// Rounded twice.
@@ -49,6 +51,12 @@ impl Arithmetic for Separate {
             }
         }
     }
+    #[inline(always)]
+    fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
+        for (target, &element) in target.iter_mut().zip(row) {
+            *target = *target - factor * element;
+        }
+    }
 }
 
 /// Rounded once, in one instruction.
@@ -72,6 +80,10 @@ impl Arithmetic for Fused {
     #[inline(always)]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
         E::subtract_columns(target, block, x);
+    }
+    #[inline(always)]
+    fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
+        E::subtract_row(target, factor, row);
     }
 }
 

@@ -80,6 +80,15 @@ pub trait Field:
         }
     }
 
+    /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the
+    /// machine.
+    #[inline(always)]
+    fn subtract_row<const W: usize>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
+        for (target, &element) in target.iter_mut().zip(row) {
+            *target = target.subtract_product(factor, element);
+        }
+    }
+
     /// `|a| < |b|`
     fn is_smaller(self, other: Self) -> Self::Mask;
 

@@ -107,6 +107,19 @@ macro_rules! blocks {
                 }
             }
         }
+        #[inline(always)]
+        fn subtract_row<const W: usize>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
+            use crate::scalar::lanes::$avx2 as Register;
+            let (target, target_rest) = target.as_chunks_mut::<$more>();
+            let (row, row_rest) = row.as_chunks::<$more>();
+            for (target, row) in target.iter_mut().zip(row) {
+                let (t, r) = (Register::<$more>::load(target), Register::<$more>::load(row));
+                t.subtract_product(Register::<$more>::splat(factor), r).store(target);
+            }
+            for (target, &element) in target_rest.iter_mut().zip(row_rest) {
+                *target = target.subtract_product(factor, element);
+            }
+        }
     };
 }
 #[cfg(not(target_arch = "x86_64"))]
