@@ -126,18 +126,18 @@ impl Family for Radau {
 }
 
 macro_rules! single {
-    ($($stages:literal: $lanes:literal),*) => {
+    ($($stages:literal: $lanes:literal, $groups:literal);*) => {
         $(impl Family for RadauIIA<$stages> {
             const LEVELS: usize = 1;
             const STAGES: usize = $stages;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-                Ok(Box::new(stages::Radau::<M, T, $stages, $lanes>::new()?))
+                Ok(Box::new(stages::Radau::<M, T, $stages, $lanes, $groups>::new()?))
             }
         })*
     };
 }
-// As many lanes as there are eigenvalues, filled up to registers.
-single!(3: 2, 5: 4, 7: 4);
+// As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
+single!(3: 2, 1; 5: 4, 2; 7: 4, 2);
 
 macro_rules! methods {
     ($($method:ty),*) => {

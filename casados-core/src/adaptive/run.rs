@@ -325,7 +325,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 Ok(())
             };
             after(&mut Accepted { evaluate: &mut evaluate, end }, dense)?;
-            self.base.point = *stages.end();
+            stages.end(&mut self.base.point);
             t = end;
             if let Some(time) = self.base.point.as_mut().last_mut() {
                 *time = t;

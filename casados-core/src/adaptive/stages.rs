@@ -2,19 +2,24 @@
 //!
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for `f(ẋ, x, z, t) = 0` with unknowns
 //! `k_i`, `z_i` instead of increments of `y`.
+//!
+//! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of the last repeats the
+//! last stage.
 
 use super::norm::{mean, norm};
 use super::replay::{Replay, Single, single};
 use crate::error::Error;
-use crate::irk::not_finite;
+use crate::irk::{dot, not_finite};
 use crate::linalg::{Arithmetic, Complex, EigenFactors, Eigenbasis, Kernel, Rows, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
-use crate::scalar::{Real, Scalar};
-use crate::shape::{Array, Plain, Shape};
+use crate::scalar::{Lanes, Real, Scalar, SideBySide};
+use crate::shape::{Plain, Shape};
 use crate::tableau::{Method, RadauIIA, Tableau};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
+use core::array::from_fn;
+use core::marker::PhantomData;
 
 /// The most stages.
 pub(super) const MOST: usize = 9;
@@ -101,7 +106,7 @@ pub trait Stages<M: Dae, T: Real> {
     /// [`Failure::NotFinite`]
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
     /// The variables at the end of the step.
-    fn end(&self) -> &ArrayV<M, T>;
+    fn end(&self, point: &mut ArrayV<M, T>);
     /// The step is accepted.
     fn accept(&mut self);
     /// The unknowns `(k, z)` of the accepted step, stages innermost.
@@ -117,92 +122,158 @@ pub trait Stages<M: Dae, T: Real> {
     fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error>;
 }
 
+/// How many stages lie side by side.
+const GROUP: usize = 4;
+
+/// The stages of an unknown.
+type Groups<T, const G: usize> = [[T; GROUP]; G];
+
 /// Memory of a step.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-struct Memory<M: Dae, T: Plain, const S: usize, const L: usize> {
+struct Memory<M: Dae, T: Plain, const S: usize, const L: usize, const G: usize> {
     /// The unknowns `(k, z)` at the stages.
-    y: ArrayK<M, [T; S]>,
+    y: ArrayK<M, Groups<T, G>>,
     /// Those of the last accepted step.
     accepted: ArrayK<M, [T; S]>,
     /// Variables of the model at the stages.
-    points: [ArrayV<M, T>; S],
-    /// Variables at the start of the step.
-    start: ArrayV<M, T>,
-    /// The residual at one stage.
-    f: ArrayK<M, T>,
-    /// The residual at all stages, then the increment.
-    residual: ArrayK<M, [[T; 1]; S]>,
+    points: [ArrayV<M, [T; GROUP]>; G],
+    /// The residual at the stages.
+    f: [ArrayK<M, [T; GROUP]>; G],
     rows: Rows<M, T, L>,
+    /// Variables at one point, and the residual there.
+    point: ArrayV<M, T>,
+    f_point: ArrayK<M, T>,
     /// The estimated error of `(x, z)`.
     error: ArrayK<M, T>,
     factors: EigenFactors<M, T, L>,
 }
 
-/// A step of the Radau IIA method with `S` stages, of which `L = ⌈S/2⌉` eigenvalues count.
-pub struct Radau<M: Dae, T: Real, const S: usize, const L: usize>
+/// A step of the Radau IIA method with `S` stages in `G` groups, for whose eigenvalues there are `L ≥ ⌈S/2⌉` lanes.
+pub struct Radau<M: Dae, T: Real, const S: usize, const L: usize, const G: usize>
 where
     RadauIIA<S>: Method<S>,
 {
     tableau: Tableau<S>,
-    /// Column after column.
-    a: [[T; S]; S],
-    c: [T; S],
+    /// Columns of `A`.
+    a: [Groups<T, G>; S],
+    c: Groups<T, G>,
+    /// Columns of the matrix of right eigenvectors, real and imaginary parts.
+    right: [[Groups<T, G>; 2]; L],
     /// Lagrange polynomials at the start of the step.
     lagrange: [T; S],
+    /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
+    factors: [f64; S],
     basis: Eigenbasis<T, S, L>,
-    memory: Box<Memory<M, T, S, L>>,
+    memory: Box<Memory<M, T, S, L, G>>,
     replay: Option<Box<Single<M, T, S>>>,
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize> Radau<M, T, S, L>
+/// A value of each stage, of which the last is repeated.
+fn groups<T: Real, const G: usize>(stages: usize, value: impl Fn(usize) -> T) -> Groups<T, G> {
+    from_fn(|group| from_fn(|lane| value((GROUP * group + lane).min(stages.saturating_sub(1)))))
+}
+
+impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Radau<M, T, S, L, G>
 where
     RadauIIA<S>: Method<S>,
 {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new() -> Result<Self, Error> {
+        const { assert!(G == S.div_ceil(GROUP), "as many groups as hold the stages") };
         let tableau = <RadauIIA<S> as Method<S>>::TABLEAU;
-        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, L>>() };
-        let mut memory: Box<Memory<M, T, S, L>> = try_zeroed_box().map_err(|()| out_of_memory)?;
-        memory.factors.set_pivoted(false);
+        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, L, G>>() };
+        let memory = try_zeroed_box().map_err(|()| out_of_memory)?;
+        // Radau IIA methods have one: tests construct all.
+        let basis: Eigenbasis<T, S, L> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
+        let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
         Ok(Self {
-            a: core::array::from_fn(|j| core::array::from_fn(|i| T::from_f64(tableau.a()[i][j]))),
-            c: tableau.c().map(T::from_f64),
+            a: from_fn(|j| groups(S, |i| T::from_f64(a[i][j]))),
+            c: groups(S, |i| T::from_f64(c[i])),
+            right: from_fn(|l| [groups(S, |i| right[i].re[l]), groups(S, |i| right[i].im[l])]),
             lagrange: tableau.lagrange(0.0).map(T::from_f64),
-            // Radau IIA methods have one: tests construct all.
-            basis: Eigenbasis::new(&tableau).ok_or(out_of_memory)?,
+            factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
+            basis,
             tableau,
             memory,
             replay: None,
         })
     }
 
-    /// The residual at all stages.
+    /// The Lagrange polynomials of the nodes, without a division.
+    fn polynomials(&self, theta: f64) -> [f64; S] {
+        let c = self.tableau.c();
+        let (mut before, mut after) = (1.0, 1.0);
+        let mut values = self.factors;
+        for (value, c) in values.iter_mut().zip(c) {
+            *value *= before;
+            before *= theta - c;
+        }
+        for (value, c) in values.iter_mut().zip(c).rev() {
+            *value *= after;
+            after *= theta - c;
+        }
+        values
+    }
+
+    /// The residual at all stages, and from there to the rows of the linear systems.
     fn evaluate(&mut self) -> Result<(), Failure> {
-        let Memory { points, f, residual, .. } = &mut *self.memory;
-        for (stage, point) in points.iter().enumerate() {
-            M::residual::<T>(point, f);
-            if not_finite(f.as_ref()).is_some() {
+        let Memory { points, f, rows, point, f_point, .. } = &mut *self.memory;
+        for (group, (points, f)) in points.iter().zip(f.iter_mut()).enumerate() {
+            if let Err(call) = T::side_by_side(Residual::<M, T> { points, f }) {
+                let Residual { points, f } = call;
+                for lane in 0..GROUP.min(S - GROUP * group) {
+                    for (to, from) in point.as_mut().iter_mut().zip(points.as_ref()) {
+                        *to = from[lane];
+                    }
+                    M::residual::<T>(point, f_point);
+                    for (to, from) in f.as_mut().iter_mut().zip(f_point.as_ref()) {
+                        to[lane..].fill(*from);
+                    }
+                }
+            }
+            if not_finite(f.as_ref().as_flattened()).is_some() {
                 return Err(Failure::NotFinite);
             }
-            for (equation, f) in f.as_ref().iter().enumerate() {
-                residual[slot::<M>(equation)][stage] = [*f];
-            }
         }
+        dispatch(Split::<M, T, S, L, G> {
+            left: self.basis.left(),
+            f: from_fn(|group| f[group].as_ref()),
+            rows: rows.as_mut(),
+            model: PhantomData,
+        });
         Ok(())
     }
 
-    /// The estimated error of `(x, z)` from the defect at the point in `start`.
+    /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of the squares of the
+    /// changes of `(ξ, z)` relative to what is tolerated.
+    fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
+        let Memory { y, points, rows, .. } = &mut *self.memory;
+        let mut points = points.each_mut().map(|points| points.as_mut());
+        let sum = dispatch(Advance {
+            a: self.a.map(|column| column.map(|group| group.map(|a| start.h * a))),
+            right: &self.right,
+            x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
+            scale: start.scale.as_ref(),
+            rows: if increment { rows.as_ref() } else { &[] },
+            y: y.as_mut(),
+            points: &mut points,
+        });
+        // Each stage once.
+        sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
+    }
+
+    /// The estimated error of `(x, z)` from the defect at the point that is there.
     fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
-        let Memory { start, f, rows, error, factors, .. } = &mut *self.memory;
+        let Memory { point, f_point, rows, error, factors, .. } = &mut *self.memory;
         *residuals += 1;
-        M::residual::<T>(start, f);
-        if not_finite(f.as_ref()).is_some() {
+        M::residual::<T>(point, f_point);
+        if not_finite(f_point.as_ref()).is_some() {
             return Err(Failure::NotFinite);
         }
         // The real system is the first.
-        for (equation, f) in f.as_ref().iter().enumerate() {
+        for (equation, f) in f_point.as_ref().iter().enumerate() {
             let [[row]] = &mut rows[slot::<M>(equation)];
             *row = Complex::ZERO;
             row.re[0] = -*f;
@@ -216,7 +287,7 @@ where
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize> Stages<M, T> for Radau<M, T, S, L>
+impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Stages<M, T> for Radau<M, T, S, L, G>
 where
     RadauIIA<S>: Method<S>,
 {
@@ -238,25 +309,15 @@ where
         let nx = M::Shape::NX;
         let (xdot, z) = (&point.as_ref()[..nx], &point.as_ref()[2 * nx..]);
         for (y, value) in self.memory.y.as_mut().iter_mut().zip(xdot.iter().chain(z)) {
-            *y = [*value; S];
+            *y = [[*value; GROUP]; G];
         }
     }
 
     fn continue_from_last(&mut self, ratio: f64) {
-        let weights: [[f64; S]; S] =
-            core::array::from_fn(|i| self.tableau.lagrange(1.0 + self.tableau.c()[i] * ratio));
-        // Column after column.
-        let weights: [[T; S]; S] =
-            core::array::from_fn(|j| core::array::from_fn(|i| T::from_f64(weights[i][j])));
+        let weights: [[f64; S]; S] = from_fn(|i| self.polynomials(1.0 + self.tableau.c()[i] * ratio));
+        let weights = from_fn(|j| groups(S, |i| T::from_f64(weights[i][j])));
         let Memory { y, accepted, .. } = &mut *self.memory;
-        for (y, accepted) in y.as_mut().iter_mut().zip(accepted.as_ref()) {
-            *y = [T::ZERO; S];
-            for (weights, accepted) in weights.iter().zip(accepted) {
-                for (y, weight) in y.iter_mut().zip(weights) {
-                    *y = *y + *weight * *accepted;
-                }
-            }
-        }
+        dispatch(Continue { weights, from: accepted.as_ref(), to: y.as_mut() });
     }
 
     fn adopt(&mut self, other: &dyn Stages<M, T>) {
@@ -278,16 +339,16 @@ where
         convergence: &mut Convergence,
         residuals: &mut usize,
     ) -> Result<(), Failure> {
-        let Start { point, scale, h } = *start;
-        let t = point.as_ref().last().copied().unwrap_or(T::ZERO);
-        for (to, c) in self.memory.points.iter_mut().zip(&self.c) {
-            *to = *point;
-            if let Some(time) = to.as_mut().last_mut() {
-                *time = t + *c * h;
+        let t = start.point.as_ref().last().copied().unwrap_or(T::ZERO);
+        for (points, c) in self.memory.points.iter_mut().zip(&self.c) {
+            for (to, from) in points.as_mut().iter_mut().zip(start.point.as_ref()) {
+                *to = [*from; GROUP];
+            }
+            if let Some(time) = points.as_mut().last_mut() {
+                *time = c.map(|c| t + c * start.h);
             }
         }
-        self.memory.residual.as_mut().fill([[T::ZERO]; S]);
-        self.advance(point, scale, h);
+        self.advance(start, false);
         let most = (ITERATIONS + MORE_ITERATIONS * (S as f64 - 3.0)).max(4.0) as usize;
         convergence.most = most;
         convergence.factor = Scalar::powf(convergence.factor.max(f64::EPSILON), 0.8);
@@ -296,9 +357,9 @@ where
         for iteration in 1..=most {
             *residuals += S;
             self.evaluate()?;
-            let Memory { residual, rows, factors, .. } = &mut *self.memory;
-            factors.solve_stages(&self.basis, residual, rows);
-            let increment = mean(self.advance(point, scale, h), M::Shape::NK * S);
+            let Memory { rows, factors, .. } = &mut *self.memory;
+            factors.solve(rows);
+            let increment = mean(self.advance(start, true), M::Shape::NK * S);
             convergence.iterations = iteration;
             if !increment.is_finite() {
                 return Err(Failure::Diverges);
@@ -316,10 +377,11 @@ where
                     let left = (most - 1 - iteration) as i32;
                     let expected =
                         convergence.factor * increment * Scalar::powi(convergence.rate, left) / tolerance;
-                    let left = f64::from(left);
                     if expected >= 1.0 {
                         let excess = expected.clamp(1e-4, 20.0);
-                        return Err(Failure::Slow(0.8 * Scalar::powf(excess, -1.0 / (4.0 + left))));
+                        return Err(Failure::Slow(
+                            0.8 * Scalar::powf(excess, -1.0 / (4.0 + f64::from(left))),
+                        ));
                     }
                 }
             }
@@ -334,16 +396,16 @@ where
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
         // What the method misses is how far the derivative of its polynomial, extrapolated to the start of the step,
         // is from the solution there.
-        self.memory.start = *start.point;
-        for (xdot, k) in self.memory.start.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
-            *xdot = crate::irk::dot(&self.lagrange, k);
+        self.memory.point = *start.point;
+        for (xdot, k) in self.memory.point.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
+            *xdot = dot(&self.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
         }
         self.defect(start.h, residuals)?;
         let error = norm(self.memory.error.as_ref(), start.scale.as_ref());
         if !(again && error >= 1.0) {
             return Ok(error);
         }
-        let states = &mut self.memory.start.as_mut()[M::Shape::NX..];
+        let states = &mut self.memory.point.as_mut()[M::Shape::NX..];
         for (state, error) in states.iter_mut().zip(self.memory.error.as_ref()) {
             *state = *state + *error;
         }
@@ -351,13 +413,19 @@ where
         Ok(norm(self.memory.error.as_ref(), start.scale.as_ref()))
     }
 
-    fn end(&self) -> &ArrayV<M, T> {
-        // There is a last stage: methods have at least one.
-        &self.memory.points[S - 1]
+    fn accept(&mut self) {
+        let Memory { y, accepted, .. } = &mut *self.memory;
+        for (accepted, y) in accepted.as_mut().iter_mut().zip(y.as_ref()) {
+            accepted.copy_from_slice(&y.as_flattened()[..S]);
+        }
     }
 
-    fn accept(&mut self) {
-        self.memory.accepted = self.memory.y;
+    fn end(&self, point: &mut ArrayV<M, T>) {
+        // The last lane repeats the last stage, which is the end of the step.
+        let Some(points) = self.memory.points.last() else { return };
+        for (to, [.., last]) in point.as_mut().iter_mut().zip(points.as_ref()) {
+            *to = *last;
+        }
     }
 
     fn accepted(&self) -> &[T] {
@@ -365,7 +433,7 @@ where
     }
 
     fn lagrange(&self, theta: f64) -> [f64; MOST] {
-        padded(self.tableau.lagrange(theta))
+        padded(self.polynomials(theta))
     }
 
     fn weights(&self, theta: f64) -> [f64; MOST] {
@@ -380,27 +448,6 @@ where
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize> Radau<M, T, S, L>
-where
-    RadauIIA<S>: Method<S>,
-{
-    /// `y ← y − Δ` with `Δ` where the residual was, and the stages moved there: the sum of the squares of the changes
-    /// of `(ξ, z)` relative to what is tolerated.
-    fn advance(&mut self, point: &ArrayV<M, T>, scale: &ArrayK<M, T>, h: T) -> f64 {
-        let Memory { y, points, residual, .. } = &mut *self.memory;
-        let nx = M::Shape::NX;
-        dispatch(Advance {
-            a: self.a.map(|column| column.map(|a| h * a)),
-            x: &point.as_ref()[nx..2 * nx],
-            scale: scale.as_ref(),
-            increment: residual.as_ref(),
-            y: y.as_mut(),
-            points,
-        })
-        .to_f64()
-    }
-}
-
 fn padded<const S: usize>(weights: [f64; S]) -> [f64; MOST] {
     let mut all = [0.0; MOST];
     for (to, from) in all.iter_mut().zip(weights) {
@@ -409,58 +456,143 @@ fn padded<const S: usize>(weights: [f64; S]) -> [f64; MOST] {
     all
 }
 
-struct Advance<'a, V, T, const S: usize> {
-    /// `h A`, column after column.
-    a: [[T; S]; S],
+/// The residual at four stages in one call.
+struct Residual<'a, M: Dae, T: Real> {
+    points: &'a ArrayV<M, [T; GROUP]>,
+    f: &'a mut ArrayK<M, [T; GROUP]>,
+}
+
+impl<M: Dae, T: Real> SideBySide<T, GROUP> for Residual<'_, M, T> {
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [T; GROUP]>>(self) {
+        M::residual::<R>(self.points, self.f);
+    }
+}
+
+/// `V⁻¹ f` in the slots of the equations.
+struct Split<'a, M: Dae, T, const S: usize, const L: usize, const G: usize> {
+    left: &'a [Complex<T, L>; S],
+    f: [&'a [[T; GROUP]]; G],
+    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for Split<'_, M, T, S, L, G> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { left, f, rows, .. } = self;
+        for equation in 0..rows.len() {
+            let mut values = [[T::ZERO; GROUP]; G];
+            for (values, f) in values.iter_mut().zip(&f) {
+                if let Some(f) = f.get(equation) {
+                    *values = *f;
+                }
+            }
+            let mut sum = Complex::ZERO;
+            for (left, value) in left.iter().zip(values.as_flattened()) {
+                for l in 0..L {
+                    sum.re[l] = A::subtract(sum.re[l], -left.re[l], *value);
+                    sum.im[l] = A::subtract(sum.im[l], -left.im[l], *value);
+                }
+            }
+            if let Some([[row]]) = rows.get_mut(slot::<M>(equation)) {
+                *row = sum;
+            }
+        }
+    }
+}
+
+/// See [`Radau::advance`].
+struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
+    /// Columns of `h A`.
+    a: [Groups<T, G>; S],
+    right: &'a [[Groups<T, G>; 2]; L],
     /// The states at the start of the step.
     x: &'a [T],
     scale: &'a [T],
-    increment: &'a [[[T; 1]; S]],
-    y: &'a mut [[T; S]],
-    points: &'a mut [V; S],
+    rows: &'a [[[Complex<T, L>; 1]; 1]],
+    y: &'a mut [Groups<T, G>],
+    points: &'a mut [&'b mut [[T; GROUP]]; G],
 }
 
-impl<T: Real, V: Array<T>, const S: usize> Kernel for Advance<'_, V, T, S> {
-    type Output = T;
+impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance<'_, '_, T, S, L, G> {
+    type Output = Groups<T, G>;
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> T {
-        let Self { a, x, scale, increment, y, points } = self;
+    fn run<A: Arithmetic>(self) -> Groups<T, G> {
+        let Self { a, right, x, scale, rows, y, points } = self;
         let nx = x.len();
-        let mut sum = [T::ZERO; S];
-        for (index, ((y, increment), scale)) in y.iter_mut().zip(increment).zip(scale).enumerate() {
-            for (y, [increment]) in y.iter_mut().zip(increment) {
-                *y = *y - *increment;
-            }
-            let Some(x) = x.get(index) else {
-                for ((point, y), (sum, [increment])) in
-                    points.iter_mut().zip(y.iter()).zip(sum.iter_mut().zip(increment))
-                {
-                    let relative = *increment * *scale;
-                    *sum = A::subtract(*sum, -relative, relative);
-                    if let Some(to) = point.as_mut().get_mut(nx + index) {
-                        *to = *y;
+        let mut sums = [[T::ZERO; GROUP]; G];
+        for (index, (y, &scale)) in y.iter_mut().zip(scale).enumerate() {
+            let before = *y;
+            if let Some([[row]]) = rows.get(index) {
+                for (l, [re, im]) in right.iter().enumerate() {
+                    for g in 0..G {
+                        for i in 0..GROUP {
+                            let partial = A::subtract(y[g][i], re[g][i], row.re[l]);
+                            y[g][i] = A::subtract(partial, -im[g][i], row.im[l]);
+                        }
                     }
                 }
-                continue;
-            };
-            let mut xi = [*x; S];
-            for (a, k) in a.iter().zip(y.iter()) {
-                for (xi, a) in xi.iter_mut().zip(a) {
-                    *xi = A::subtract(*xi, -*a, *k);
-                }
             }
-            for (((point, y), xi), sum) in points.iter_mut().zip(y.iter()).zip(xi).zip(&mut sum) {
-                let point = point.as_mut();
-                if let Some(k) = point.get_mut(index) {
-                    *k = *y;
+            if let Some(&x) = x.get(index) {
+                let mut xi = [[x; GROUP]; G];
+                for (a, &k) in a.iter().zip(y.as_flattened()) {
+                    for g in 0..G {
+                        for i in 0..GROUP {
+                            xi[g][i] = A::subtract(xi[g][i], -a[g][i], k);
+                        }
+                    }
                 }
-                if let Some(state) = point.get_mut(nx + index) {
-                    let relative = (xi - *state) * *scale;
-                    *sum = A::subtract(*sum, -relative, relative);
-                    *state = xi;
+                for g in 0..G {
+                    if let Some(k) = points[g].get_mut(index) {
+                        *k = y[g];
+                    }
+                    let Some(state) = points[g].get_mut(nx + index) else { continue };
+                    for i in 0..GROUP {
+                        let relative = (xi[g][i] - state[i]) * scale;
+                        sums[g][i] = A::subtract(sums[g][i], -relative, relative);
+                    }
+                    *state = xi[g];
+                }
+            } else {
+                for g in 0..G {
+                    for i in 0..GROUP {
+                        let relative = (y[g][i] - before[g][i]) * scale;
+                        sums[g][i] = A::subtract(sums[g][i], -relative, relative);
+                    }
+                    if let Some(z) = points[g].get_mut(nx + index) {
+                        *z = y[g];
+                    }
                 }
             }
         }
-        sum.into_iter().fold(T::ZERO, |total, sum| total + sum)
+        sums
+    }
+}
+
+/// The polynomial of the last step at the stages of this one.
+struct Continue<'a, T, const S: usize, const G: usize> {
+    /// Columns of its weights.
+    weights: [Groups<T, G>; S],
+    from: &'a [[T; S]],
+    to: &'a mut [Groups<T, G>],
+}
+
+impl<T: Real, const S: usize, const G: usize> Kernel for Continue<'_, T, S, G> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            let mut sum = [[T::ZERO; GROUP]; G];
+            for (weights, &value) in self.weights.iter().zip(from) {
+                for g in 0..G {
+                    for i in 0..GROUP {
+                        sum[g][i] = A::subtract(sum[g][i], -weights[g][i], value);
+                    }
+                }
+            }
+            *to = sum;
+        }
     }
 }

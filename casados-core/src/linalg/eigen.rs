@@ -15,7 +15,6 @@
 use super::complex::Complex;
 use super::dense::Dense;
 use super::factors::slot;
-use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse;
 use crate::model::{ArrayK, Assembly, Dae};
 use crate::scalar::Real;
@@ -49,28 +48,14 @@ impl<T: Real, const S: usize, const L: usize> Eigenbasis<T, S, L> {
         &self.values
     }
 
-    /// `b̂ = V⁻¹ b`
-    #[inline(always)]
-    pub fn split<A: Arithmetic>(&self, b: impl Iterator<Item = T>) -> Complex<T, L> {
-        let mut sum = Complex::ZERO;
-        for (left, b) in self.left.iter().zip(b) {
-            for l in 0..L {
-                sum.re[l] = A::subtract(sum.re[l], -left.re[l], b);
-                sum.im[l] = A::subtract(sum.im[l], -left.im[l], b);
-            }
-        }
-        sum
+    /// Columns of `V⁻¹`, one for each stage.
+    pub fn left(&self) -> &[Complex<T, L>; S] {
+        &self.left
     }
 
-    /// `y_i` of `y = V ŷ`
-    #[inline(always)]
-    pub fn join<A: Arithmetic>(&self, stage: usize, y: &Complex<T, L>) -> T {
-        let right = &self.right[stage];
-        let mut sum = T::ZERO;
-        for l in 0..L {
-            sum = A::subtract(A::subtract(sum, -right.re[l], y.re[l]), right.im[l], y.im[l]);
-        }
-        sum
+    /// Rows of `V`, one for each stage, with a factor of two where they stand for a conjugate too: `y_i = Re Σ_l v_il ŷ_l`.
+    pub fn right(&self) -> &[Complex<T, L>; S] {
+        &self.right
     }
 }
 
@@ -342,53 +327,6 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
             }
         }
     }
-
-    /// Solves the Newton system of the stages in place: `b` has one row for each slot, of all stages, as
-    /// [`Factors::solve`](super::Factors::solve) has it. `rows` is memory to work in.
-    pub fn solve_stages<const S: usize>(
-        &self,
-        basis: &Eigenbasis<T, S, L>,
-        b: &mut ArrayK<M, [[T; 1]; S]>,
-        rows: &mut Rows<M, T, L>,
-    ) {
-        dispatch(Split { basis, b: b.as_ref(), rows: rows.as_mut() });
-        self.solve(rows);
-        dispatch(Join { basis, b: b.as_mut(), rows: rows.as_ref() });
-    }
-}
-
-struct Split<'a, T, const S: usize, const L: usize> {
-    basis: &'a Eigenbasis<T, S, L>,
-    b: &'a [[[T; 1]; S]],
-    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
-}
-
-impl<T: Real, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
-            *row = self.basis.split::<A>(b.iter().map(|[b]| *b));
-        }
-    }
-}
-
-struct Join<'a, T, const S: usize, const L: usize> {
-    basis: &'a Eigenbasis<T, S, L>,
-    b: &'a mut [[[T; 1]; S]],
-    rows: &'a [[[Complex<T, L>; 1]; 1]],
-}
-
-impl<T: Real, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for ([[row]], b) in self.rows.iter().zip(self.b) {
-            for (stage, [b]) in b.iter_mut().enumerate() {
-                *b = self.basis.join::<A>(stage, row);
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -401,11 +339,10 @@ mod tests {
     fn check<const S: usize, const L: usize>(tableau: &Tableau<S>) {
         let basis = Eigenbasis::<f64, S, L>::new(tableau).expect("a basis");
         for column in 0..S {
-            let unit = (0..S).map(|j| if j == column { 1.0 } else { 0.0 });
-            let image = *basis.values() * basis.split::<super::super::fused::Separate>(unit);
+            let image = *basis.values() * basis.left()[column];
             for stage in 0..S {
-                let found = basis.join::<super::super::fused::Separate>(stage, &image);
-                let right = basis.right[stage];
+                let right = basis.right()[stage];
+                let found: f64 = (0..L).map(|l| right.re[l] * image.re[l] - right.im[l] * image.im[l]).sum();
                 let terms: f64 =
                     (0..L).map(|l| right.re[l].hypot(right.im[l]) * image.re[l].hypot(image.im[l])).sum();
                 let error = (found - tableau.a()[stage][column]).abs();
