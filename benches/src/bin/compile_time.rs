@@ -30,7 +30,8 @@ fn programs() -> Result<Vec<Program>, Failure> {
     let chain = fs::read_to_string(repository("examples/models/chain.rs"))?;
     let (head, tail) = chain.split_once("NX = [").ok_or("the chain has no list of sizes")?;
     let (_, tail) = tail.split_once(']').ok_or("the list of sizes has no end")?;
-    let mut all = vec![Program { name: "aircraft".into(), source: awe, model: "Awe".into(), method: "RadauIIA<4>" }];
+    let mut all =
+        vec![Program { name: "aircraft".into(), source: awe, model: "Awe".into(), method: "RadauIIA<4>" }];
     for masses in [5, 9, 17, 33] {
         let nx = 6 * (masses - 2) + 3;
         all.push(Program {
@@ -89,8 +90,10 @@ fn main() -> Result<(), casados::Error> {
 
 fn build(folder: &Path) -> Result<f64, Failure> {
     let begin = Instant::now();
-    let output =
-        Command::new(env!("CARGO")).args(["build", "--release", "--quiet", "--target-dir", "target"]).current_dir(folder).output()?;
+    let output = Command::new(env!("CARGO"))
+        .args(["build", "--release", "--quiet", "--target-dir", "target"])
+        .current_dir(folder)
+        .output()?;
     if !output.status.success() {
         return Err(String::from_utf8_lossy(&output.stderr).into_owned().into());
     }
@@ -120,10 +123,10 @@ fn run() -> Result<(), Failure> {
             fs::write(folder.join("src/main.rs"), format!("{main}// {k}\n"))?;
             times.push(build(&folder)?);
         }
-        times.sort_unstable_by(f64::total_cmp);
+        // What else the machine does can only add to it.
+        let seconds = times.into_iter().fold(f64::INFINITY, f64::min);
         let output = Command::new(folder.join("target/release/compile-time")).output()?;
         let operations: f64 = String::from_utf8(output.stdout)?.trim().parse()?;
-        let seconds = times[1];
         if program.name.starts_with("chain") {
             points.push((operations, seconds));
         }

@@ -24,7 +24,11 @@ pub fn measure(casadi: &mut Casadi, effort: Effort) -> Result<Vec<Line>, Failure
     problems.push(("awe", Case::awe()?));
     let mut lines = Vec::new();
     for (problem, mut case) in problems {
-        let (flow, _) = casadi.flow(&case)?;
+        let (mut flow, _) = casadi.flow(&case)?;
+        let columns = flow.forward.len() / case.nx;
+        let product =
+            |j| case.lambda.iter().enumerate().map(|(i, l)| l * flow.forward[i * columns + j]).sum();
+        flow.adjoint = (0..columns).map(product).collect();
         // The orbit's first interval only: one flow.
         case.reference = Some(("flow", flow.clone()));
         case.single = 1;

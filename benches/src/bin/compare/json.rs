@@ -18,7 +18,7 @@ pub fn of(results: &Results) -> Value {
             json!({
                 "case": row.case, "nx": row.nx, "mode": row.mode.name(), "reference": row.reference,
                 "cold": measured(&row.cold), "rounding": measured(&row.rounding),
-                "warm": row.warm.as_ref().map(measured), "forty": row.forty.as_ref().map(measured),
+                "warm": row.warm.as_ref().map(measured), "forty": measured(&row.forty),
                 "casadi": row.casadi.as_ref().map(|passes| passes.iter().map(measured).collect::<Vec<_>>()),
                 "acados_irk": row.acados[0], "acados_gnsf": row.acados[1],
             })

@@ -34,7 +34,7 @@ usage: cargo run --release --manifest-path benches/Cargo.toml [--features diffso
     --seconds S      budget of one measurement, default 0.3; of each of CasADi's two, the same
     --no-peers       casados alone
     --out FOLDER     where compare.md, compare.json and the plots go, default plots/compare
-    --write FILE     the tables go into FILE too, between the lines `<!-- compare -->` and `<!-- end of compare -->`";
+    --write FILE     the tables go into FILE instead, between the lines `<!-- compare -->` and `<!-- end of compare -->`";
 
 /// How long a measurement lasts.
 #[derive(Clone, Copy)]
@@ -154,11 +154,11 @@ fn run() -> Result<(), Failure> {
     let text = report::markdown(&results);
     println!("{text}");
     std::fs::create_dir_all(&arguments.out)?;
-    std::fs::write(arguments.out.join("compare.md"), &text)?;
     std::fs::write(arguments.out.join("compare.json"), json::of(&results).to_string() + "\n")?;
     plots::draw(&results, &arguments.out)?;
-    if let Some(file) = &arguments.write {
-        insert(file, "compare", &text)?;
+    match &arguments.write {
+        Some(file) => insert(file, "compare", &text)?,
+        None => std::fs::write(arguments.out.join("compare.md"), &text)?,
     }
     eprintln!("tables, JSON and plots are in {}", arguments.out.display());
     Ok(())

@@ -158,14 +158,13 @@ fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "| case | mode | one call after the other | than acados IRK |")?;
     writeln!(text, "| --- | --- | --- | --- |")?;
     for row in rows {
-        let Some(forty) = &row.forty else { continue };
-        let ratio = row.acados[0].map(|t| t / forty.time.median);
+        let ratio = row.acados[0].map(|t| t / row.forty.time.median);
         writeln!(
             text,
             "| {} | {} | {} | {} |",
             row.case,
             row.mode.name(),
-            spread(forty),
+            spread(&row.forty),
             optional(ratio, times)
         )?;
     }

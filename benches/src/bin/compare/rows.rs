@@ -35,7 +35,7 @@ pub struct Row {
     /// From the stages of an interval that is 1e-2 away, to 1e-8 / steps.
     pub warm: Option<Measured>,
     /// Forty calls for the intervals of a horizon; one of them.
-    pub forty: Option<Measured>,
+    pub forty: Measured,
     /// CasADi before and after.
     pub casadi: Option<[Measured; 2]>,
     /// acados' IRK and GNSF, carried over; seconds.
@@ -59,7 +59,7 @@ fn affordable(case: &Case, mode: Mode) -> bool {
     }
 }
 
-/// All questions to one case, CasADi before and after.
+/// All questions to one case; to each CasADi before and after.
 pub fn measure_case(case: &Case, casadi: Option<&mut Casadi>, effort: Effort) -> Result<Vec<Row>, Failure> {
     let mut case = case.clone();
     let modes: Vec<Mode> = Mode::ALL.into_iter().filter(|m| affordable(&case, *m)).collect();
@@ -72,22 +72,20 @@ pub fn measure_case(case: &Case, casadi: Option<&mut Casadi>, effort: Effort) ->
     }
     let reference = case.reference.as_ref().map(|(_, values)| values);
 
-    let ask = |casadi: &mut Option<&mut Casadi>| -> Vec<Option<Measured>> {
-        let one = |mode: &Mode| {
-            let casadi = casadi.as_mut().filter(|_| affordable(&case, *mode))?;
-            casadi.time(&case, solver, *mode, effort.seconds, reference).ok()
-        };
-        Mode::ALL.iter().map(one).collect()
-    };
-    let before = ask(&mut casadi);
     let mut rows = Vec::new();
     for mode in Mode::ALL {
+        let ask = |casadi: &mut Option<&mut Casadi>| {
+            let casadi = casadi.as_mut().filter(|_| affordable(&case, mode))?;
+            casadi.time(&case, solver, mode, effort.seconds, reference).ok()
+        };
+        let before = ask(&mut casadi);
         let single = 0..case.single;
         let cold = time(&case, 1e-8, Start::Zero, mode, single.clone(), effort)?;
         let rounding = time(&case, 0.0, Start::Zero, mode, single, effort)?;
         let implicit = case.family != Family::Rk4;
         let warm = implicit.then(|| time(&case, 1e-8, Start::Warm, mode, 0..2, effort)).transpose()?;
         let forty = time(&case, 1e-8, Start::Zero, mode, 0..case.inputs.len(), effort)?;
+        let after = ask(&mut casadi);
         rows.push(Row {
             case: case.name.clone(),
             nx: case.nx,
@@ -99,14 +97,10 @@ pub fn measure_case(case: &Case, casadi: Option<&mut Casadi>, effort: Effort) ->
             cold,
             rounding,
             warm,
-            forty: Some(forty),
-            casadi: None,
+            forty,
+            casadi: before.zip(after).map(|(before, after)| [before, after]),
             acados: [None; 2],
         });
-    }
-    let after = ask(&mut casadi);
-    for (row, (before, after)) in rows.iter_mut().zip(before.into_iter().zip(after)) {
-        row.casadi = before.zip(after).map(|(before, after)| [before, after]);
     }
     Ok(rows)
 }
