@@ -211,7 +211,7 @@ class Call:
                     self.run()
                 samples.append((clock() - start) / repetitions)
             spent = time.perf_counter() - begin
-            if (spent > budget and len(samples) >= 9) or spent > 10 * budget + 1:
+            if (spent > budget and len(samples) >= 3) or spent > 10 * budget + 1:
                 break
         q1, median, q3 = np.percentile(samples, [25, 50, 75]) * 1e-9
         return {"median": median, "q1": q1, "q3": q3, "samples": len(samples)}

@@ -1,7 +1,7 @@
 //! Solvers with step-size control, against the exact flow.
 
 use super::casadi::Casadi;
-use super::rows::{Measured, time};
+use super::rows::{Measured, Timer, in_turn};
 use super::{Effort, Failure};
 use casados::prelude::*;
 use casados_benches::case::{Case, Family, Mode};
@@ -36,8 +36,9 @@ pub fn measure(casadi: &mut Casadi, effort: Effort) -> Result<Vec<Line>, Failure
             let (problem, solver) = (problem.to_owned(), solver.to_owned());
             lines.push(Line { problem, nx: case.nx, solver, mode, measured });
         };
-        for mode in Mode::ALL {
-            let ours = time(&case, 1e-8, Start::Zero, mode, 0..1, effort)?;
+        let timers = Mode::ALL.map(|mode| Timer::new(&case, 1e-8, Start::Zero, mode, 0..1));
+        let ours = in_turn(timers.into_iter().collect::<Result<_, _>>()?, effort)?;
+        for (ours, mode) in ours.into_iter().zip(Mode::ALL) {
             line(&format!("casados, {}", case.name.rsplit_once(' ').map_or("", |(_, m)| m)), mode, Ok(ours));
         }
         let solvers: &[&str] = if case.model == "awe" { &["idas"] } else { &["cvodes", "idas"] };

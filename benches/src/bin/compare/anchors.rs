@@ -25,7 +25,7 @@ impl Anchors {
     /// CasADi here over CasADi there, for the simulation of a case.
     pub fn scale(&self, rows: &[Row], case: &str) -> Option<f64> {
         let row = rows.iter().find(|row| row.case == case && row.mode == Mode::Simulation)?;
-        Some(row.casadi_time()? / self.seconds(case, "casadi", Mode::Simulation)?)
+        Some(row.casadi?.time.median / self.seconds(case, "casadi", Mode::Simulation)?)
     }
 
     /// The median of all cases; not a number without CasADi.

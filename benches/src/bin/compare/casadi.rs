@@ -104,7 +104,7 @@ impl Casadi {
         let samples = answer["time"]["samples"].as_u64().unwrap_or(0) as usize;
         let time = Summary { median: number("median"), q1: number("q1"), q3: number("q3"), samples };
         let values = Values::read(&answer["values"][0]);
-        Ok(Measured { time, error: reference.and_then(|r| values.error(r, mode)) })
+        Ok(Measured { time, error: reference.and_then(|r| values.error(r, mode)), ..Default::default() })
     }
 }
 

@@ -34,7 +34,7 @@ pub fn measure(
     let one = |mode: Mode, solve: &dyn Fn() -> Result<Values, String>| -> Result<Measured, String> {
         let error = solve()?.error(flow, mode);
         let time = sample(effort.budget(), || solve().map(drop))?;
-        Ok(Measured { time, error })
+        Ok(Measured { time, error, ..Default::default() })
     };
     let mut lines = Vec::new();
     for name in ["BDF", "ESDIRK34", "TR-BDF2"] {

@@ -1,7 +1,7 @@
 //! How cost grows with the size of the chain, and what accuracy costs.
 
 use super::casadi::Casadi;
-use super::rows::{Measured, time};
+use super::rows::{Measured, Timer, in_turn};
 use super::{Effort, Failure};
 use casados::prelude::*;
 use casados_benches::case::{Case, Family, Mode};
@@ -17,22 +17,17 @@ pub struct Growth {
 
 impl Growth {
     pub fn measure(masses: &[usize], stages: usize, steps: usize, effort: Effort) -> Result<Self, Failure> {
-        let mut points = Vec::new();
-        for masses in masses {
-            let case = Case::chain(*masses, Family::Gauss, stages, steps);
-            let mut times = [Measured::default(); 4];
-            for (measured, mode) in times.iter_mut().zip(Mode::ALL) {
-                *measured = time(&case, 1e-8, Start::Zero, mode, 0..1, effort)?;
-            }
-            points.push((case.nx, times));
-        }
-        Ok(Self { stages, steps, points })
+        let cases: Vec<_> = masses.iter().map(|m| Case::chain(*m, Family::Gauss, stages, steps)).collect();
+        let questions = cases.iter().flat_map(|case| Mode::ALL.map(|mode| (case, mode)));
+        let timers = questions.map(|(case, mode)| Timer::new(case, 1e-8, Start::Zero, mode, 0..1));
+        let times = in_turn(timers.collect::<Result<_, _>>()?, effort)?;
+        let points = cases.iter().zip(times.chunks_exact(4)).map(|(c, t)| (c.nx, [t[0], t[1], t[2], t[3]]));
+        Ok(Self { stages, steps, points: points.collect() })
     }
 
-    /// The slope of log time over log nx, by least squares over the sizes from `nx` on.
-    pub fn exponent(&self, mode: usize, from: usize) -> f64 {
-        let points = self.points.iter().filter(|(nx, _)| *nx >= from);
-        slope(points.map(|(nx, times)| (*nx as f64, times[mode].time.median)))
+    /// The slope of log time over log nx.
+    pub fn exponent(&self, mode: usize) -> f64 {
+        slope(self.points.iter().map(|(nx, times)| (*nx as f64, times[mode].time.median)))
     }
 }
 
@@ -47,15 +42,24 @@ pub struct Precision {
 /// A chain of 5 masses: Gauss-Legendre with 1 to 5 stages, 1 to 8 steps.
 pub fn work_precision(casadi: &mut Casadi, effort: Effort) -> Result<(Vec<Precision>, f64), Failure> {
     let (flow, uncertainty) = casadi.flow(&Case::chain(5, Family::Gauss, 4, 1))?;
-    let mut all = Vec::new();
+    let mut methods = Vec::new();
+    let mut timers = Vec::new();
     for stages in 1..=5 {
         for steps in [1, 2, 4, 8] {
             let mut case = Case::chain(5, Family::Gauss, stages, steps);
             case.reference = Some(("flow", flow.clone()));
-            let one = |mode| time(&case, 0.0, Start::Zero, mode, 0..1, effort);
-            let (simulation, forward) = (one(Mode::Simulation)?, one(Mode::Forward)?);
-            all.push(Precision { stages, steps, simulation, forward });
+            methods.push((stages, steps));
+            for mode in [Mode::Simulation, Mode::Forward] {
+                timers.push(Timer::new(&case, 0.0, Start::Zero, mode, 0..1)?);
+            }
         }
     }
-    Ok((all, uncertainty))
+    let times = in_turn(timers, effort)?;
+    let all = methods.into_iter().zip(times.chunks_exact(2)).map(|((stages, steps), t)| Precision {
+        stages,
+        steps,
+        simulation: t[0],
+        forward: t[1],
+    });
+    Ok((all.collect(), uncertainty))
 }

@@ -6,7 +6,7 @@ use casados_benches::case::Mode;
 use serde_json::{Value, json};
 
 fn measured(m: &Measured) -> Value {
-    json!({ "median": m.time.median, "q1": m.time.q1, "q3": m.time.q3, "samples": m.time.samples, "error": m.error })
+    json!({ "median": m.time.median, "q1": m.time.q1, "q3": m.time.q3, "samples": m.time.samples, "error": m.error, "iterations": m.iterations, "dense": m.dense })
 }
 
 /// Times in seconds.
@@ -19,7 +19,7 @@ pub fn of(results: &Results) -> Value {
                 "case": row.case, "nx": row.nx, "mode": row.mode.name(), "reference": row.reference,
                 "cold": measured(&row.cold), "rounding": measured(&row.rounding),
                 "warm": row.warm.as_ref().map(measured), "forty": measured(&row.forty),
-                "casadi": row.casadi.as_ref().map(|passes| passes.iter().map(measured).collect::<Vec<_>>()),
+                "casadi": row.casadi.as_ref().map(measured),
                 "acados_irk": row.acados[0], "acados_gnsf": row.acados[1],
             })
         })

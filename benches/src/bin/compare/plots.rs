@@ -88,7 +88,7 @@ fn draw_growth(area: &Area, growth: &Growth) -> Result<(), Failure> {
         let colour = COLOURS[k];
         chart
             .draw_series(LineSeries::new(points.iter().copied(), colour.stroke_width(2)).point_size(3))?
-            .label(format!("{}, nx^{:.2}", label(mode), growth.exponent(k, 0)))
+            .label(format!("{}, nx^{:.2}", label(mode), growth.exponent(k)))
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
     }
     chart
@@ -97,6 +97,13 @@ fn draw_growth(area: &Area, growth: &Growth) -> Result<(), Failure> {
         .background_style(WHITE)
         .draw()?;
     Ok(())
+}
+
+/// Labels at 1, 2, 5, 10, ... only: the others would overlap.
+fn round(value: f64) -> String {
+    let digit = value / 10f64.powf(value.log10().floor());
+    let known = [1.0, 2.0, 5.0, 10.0].iter().any(|d| (digit - d).abs() < 1e-6);
+    if known { format!("{value:.0}") } else { String::new() }
 }
 
 fn draw_precision(
@@ -122,7 +129,7 @@ fn draw_precision(
         .y_desc("relative error")
         .light_line_style(TRANSPARENT)
         .bold_line_style(GRID)
-        .x_label_formatter(&|v| three(*v))
+        .x_label_formatter(&|v| round(*v))
         .y_label_formatter(&|v| format!("{v:.0e}"))
         .draw()?;
     for stages in 1..=5 {
@@ -171,7 +178,9 @@ fn draw_speedup(area: &Area, results: &Results) -> Result<(), Failure> {
         .x_label_formatter(&|x| {
             let at = x - 0.5;
             let case = if (at - at.round()).abs() < 1e-6 { cases.get(at.round() as usize) } else { None };
-            case.map_or_else(String::new, |case| case.replace("chain ", "ch"))
+            case.map_or_else(String::new, |case| {
+                case.replace("chain ", "ch").replace("pendulum", "pend").replace("radau ", "")
+            })
         })
         .y_label_formatter(&|v| three(*v))
         .draw()?;

@@ -4,9 +4,10 @@ use super::anchors::Anchors;
 use super::casadi::Casadi;
 use super::{Effort, Failure};
 use casados::prelude::*;
-use casados_benches::calls::{open, options};
-use casados_benches::case::{Case, Family, Mode, Values};
+use casados_benches::calls::{Calls, open, options};
+use casados_benches::case::{Case, Family, Mode};
 use casados_benches::time::{Summary, measure};
+use std::ops::Range;
 
 /// A time and the error of what was computed in it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,6 +16,10 @@ pub struct Measured {
     pub time: Summary,
     /// Relative to the largest element of the reference; none without a reference.
     pub error: Option<f64>,
+    /// Iterations of Newton's method in the last call; zero for peers.
+    pub iterations: usize,
+    /// Factorisations of it in which the whole matrix was pivoted.
+    pub dense: usize,
 }
 
 /// One question to one case.
@@ -36,17 +41,10 @@ pub struct Row {
     pub warm: Option<Measured>,
     /// Forty calls for the intervals of a horizon; one of them.
     pub forty: Measured,
-    /// CasADi before and after.
-    pub casadi: Option<[Measured; 2]>,
+    /// CasADi, in the same rounds.
+    pub casadi: Option<Measured>,
     /// acados' IRK and GNSF, carried over; seconds.
     pub acados: [Option<f64>; 2],
-}
-
-impl Row {
-    /// CasADi's time: the mean of before and after.
-    pub fn casadi_time(&self) -> Option<f64> {
-        self.casadi.map(|[a, b]| (a.time.median + b.time.median) / 2.0)
-    }
 }
 
 /// Jacobians of this size and Hessians of that keep CasADi busy for minutes.
@@ -59,69 +57,124 @@ fn affordable(case: &Case, mode: Mode) -> bool {
     }
 }
 
-/// All questions to one case; to each CasADi before and after.
-pub fn measure_case(case: &Case, casadi: Option<&mut Casadi>, effort: Effort) -> Result<Vec<Row>, Failure> {
+/// All questions to one case, CasADi and casados in turn.
+pub fn measure_case(
+    case: &Case,
+    mut casadi: Option<&mut Casadi>,
+    effort: Effort,
+) -> Result<Vec<Row>, Failure> {
     let mut case = case.clone();
     let modes: Vec<Mode> = Mode::ALL.into_iter().filter(|m| affordable(&case, *m)).collect();
-    let solver = if case.family == Family::Rk4 { "rk" } else { "collocation" };
-    let mut casadi = casadi;
     if case.reference.is_none()
         && let Some(casadi) = casadi.as_mut()
     {
         case.reference = casadi.values(&case, &modes).ok().map(|values| ("CasADi", values));
     }
-    let reference = case.reference.as_ref().map(|(_, values)| values);
+    Mode::ALL.into_iter().map(|mode| measure_row(&case, mode, casadi.as_deref_mut(), effort)).collect()
+}
 
-    let mut rows = Vec::new();
-    for mode in Mode::ALL {
-        let ask = |casadi: &mut Option<&mut Casadi>| {
-            let casadi = casadi.as_mut().filter(|_| affordable(&case, mode))?;
-            casadi.time(&case, solver, mode, effort.seconds, reference).ok()
-        };
-        let before = ask(&mut casadi);
-        let single = 0..case.single;
-        let cold = time(&case, 1e-8, Start::Zero, mode, single.clone(), effort)?;
-        let rounding = time(&case, 0.0, Start::Zero, mode, single, effort)?;
-        let implicit = case.family != Family::Rk4;
-        let warm = implicit.then(|| time(&case, 1e-8, Start::Warm, mode, 0..2, effort)).transpose()?;
-        let forty = time(&case, 1e-8, Start::Zero, mode, 0..case.inputs.len(), effort)?;
-        let after = ask(&mut casadi);
-        rows.push(Row {
-            case: case.name.clone(),
-            nx: case.nx,
-            mode,
-            reference: match &case.reference {
-                Some((source, values)) if !values.of(mode).is_empty() => source,
-                _ => "none",
-            },
-            cold,
-            rounding,
-            warm,
-            forty,
-            casadi: before.zip(after).map(|(before, after)| [before, after]),
-            acados: [None; 2],
-        });
+fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Effort) -> Result<Row, Failure> {
+    let solver = if case.family == Family::Rk4 { "rk" } else { "collocation" };
+    let reference = case.reference.as_ref().map(|(_, values)| values);
+    let warm = case.family != Family::Rk4;
+    let single = 0..case.single;
+    let mut timers = vec![
+        Timer::new(case, 1e-8, Start::Zero, mode, single.clone())?,
+        Timer::new(case, 0.0, Start::Zero, mode, single)?,
+        Timer::new(case, 1e-8, Start::Zero, mode, 0..case.inputs.len())?,
+    ];
+    if warm {
+        timers.push(Timer::new(case, 1e-8, Start::Warm, mode, 0..2)?);
     }
-    Ok(rows)
+    let mut ask = casadi
+        .filter(|_| affordable(case, mode))
+        .map(|casadi| move |seconds| casadi.time(case, solver, mode, seconds, reference));
+    // Built and called once before the clock runs; what CasADi cannot do is left out.
+    let first = ask.as_mut().and_then(|ask| ask(0.0).ok());
+    let mut peer = Vec::new();
+    for _ in 0..ROUNDS {
+        if let (Some(ask), Some(_)) = (ask.as_mut(), first) {
+            peer.push(ask(effort.seconds / ROUNDS as f64)?.time);
+        }
+        timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
+    }
+    let measured: Vec<_> = timers.into_iter().map(Timer::finish).collect();
+    Ok(Row {
+        case: case.name.clone(),
+        nx: case.nx,
+        mode,
+        reference: match &case.reference {
+            Some((source, values)) if !values.of(mode).is_empty() => source,
+            _ => "none",
+        },
+        cold: measured[0],
+        rounding: measured[1],
+        forty: measured[2],
+        warm: measured.get(3).copied(),
+        casadi: first.map(|first| Measured { time: of_rounds(&peer), ..first }),
+        acados: [None; 2],
+    })
+}
+
+/// Measurements that are compared are taken in turn, this often: what else the machine does comes and goes in seconds.
+const ROUNDS: usize = 5;
+
+/// The median round, the least, and the greatest.
+fn of_rounds(rounds: &[Summary]) -> Summary {
+    let all = Summary::of(rounds.iter().map(|r| r.median).collect());
+    let (least, greatest) =
+        rounds.iter().fold((f64::INFINITY, 0.0f64), |(a, b), r| (a.min(r.median), b.max(r.median)));
+    Summary { q1: least, q3: greatest, samples: rounds.iter().map(|r| r.samples).sum(), ..all }
 }
 
 /// Passes over some inputs of a case: the time of one call, and the error at the first of them.
-pub fn time(
-    case: &Case,
-    tolerance: f64,
-    start: Start,
+pub struct Timer {
+    calls: Box<dyn Calls>,
     mode: Mode,
-    inputs: std::ops::Range<usize>,
-    effort: Effort,
-) -> Result<Measured, Failure> {
-    let mut calls = open(case, options(case, tolerance, start))?;
-    let values = calls.values(mode, 0).map_err(|e| format!("{}: {e}", case.name))?;
-    let error =
-        case.reference.as_ref().and_then(|(_, reference): &(_, Values)| values.error(reference, mode));
-    let count = inputs.len() as f64;
-    let time = measure(effort.budget(), || inputs.clone().try_for_each(|k| calls.call(mode, k)))
-        .map_err(|e| format!("{}: {e}", case.name))?;
-    Ok(Measured { time: time.divided(count), error })
+    inputs: Range<usize>,
+    error: Option<f64>,
+    rounds: Vec<Summary>,
+}
+
+impl Timer {
+    pub fn new(
+        case: &Case,
+        tolerance: f64,
+        start: Start,
+        mode: Mode,
+        inputs: Range<usize>,
+    ) -> Result<Self, Failure> {
+        let mut calls = open(case, options(case, tolerance, start))?;
+        let values = calls.values(mode, 0).map_err(|e| format!("{}: {e}", case.name))?;
+        let error = case.reference.as_ref().and_then(|(_, reference)| values.error(reference, mode));
+        Ok(Self { calls, mode, inputs, error, rounds: Vec::new() })
+    }
+
+    pub fn round(&mut self, effort: Effort) -> Result<(), Failure> {
+        let budget = effort.budget() / ROUNDS as u32;
+        let time = measure(budget, || self.inputs.clone().try_for_each(|k| self.calls.call(self.mode, k)))
+            .map_err(|e| e.to_string())?;
+        self.rounds.push(time.divided(self.inputs.len() as f64));
+        Ok(())
+    }
+
+    pub fn finish(self) -> Measured {
+        let statistics = self.calls.statistics();
+        Measured {
+            time: of_rounds(&self.rounds),
+            error: self.error,
+            iterations: statistics.iterations,
+            dense: statistics.dense,
+        }
+    }
+}
+
+/// All in turn.
+pub fn in_turn(mut timers: Vec<Timer>, effort: Effort) -> Result<Vec<Measured>, Failure> {
+    for _ in 0..ROUNDS {
+        timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
+    }
+    Ok(timers.into_iter().map(Timer::finish).collect())
 }
 
 /// Carries acados' times over; see [`Anchors`].
