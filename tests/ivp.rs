@@ -223,6 +223,26 @@ fn squeezer() {
     follows!(variable::<Squeezer, 14, 13, 0>(problem, [1e-5, 1e-8], 1.0, all));
 }
 
+/// Beside the Fortran code: E. Hairer's driver for RADAU5 at Van der Pol's equation reports 242 steps accepted and 8 refused,
+/// 280 tried, 2248 evaluations, 162 Jacobians and 253 factorisations (reproduced in the tests of russell_ode by D. Pedroso).
+/// The algorithm is the same but for the norm in which Newton's method is stopped and its start in the first step.
+#[test]
+fn as_many_steps_as_radau5() {
+    let options = AdaptiveOptions { rtol: 1e-4, atol: 1e-4, initial_step: Some(1e-6), ..Default::default() };
+    let mut adaptive = Adaptive::<VanDerPolScaled, RadauIIA<3>>::new(options).expect("valid");
+    adaptive.set_parameters(&SVector::from([1e6])).expect("finite");
+    adaptive.solve(&SVector::from([2.0, -0.66]), &SVector::zeros(), 2.0).expect("a solution");
+    let work = *adaptive.statistics();
+    let near = |found: usize, published: usize| {
+        assert!(found.abs_diff(published) <= published / 10, "{found} instead of {published}: {work:?}");
+    };
+    near(work.steps, 242);
+    near(work.steps + work.rejected + work.failed, 280);
+    near(work.residuals, 2248);
+    near(work.jacobians, 162);
+    near(work.factorizations, 253);
+}
+
 /// Dense output is as good as the method between its steps: order `s + 1`, so that it follows the tolerance too. And
 /// output while integrating is the same.
 #[test]

@@ -252,7 +252,7 @@ where
         let Memory { y, points, rows, .. } = &mut *self.memory;
         let mut points = points.each_mut().map(|points| points.as_mut());
         let sum = dispatch(Advance {
-            a: self.a.map(|column| column.map(|group| group.map(|a| start.h * a))),
+            a: self.a.map(|column| column.map(|group| group.map(|a| -(start.h * a)))),
             right: &self.right,
             x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
             scale: start.scale.as_ref(),
@@ -505,7 +505,7 @@ impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for
 
 /// See [`Radau::advance`].
 struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
-    /// Columns of `h A`.
+    /// Columns of `−h A`.
     a: [Groups<T, G>; S],
     right: &'a [[Groups<T, G>; 2]; L],
     /// The states at the start of the step.
@@ -523,24 +523,27 @@ impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance
         let Self { a, right, x, scale, rows, y, points } = self;
         let nx = x.len();
         let mut sums = [[T::ZERO; GROUP]; G];
-        for (index, (y, &scale)) in y.iter_mut().zip(scale).enumerate() {
-            let before = *y;
+        for (index, (unknown, &scale)) in y.iter_mut().zip(scale).enumerate() {
+            // In registers until it is finished.
+            let before = *unknown;
+            let mut y = before;
             if let Some([[row]]) = rows.get(index) {
                 for (l, [re, im]) in right.iter().enumerate() {
-                    for g in 0..G {
-                        for i in 0..GROUP {
-                            let partial = A::subtract(y[g][i], re[g][i], row.re[l]);
-                            y[g][i] = A::subtract(partial, -im[g][i], row.im[l]);
+                    let (real, imaginary) = (row.re[l], -row.im[l]);
+                    for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
+                        for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
+                            *y = A::subtract(A::subtract(*y, *re, real), *im, imaginary);
                         }
                     }
                 }
+                *unknown = y;
             }
             if let Some(&x) = x.get(index) {
                 let mut xi = [[x; GROUP]; G];
                 for (a, &k) in a.iter().zip(y.as_flattened()) {
-                    for g in 0..G {
-                        for i in 0..GROUP {
-                            xi[g][i] = A::subtract(xi[g][i], -a[g][i], k);
+                    for (xi, a) in xi.iter_mut().zip(a) {
+                        for (xi, a) in xi.iter_mut().zip(a) {
+                            *xi = A::subtract(*xi, *a, k);
                         }
                     }
                 }
