@@ -275,7 +275,7 @@ where
         // The real system is the first.
         for (equation, f) in f_point.as_ref().iter().enumerate() {
             let [[row]] = &mut rows[slot::<M>(equation)];
-            *row = Complex::ZERO;
+            *row = Complex::zero();
             row.re[0] = -*f;
         }
         factors.solve(rows);
@@ -489,7 +489,7 @@ impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for
                     *values = *f;
                 }
             }
-            let mut sum = Complex::ZERO;
+            let mut sum = Complex::zero();
             for (left, value) in left.iter().zip(values.as_flattened()) {
                 for l in 0..L {
                     sum.re[l] = A::subtract(sum.re[l], -left.re[l], *value);

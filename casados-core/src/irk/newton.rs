@@ -13,7 +13,9 @@
 //! larger than expected, it has converged too if they are small: more cannot be known.
 //!
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
-//! values is kept as long as the iterations that are still expected with it cost less than a new one.
+//! values is kept as long as the iterations that are still expected with it cost less than a new one. A new one, with
+//! three stages or more, is the mean of those of the stages, whose system is solved in the eigenbasis of the tableau: it
+//! costs a fraction of one with a Jacobian for each stage.
 //!
 //! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost.
 //!
@@ -29,6 +31,9 @@ use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 1.0;
+
+/// So often the mean Jacobian is renewed in a step before the stages' own are taken.
+const MEANS: usize = 3;
 
 /// Linear equations are refined so often if one iteration was not enough.
 const REFINEMENTS: usize = 4;
@@ -110,15 +115,15 @@ impl Progress {
 const MOST_LANES: usize = 16;
 
 impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
-    /// The cost of new factors, in iterations with old ones.
-    const RENEWAL: f64 = {
+    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis.
+    const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
-        let (s, blocks, updates) = (S as f64, plan.slots.len() as f64, plan.updates.len() as f64);
-        // What is computed for all stages side by side counts once.
+        let (s, blocks) = (S as f64, plan.slots.len() as f64);
+        let updates = plan.updates.len() as f64 + 4.0 * plan.pivots.len() as f64;
+        // What is computed for all stages side by side counts once; a complex product is four real ones.
         let iteration = operations.residual as f64 + blocks * s + 1.0;
-        let factors =
-            operations.residual_jacobian as f64 + (updates + 4.0 * plan.pivots.len() as f64) * s * s;
-        factors / iteration
+        let jacobian = operations.residual_jacobian as f64;
+        [(jacobian + updates * s * s) / iteration, (jacobian + updates * 4.0) / iteration]
     };
 
     /// Solves the stages of a step from the start values in `y`.
@@ -145,8 +150,16 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         let rate = Some(self.validity.rate).filter(|rate| *rate > 0.0);
         let mut lanes = [Progress { state: State::Active, last: 0.0, rate }; MOST_LANES];
         let lanes = lanes.get_mut(..E::LANES).unwrap_or_default();
-        let mut renew = !(self.validity.factors && M::STRUCTURE.constant_matrix)
-            && (rule.full || rule.exact || !self.validity.factors);
+        let simplified = options.jacobian == Jacobian::Simplified;
+        let adaptive = simplified || options.jacobian == Jacobian::Auto;
+        let basis = coefficients.basis.as_ref().filter(|_| test && adaptive && !rule.exact);
+        // Exact factors of the step before are the best there are, and cost nothing.
+        let mut mean = basis.is_some() && !self.validity.factors;
+        let mut renewals = 0;
+        let mut renew = !mean
+            && !(self.validity.factors && M::STRUCTURE.constant_matrix)
+            && (rule.full || rule.exact || !(adaptive && self.validity.factors))
+            || mean && !self.validity.mean;
         let mut iteration = 0;
         loop {
             self.place(coefficients, step, x, y);
@@ -154,13 +167,19 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
                 self.evaluate_jacobian();
-                self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
-                self.validity.factors = true;
+                // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
+                mean = basis.is_some() && (simplified || renewals < MEANS);
+                renewals += 1;
+                match basis {
+                    Some(basis) if mean => self.mean.factor(&self.linear.jacobian, basis, h),
+                    _ => self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h),
+                }
             } else {
                 statistics.residuals += 1;
                 self.evaluate_residual();
             }
             if rule.exact && test && iteration > 0 {
+                self.validity.factors = true;
                 let satisfied = self.is_satisfied();
                 if E::all(satisfied) || iteration == REFINEMENTS {
                     return Solved { converged: satisfied, exact: true };
@@ -171,7 +190,10 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             for (equation, f) in self.f.as_ref().iter().enumerate() {
                 self.increment[slot::<M>(equation)] = f.map(|f| [f]);
             }
-            self.linear.factors.solve(&mut self.increment);
+            match basis {
+                Some(basis) if mean => self.mean.solve(basis, &mut self.increment),
+                _ => self.linear.factors.solve(&mut self.increment),
+            }
             let active = mask::<E>(lanes, State::Active);
             let floor = E::from_f64(rounding / rule.tolerance);
             let sizes = dispatch(Update {
@@ -219,15 +241,18 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 let converged = mask::<E>(lanes, State::Converged);
                 let rates = lanes.iter().map(|lane| lane.rate.unwrap_or(0.0));
                 self.validity.rate = rates.fold(0.0, f64::max);
-                self.validity.factors = lanes.iter().all(|lane| lane.state == State::Converged);
+                let all = lanes.iter().all(|lane| lane.state == State::Converged);
+                (self.validity.factors, self.validity.mean) = (all && !mean, all && mean);
                 return Solved { converged, exact: false };
             };
             if iteration == most {
-                self.validity.factors = false;
+                (self.validity.factors, self.validity.mean) = (false, false);
                 return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
             }
-            renew = !rule.exact
-                && (rule.full || options.jacobian == Jacobian::Auto && remaining > 1.0 + Self::RENEWAL);
+            let cheap = basis.is_some() && (simplified || renewals < MEANS);
+            // New factors take two more iterations themselves.
+            renew =
+                !rule.exact && (rule.full || adaptive && remaining > 2.0 + Self::RENEWAL[usize::from(cheap)]);
         }
     }
 }

@@ -1,9 +1,9 @@
 //! What is remembered about steps, and the memory that all calls work in.
 
-use crate::linalg::Factors;
+use crate::linalg::{Eigenbasis, Factors, MeanFactors};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
-use crate::scalar::{Field, Lanes};
+use crate::scalar::Lanes;
 use crate::shape::{Plain, assign};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -32,10 +32,12 @@ pub(crate) struct Coefficients<E, const S: usize> {
     pub end: [E; S],
     /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them; if there are any.
     pub next: Option<[[E; S]; S]>,
+    /// The eigenbasis of `A`, if iterations in it are cheaper than with blocks.
+    pub basis: Option<Eigenbasis<E, S, S>>,
     pub tableau: Tableau<S>,
 }
 
-impl<E: Field, const S: usize> Coefficients<E, S> {
+impl<E: Lanes, const S: usize> Coefficients<E, S> {
     pub fn new(tableau: Tableau<S>) -> Self {
         let mut end = tableau.lagrange(1.0);
         if tableau.is_stiffly_accurate() {
@@ -51,6 +53,7 @@ impl<E: Field, const S: usize> Coefficients<E, S> {
             start: tableau.lagrange(0.0).map(E::from_f64),
             end: end.map(E::from_f64),
             next: finite.then(|| next.map(|row| row.map(E::from_f64))),
+            basis: if S < 3 { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
     }
@@ -125,6 +128,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize> {
     /// The sizes of the last increments.
     pub(crate) sizes: ArrayK<M, T>,
     pub(crate) linear: Linearization<M, T, S>,
+    /// Factors of the mean Jacobian of the stages, which iterations take where that is cheaper.
+    pub(crate) mean: MeanFactors<M, T, S>,
     /// Where derivatives are tried on their equations: sums, and the sizes of their terms.
     pub(crate) probe: [ArrayV<M, [T; S]>; 2],
     pub(crate) sums: [ArrayK<M, [T; S]>; 2],
@@ -152,6 +157,8 @@ pub(crate) struct Stage<M: Dae, T: Plain> {
 pub(crate) struct Validity {
     /// They belong to this call, and to its size of steps.
     pub factors: bool,
+    /// Those of the mean Jacobian do.
+    pub mean: bool,
     /// How fast Newton's method converged with them, `θ`; zero if it is not known.
     pub rate: f64,
 }

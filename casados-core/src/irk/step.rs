@@ -173,7 +173,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             statistics.factorizations += 1;
             let h = self.inputs.time.step;
             self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
-            self.validity = Validity { factors: true, rate: 0.0 };
+            self.validity = Validity { factors: true, mean: false, rate: 0.0 };
         }
     }
 }

@@ -1,8 +1,7 @@
 //! Complex numbers, several side by side.
 
-use crate::scalar::{Field, Real};
+use crate::scalar::{Field, Lanes};
 use bytemuck::Zeroable;
-use core::array::from_fn;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `L` complex numbers side by side: what elimination computes with where it solves `L` systems of one pattern at once.
@@ -14,26 +13,37 @@ pub struct Complex<T, const L: usize> {
     pub im: [T; L],
 }
 
-impl<T: Real, const L: usize> Complex<T, L> {
+impl<T: Lanes, const L: usize> Complex<T, L> {
     /// `L` times zero.
-    pub const ZERO: Self = Self { re: [T::ZERO; L], im: [T::ZERO; L] };
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self::real([T::from_f64(0.0); L])
+    }
 
     /// Real numbers.
     #[inline(always)]
     pub fn real(re: [T; L]) -> Self {
-        Self { re, im: [T::ZERO; L] }
+        Self { re, im: [T::from_f64(0.0); L] }
     }
 
     /// `a z` with a real number `a`.
     #[inline(always)]
     pub fn scaled(self, a: T) -> Self {
-        Self { re: self.re.map(|re| a * re), im: self.im.map(|im| a * im) }
+        let Self { mut re, mut im } = self;
+        for l in 0..L {
+            (re[l], im[l]) = (a * re[l], a * im[l]);
+        }
+        Self { re, im }
     }
 
     /// Whether all parts are neither infinite nor NaN.
     #[inline(always)]
     pub fn is_finite(&self) -> bool {
-        self.re.iter().chain(&self.im).fold(true, |finite, part| finite & part.is_finite())
+        let mut finite = true;
+        for part in self.re.iter().chain(&self.im) {
+            finite &= T::all(part.is_finite());
+        }
+        finite
     }
 
     /// `1/z`. Divided by its larger part first, so that no square of a part overflows.
@@ -50,34 +60,41 @@ impl<T: Real, const L: usize> Complex<T, L> {
     }
 }
 
-impl<T: Real, const L: usize> Add for Complex<T, L> {
+impl<T: Lanes, const L: usize> Add for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self { re: from_fn(|l| self.re[l] + other.re[l]), im: from_fn(|l| self.im[l] + other.im[l]) }
-    }
-}
-
-impl<T: Real, const L: usize> Sub for Complex<T, L> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self { re: from_fn(|l| self.re[l] - other.re[l]), im: from_fn(|l| self.im[l] - other.im[l]) }
-    }
-}
-
-impl<T: Real, const L: usize> Mul for Complex<T, L> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Self {
-            re: from_fn(|l| self.re[l] * other.re[l] - self.im[l] * other.im[l]),
-            im: from_fn(|l| self.re[l] * other.im[l] + self.im[l] * other.re[l]),
+    fn add(mut self, other: Self) -> Self {
+        for l in 0..L {
+            (self.re[l], self.im[l]) = (self.re[l] + other.re[l], self.im[l] + other.im[l]);
         }
+        self
     }
 }
 
-impl<T: Real, const L: usize> Div for Complex<T, L> {
+impl<T: Lanes, const L: usize> Sub for Complex<T, L> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(mut self, other: Self) -> Self {
+        for l in 0..L {
+            (self.re[l], self.im[l]) = (self.re[l] - other.re[l], self.im[l] - other.im[l]);
+        }
+        self
+    }
+}
+
+impl<T: Lanes, const L: usize> Mul for Complex<T, L> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(mut self, other: Self) -> Self {
+        for l in 0..L {
+            let re = self.re[l] * other.re[l] - self.im[l] * other.im[l];
+            (self.re[l], self.im[l]) = (re, self.re[l] * other.im[l] + self.im[l] * other.re[l]);
+        }
+        self
+    }
+}
+
+impl<T: Lanes, const L: usize> Div for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
     #[allow(clippy::suspicious_arithmetic_impl)] // There is no other quotient.
@@ -86,16 +103,19 @@ impl<T: Real, const L: usize> Div for Complex<T, L> {
     }
 }
 
-impl<T: Real, const L: usize> Neg for Complex<T, L> {
+impl<T: Lanes, const L: usize> Neg for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
-    fn neg(self) -> Self {
-        Self { re: self.re.map(|re| -re), im: self.im.map(|im| -im) }
+    fn neg(mut self) -> Self {
+        for l in 0..L {
+            (self.re[l], self.im[l]) = (-self.re[l], -self.im[l]);
+        }
+        self
     }
 }
 
-impl<T: Real, const L: usize> Field for Complex<T, L> {
-    type Mask = [bool; L];
+impl<T: Lanes, const L: usize> Field for Complex<T, L> {
+    type Mask = [T::Mask; L];
 
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
@@ -104,30 +124,39 @@ impl<T: Real, const L: usize> Field for Complex<T, L> {
 
     #[inline(always)]
     fn subtract_product(self, a: Self, b: Self) -> Self {
-        Self {
-            re: from_fn(|l| {
-                self.re[l].subtract_product(a.re[l], b.re[l]).subtract_product(-a.im[l], b.im[l])
-            }),
-            im: from_fn(|l| self.im[l].subtract_product(a.re[l], b.im[l]).subtract_product(a.im[l], b.re[l])),
-        }
+        let (Self { mut re, mut im }, negative) = (self, -a);
+        T::subtract_products(&mut re, &a.re, &b.re);
+        T::subtract_products(&mut re, &negative.im, &b.im);
+        T::subtract_products(&mut im, &a.re, &b.im);
+        T::subtract_products(&mut im, &a.im, &b.re);
+        Self { re, im }
     }
 
     /// By `|re| + |im|`.
     #[inline(always)]
     fn is_smaller(self, other: Self) -> Self::Mask {
-        from_fn(|l| self.re[l].abs() + self.im[l].abs() < other.re[l].abs() + other.im[l].abs())
+        let zero = T::from_f64(0.0);
+        let mut mask = [T::lt(zero, zero); L];
+        for (l, mask) in mask.iter_mut().enumerate() {
+            *mask = T::lt(self.re[l].abs() + self.im[l].abs(), other.re[l].abs() + other.im[l].abs());
+        }
+        mask
     }
 
     #[inline(always)]
-    fn select(mask: Self::Mask, a: Self, b: Self) -> Self {
-        Self {
-            re: from_fn(|l| if mask[l] { a.re[l] } else { b.re[l] }),
-            im: from_fn(|l| if mask[l] { a.im[l] } else { b.im[l] }),
+    fn select(mask: Self::Mask, a: Self, mut b: Self) -> Self {
+        for l in 0..L {
+            (b.re[l], b.im[l]) = (T::select(mask[l], a.re[l], b.re[l]), T::select(mask[l], a.im[l], b.im[l]));
         }
+        b
     }
 
     #[inline(always)]
     fn any(mask: Self::Mask) -> bool {
-        mask.contains(&true)
+        let mut any = false;
+        for mask in mask {
+            any |= T::any(mask);
+        }
+        any
     }
 }

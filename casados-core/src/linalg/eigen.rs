@@ -15,9 +15,10 @@
 use super::complex::Complex;
 use super::dense::Dense;
 use super::factors::slot;
+use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse;
-use crate::model::{ArrayK, Assembly, Dae};
-use crate::scalar::Real;
+use crate::model::{ArrayK, Assembly, Dae, Elimination};
+use crate::scalar::{Lanes, Real};
 use crate::shape::Plain;
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -30,17 +31,21 @@ pub struct Eigenbasis<T, const S: usize, const L: usize> {
     values: Complex<T, L>,
     /// Columns of `V⁻¹`.
     left: [Complex<T, L>; S],
-    /// Rows of `V`, with a factor of two where they stand for a conjugate too.
-    right: [Complex<T, L>; S],
+    /// Real and imaginary parts of the columns of `V`, with a factor of two where they stand for a conjugate too.
+    right: [[[T; S]; 2]; L],
 }
 
-impl<T: Real, const S: usize, const L: usize> Eigenbasis<T, S, L> {
+impl<T: Lanes, const S: usize, const L: usize> Eigenbasis<T, S, L> {
     /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than `1e-10`.
     pub fn new(tableau: &Tableau<S>) -> Option<Self> {
         const { assert!(L >= S.div_ceil(2), "L must be S / 2 at least, rounded up") };
         let basis = Eigenbasis::<f64, S, L>::compute(tableau.a())?;
         let cast = |z: Complex<f64, L>| Complex { re: z.re.map(T::from_f64), im: z.im.map(T::from_f64) };
-        Some(Self { values: cast(basis.values), left: basis.left.map(cast), right: basis.right.map(cast) })
+        Some(Self {
+            values: cast(basis.values),
+            left: basis.left.map(cast),
+            right: basis.right.map(|column| column.map(|part| part.map(T::from_f64))),
+        })
     }
 
     /// The eigenvalues `μ` of `A`: if `S` is odd the first is real, and of each complex pair there is one.
@@ -54,8 +59,33 @@ impl<T: Real, const S: usize, const L: usize> Eigenbasis<T, S, L> {
     }
 
     /// Rows of `V`, one for each stage, with a factor of two where they stand for a conjugate too: `y_i = Re Σ_l v_il ŷ_l`.
-    pub fn right(&self) -> &[Complex<T, L>; S] {
-        &self.right
+    pub fn right(&self) -> [Complex<T, L>; S] {
+        from_fn(|stage| Complex {
+            re: from_fn(|l| self.right[l][0][stage]),
+            im: from_fn(|l| self.right[l][1][stage]),
+        })
+    }
+
+    /// `b̂ = V⁻¹ b`
+    #[inline(always)]
+    pub fn split<A: Arithmetic>(&self, b: &[T; S]) -> Complex<T, L> {
+        let mut sum = Complex::zero();
+        for (left, &b) in self.left.iter().zip(b) {
+            A::subtract_row(&mut sum.re, -b, &left.re);
+            A::subtract_row(&mut sum.im, -b, &left.im);
+        }
+        sum
+    }
+
+    /// `y = V ŷ`
+    #[inline(always)]
+    pub fn join<A: Arithmetic>(&self, y: &Complex<T, L>) -> [T; S] {
+        let mut sum = [T::from_f64(0.0); S];
+        for (l, column) in self.right.iter().enumerate() {
+            A::subtract_row(&mut sum, -y.re[l], &column[0]);
+            A::subtract_row(&mut sum, y.im[l], &column[1]);
+        }
+        sum
     }
 }
 
@@ -63,7 +93,8 @@ type Number = Complex<f64, 1>;
 
 impl<const S: usize, const L: usize> Eigenbasis<f64, S, L> {
     fn compute(a: &[[f64; S]; S]) -> Option<Self> {
-        let mut basis = Self { values: Complex::ZERO, left: [Complex::ZERO; S], right: [Complex::ZERO; S] };
+        let mut basis =
+            Self { values: Complex::zero(), left: [Complex::zero(); S], right: [[[0.0; S]; 2]; L] };
         let (mut reals, mut pairs) = (0, S % 2);
         for root in eigenvalues(a) {
             let is_real = root.im[0].abs() <= 1e-8 * root.re[0].abs();
@@ -82,7 +113,8 @@ impl<const S: usize, const L: usize> Eigenbasis<f64, S, L> {
             set(&mut basis.values, value);
             for stage in 0..S {
                 set(&mut basis.left[stage], left[stage]);
-                set(&mut basis.right[stage], right[stage].scaled(weight));
+                let right = right[stage].scaled(weight);
+                (basis.right[lane][0][stage], basis.right[lane][1][stage]) = (right.re[0], right.im[0]);
             }
         }
         for lane in pairs..L {
@@ -99,7 +131,7 @@ impl<const S: usize, const L: usize> Eigenbasis<f64, S, L> {
             let column = self.values * self.left[j];
             (0..S).all(|i| {
                 let sum: f64 = (0..L)
-                    .map(|l| self.right[i].re[l] * column.re[l] - self.right[i].im[l] * column.im[l])
+                    .map(|l| self.right[l][0][i] * column.re[l] - self.right[l][1][i] * column.im[l])
                     .sum();
                 (sum - a[i][j]).abs() <= 1e-10 * largest
             })
@@ -175,13 +207,13 @@ fn eigenvectors<const S: usize>(
         // Beside the eigenvalue, so that the matrix is regular.
         let shift = value.scaled(1.0 + 1e-10);
         let matrix: [[Number; S]; S] =
-            from_fn(|i| from_fn(|j| Complex::real([a[i][j]]) - if i == j { shift } else { Complex::ZERO }));
+            from_fn(|i| from_fn(|j| Complex::real([a[i][j]]) - if i == j { shift } else { Complex::zero() }));
         right = direction(matrix, right)?;
         left = direction(from_fn(|i| from_fn(|j| matrix[j][i])), left)?;
-        let mut overlap = Complex::ZERO;
-        let mut quotient = Complex::ZERO;
+        let mut overlap = Complex::zero();
+        let mut quotient = Complex::zero();
         for i in 0..S {
-            let mut product = Complex::ZERO;
+            let mut product = Complex::zero();
             for j in 0..S {
                 product = product + right[j].scaled(a[i][j]);
             }
@@ -267,7 +299,7 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
     fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
         let plan = &M::STRUCTURE.elimination;
         let blocks = self.blocks.as_mut();
-        blocks.fill([[Complex::ZERO]]);
+        blocks.fill([[Complex::zero()]]);
         for entry in plan.assembly {
             let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
             if entry.state != Assembly::NONE {
@@ -329,6 +361,126 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
     }
 }
 
+/// Factors of the mean Jacobian of the stages for all `L` eigenvalues, by the plan: what an iteration takes that need
+/// not be exact.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct MeanFactors<M: Dae, E: Plain, const L: usize> {
+    blocks: M::Factors<[[Complex<E, L>; 1]; 1]>,
+    rows: ArrayK<M, [[Complex<E, L>; 1]; 1]>,
+}
+
+impl<M: Dae, E: Plain, const L: usize> Clone for MeanFactors<M, E, L> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, E: Plain, const L: usize> Copy for MeanFactors<M, E, L> {}
+
+impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
+    /// Factors; a pivot that vanishes leaves elements that are not finite.
+    pub fn factor<const S: usize>(
+        &mut self,
+        jacobian: &M::Jacobian<[E; S]>,
+        basis: &Eigenbasis<E, S, L>,
+        h: E,
+    ) {
+        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_mut());
+        dispatch(AssembleMean {
+            plan,
+            jacobian: jacobian.as_ref(),
+            values: &basis.values,
+            h,
+            blocks: &mut *blocks,
+        });
+        sparse::factor(plan, blocks);
+    }
+
+    /// Solves the Newton system of the stages in place, equations in their slots.
+    pub fn solve<const S: usize>(&mut self, basis: &Eigenbasis<E, S, L>, b: &mut ArrayK<M, [[E; 1]; S]>) {
+        dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
+        sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), self.rows.as_mut());
+        dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
+    }
+}
+
+/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian; fill zero.
+struct AssembleMean<'a, E, const S: usize, const L: usize> {
+    plan: &'a Elimination,
+    jacobian: &'a [[E; S]],
+    values: &'a Complex<E, L>,
+    h: E,
+    blocks: &'a mut [[[Complex<E, L>; 1]; 1]],
+}
+
+impl<E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, E, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { plan, jacobian, values, h, blocks } = self;
+        let share = E::from_f64(1.0 / S as f64);
+        let scale = values.scaled(h * share);
+        let zero = Complex::zero();
+        blocks.fill([[zero]]);
+        for entry in plan.assembly {
+            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
+            if let Some(state) = jacobian.get(entry.state as usize) {
+                *element = scale.scaled(total(state));
+            }
+            if let Some(direct) = jacobian.get(entry.direct as usize) {
+                let direct = share * total(direct);
+                for re in &mut element.re {
+                    *re = *re + direct;
+                }
+            }
+        }
+    }
+}
+
+/// The sum over the stages.
+#[inline(always)]
+fn total<E: Lanes, const S: usize>(stages: &[E; S]) -> E {
+    let mut total = E::from_f64(0.0);
+    for &stage in stages {
+        total = total + stage;
+    }
+    total
+}
+
+struct Split<'a, T, const S: usize, const L: usize> {
+    basis: &'a Eigenbasis<T, S, L>,
+    b: &'a [[[T; 1]; S]],
+    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+}
+
+impl<T: Lanes, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
+            let mut stages = [T::from_f64(0.0); S];
+            stages.copy_from_slice(b.as_flattened());
+            *row = self.basis.split::<A>(&stages);
+        }
+    }
+}
+
+struct Join<'a, T, const S: usize, const L: usize> {
+    basis: &'a Eigenbasis<T, S, L>,
+    b: &'a mut [[[T; 1]; S]],
+    rows: &'a [[[Complex<T, L>; 1]; 1]],
+}
+
+impl<T: Lanes, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for ([[row]], b) in self.rows.iter().zip(self.b) {
+            b.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(row));
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -339,12 +491,12 @@ mod tests {
     fn check<const S: usize, const L: usize>(tableau: &Tableau<S>) {
         let basis = Eigenbasis::<f64, S, L>::new(tableau).expect("a basis");
         for column in 0..S {
-            let image = *basis.values() * basis.left()[column];
-            for stage in 0..S {
-                let right = basis.right()[stage];
-                let found: f64 = (0..L).map(|l| right.re[l] * image.re[l] - right.im[l] * image.im[l]).sum();
-                let terms: f64 =
-                    (0..L).map(|l| right.re[l].hypot(right.im[l]) * image.re[l].hypot(image.im[l])).sum();
+            let unit = from_fn(|j| if j == column { 1.0 } else { 0.0 });
+            let image = *basis.values() * basis.split::<super::super::fused::Separate>(&unit);
+            let found = basis.join::<super::super::fused::Separate>(&image);
+            for (stage, found) in found.into_iter().enumerate() {
+                let right = |l: usize| basis.right[l][0][stage].hypot(basis.right[l][1][stage]);
+                let terms: f64 = (0..L).map(|l| right(l) * image.re[l].hypot(image.im[l])).sum();
                 let error = (found - tableau.a()[stage][column]).abs();
                 assert!(
                     error <= 64.0 * f64::EPSILON * terms,

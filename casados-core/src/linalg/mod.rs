@@ -22,7 +22,8 @@ mod sparse;
 #[cfg(feature = "alloc")]
 pub(crate) use complex::Complex;
 #[cfg(feature = "alloc")]
-pub(crate) use eigen::{EigenFactors, Eigenbasis, Rows};
+pub(crate) use eigen::{EigenFactors, Rows};
+pub(crate) use eigen::{Eigenbasis, MeanFactors};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;

@@ -80,6 +80,15 @@ pub trait Field:
         }
     }
 
+    /// `target − a b`, element by element, fused. As [`subtract_product`](Field::subtract_product), only for code that
+    /// knows the machine.
+    #[inline(always)]
+    fn subtract_products<const W: usize>(target: &mut [Self; W], a: &[Self; W], b: &[Self; W]) {
+        for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
+            *target = target.subtract_product(a, b);
+        }
+    }
+
     /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the
     /// machine.
     #[inline(always)]

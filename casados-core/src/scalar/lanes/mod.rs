@@ -108,6 +108,20 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
+        fn subtract_products<const W: usize>(target: &mut [Self; W], a: &[Self; W], b: &[Self; W]) {
+            use crate::scalar::lanes::$avx2 as Register;
+            let (target, target_rest) = target.as_chunks_mut::<$more>();
+            let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<$more>(), b.as_chunks::<$more>());
+            for ((target, a), b) in target.iter_mut().zip(a).zip(b) {
+                let (t, a, b) =
+                    (Register::<$more>::load(target), Register::<$more>::load(a), Register::<$more>::load(b));
+                t.subtract_product(a, b).store(target);
+            }
+            for ((target, &a), &b) in target_rest.iter_mut().zip(a_rest).zip(b_rest) {
+                *target = target.subtract_product(a, b);
+            }
+        }
+        #[inline(always)]
         fn subtract_row<const W: usize>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
             use crate::scalar::lanes::$avx2 as Register;
             let (target, target_rest) = target.as_chunks_mut::<$more>();
