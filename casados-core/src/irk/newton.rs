@@ -100,6 +100,11 @@ impl Progress {
         }
     }
 
+    /// Whether increments grow.
+    fn grows(&self) -> bool {
+        self.state == State::Active && self.rate.is_some_and(|rate| rate > 1.0)
+    }
+
     /// How many more increments are expected until the tolerance.
     fn remaining(&self, rule: &Rule) -> f64 {
         let (mut increment, mut count) = (self.last, 0.0);
@@ -248,6 +253,10 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             if iteration == most {
                 (self.validity.factors, self.validity.mean) = (false, false);
                 return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
+            }
+            if iteration > 1 && lanes.iter().any(Progress::grows) {
+                // The mean of the stages does not do.
+                renewals = MEANS;
             }
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
             // New factors take two more iterations themselves.

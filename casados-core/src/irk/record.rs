@@ -52,7 +52,8 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
             c: tableau.c().map(E::from_f64),
             start: tableau.lagrange(0.0).map(E::from_f64),
             end: end.map(E::from_f64),
-            next: finite.then(|| next.map(|row| row.map(E::from_f64))),
+            // Polynomials of higher degree are not worth much outside of their interval.
+            next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
             basis: if S < 3 { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
