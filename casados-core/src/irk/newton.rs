@@ -84,11 +84,8 @@ impl Progress {
         }
         let mut expected = increment;
         if first {
-            // What the last step found out holds for its factors only, and roughly.
+            // What the last step found out holds for its factors only; and too roughly to stop by it.
             self.rate = self.rate.filter(|_| !new);
-            if let Some(rate) = self.rate.filter(|rate| *rate < 0.1) {
-                expected = 10.0 * rate * increment;
-            }
         } else {
             self.rate = Some(increment / self.last);
             expected = if increment <= rule.stagnation && 2.0 * increment >= self.last { 0.0 } else { next };

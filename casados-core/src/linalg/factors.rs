@@ -95,11 +95,11 @@ impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
     fn run<A: Arithmetic>(self) {
         let Self { plan, jacobian, a, h, blocks } = self;
         let zero = E::from_f64(0.0);
-        // Columns of hA.
+        // Columns of −hA.
         let mut ha = [[zero; S]; S];
         for (i, row) in a.iter().enumerate() {
             for (column, &a) in ha.iter_mut().zip(row) {
-                column[i] = h * a;
+                column[i] = -(h * a);
             }
         }
         blocks.fill([[zero; S]; S]);
@@ -107,9 +107,8 @@ impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
             let Some(block) = blocks.get_mut(entry.block as usize) else { continue };
             if let Some(state) = jacobian.get(entry.state as usize) {
                 for (column, ha) in block.iter_mut().zip(&ha) {
-                    for ((element, &ha), &state) in column.iter_mut().zip(ha).zip(state) {
-                        *element = state * ha;
-                    }
+                    *column = [zero; S];
+                    A::subtract_products(column, state, ha);
                 }
             }
             if let Some(direct) = jacobian.get(entry.direct as usize) {

@@ -23,6 +23,8 @@ pub trait Arithmetic {
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]);
     /// `target − factor · row`
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]);
+    /// `target − a b`, element by element
+    fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]);
 }
 
 /// Rounded twice.
@@ -57,6 +59,12 @@ impl Arithmetic for Separate {
             *target = *target - factor * element;
         }
     }
+    #[inline(always)]
+    fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
+        for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
+            *target = *target - a * b;
+        }
+    }
 }
 
 /// Rounded once, in one instruction.
@@ -84,6 +92,10 @@ impl Arithmetic for Fused {
     #[inline(always)]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
         E::subtract_row(target, factor, row);
+    }
+    #[inline(always)]
+    fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
+        E::subtract_products(target, a, b);
     }
 }
 

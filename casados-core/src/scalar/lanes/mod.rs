@@ -91,6 +91,36 @@ pub(crate) use side_by_side;
 macro_rules! blocks {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline(always)]
+        fn subtract_blocks<const S: usize>(
+            target: &mut [[Self; S]; S],
+            left: &[[Self; S]; S],
+            right: &[[Self; S]; S],
+        ) {
+            use crate::scalar::lanes::$avx2 as Register;
+            if let (Some([t0, t1]), Some([l0, l1]), Some([r0, r1])) =
+                (target.first_chunk::<2>(), left.first_chunk::<2>(), right.first_chunk::<2>())
+                && let (&[t00, t10, ..], &[t01, t11, ..]) = (&t0[..], &t1[..])
+                && let (&[l00, l10, ..], &[l01, l11, ..]) = (&l0[..], &l1[..])
+                && let (&[r00, r10, ..], &[r01, r11, ..]) = (&r0[..], &r1[..])
+                && const { S == 2 }
+            {
+                // A whole block fits a register.
+                let mut sum = Register::<4>::load(&[t00, t10, t01, t11]);
+                let columns = [[l00, l10, l00, l10], [l01, l11, l01, l11]];
+                let factors = [[r00, r00, r01, r01], [r10, r10, r11, r11]];
+                for (column, factor) in columns.iter().zip(&factors) {
+                    sum = sum.subtract_product(Register::<4>::load(column), Register::<4>::load(factor));
+                }
+                let mut block = [0.0; 4];
+                sum.store(&mut block);
+                target.as_flattened_mut().copy_from_slice(&block);
+                return;
+            }
+            for (target, right) in target.iter_mut().zip(right) {
+                Self::subtract_columns(target, left, right);
+            }
+        }
+        #[inline(always)]
         fn subtract_columns<const S: usize>(target: &mut [Self; S], block: &[[Self; S]; S], x: &[Self; S]) {
             use crate::scalar::lanes::$avx2 as Register;
             if const { S > 1 && S <= $more } {
