@@ -21,6 +21,8 @@ compile_error!(
 
 #[cfg(feature = "alloc")]
 pub mod adaptive;
+#[cfg(feature = "alloc")]
+pub mod batch;
 #[cfg(feature = "num-dual")]
 pub mod dual;
 pub mod erk;
@@ -41,6 +43,8 @@ pub mod testing;
 
 #[cfg(feature = "alloc")]
 pub use adaptive::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Radau};
+#[cfg(feature = "alloc")]
+pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
 pub use erk::Erk;
 pub use error::Error;
 pub use irk::Irk;
@@ -61,6 +65,8 @@ pub use tableau::{
 pub mod prelude {
     #[cfg(feature = "alloc")]
     pub use crate::adaptive::{Adaptive, AdaptiveOptions, Radau};
+    #[cfg(feature = "alloc")]
+    pub use crate::batch::{Batch, BatchError, Intervals};
     #[cfg(feature = "alloc")]
     pub use crate::memory::Heap;
     pub use crate::options::{Jacobian, Newton, Options, Start};

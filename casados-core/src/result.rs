@@ -166,6 +166,24 @@ plain!([M: Dae, T: Plain] Hessian<M, T> { first, h_xx, h_xu, h_uu, h_xp, h_up, h
 plain!([M: Dae, T: Plain] Dense<M, T> { x, z });
 plain!([M: Dae, T: Plain] DenseForward<M, T> { dense, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp });
 
+/// Zeros: a place for a result.
+macro_rules! zeros {
+    ($($type:ident)*) => { $(
+        impl<M: Dae, T: Plain> Default for $type<M, T> {
+            fn default() -> Self {
+                Self::zeroed()
+            }
+        }
+    )* };
+}
+zeros!(Nominal Forward ForwardAdjoint Hessian Dense DenseForward);
+
+impl<M: Dae, T: Plain, const C: usize> Default for Adjoint<M, T, C> {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
 /// No direction at all: the seeds that are wanted are set in it.
 impl<M: Dae, T: Plain, const C: usize> Default for Seeds<M, T, C> {
     fn default() -> Self {

@@ -49,12 +49,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     /// `μ`
     pub(crate) fn solve(&mut self, linear: &Linearization<M, E, S>, coefficients: &Coefficients<E, S>, h: E) {
         let Self { lambda, mu, .. } = self;
-        mu.as_mut().fill([[E::from_f64(0.0); C]; S]);
-        for (mu, lambda) in mu.as_mut().iter_mut().zip(lambda.as_ref()) {
-            for (mu, &b) in mu.iter_mut().zip(&coefficients.b) {
-                *mu = lambda.map(|lambda| h * b * lambda);
-            }
-        }
+        dispatch(RightHandSide { lambda: lambda.as_ref(), b: &coefficients.b, h, mu: mu.as_mut() });
         linear.factors.solve_transposed(mu);
     }
 
@@ -85,6 +80,30 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
         }
         self.advance(&work.linear);
         Ok(())
+    }
+}
+
+/// `h (b ⊗ λ, 0)`
+struct RightHandSide<'a, E, const S: usize, const C: usize> {
+    lambda: &'a [[E; C]],
+    b: &'a [E; S],
+    h: E,
+    mu: &'a mut [[[E; C]; S]],
+}
+
+impl<E: Lanes, const S: usize, const C: usize> Kernel for RightHandSide<'_, E, S, C> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { lambda, b, h, mu } = self;
+        mu.fill([[E::from_f64(0.0); C]; S]);
+        for (mu, lambda) in mu.iter_mut().zip(lambda) {
+            for (mu, &b) in mu.iter_mut().zip(b) {
+                for (mu, &lambda) in mu.iter_mut().zip(lambda) {
+                    *mu = h * b * lambda;
+                }
+            }
+        }
     }
 }
 
@@ -140,10 +159,9 @@ pub struct AdjointMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] AdjointMemory<M, T, S, C>);
 
-impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> {
-    /// # Errors
-    /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, work: &Work<M, T, S>) -> Result<(), Error> {
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C> {
+    /// The result, after the first step.
+    pub(crate) fn collect(&mut self, work: &Work<M, E, S>) {
         let Self { result, backward } = self;
         result.nominal = work.result;
         let nx = M::Shape::NX;
@@ -160,6 +178,15 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> 
                 }
             }
         }
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> {
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(&mut self, work: &Work<M, T, S>) -> Result<(), Error> {
+        self.collect(work);
+        let result = &self.result;
         check(result.grad_x0.as_slice(), 0)?;
         check(result.grad_u.as_slice(), 0)?;
         check(result.grad_p.as_slice(), 0)

@@ -43,9 +43,9 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         if let Err(call) = E::side_by_side(Residual::<M, E, S> { points, f, stage }) {
             let Residual { points, f, stage } = call;
             for i in 0..S {
-                take::<E, S>(stage.v.as_mut(), points.as_ref(), i);
+                dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
                 M::residual::<E>(&stage.v, &mut stage.f);
-                give::<E, S>(stage.f.as_ref(), f.as_mut(), i);
+                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i });
             }
         }
     }
@@ -57,28 +57,50 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         if let Err(call) = E::side_by_side(ResidualJacobian::<M, E, S> { points, f, jacobian, stage }) {
             let ResidualJacobian { points, f, jacobian, stage } = call;
             for i in 0..S {
-                take::<E, S>(stage.v.as_mut(), points.as_ref(), i);
+                dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
                 M::residual_jacobian::<E>(&stage.v, &mut stage.f, &mut stage.jacobian);
-                give::<E, S>(stage.f.as_ref(), f.as_mut(), i);
-                give::<E, S>(stage.jacobian.as_ref(), jacobian.as_mut(), i);
+                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i });
+                dispatch(Give { cells: stage.jacobian.as_ref(), to: jacobian.as_mut(), i });
             }
         }
     }
 }
 
 /// The value of every variable at stage `i`.
-#[inline(always)]
-pub(crate) fn take<E: Lanes, const S: usize>(cells: &mut [E::Cell], from: &[[E; S]], i: usize) {
-    for (cell, from) in cells.iter_mut().zip(from) {
-        from[i].store(cell);
+pub(crate) struct Take<'a, E: Lanes, const S: usize> {
+    pub cells: &'a mut [E::Cell],
+    pub from: &'a [[E; S]],
+    pub i: usize,
+}
+
+impl<E: Lanes, const S: usize> Kernel for Take<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (cell, from) in self.cells.iter_mut().zip(self.from) {
+            if let Some(from) = from.get(self.i) {
+                from.store(cell);
+            }
+        }
     }
 }
 
 /// What was computed at stage `i`.
-#[inline(always)]
-pub(crate) fn give<E: Lanes, const S: usize>(cells: &[E::Cell], to: &mut [[E; S]], i: usize) {
-    for (cell, to) in cells.iter().zip(to) {
-        to[i] = E::load(cell);
+pub(crate) struct Give<'a, E: Lanes, const S: usize> {
+    pub cells: &'a [E::Cell],
+    pub to: &'a mut [[E; S]],
+    pub i: usize,
+}
+
+impl<E: Lanes, const S: usize> Kernel for Give<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (cell, to) in self.cells.iter().zip(self.to) {
+            if let Some(to) = to.get_mut(self.i) {
+                *to = E::load(cell);
+            }
+        }
     }
 }
 

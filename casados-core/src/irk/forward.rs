@@ -18,6 +18,7 @@ use crate::shape::{Array, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
+use core::slice::{from_mut, from_ref};
 
 /// Derivatives of one step in directions that are the elements of `R`.
 #[derive(Zeroable)]
@@ -99,11 +100,7 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
     where
         R: Array<E>,
     {
-        dispatch(Combine {
-            to: self.v.as_mut(),
-            dy: self.dy.as_ref(),
-            weights: &coefficients.b.map(|b| h * b),
-        });
+        dispatch(Combine { to: self.v.as_mut(), dy: self.dy.as_ref(), weights: &coefficients.b, h });
     }
 
     /// Derivatives `row` of `x` at the point of the step where the weights are `weights`.
@@ -112,9 +109,8 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
         R: Array<E>,
     {
         *row = self.v[state];
-        for (b, dk) in weights.iter().zip(&self.dy[state]) {
-            axpy(h * *b, dk.as_ref(), row.as_mut());
-        }
+        let (to, dy) = (from_mut(row), from_ref(&self.dy[state]));
+        dispatch(Combine { to, dy, weights, h });
     }
 
     /// Derivatives `row` of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
@@ -123,9 +119,8 @@ impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
         R: Array<E>,
     {
         row.as_mut().fill(E::from_f64(0.0));
-        for (l, dz) in lagrange.iter().zip(&self.dy[M::Shape::NX + state]) {
-            axpy(*l, dz.as_ref(), row.as_mut());
-        }
+        let (to, dy) = (from_mut(row), from_ref(&self.dy[M::Shape::NX + state]));
+        dispatch(Combine { to, dy, weights: lagrange, h: E::from_f64(1.0) });
     }
 }
 
@@ -177,11 +172,12 @@ impl<M: Dae, E: Lanes, R: Array<E>, D: Directions<E, R>, const S: usize> Kernel
     }
 }
 
-/// `to += Σ_i weight_i dy_i`, row after row.
+/// `to += h Σ_i weight_i dy_i`, row after row.
 struct Combine<'a, E, R, const S: usize> {
     to: &'a mut [R],
     dy: &'a [[R; S]],
     weights: &'a [E; S],
+    h: E,
 }
 
 impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Combine<'_, E, R, S> {
@@ -191,7 +187,7 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Combine<'_, E, R, S> {
         for (to, dy) in self.to.iter_mut().zip(self.dy) {
             for (&weight, dy) in self.weights.iter().zip(dy) {
                 for (to, &dy) in to.as_mut().iter_mut().zip(dy.as_ref()) {
-                    *to = A::subtract(*to, -weight, dy);
+                    *to = A::subtract(*to, -(self.h * weight), dy);
                 }
             }
         }
@@ -308,16 +304,28 @@ pub(crate) fn check_result<M: Dae, T: Real>(result: &Forward<M, T>, step: usize)
     Ok(())
 }
 
+impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
+    /// `∇(λᵀx)` from the derivatives of `x`.
+    pub(crate) fn multiply(&mut self, lambda: &[E]) {
+        let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut self.result;
+        for (matrix, gradient) in [
+            (forward.dx_dx0.as_slice(), grad_x0.as_mut_slice()),
+            (forward.dx_du.as_slice(), grad_u.as_mut_slice()),
+            (forward.dx_dp.as_slice(), grad_p.as_mut_slice()),
+        ] {
+            dispatch(Product { lambda, matrix, gradient });
+        }
+    }
+}
+
 impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
     /// `∇(λᵀx)` from the derivatives of `x`.
     ///
     /// # Errors
     /// [`Error::Overflow`]
     pub(crate) fn gradient(&mut self, lambda: &[T]) -> Result<(), Error> {
-        let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut self.result;
-        product(lambda, forward.dx_dx0.as_slice(), grad_x0.as_mut_slice());
-        product(lambda, forward.dx_du.as_slice(), grad_u.as_mut_slice());
-        product(lambda, forward.dx_dp.as_slice(), grad_p.as_mut_slice());
+        self.multiply(lambda);
+        let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &self.result;
         check(grad_x0.as_slice(), 0)?;
         check(grad_u.as_slice(), 0)?;
         check(grad_p.as_slice(), 0)
@@ -325,13 +333,25 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
 }
 
 /// `gradientᵀ = λᵀ S`, with `S` column after column.
-fn product<T: Real>(lambda: &[T], matrix: &[T], gradient: &mut [T]) {
-    if lambda.is_empty() {
-        gradient.fill(T::ZERO);
-        return;
-    }
-    for (gradient, column) in gradient.iter_mut().zip(matrix.chunks_exact(lambda.len())) {
-        *gradient = lambda.iter().zip(column).fold(T::ZERO, |sum, (l, s)| sum + *l * *s);
+struct Product<'a, E> {
+    lambda: &'a [E],
+    matrix: &'a [E],
+    gradient: &'a mut [E],
+}
+
+impl<E: Lanes> Kernel for Product<'_, E> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { lambda, matrix, gradient } = self;
+        gradient.fill(E::from_f64(0.0));
+        // A model without states has no columns to go through.
+        let columns = matrix.chunks_exact(lambda.len().max(1));
+        for (gradient, column) in gradient.iter_mut().zip(columns) {
+            for (&lambda, &s) in lambda.iter().zip(column) {
+                *gradient = *gradient + lambda * s;
+            }
+        }
     }
 }
 

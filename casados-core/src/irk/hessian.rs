@@ -8,7 +8,7 @@
 //! the middle comes first, `G = H D`, then the lower triangle of `Dᵀ G`.
 
 use super::adjoint::Backward;
-use super::evaluate::{give, not_finite, take};
+use super::evaluate::{Give, Take, not_finite};
 use super::forward::{ForwardMemory, Sweep};
 use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
@@ -55,6 +55,12 @@ impl<M: Dae, E: Lanes, const S: usize> HessianStep<M, E, S> {
     pub(crate) fn record(&mut self, work: &Work<M, E, S>, forward: &ForwardMemory<M, E, S>) {
         self.linear.copy_from(&work.linear);
         assign(&mut self.sweep, &forward.sweep);
+    }
+
+    /// The derivatives of its stages.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn sweep(&self) -> &Sweep<M, ArrayW<M, E>, S> {
+        &self.sweep
     }
 
     /// Brings back what was remembered.
@@ -125,10 +131,10 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         if let Err(call) = E::side_by_side(Curvature::<M, E, S> { points, mu, entries, stage }) {
             let Curvature { points, mu, entries, stage } = call;
             for i in 0..S {
-                take::<E, S>(stage.v.as_mut(), points.as_ref(), i);
-                take::<E, S>(stage.mu.as_mut(), mu.as_ref(), i);
+                dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
+                dispatch(Take { cells: stage.mu.as_mut(), from: mu.as_ref(), i });
                 M::hessian::<E>(&stage.v, &stage.mu, &mut stage.hessian);
-                give::<E, S>(stage.hessian.as_ref(), entries.as_mut(), i);
+                dispatch(Give { cells: stage.hessian.as_ref(), to: entries.as_mut(), i });
             }
         }
     }
@@ -173,10 +179,9 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, 
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
-    /// # Errors
-    /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, forward: &ForwardMemory<M, T, S>) -> Result<(), Error> {
+impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
+    /// The result, after the first step.
+    pub(crate) fn collect(&mut self, forward: &ForwardMemory<M, E, S>) {
         let (nx, nu, np) = (M::Shape::NX, M::Shape::NU, M::Shape::NP);
         let Self { result, backward, sum, .. } = self;
         assign(&mut result.first.forward, &forward.result.forward);
@@ -206,6 +211,15 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                 result.h_up[(u, p)] = sum[nx + nu + p][nx + u];
             }
         }
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(&mut self, forward: &ForwardMemory<M, T, S>) -> Result<(), Error> {
+        self.collect(forward);
+        let result = &self.result;
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
         for values in [
             grad_x0.as_slice(),

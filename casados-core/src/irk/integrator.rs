@@ -97,7 +97,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
     pub const SIZE: usize = size_of::<Self>();
 
-    fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+    pub(crate) fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Ok(Self {
             run: Run::new(options, tableau)?,
             forward: Default::default(),
@@ -162,6 +162,21 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     #[cfg(feature = "alloc")]
     pub(crate) fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
         self.run.set_stages(y)
+    }
+
+    /// The stages of every step, for an integrator with a warm start.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set_record(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        self.run.set_record(record)
+    }
+
+    /// Copies the stages of every step of the last successful call.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn record(&mut self, record: &mut [crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        for (y, step) in record.iter_mut().zip(self.run.last()?.steps) {
+            crate::shape::assign(y, &step.y);
+        }
+        Ok(())
     }
 
     /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages innermost.

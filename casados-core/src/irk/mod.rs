@@ -39,8 +39,12 @@ pub(crate) use self::{
     evaluate::{dot, not_finite},
     forward::{check_result, split},
     pivoted::unknown_name,
+    record::{Coefficients, Step, Work},
     run::check,
+    step::From,
 };
+#[cfg(feature = "alloc")]
+pub(crate) use hessian::{HessianMemory, HessianStep};
 
 use crate::memory::Memory;
 use crate::model::Dae;

@@ -241,10 +241,11 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             });
             let Some(remaining) = slowest else {
                 let converged = mask::<E>(lanes, State::Converged);
-                let rates = lanes.iter().map(|lane| lane.rate.unwrap_or(0.0));
-                self.validity.rate = rates.fold(0.0, f64::max);
-                let all = lanes.iter().all(|lane| lane.state == State::Converged);
-                (self.validity.factors, self.validity.mean) = (all && !mean, all && mean);
+                // Lanes that failed have no say in what the others do next.
+                let good = lanes.iter().filter(|lane| lane.state == State::Converged);
+                self.validity.rate = good.clone().fold(0.0, |rate, lane| lane.rate.unwrap_or(0.0).max(rate));
+                let any = good.count() > 0;
+                (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
                 return Solved { converged, exact: false };
             };
             if iteration == most {

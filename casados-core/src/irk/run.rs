@@ -173,6 +173,18 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         Ok(())
     }
 
+    /// The stages of every step, as a warm start.
+    #[cfg(feature = "alloc")]
+    pub fn set_record(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        let [first, second] = &mut self.tapes;
+        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        for (step, y) in steps.iter_mut().zip(record) {
+            crate::shape::assign(&mut step.y, y);
+        }
+        self.warm = true;
+        Ok(())
+    }
+
     /// Everything succeeded: the record of this call is the one to keep.
     pub fn keep(&mut self) -> Result<&Work<M, T, S>, Error> {
         let work = W::nominal(&mut self.work)?;

@@ -184,8 +184,24 @@ pub(crate) fn algebraic<M: Dae, E: Lanes, const S: usize>(
     y: &ArrayK<M, [E; S]>,
     lagrange: &[E; S],
 ) {
-    for (z, y) in z.iter_mut().zip(&y.as_ref()[M::Shape::NX..]) {
-        *z = dot(lagrange, y);
+    let y = y.as_ref().get(M::Shape::NX..).unwrap_or_default();
+    dispatch(Combine { to: z, y, weights: lagrange });
+}
+
+/// `Σ_i weight_i y_i` of each unknown.
+struct Combine<'a, E, const S: usize> {
+    to: &'a mut [E],
+    y: &'a [[E; S]],
+    weights: &'a [E; S],
+}
+
+impl<E: Field, const S: usize> Kernel for Combine<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (to, y) in self.to.iter_mut().zip(self.y) {
+            *to = dot(self.weights, y);
+        }
     }
 }
 

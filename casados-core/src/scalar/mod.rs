@@ -239,6 +239,15 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     }
 }
 
+/// A computation that can be made with any register of numbers of type `T`.
+#[doc(hidden)]
+pub trait Widest<T> {
+    /// Its result.
+    type Output;
+    /// With this one.
+    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
+}
+
 /// One real number: `f32` or `f64`.
 pub trait Real: Lanes<Cell = Self, Mask = bool> + PartialOrd + Default {
     /// Zero.
@@ -247,4 +256,14 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + PartialOrd + Default {
     const ONE: Self;
     /// As `f64`, exactly.
     fn to_f64(self) -> f64;
+
+    /// Runs a computation with the widest register of such numbers that this machine has; not with those of two
+    /// numbers where there are any wider ones.
+    ///
+    /// # Errors
+    /// The computation, if there is none.
+    #[doc(hidden)]
+    fn widest<C: Widest<Self>>(computation: C) -> Result<C::Output, C> {
+        Err(computation)
+    }
 }

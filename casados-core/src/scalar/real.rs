@@ -1,6 +1,6 @@
 //! `f32` and `f64`.
 
-use super::lanes::{blocks, side_by_side};
+use super::lanes::{blocks, side_by_side, widest_register};
 use super::{Field, Lanes, Real, Scalar, own_cell};
 
 /// The methods of one real type, from `std` where it is there and from `libm` elsewhere.
@@ -155,6 +155,7 @@ macro_rules! real {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            widest_register!($($registers)*);
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 self as f64

@@ -85,6 +85,38 @@ macro_rules! side_by_side {
 }
 pub(crate) use side_by_side;
 
+/// Runs a computation with whole registers.
+#[cfg(target_arch = "x86_64")]
+macro_rules! widest_register {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        fn widest<C: crate::scalar::Widest<Self>>(computation: C) -> Result<C::Output, C> {
+            use crate::scalar::lanes::{Level, level};
+            match level() {
+                Level::Avx512 => Ok(computation.call::<crate::scalar::lanes::$avx512<$most>>()),
+                Level::Avx2 => Ok(computation.call::<crate::scalar::lanes::$avx2<$more>>()),
+                _ => Err(computation),
+            }
+        }
+    };
+}
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
+macro_rules! widest_register {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        fn widest<C: crate::scalar::Widest<Self>>(computation: C) -> Result<C::Output, C> {
+            use crate::scalar::lanes::{Level, level};
+            if level() < Level::Base {
+                return Err(computation);
+            }
+            Ok(computation.call::<crate::scalar::lanes::$base<$few>>())
+        }
+    };
+}
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))))]
+macro_rules! widest_register {
+    ($($register:tt)*) => {};
+}
+pub(crate) use widest_register;
+
 /// Products of blocks with their columns in registers. Left to itself the compiler puts rows into registers, and
 /// transposes every block for it.
 #[cfg(target_arch = "x86_64")]

@@ -1,0 +1,76 @@
+//! Why a batch has not all of its results.
+
+use crate::error::{Argument, Error};
+use core::fmt;
+
+/// Why a batch has not all of its results.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum BatchError {
+    /// A slice has not one element for each interval (nor one for all, where that is allowed). Nothing was computed.
+    Length {
+        /// What it is the slice of.
+        slice: Slice,
+        /// How many elements it has.
+        length: usize,
+        /// How many intervals there are.
+        intervals: usize,
+    },
+    /// Intervals have no result; all others have. What happened to each of them is its `status`.
+    Intervals {
+        /// How many failed.
+        failed: usize,
+        /// The first one that did.
+        first: usize,
+        /// Why.
+        error: Error,
+    },
+    /// The memory could not be allocated. Nothing was computed.
+    OutOfMemory {
+        /// Its size.
+        bytes: usize,
+    },
+}
+
+/// A slice that a batch is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Slice {
+    /// An argument of the intervals.
+    Argument(Argument),
+    /// The place for the results.
+    Results,
+}
+
+impl fmt::Display for Slice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Argument(Argument::T) => f.write_str("t0"),
+            Self::Argument(argument) => argument.fmt(f),
+            Self::Results => f.write_str("results"),
+        }
+    }
+}
+
+impl fmt::Display for BatchError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length { slice, length, intervals } => {
+                write!(f, "there are {intervals} intervals, and `{slice}` has {length} elements")
+            }
+            Self::Intervals { failed, first, error } => {
+                write!(f, "{failed} intervals failed, the first of them interval {first}: {error}")
+            }
+            Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes could not be allocated"),
+        }
+    }
+}
+
+impl core::error::Error for BatchError {
+    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
+        match self {
+            Self::Intervals { error, .. } => Some(error),
+            _ => None,
+        }
+    }
+}

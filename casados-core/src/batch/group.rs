@@ -1,0 +1,342 @@
+//! Intervals side by side: one in each lane of registers, through the same engine as a single one.
+//!
+//! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy their equations;
+//! lanes never mix, so that one that fails takes nobody with it.
+
+use super::intervals::Interval;
+use crate::error::Error;
+use crate::irk::{AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Step, Work};
+use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::memory::{Heap, Memory, WithForward, WithHessian};
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::options::{Options, Start};
+use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
+use crate::scalar::Lanes;
+use crate::shape::{Matrix, Plain, Shape};
+use crate::statistics::Statistics;
+use crate::tableau::Tableau;
+
+/// More lanes than any register has.
+const MOST_LANES: usize = 16;
+
+type Place<V> = <Heap as Memory>::Nominal<V>;
+type Places<V> = <Heap as Memory>::Tape<V>;
+
+/// The stages of all steps of an interval.
+pub type Record<'a, M, T, const S: usize> = &'a [ArrayK<M, [T; S]>];
+
+/// A group of intervals, and the memory that it needs.
+pub struct Group<M: Dae, E: Lanes, const S: usize> {
+    options: Options,
+    coefficients: Coefficients<E, S>,
+    pub statistics: Statistics,
+    work: Place<Work<M, E, S>>,
+    steps: Places<Step<M, E, S>>,
+    /// The warm start.
+    record: Places<Step<M, E, S>>,
+    lambda: Place<ArrayX<M, E>>,
+    forward: Place<ForwardMemory<M, E, S>>,
+    adjoint: Place<AdjointMemory<M, E, S, 1>>,
+    hessian: Place<HessianMemory<M, E, S>>,
+    tape: Places<HessianStep<M, E, S>>,
+}
+
+/// What a pass over the steps works in.
+struct Pass<'a, M: Dae, E: Lanes, const S: usize> {
+    options: &'a Options,
+    coefficients: &'a Coefficients<E, S>,
+    statistics: &'a mut Statistics,
+    work: &'a mut Work<M, E, S>,
+    steps: &'a mut [Step<M, E, S>],
+    from: From<'a, M, E, S>,
+}
+
+/// The verdict on lanes, and the results of those for which it is good.
+pub type Verdict<'a, E, R> = Result<(<E as crate::scalar::Field>::Mask, &'a R), Error>;
+
+/// Opens what every pass needs.
+macro_rules! pass {
+    ($group:ident, $warm:ident) => {{
+        $group.statistics = Statistics::default();
+        let count = $group.options.steps;
+        let from = match $group.options.start {
+            Start::Warm if $warm => From::Record(Heap::tape(&mut $group.record, count)?),
+            Start::Zero => From::Zero,
+            Start::Given | Start::Warm => From::Given,
+        };
+        Pass {
+            options: &$group.options,
+            coefficients: &$group.coefficients,
+            statistics: &mut $group.statistics,
+            work: Heap::nominal(&mut $group.work)?,
+            steps: Heap::tape(&mut $group.steps, count)?,
+            from,
+        }
+    }};
+}
+impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
+    pub fn new(options: &Options, tableau: &Tableau<S>) -> Self {
+        Self {
+            options: *options,
+            coefficients: Coefficients::new(*tableau),
+            statistics: Statistics::default(),
+            work: Default::default(),
+            steps: Default::default(),
+            record: Default::default(),
+            lambda: Default::default(),
+            forward: Default::default(),
+            adjoint: Default::default(),
+            hessian: Default::default(),
+            tape: Default::default(),
+        }
+    }
+
+    /// Puts an interval into each lane; `given` are start values for Newton's method, and `records` the stages of
+    /// earlier solutions, if all lanes have them.
+    pub fn place<T: Plain>(
+        &mut self,
+        intervals: &[Interval<'_, M, T>],
+        given: Option<[&[T]; 2]>,
+        records: Option<&[Record<'_, M, T, S>]>,
+    ) -> Result<(), Error>
+    where
+        E::Cell: AsMut<[T]>,
+    {
+        let count = self.options.steps;
+        let work = Heap::nominal(&mut self.work)?;
+        work.prepare();
+        let mut from: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
+        macro_rules! pack {
+            ($to:expr, |$interval:ident| $slice:expr) => {
+                for (from, $interval) in from.iter_mut().zip(intervals) {
+                    *from = $slice;
+                }
+                dispatch(Pack { from: &from, to: $to });
+            };
+        }
+        pack!(work.x.as_mut(), |interval| interval.x0.as_slice());
+        pack!(work.inputs.u.as_mut_slice(), |interval| interval.u);
+        pack!(work.inputs.p.as_mut_slice(), |interval| interval.p);
+        pack!(core::slice::from_mut(&mut work.inputs.time.interval), |interval| core::slice::from_ref(
+            &interval.h
+        ));
+        pack!(core::slice::from_mut(&mut work.inputs.time.start), |interval| core::slice::from_ref(
+            &interval.t0
+        ));
+        let time = &mut work.inputs.time;
+        time.step = time.interval / E::from_f64(count as f64);
+        let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
+        for (given, to) in given.unwrap_or_default().iter().zip([xdot, z]) {
+            dispatch(Pack { from: &[*given; MOST_LANES], to });
+        }
+        pack!(Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
+        Heap::tape(&mut self.steps, count)?;
+        let Some(records) = records else { return Ok(()) };
+        for (n, step) in Heap::tape(&mut self.record, count)?.iter_mut().enumerate() {
+            for (from, record) in from.iter_mut().zip(records) {
+                *from = record.get(n).map_or(&[], |y| y.as_ref().as_flattened());
+            }
+            dispatch(Pack { from: &from, to: step.y.as_mut().as_flattened_mut() });
+        }
+        Ok(())
+    }
+
+    /// The stages of a lane in the last pass.
+    pub fn record<T: Plain>(&mut self, lane: usize, record: &mut [ArrayK<M, [T; S]>]) -> Result<(), Error>
+    where
+        E::Cell: AsRef<[T]>,
+    {
+        for (y, step) in record.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
+            let (from, to) = (step.y.as_ref().as_flattened(), y.as_mut().as_flattened_mut());
+            dispatch(Unpack { from, lane, to });
+        }
+        Ok(())
+    }
+
+    pub fn solve(&mut self, warm: bool) -> Verdict<'_, E, Nominal<M, E>> {
+        let mut pass = pass!(self, warm);
+        let good = pass.run(|_, _, _, _| yes::<E>());
+        Ok((good, &pass.work.result))
+    }
+
+    pub fn forward(&mut self, warm: bool) -> Verdict<'_, E, Forward<M, E>> {
+        let (good, result) = self.differentiate(warm, false)?;
+        Ok((good, &result.forward))
+    }
+
+    pub fn forward_adjoint(&mut self, warm: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+        self.differentiate(warm, true)
+    }
+
+    fn differentiate(&mut self, warm: bool, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
+        let mut pass = pass!(self, warm);
+        let forward = Heap::forward(&mut self.forward)?;
+        let count = pass.steps.len();
+        let good = pass.run(|pass, n, step, exact| {
+            pass.linearize(n, step, exact);
+            pass.forward(forward, n, count)
+        });
+        forward.result.forward.nominal = pass.work.result;
+        if adjoint {
+            forward.multiply(Heap::nominal(&mut self.lambda)?.as_ref());
+        }
+        Ok((good, &forward.result))
+    }
+
+    pub fn adjoint(&mut self, warm: bool) -> Verdict<'_, E, Adjoint<M, E>> {
+        let mut pass = pass!(self, warm);
+        let adjoint = Heap::nominal(&mut self.adjoint)?;
+        let lambda = Heap::nominal(&mut self.lambda)?;
+        let count = pass.steps.len();
+        // On the way forth only the last step is linearised: it is where the way back begins.
+        let mut good = pass.run(|pass, n, step, exact| {
+            if n + 1 == count {
+                pass.linearize(n, step, exact);
+            }
+            yes::<E>()
+        });
+        adjoint.backward.start(lambda.as_ref());
+        let Pass { steps, coefficients, work, statistics, .. } = pass;
+        for (n, step) in steps.iter().enumerate().rev() {
+            if n + 1 < count {
+                work.linearize_planned(coefficients, n, step, false, statistics);
+            }
+            good = E::and(good, adjoint.backward.stages(work, coefficients));
+            adjoint.backward.advance(&work.linear);
+        }
+        adjoint.collect(work);
+        Ok((good, &adjoint.result))
+    }
+
+    pub fn hessian(&mut self, warm: bool) -> Verdict<'_, E, Hessian<M, E>> {
+        let mut pass = pass!(self, warm);
+        let forward = Heap::forward(&mut self.forward)?;
+        let hessian = Heap::hessian(&mut self.hessian)?;
+        let lambda = Heap::nominal(&mut self.lambda)?;
+        let count = pass.steps.len();
+        let records = Heap::hessian_tape(&mut self.tape, count)?;
+        let mut good = pass.run(|pass, n, step, exact| {
+            pass.linearize(n, step, exact);
+            let good = pass.forward(forward, n, count);
+            if let Some(record) = records.get_mut(n) {
+                record.record(pass.work, forward);
+            }
+            good
+        });
+        forward.result.forward.nominal = pass.work.result;
+        let Pass { steps, coefficients, work, .. } = pass;
+        hessian.begin(lambda.as_ref());
+        for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
+            // What belongs to the last step is still there.
+            if n + 1 < count {
+                record.recall(work);
+            }
+            good = E::and(good, hessian.backward.stages(work, coefficients));
+            hessian.backward.advance(&work.linear);
+            hessian.curvature(work, coefficients, n, step);
+            hessian.subtract(record.sweep(), coefficients, work.inputs.time.step);
+        }
+        hessian.collect(forward);
+        Ok((good, &hessian.result))
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
+    /// The steps of the interval, with `after` called after each; whether all went well, lane by lane.
+    fn run(
+        &mut self,
+        mut after: impl FnMut(&mut Pass<'_, M, E, S>, usize, &Step<M, E, S>, bool) -> E::Mask,
+    ) -> E::Mask {
+        self.work.begin();
+        let (mut good, count) = (yes::<E>(), self.steps.len());
+        for n in 0..count {
+            let Self { options, coefficients, statistics, work, steps, from } = self;
+            let (done, rest) = steps.split_at_mut(n);
+            let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
+            step.x = work.x;
+            work.start(coefficients, from, n, before, &mut step.y);
+            let Step { x, y } = &mut *step;
+            let solved = work.newton(coefficients, &options.newton, n, x, y, statistics);
+            work.advance(coefficients, step, n, count);
+            good = E::and(good, solved.converged);
+            let mut pass = Pass { options, coefficients, statistics, work, steps: &mut [], from: From::Zero };
+            good = E::and(good, after(&mut pass, n, step, solved.exact));
+            self.statistics.steps += 1;
+        }
+        good
+    }
+
+    fn linearize(&mut self, n: usize, step: &Step<M, E, S>, exact: bool) {
+        self.work.linearize_planned(self.coefficients, n, step, exact, self.statistics);
+    }
+
+    fn forward(&mut self, forward: &mut ForwardMemory<M, E, S>, n: usize, count: usize) -> E::Mask {
+        forward.begin(self.work, self.coefficients, n);
+        let good = forward.stages(self.work, self.coefficients, n);
+        forward.collect(self.work, self.coefficients, n, count);
+        good
+    }
+}
+
+/// True in every lane.
+fn yes<E: Lanes>() -> E::Mask {
+    E::le(E::from_f64(0.0), E::from_f64(0.0))
+}
+
+/// The elements of several slices, one of each in the lanes of a register.
+struct Pack<'a, T, E> {
+    from: &'a [&'a [T]; MOST_LANES],
+    to: &'a mut [E],
+}
+
+impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
+        for (i, to) in self.to.iter_mut().enumerate() {
+            for (cell, from) in cell.as_mut().iter_mut().zip(self.from) {
+                if let Some(&from) = from.get(i) {
+                    *cell = from;
+                }
+            }
+            *to = E::load(&cell);
+        }
+    }
+}
+
+/// One lane of registers.
+pub struct Unpack<'a, T, E> {
+    pub from: &'a [E],
+    pub lane: usize,
+    pub to: &'a mut [T],
+}
+
+impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
+        for (&from, to) in self.from.iter().zip(self.to) {
+            from.store(&mut cell);
+            if let Some(&element) = cell.as_ref().get(self.lane) {
+                *to = element;
+            }
+        }
+    }
+}
+
+/// Whether all numbers are finite, lane by lane.
+pub struct Finite<'a, E>(pub &'a [E]);
+
+impl<E: Lanes> Kernel for Finite<'_, E> {
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E::Mask {
+        let mut finite = E::le(E::from_f64(0.0), E::from_f64(0.0));
+        for &value in self.0 {
+            finite = E::and(finite, value.is_finite());
+        }
+        finite
+    }
+}

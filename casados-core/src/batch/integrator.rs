@@ -1,0 +1,242 @@
+//! The batch as its users see it.
+
+use super::answer::Answer;
+use super::error::BatchError;
+use super::intervals::{Inputs, Intervals};
+use super::statistics::BatchStatistics;
+#[cfg(feature = "parallel")]
+use super::work::parallel;
+use super::work::{Share, Width, Work, Worker};
+use crate::error::{Argument, Error};
+use crate::irk::check;
+use crate::model::{ArrayK, Dae, VectorX, VectorZ};
+use crate::options::{Options, Start};
+use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::Matrix;
+use crate::tableau::{Custom, Method, Tableau};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// Integrates many intervals of one model with `S` stages of the method `B`; see [`Batch`](super::Batch).
+///
+/// Every call writes one result for each interval into the caller's slice. An interval that fails is reported with
+/// the error that a single call would return, leaves its element of the slice as it was, and has no influence on the others.
+///
+/// # Errors
+/// Of every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;
+/// [`BatchError::Intervals`] if intervals failed.
+pub struct Integrator<M: Dae, B, const S: usize, T: Real> {
+    options: Options,
+    tableau: Tableau<S>,
+    /// One for each thread.
+    workers: Vec<Worker<M, B, S, T>>,
+    #[cfg(feature = "parallel")]
+    threads: usize,
+    given: Option<(VectorX<M, T>, VectorZ<M, T>)>,
+    status: Vec<Result<(), Error>>,
+    /// The stages of every step of every interval, and whether there are any.
+    records: Vec<ArrayK<M, [T; S]>>,
+    warm: Vec<bool>,
+    statistics: BatchStatistics,
+}
+
+impl<M: Dae, B: Method<S>, const S: usize, T: Real> Integrator<M, B, S, T> {
+    /// A batch of any number of intervals.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`]
+    pub fn new(options: Options) -> Result<Self, Error> {
+        Self::build(options, B::TABLEAU)
+    }
+}
+
+impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T> {
+    /// A batch for a tableau of the user's own.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and two nodes
+    /// are equal.
+    pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        Self::build(options, tableau)
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
+    fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        let mut workers = Vec::new();
+        workers.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of::<Worker<M, B, S, T>>() })?;
+        workers.push(Worker::new(options, tableau)?);
+        Ok(Self {
+            options,
+            tableau,
+            workers,
+            #[cfg(feature = "parallel")]
+            threads: rayon::current_num_threads(),
+            given: None,
+            status: Vec::new(),
+            records: Vec::new(),
+            warm: Vec::new(),
+            statistics: BatchStatistics::default(),
+        })
+    }
+
+    /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals: read with
+    /// [`Start::Given`], and with [`Start::Warm`] where there is no warm start.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]: then the last values stay.
+    pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
+        check(Argument::StartXdot, xdot.as_slice())?;
+        check(Argument::StartZ, z.as_slice())?;
+        self.given = Some((*xdot, *z));
+        Ok(())
+    }
+
+    /// How many threads share the intervals; as many as rayon has if never set. Results are the same to the last bit.
+    #[cfg(feature = "parallel")]
+    pub fn set_threads(&mut self, threads: usize) {
+        self.threads = threads.max(1);
+    }
+
+    /// Forgets the warm start.
+    pub fn reset(&mut self) {
+        self.warm.fill(false);
+    }
+
+    /// The options.
+    #[must_use]
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// What the last call did.
+    #[must_use]
+    pub fn statistics(&self) -> &BatchStatistics {
+        &self.statistics
+    }
+
+    /// What happened to an interval in the last call.
+    ///
+    /// # Errors
+    /// Those of a single call; [`Error::NoResult`] if there was no such interval.
+    pub fn status(&self, interval: usize) -> Result<(), Error> {
+        self.status.get(interval).copied().unwrap_or(Err(Error::NoResult))
+    }
+
+    /// `x₊`, and `z` at both ends of every interval.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn solve(
+        &mut self,
+        intervals: &Intervals<'_, M, T>,
+        results: &mut [Nominal<M, T>],
+    ) -> Result<(), BatchError> {
+        self.run(&Inputs::new(intervals, None, results.len())?, results)
+    }
+
+    /// The solutions, and their derivatives with respect to `x₀`, `u` and `p`.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn forward(
+        &mut self,
+        intervals: &Intervals<'_, M, T>,
+        results: &mut [Forward<M, T>],
+    ) -> Result<(), BatchError> {
+        self.run(&Inputs::new(intervals, None, results.len())?, results)
+    }
+
+    /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for each interval, or one
+    /// for all.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn adjoint(
+        &mut self,
+        intervals: &Intervals<'_, M, T>,
+        lambda: &[VectorX<M, T>],
+        results: &mut [Adjoint<M, T>],
+    ) -> Result<(), BatchError> {
+        self.run(&Inputs::new(intervals, Some(lambda), results.len())?, results)
+    }
+
+    /// The solutions, their derivatives, and the gradients of `λᵀx₊`.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn forward_adjoint(
+        &mut self,
+        intervals: &Intervals<'_, M, T>,
+        lambda: &[VectorX<M, T>],
+        results: &mut [ForwardAdjoint<M, T>],
+    ) -> Result<(), BatchError> {
+        self.run(&Inputs::new(intervals, Some(lambda), results.len())?, results)
+    }
+
+    /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊`.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn hessian(
+        &mut self,
+        intervals: &Intervals<'_, M, T>,
+        lambda: &[VectorX<M, T>],
+        results: &mut [Hessian<M, T>],
+    ) -> Result<(), BatchError> {
+        self.run(&Inputs::new(intervals, Some(lambda), results.len())?, results)
+    }
+
+    fn run<R: Answer<M, T>>(
+        &mut self,
+        inputs: &Inputs<'_, M, T>,
+        results: &mut [R],
+    ) -> Result<(), BatchError> {
+        let (count, steps) = (results.len(), self.options.steps);
+        self.status.clear();
+        fill(&mut self.status, count, Ok(()))?;
+        if self.options.start == Start::Warm {
+            fill(&mut self.warm, count, false)?;
+            fill(&mut self.records, count.saturating_mul(steps), Zeroable::zeroed())?;
+        }
+        let missing = self.options.start == Start::Given && self.given.is_none();
+        let lanes = if missing { 1 } else { T::widest(Width::<M, R, S>(PhantomData)).unwrap_or(1) };
+        let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
+        let work = Work { inputs, options: &self.options, tableau: &self.tableau, given, lanes };
+        let share = Share {
+            first: 0,
+            results,
+            status: &mut self.status,
+            records: &mut self.records,
+            warm: &mut self.warm,
+        };
+        #[cfg(feature = "parallel")]
+        parallel(&work, &mut self.workers, self.threads, share)?;
+        #[cfg(not(feature = "parallel"))]
+        if let Some(worker) = self.workers.first_mut() {
+            worker.run(&work, share);
+        }
+        self.statistics = BatchStatistics::default();
+        for worker in &mut self.workers {
+            self.statistics.add(&core::mem::take(&mut worker.statistics));
+        }
+        let mut failures = self.status.iter().enumerate().filter_map(|(i, status)| Some((i, status.err()?)));
+        match failures.next() {
+            Some((first, error)) => {
+                self.statistics.failed = 1 + failures.count();
+                Err(BatchError::Intervals { failed: self.statistics.failed, first, error })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Makes a vector as long as that.
+fn fill<V: Clone>(vector: &mut Vec<V>, length: usize, value: V) -> Result<(), BatchError> {
+    let bytes = length.saturating_mul(size_of::<V>());
+    vector.try_reserve(length.saturating_sub(vector.len())).map_err(|_| BatchError::OutOfMemory { bytes })?;
+    vector.resize(length, value);
+    Ok(())
+}

@@ -1,0 +1,134 @@
+//! What a batch is given.
+
+use super::error::{BatchError, Slice};
+use crate::error::{Argument, Error};
+use crate::irk::check;
+use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain, Shape};
+use bytemuck::Zeroable;
+
+/// Many intervals of one model: one element of each slice for each interval. Of all but `x0` there may be one element
+/// for all of them instead.
+#[derive(Debug)]
+pub struct Intervals<'a, M: Dae, T: Plain = f64> {
+    /// States at the start: as many as there are intervals.
+    pub x0: &'a [VectorX<M, T>],
+    /// Controls; may be empty if the model has none.
+    pub u: &'a [VectorU<M, T>],
+    /// Parameters; may be empty if the model has none.
+    pub p: &'a [VectorP<M, T>],
+    /// Lengths of the intervals.
+    pub h: &'a [T],
+    /// Times at their starts; zero if empty.
+    pub t0: &'a [T],
+}
+
+impl<M: Dae, T: Plain> Clone for Intervals<'_, M, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, T: Plain> Copy for Intervals<'_, M, T> {}
+
+/// No interval at all: what is there is set in it.
+impl<M: Dae, T: Plain> Default for Intervals<'_, M, T> {
+    fn default() -> Self {
+        Self { x0: &[], u: &[], p: &[], h: &[], t0: &[] }
+    }
+}
+
+/// One of them.
+#[derive(Debug)]
+pub struct Interval<'a, M: Dae, T: Plain> {
+    pub x0: &'a VectorX<M, T>,
+    /// Empty if the model has none, as `p`.
+    pub u: &'a [T],
+    pub p: &'a [T],
+    pub h: T,
+    pub t0: T,
+    /// Empty if nobody asks for adjoints.
+    pub lambda: &'a [T],
+}
+
+impl<M: Dae, T: Plain> Clone for Interval<'_, M, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, T: Plain> Copy for Interval<'_, M, T> {}
+
+/// All that a call was given, of the right lengths.
+pub struct Inputs<'a, M: Dae, T: Plain> {
+    intervals: &'a Intervals<'a, M, T>,
+    lambda: Option<&'a [VectorX<M, T>]>,
+}
+
+impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
+    /// # Errors
+    /// [`BatchError::Length`]
+    pub fn new(
+        intervals: &'a Intervals<'a, M, T>,
+        lambda: Option<&'a [VectorX<M, T>]>,
+        results: usize,
+    ) -> Result<Self, BatchError> {
+        let count = intervals.x0.len();
+        let (no_u, no_p) = (M::Shape::NU == 0, M::Shape::NP == 0);
+        for (argument, length, may_be_empty) in [
+            (Argument::U, intervals.u.len(), no_u),
+            (Argument::P, intervals.p.len(), no_p),
+            (Argument::H, intervals.h.len(), false),
+            (Argument::T, intervals.t0.len(), true),
+            (Argument::Lambda, lambda.map_or(count, <[_]>::len), false),
+        ] {
+            if length != count && length != 1 && !(length == 0 && may_be_empty) {
+                return Err(BatchError::Length {
+                    slice: Slice::Argument(argument),
+                    length,
+                    intervals: count,
+                });
+            }
+        }
+        if results != count {
+            return Err(BatchError::Length { slice: Slice::Results, length: results, intervals: count });
+        }
+        Ok(Self { intervals, lambda })
+    }
+
+    /// One interval.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]
+    pub fn interval(&self, index: usize) -> Result<Interval<'a, M, T>, Error> {
+        let Intervals { x0, u, p, h, t0 } = *self.intervals;
+        let interval: Interval<'a, M, T> = Interval {
+            x0: x0.get(index).ok_or(Error::NoResult)?,
+            u: of(u, index).map_or(&[], Matrix::as_slice),
+            p: of(p, index).map_or(&[], Matrix::as_slice),
+            h: of(h, index).map_or(T::ZERO, |h| *h),
+            t0: of(t0, index).map_or(T::ZERO, |t| *t),
+            lambda: self.lambda.and_then(|lambda| of(lambda, index)).map_or(&[], Matrix::as_slice),
+        };
+        check(Argument::X0, interval.x0.as_slice())?;
+        check(Argument::U, interval.u)?;
+        check(Argument::P, interval.p)?;
+        check(Argument::H, &[interval.h])?;
+        check(Argument::T, &[interval.t0])?;
+        check(Argument::Lambda, interval.lambda)?;
+        Ok(interval)
+    }
+}
+
+/// The element of an interval, which may be that of all.
+fn of<V>(slice: &[V], index: usize) -> Option<&V> {
+    if slice.len() == 1 { slice.first() } else { slice.get(index) }
+}
+
+/// A vector of these elements.
+pub fn vector<T: Plain, V: Matrix<T> + Zeroable>(elements: &[T]) -> V {
+    let mut vector = V::zeroed();
+    for (to, from) in vector.as_mut_slice().iter_mut().zip(elements) {
+        *to = *from;
+    }
+    vector
+}

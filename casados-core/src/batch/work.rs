@@ -1,0 +1,264 @@
+//! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a result for.
+
+use super::answer::{Answer, Slices};
+#[cfg(feature = "parallel")]
+use super::error::BatchError;
+use super::group::{Finite, Group, Unpack};
+use super::intervals::{Inputs, Interval, vector};
+use super::statistics::BatchStatistics;
+use crate::error::Error;
+use crate::irk;
+use crate::linalg::dispatch;
+use crate::memory::Heap;
+use crate::model::{ArrayK, Dae};
+use crate::options::{Options, Start};
+use crate::scalar::{Lanes, Real, Widest};
+use crate::shape::{Shape, assign};
+use crate::tableau::Tableau;
+use alloc::boxed::Box;
+#[cfg(feature = "parallel")]
+use alloc::vec::Vec;
+use core::any::Any;
+use core::marker::PhantomData;
+
+/// More lanes than any register has.
+const MOST_LANES: usize = 16;
+
+/// Groups whose factors, and the columns that go through them, need more bytes are computed one interval after
+/// the other: what does not lie in the second-level cache is fetched from afar again and again.
+const WORKING_SET: usize = 1 << 20;
+
+/// How many intervals are computed together.
+pub struct Width<M, R, const S: usize>(pub PhantomData<(M, R)>);
+
+impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Width<M, R, S> {
+    type Output = usize;
+    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> usize {
+        let bytes = size_of::<M::Factors<[[E; S]; S]>>() + R::sweep::<E, S>();
+        // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
+        if M::STRUCTURE.elimination.pivots.is_empty() || bytes > WORKING_SET { 1 } else { E::LANES }
+    }
+}
+
+/// What is to be done.
+pub struct Work<'a, M: Dae, T: Real, const S: usize> {
+    pub inputs: &'a Inputs<'a, M, T>,
+    pub options: &'a Options,
+    pub tableau: &'a Tableau<S>,
+    pub given: Option<[&'a [T]; 2]>,
+    pub lanes: usize,
+}
+
+/// Consecutive intervals, and where what is found out about them belongs.
+pub struct Share<'a, M: Dae, T: Real, R, const S: usize> {
+    pub first: usize,
+    pub results: &'a mut [R],
+    pub status: &'a mut [Result<(), Error>],
+    /// The stages of all steps of every interval; empty without a warm start, as `warm`.
+    pub records: &'a mut [ArrayK<M, [T; S]>],
+    pub warm: &'a mut [bool],
+}
+
+impl<'a, M: Dae, T: Real, R, const S: usize> Share<'a, M, T, R, S> {
+    /// The next intervals, which are taken away.
+    fn take(&mut self, count: usize, steps: usize) -> Share<'a, M, T, R, S> {
+        let first = self.first;
+        let count = count.min(self.results.len());
+        self.first += count;
+        Share {
+            first,
+            results: split(&mut self.results, count),
+            status: split(&mut self.status, count),
+            records: split(&mut self.records, count.saturating_mul(steps)),
+            warm: split(&mut self.warm, count),
+        }
+    }
+}
+
+/// The first elements, which are taken away.
+fn split<'a, V>(slice: &mut &'a mut [V], count: usize) -> &'a mut [V] {
+    let count = count.min(slice.len());
+    let (first, rest) = core::mem::take(slice).split_at_mut(count);
+    *slice = rest;
+    first
+}
+
+/// Gives every thread as many groups as every other.
+#[cfg(feature = "parallel")]
+pub fn parallel<M: Dae, B, R: Answer<M, T>, T: Real, const S: usize>(
+    work: &Work<'_, M, T, S>,
+    workers: &mut Vec<Worker<M, B, S, T>>,
+    threads: usize,
+    mut share: Share<'_, M, T, R, S>,
+) -> Result<(), BatchError> {
+    let groups = share.results.len().div_ceil(work.lanes);
+    let threads = threads.min(groups).max(1);
+    while workers.len() < threads {
+        let worker = Worker::new(*work.options, *work.tableau);
+        let bytes = threads.saturating_mul(size_of::<Worker<M, B, S, T>>());
+        let (Ok(worker), Ok(())) = (worker, workers.try_reserve(1)) else {
+            return Err(BatchError::OutOfMemory { bytes });
+        };
+        workers.push(worker);
+    }
+    if let (1, Some(worker)) = (threads, workers.first_mut()) {
+        worker.run(work, share);
+        return Ok(());
+    }
+    let most = groups.div_ceil(threads).saturating_mul(work.lanes);
+    rayon::scope(|scope| {
+        for worker in workers.iter_mut().take(threads) {
+            let share = share.take(most, work.options.steps);
+            scope.spawn(move |_| worker.run(work, share));
+        }
+    });
+    Ok(())
+}
+
+/// What computes, with memory of its own.
+pub struct Worker<M: Dae, B, const S: usize, T: Real> {
+    single: irk::Integrator<M, B, S, T, Heap>,
+    /// A [`Group`] of the registers of this machine.
+    group: Option<Box<dyn Any + Send + Sync>>,
+    pub statistics: BatchStatistics,
+}
+
+impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
+    pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        let single = irk::Integrator::build(options, tableau)?;
+        Ok(Self { single, group: None, statistics: BatchStatistics::default() })
+    }
+
+    pub fn run<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
+        while !share.results.is_empty() {
+            let group = share.take(work.lanes, work.options.steps);
+            self.group(work, group);
+        }
+    }
+
+    /// The intervals of one group.
+    fn group<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
+        let mut intervals = [None; MOST_LANES];
+        for (i, (interval, status)) in intervals.iter_mut().zip(share.status.iter_mut()).enumerate() {
+            match work.inputs.interval(share.first + i) {
+                Ok(good) => *interval = Some(good),
+                Err(error) => *status = Err(error),
+            }
+        }
+        let several = intervals.iter().flatten().count() > 1;
+        let mut done = [false; MOST_LANES];
+        if several {
+            let (group, statistics, share) = (&mut self.group, &mut self.statistics, &mut share);
+            let together = Together { work, group, statistics, intervals: &intervals, share };
+            // What did not get memory side by side may get it alone.
+            done = T::widest(together).ok().and_then(Result::ok).unwrap_or_default();
+        }
+        for (i, (interval, done)) in intervals.iter().zip(done).enumerate() {
+            let (Some(interval), false) = (interval, done) else { continue };
+            *(if several { &mut self.statistics.redone } else { &mut self.statistics.alone }) += 1;
+            let outcome = self.alone(work, interval, i, &mut share);
+            self.statistics.add_work(self.single.statistics());
+            if let Some(status) = share.status.get_mut(i) {
+                *status = outcome;
+            }
+        }
+    }
+
+    /// One interval.
+    fn alone<R: Answer<M, T>>(
+        &mut self,
+        work: &Work<'_, M, T, S>,
+        interval: &Interval<'_, M, T>,
+        index: usize,
+        share: &mut Share<'_, M, T, R, S>,
+    ) -> Result<(), Error> {
+        let irk = &mut self.single;
+        if M::Shape::NP > 0 {
+            irk.set_parameters(&vector(interval.p))?;
+        }
+        irk.set_time(interval.t0)?;
+        if let Some([xdot, z]) = work.given {
+            irk.set_start(&vector(xdot), &vector(z))?;
+        }
+        let steps = work.options.steps;
+        let record = share.records.chunks_exact_mut(steps).nth(index);
+        let warm = share.warm.get_mut(index);
+        match (&record, &warm) {
+            (Some(record), Some(true)) => irk.set_record(record)?,
+            _ => irk.reset(),
+        }
+        let answer = R::alone(irk, interval)?;
+        if let Some(result) = share.results.get_mut(index) {
+            assign(result, answer);
+        }
+        if let (Some(record), Some(warm)) = (record, warm) {
+            irk.record(record)?;
+            *warm = true;
+        }
+        Ok(())
+    }
+}
+
+/// The intervals of a group side by side.
+struct Together<'a, 'b, 'c, M: Dae, T: Real, R, const S: usize> {
+    work: &'a Work<'b, M, T, S>,
+    group: &'a mut Option<Box<dyn Any + Send + Sync>>,
+    statistics: &'a mut BatchStatistics,
+    intervals: &'a [Option<Interval<'b, M, T>>; MOST_LANES],
+    share: &'a mut Share<'c, M, T, R, S>,
+}
+
+impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_, '_, '_, M, T, R, S> {
+    /// For which intervals there is a result.
+    type Output = Result<[bool; MOST_LANES], Error>;
+
+    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output {
+        let Self { work, group, statistics, intervals, share } = self;
+        let mut done = [false; MOST_LANES];
+        if !group.as_ref().is_some_and(|group| (**group).is::<Group<M, E, S>>()) {
+            *group = Some(Box::new(Group::<M, E, S>::new(work.options, work.tableau)));
+        }
+        let group = group.as_mut().and_then(|group| group.downcast_mut::<Group<M, E, S>>());
+        // Lanes that nobody needs hold a copy of the first interval.
+        let first = intervals.iter().position(Option::is_some);
+        let (Some(group), Some(first)) = (group, first) else { return Ok(done) };
+        let Some(Some(copy)) = intervals.get(first) else { return Ok(done) };
+        let lanes = intervals.map(|interval| interval.unwrap_or(*copy));
+        let index = |lane: usize| if matches!(intervals.get(lane), Some(Some(_))) { lane } else { first };
+
+        let steps = work.options.steps;
+        let mut records: [&[ArrayK<M, [T; S]>]; MOST_LANES] = [&[]; MOST_LANES];
+        let mut warm = work.options.start == Start::Warm;
+        for (lane, record) in records.iter_mut().enumerate() {
+            let from = share.records.chunks_exact(steps).nth(index(lane));
+            *record = from.unwrap_or_default();
+            warm &= share.warm.get(index(lane)).copied().unwrap_or(false);
+        }
+        group.place(lanes.get(..E::LANES).unwrap_or_default(), work.given, warm.then_some(&records))?;
+
+        let (mut good, wide) = R::together(group, warm)?;
+        for slice in wide.slices() {
+            good = E::and(good, dispatch(Finite(slice)));
+        }
+        let mut verdict: E::Cell = bytemuck::Zeroable::zeroed();
+        E::select(good, E::from_f64(1.0), E::from_f64(0.0)).store(&mut verdict);
+        for (lane, (done, result)) in done.iter_mut().zip(share.results.iter_mut()).enumerate() {
+            *done = intervals[lane].is_some() && lane < E::LANES && E::lane(&verdict, lane) != 0.0;
+            if *done {
+                for (from, to) in wide.slices().zip(result.slices_mut()) {
+                    dispatch(Unpack { from, lane, to });
+                }
+            }
+        }
+        let places = share.records.chunks_exact_mut(steps).zip(share.warm.iter_mut());
+        for (lane, ((record, warm), done)) in places.zip(done).enumerate() {
+            if done {
+                group.record(lane, record)?;
+                *warm = true;
+            }
+        }
+        statistics.groups += 1;
+        statistics.add_work(&group.statistics);
+        Ok(done)
+    }
+}
