@@ -94,7 +94,9 @@ fn start_values() {
         Record::load("ivp/ends.json").expect("the reference is there").record("squeezer").expect("a problem");
     let x = q.numbers("x0", 14).expect("x0");
     // Hairer and Wanner, Solving ODEs II, section VII.7.
+    #[allow(clippy::excessive_precision)] // As published.
     let w = [14222.4439199541138705911625887, -10666.8329399655854029433719415, 0.0, 0.0, 0.0, 0.0, 0.0];
+    #[allow(clippy::excessive_precision)]
     let lambda = [98.5668703962410896057654982170, -6.12268834425566265503114393122, 0.0, 0.0, 0.0, 0.0];
     let v = [&[0.0; 7], &w[..], &x, &w, &lambda, &[0.0]].concat();
     for (row, f) in residual::<Squeezer>(&v, 27).iter().enumerate() {

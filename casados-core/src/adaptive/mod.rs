@@ -137,7 +137,7 @@ macro_rules! single {
     };
 }
 // As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
-single!(3: 2, 1; 5: 4, 2; 7: 4, 2);
+single!(3: 4, 1; 5: 4, 2; 7: 4, 2);
 
 macro_rules! methods {
     ($($method:ty),*) => {

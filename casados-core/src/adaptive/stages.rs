@@ -155,8 +155,9 @@ where
     RadauIIA<S>: Method<S>,
 {
     tableau: Tableau<S>,
-    /// Columns of `A`.
+    /// Columns of `A`, and of `−h A` of this step.
     a: [Groups<T, G>; S],
+    minus_ha: [Groups<T, G>; S],
     c: Groups<T, G>,
     /// Columns of the matrix of right eigenvectors, real and imaginary parts.
     right: [[Groups<T, G>; 2]; L],
@@ -188,8 +189,10 @@ where
         // Radau IIA methods have one: tests construct all.
         let basis: Eigenbasis<T, S, L> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
         let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
+        let a = from_fn(|j| groups(S, |i| T::from_f64(a[i][j])));
         Ok(Self {
-            a: from_fn(|j| groups(S, |i| T::from_f64(a[i][j]))),
+            a,
+            minus_ha: a,
             c: groups(S, |i| T::from_f64(c[i])),
             right: from_fn(|l| [groups(S, |i| right[i].re[l]), groups(S, |i| right[i].im[l])]),
             lagrange: tableau.lagrange(0.0).map(T::from_f64),
@@ -252,8 +255,9 @@ where
         let Memory { y, points, rows, .. } = &mut *self.memory;
         let mut points = points.each_mut().map(|points| points.as_mut());
         let sum = dispatch(Advance {
-            a: self.a.map(|column| column.map(|group| group.map(|a| -(start.h * a)))),
-            right: &self.right,
+            minus_ha: &self.minus_ha,
+            // Of the lanes that there are eigenvalues for.
+            right: &self.right[..S.div_ceil(2)],
             x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
             scale: start.scale.as_ref(),
             rows: if increment { rows.as_ref() } else { &[] },
@@ -339,9 +343,13 @@ where
         convergence: &mut Convergence,
         residuals: &mut usize,
     ) -> Result<(), Failure> {
+        for (to, from) in self.minus_ha.as_flattened_mut().iter_mut().zip(self.a.as_flattened()) {
+            *to = from.map(|a| -(start.h * a));
+        }
         let t = start.point.as_ref().last().copied().unwrap_or(T::ZERO);
+        let inputs = 2 * M::Shape::NX + M::Shape::NZ;
         for (points, c) in self.memory.points.iter_mut().zip(&self.c) {
-            for (to, from) in points.as_mut().iter_mut().zip(start.point.as_ref()) {
+            for (to, from) in points.as_mut().iter_mut().zip(start.point.as_ref()).skip(inputs) {
                 *to = [*from; GROUP];
             }
             if let Some(time) = points.as_mut().last_mut() {
@@ -506,8 +514,8 @@ impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for
 /// See [`Radau::advance`].
 struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
     /// Columns of `−h A`.
-    a: [Groups<T, G>; S],
-    right: &'a [[Groups<T, G>; 2]; L],
+    minus_ha: &'a [Groups<T, G>; S],
+    right: &'a [[Groups<T, G>; 2]],
     /// The states at the start of the step.
     x: &'a [T],
     scale: &'a [T],
@@ -520,7 +528,7 @@ impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance
     type Output = Groups<T, G>;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> Groups<T, G> {
-        let Self { a, right, x, scale, rows, y, points } = self;
+        let Self { minus_ha, right, x, scale, rows, y, points } = self;
         let nx = x.len();
         let mut sums = [[T::ZERO; GROUP]; G];
         for (index, (unknown, &scale)) in y.iter_mut().zip(scale).enumerate() {
@@ -540,7 +548,7 @@ impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance
             }
             if let Some(&x) = x.get(index) {
                 let mut xi = [[x; GROUP]; G];
-                for (a, &k) in a.iter().zip(y.as_flattened()) {
+                for (a, &k) in minus_ha.iter().zip(y.as_flattened()) {
                     for (xi, a) in xi.iter_mut().zip(a) {
                         for (xi, a) in xi.iter_mut().zip(a) {
                             *xi = A::subtract(*xi, *a, k);

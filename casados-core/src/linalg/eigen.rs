@@ -524,6 +524,7 @@ mod tests {
         check::<5, 3>(&RadauIIA::<5>::TABLEAU);
         check::<6, 3>(&RadauIIA::<6>::TABLEAU);
         check::<7, 4>(&RadauIIA::<7>::TABLEAU);
+        check::<3, 4>(&RadauIIA::<3>::TABLEAU);
         check::<5, 4>(&RadauIIA::<5>::TABLEAU);
         check::<8, 4>(&RadauIIA::<8>::TABLEAU);
         check::<9, 5>(&RadauIIA::<9>::TABLEAU);

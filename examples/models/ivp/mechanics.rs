@@ -6,11 +6,7 @@ use casados::{dae, ode};
 /// is its number.
 #[ode]
 pub fn pleiades(x: [f64; 28]) -> [f64; 28] {
-    let mut derivative = [0.0; 28];
-    for i in 0..7 {
-        derivative[i] = x[14 + i];
-        derivative[7 + i] = x[21 + i];
-    }
+    let mut derivative: [f64; 28] = core::array::from_fn(|i| if i < 14 { x[14 + i] } else { 0.0 });
     for i in 0..7 {
         for j in 0..i {
             let (dx, dy) = (x[j] - x[i], x[7 + j] - x[7 + i]);
