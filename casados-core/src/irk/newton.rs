@@ -78,7 +78,7 @@ impl Progress {
     /// After an increment, and what is expected of the next one: with factors that are `new` or older ones, the first
     /// in this step or a later one.
     fn judge(&mut self, rule: &Rule, [increment, next]: [f64; 2], new: bool, first: bool) {
-        if !(increment <= f64::MAX) {
+        if !increment.is_finite() {
             self.state = State::Failed;
             return;
         }
@@ -158,10 +158,13 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
         let mut renewals = 0;
-        let mut renew = !mean
-            && !(self.validity.factors && M::STRUCTURE.constant_matrix)
-            && (rule.full || rule.exact || !(adaptive && self.validity.factors))
-            || mean && !self.validity.mean;
+        let mut renew = if mean {
+            !self.validity.mean
+        } else if M::STRUCTURE.constant_matrix && self.validity.factors {
+            false
+        } else {
+            rule.full || rule.exact || !(adaptive && self.validity.factors)
+        };
         let mut iteration = 0;
         loop {
             self.place(coefficients, step, x, y);

@@ -145,8 +145,8 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
 
     #[inline(always)]
     fn select(mask: Self::Mask, a: Self, mut b: Self) -> Self {
-        for l in 0..L {
-            (b.re[l], b.im[l]) = (T::select(mask[l], a.re[l], b.re[l]), T::select(mask[l], a.im[l], b.im[l]));
+        for (l, &mask) in mask.iter().enumerate() {
+            (b.re[l], b.im[l]) = (T::select(mask, a.re[l], b.re[l]), T::select(mask, a.im[l], b.im[l]));
         }
         b
     }

@@ -13,22 +13,16 @@
 //! is left of a register repeats the last.
 
 use super::complex::Complex;
-use super::dense::Dense;
-use super::factors::slot;
-use super::fused::{Arithmetic, Kernel, dispatch};
-use super::sparse;
-use crate::model::{ArrayK, Assembly, Dae, Elimination};
-use crate::scalar::{Lanes, Real};
-use crate::shape::Plain;
+use super::fused::Arithmetic;
+use crate::scalar::Lanes;
 use crate::tableau::Tableau;
-use bytemuck::Zeroable;
 use core::array::from_fn;
 
 /// `A = V diag(μ) V⁻¹` of a tableau with at most one real eigenvalue, such as those of Gauss and Radau.
 #[derive(Clone, Copy, Debug)]
 pub struct Eigenbasis<T, const S: usize, const L: usize> {
     /// `μ`; the real one first, of conjugate ones that with the positive imaginary part.
-    values: Complex<T, L>,
+    pub(super) values: Complex<T, L>,
     /// Columns of `V⁻¹`.
     left: [Complex<T, L>; S],
     /// Real and imaginary parts of the columns of `V`, with a factor of two where they stand for a conjugate too.
@@ -48,16 +42,19 @@ impl<T: Lanes, const S: usize, const L: usize> Eigenbasis<T, S, L> {
         })
     }
 
+    #[cfg(feature = "alloc")]
     /// The eigenvalues `μ` of `A`: if `S` is odd the first is real, and of each complex pair there is one.
     pub fn values(&self) -> &Complex<T, L> {
         &self.values
     }
 
+    #[cfg(feature = "alloc")]
     /// Columns of `V⁻¹`, one for each stage.
     pub fn left(&self) -> &[Complex<T, L>; S] {
         &self.left
     }
 
+    #[cfg(feature = "alloc")]
     /// Rows of `V`, one for each stage, with a factor of two where they stand for a conjugate too: `y_i = Re Σ_l v_il ŷ_l`.
     pub fn right(&self) -> [Complex<T, L>; S] {
         from_fn(|stage| Complex {
@@ -255,230 +252,6 @@ fn direction<const S: usize>(mut matrix: [[Number; S]; S], mut b: [Number; S]) -
     let largest = b.iter().fold(0.0, |m: f64, z| m.max(size(*z)));
     let scaled = b.map(|z| z.scaled(1.0 / largest));
     scaled.iter().all(Complex::is_finite).then_some(scaled)
-}
-
-/// A right-hand side or a solution of the `L` systems, one row for each slot.
-pub type Rows<M, T, const L: usize> = ArrayK<M, [[Complex<T, L>; 1]; 1]>;
-
-/// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all `L` eigenvalues.
-#[derive(Zeroable)]
-#[zeroable(bound = "T: Zeroable")]
-pub struct EigenFactors<M: Dae, T: Plain, const L: usize> {
-    blocks: M::Factors<[[Complex<T, L>; 1]; 1]>,
-    /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
-    dense: [Dense<M, T, 2>; L],
-    is_dense: bool,
-    pivoted: bool,
-}
-
-impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
-    /// Whether the plan is in use, so that pivoting may give better factors.
-    pub fn is_planned(&self) -> bool {
-        !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
-    }
-
-    /// From now on, whether every matrix is to be pivoted.
-    pub fn set_pivoted(&mut self, pivoted: bool) {
-        self.pivoted = pivoted;
-    }
-
-    /// Factors of the matrices of a Jacobian. Whether those of the plan hold, if there is one.
-    ///
-    /// # Errors
-    /// The unknown for which there is no pivot.
-    pub fn factor(&mut self, jacobian: &M::Jacobian<T>, values: &Complex<T, L>, h: T) -> Result<bool, usize> {
-        let scale = values.scaled(h);
-        self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
-        if self.is_dense {
-            self.factor_dense(jacobian, &scale)?;
-        }
-        Ok(!self.is_dense || M::STRUCTURE.elimination.pivots.is_empty())
-    }
-
-    /// By the plan; whether that went well.
-    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
-        let plan = &M::STRUCTURE.elimination;
-        let blocks = self.blocks.as_mut();
-        blocks.fill([[Complex::zero()]]);
-        for entry in plan.assembly {
-            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
-            if entry.state != Assembly::NONE {
-                *element = scale.scaled(jacobian[entry.state as usize]);
-            }
-            if entry.direct != Assembly::NONE {
-                let direct = jacobian[entry.direct as usize];
-                element.re = element.re.map(|re| re + direct);
-            }
-        }
-        sparse::factor(plan, blocks);
-        // A pivot that vanishes leaves infinite elements or NaN.
-        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
-        pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
-    }
-
-    /// By pivoting whole matrices.
-    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> Result<(), usize> {
-        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
-        for (l, dense) in self.dense.iter_mut().enumerate() {
-            dense.clear();
-            for e in 0..blocks[3] {
-                let (r, c) = pattern.at(e);
-                let (r, value) = (slot::<M>(r), jacobian[e]);
-                if e >= blocks[1] && e < blocks[2] {
-                    dense.add_row(r, c - nx, 0, value, &[scale.re[l], -scale.im[l]]);
-                    dense.add_row(r, c - nx, 1, value, &[scale.im[l], scale.re[l]]);
-                } else {
-                    let c = if e < blocks[1] { c } else { c - nx };
-                    dense.add(r, c, 0, value);
-                    dense.add(r, c, 1, value);
-                }
-            }
-            dense.factor().map_err(|(unknown, _)| unknown)?;
-        }
-        Ok(())
-    }
-
-    /// Solves all `L` systems in place; equations are in their slots.
-    pub fn solve(&self, rows: &mut Rows<M, T, L>) {
-        if self.is_dense {
-            self.solve_dense(rows);
-        } else {
-            sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), rows.as_mut());
-        }
-    }
-
-    fn solve_dense(&self, rows: &mut Rows<M, T, L>) {
-        let mut parts: ArrayK<M, [[T; 1]; 2]> = Zeroable::zeroed();
-        for (l, dense) in self.dense.iter().enumerate() {
-            for (part, [[row]]) in parts.as_mut().iter_mut().zip(rows.as_ref()) {
-                *part = [[row.re[l]], [row.im[l]]];
-            }
-            dense.solve(&mut parts);
-            for ([[re], [im]], [[row]]) in parts.as_ref().iter().zip(rows.as_mut()) {
-                (row.re[l], row.im[l]) = (*re, *im);
-            }
-        }
-    }
-}
-
-/// Factors of the mean Jacobian of the stages for all `L` eigenvalues, by the plan: what an iteration takes that need
-/// not be exact.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-pub struct MeanFactors<M: Dae, E: Plain, const L: usize> {
-    blocks: M::Factors<[[Complex<E, L>; 1]; 1]>,
-    rows: ArrayK<M, [[Complex<E, L>; 1]; 1]>,
-}
-
-impl<M: Dae, E: Plain, const L: usize> Clone for MeanFactors<M, E, L> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<M: Dae, E: Plain, const L: usize> Copy for MeanFactors<M, E, L> {}
-
-impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
-    /// Factors; a pivot that vanishes leaves elements that are not finite.
-    pub fn factor<const S: usize>(
-        &mut self,
-        jacobian: &M::Jacobian<[E; S]>,
-        basis: &Eigenbasis<E, S, L>,
-        h: E,
-    ) {
-        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_mut());
-        dispatch(AssembleMean {
-            plan,
-            jacobian: jacobian.as_ref(),
-            values: &basis.values,
-            h,
-            blocks: &mut *blocks,
-        });
-        sparse::factor(plan, blocks);
-    }
-
-    /// Solves the Newton system of the stages in place, equations in their slots.
-    pub fn solve<const S: usize>(&mut self, basis: &Eigenbasis<E, S, L>, b: &mut ArrayK<M, [[E; 1]; S]>) {
-        dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
-        sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), self.rows.as_mut());
-        dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
-    }
-}
-
-/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian; fill zero.
-struct AssembleMean<'a, E, const S: usize, const L: usize> {
-    plan: &'a Elimination,
-    jacobian: &'a [[E; S]],
-    values: &'a Complex<E, L>,
-    h: E,
-    blocks: &'a mut [[[Complex<E, L>; 1]; 1]],
-}
-
-impl<E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, E, S, L> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { plan, jacobian, values, h, blocks } = self;
-        let share = E::from_f64(1.0 / S as f64);
-        let scale = values.scaled(h * share);
-        let zero = Complex::zero();
-        blocks.fill([[zero]]);
-        for entry in plan.assembly {
-            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
-            if let Some(state) = jacobian.get(entry.state as usize) {
-                *element = scale.scaled(total(state));
-            }
-            if let Some(direct) = jacobian.get(entry.direct as usize) {
-                let direct = share * total(direct);
-                for re in &mut element.re {
-                    *re = *re + direct;
-                }
-            }
-        }
-    }
-}
-
-/// The sum over the stages.
-#[inline(always)]
-fn total<E: Lanes, const S: usize>(stages: &[E; S]) -> E {
-    let mut total = E::from_f64(0.0);
-    for &stage in stages {
-        total = total + stage;
-    }
-    total
-}
-
-struct Split<'a, T, const S: usize, const L: usize> {
-    basis: &'a Eigenbasis<T, S, L>,
-    b: &'a [[[T; 1]; S]],
-    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
-}
-
-impl<T: Lanes, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
-            let mut stages = [T::from_f64(0.0); S];
-            stages.copy_from_slice(b.as_flattened());
-            *row = self.basis.split::<A>(&stages);
-        }
-    }
-}
-
-struct Join<'a, T, const S: usize, const L: usize> {
-    basis: &'a Eigenbasis<T, S, L>,
-    b: &'a mut [[[T; 1]; S]],
-    rows: &'a [[[Complex<T, L>; 1]; 1]],
-}
-
-impl<T: Lanes, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for ([[row]], b) in self.rows.iter().zip(self.b) {
-            b.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(row));
-        }
-    }
 }
 
 #[cfg(test)]

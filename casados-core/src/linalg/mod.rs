@@ -6,24 +6,27 @@
 //!
 //! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
 //! by the plan of the model (`sparse`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
-//! [`EigenFactors`] is the same for stages that share one Jacobian, in the eigenbasis of the tableau.
+//! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
+//! iterations that need not be exact, `EigenFactors` for steps of variable size.
 
 mod block;
-#[cfg(feature = "alloc")]
 mod complex;
 mod dense;
-#[cfg(feature = "alloc")]
 mod eigen;
+#[cfg(feature = "alloc")]
+mod eigen_factors;
 mod factors;
 mod fused;
 mod kernels;
+mod mean;
 mod sparse;
 
 #[cfg(feature = "alloc")]
 pub(crate) use complex::Complex;
+pub(crate) use eigen::Eigenbasis;
 #[cfg(feature = "alloc")]
-pub(crate) use eigen::{EigenFactors, Rows};
-pub(crate) use eigen::{Eigenbasis, MeanFactors};
+pub(crate) use eigen_factors::{EigenFactors, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;
+pub(crate) use mean::MeanFactors;

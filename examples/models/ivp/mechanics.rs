@@ -1,4 +1,5 @@
 //! Celestial and multibody mechanics.
+#![allow(clippy::manual_memcpy)] // One loop over the bodies reads best.
 
 use casados::{dae, ode};
 

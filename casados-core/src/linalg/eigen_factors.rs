@@ -1,0 +1,115 @@
+//! Factors in the eigenbasis of the tableau that say whether they hold, with whole matrices pivoted where they do not: what
+//! steps of variable size iterate with.
+
+use super::complex::Complex;
+use super::dense::Dense;
+use super::factors::slot;
+use super::sparse;
+use crate::model::{ArrayK, Assembly, Dae};
+use crate::scalar::Real;
+use crate::shape::Plain;
+use bytemuck::Zeroable;
+
+/// A right-hand side or a solution of the `L` systems, one row for each slot.
+pub type Rows<M, T, const L: usize> = ArrayK<M, [[Complex<T, L>; 1]; 1]>;
+
+/// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all `L` eigenvalues.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+pub struct EigenFactors<M: Dae, T: Plain, const L: usize> {
+    blocks: M::Factors<[[Complex<T, L>; 1]; 1]>,
+    /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
+    dense: [Dense<M, T, 2>; L],
+    is_dense: bool,
+    pivoted: bool,
+}
+
+impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
+    /// Whether the plan is in use, so that pivoting may give better factors.
+    pub fn is_planned(&self) -> bool {
+        !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
+    }
+
+    /// From now on, whether every matrix is to be pivoted.
+    pub fn set_pivoted(&mut self, pivoted: bool) {
+        self.pivoted = pivoted;
+    }
+
+    /// Factors of the matrices of a Jacobian. Whether those of the plan hold, if there is one.
+    ///
+    /// # Errors
+    /// The unknown for which there is no pivot.
+    pub fn factor(&mut self, jacobian: &M::Jacobian<T>, values: &Complex<T, L>, h: T) -> Result<bool, usize> {
+        let scale = values.scaled(h);
+        self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
+        if self.is_dense {
+            self.factor_dense(jacobian, &scale)?;
+        }
+        Ok(!self.is_dense || M::STRUCTURE.elimination.pivots.is_empty())
+    }
+
+    /// By the plan; whether that went well.
+    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
+        let plan = &M::STRUCTURE.elimination;
+        let blocks = self.blocks.as_mut();
+        blocks.fill([[Complex::zero()]]);
+        for entry in plan.assembly {
+            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
+            if entry.state != Assembly::NONE {
+                *element = scale.scaled(jacobian[entry.state as usize]);
+            }
+            if entry.direct != Assembly::NONE {
+                let direct = jacobian[entry.direct as usize];
+                element.re = element.re.map(|re| re + direct);
+            }
+        }
+        sparse::factor(plan, blocks);
+        // A pivot that vanishes leaves infinite elements or NaN.
+        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
+        pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
+    }
+
+    /// By pivoting whole matrices.
+    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> Result<(), usize> {
+        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+        for (l, dense) in self.dense.iter_mut().enumerate() {
+            dense.clear();
+            for e in 0..blocks[3] {
+                let (r, c) = pattern.at(e);
+                let (r, value) = (slot::<M>(r), jacobian[e]);
+                if e >= blocks[1] && e < blocks[2] {
+                    dense.add_row(r, c - nx, 0, value, &[scale.re[l], -scale.im[l]]);
+                    dense.add_row(r, c - nx, 1, value, &[scale.im[l], scale.re[l]]);
+                } else {
+                    let c = if e < blocks[1] { c } else { c - nx };
+                    dense.add(r, c, 0, value);
+                    dense.add(r, c, 1, value);
+                }
+            }
+            dense.factor().map_err(|(unknown, _)| unknown)?;
+        }
+        Ok(())
+    }
+
+    /// Solves all `L` systems in place; equations are in their slots.
+    pub fn solve(&self, rows: &mut Rows<M, T, L>) {
+        if self.is_dense {
+            self.solve_dense(rows);
+        } else {
+            sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), rows.as_mut());
+        }
+    }
+
+    fn solve_dense(&self, rows: &mut Rows<M, T, L>) {
+        let mut parts: ArrayK<M, [[T; 1]; 2]> = Zeroable::zeroed();
+        for (l, dense) in self.dense.iter().enumerate() {
+            for (part, [[row]]) in parts.as_mut().iter_mut().zip(rows.as_ref()) {
+                *part = [[row.re[l]], [row.im[l]]];
+            }
+            dense.solve(&mut parts);
+            for ([[re], [im]], [[row]]) in parts.as_ref().iter().zip(rows.as_mut()) {
+                (row.re[l], row.im[l]) = (*re, *im);
+            }
+        }
+    }
+}

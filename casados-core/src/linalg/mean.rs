@@ -1,0 +1,130 @@
+//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau.
+
+use super::complex::Complex;
+use super::eigen::Eigenbasis;
+use super::fused::{Arithmetic, Kernel, dispatch};
+use super::sparse;
+use crate::model::{ArrayK, Dae, Elimination};
+use crate::scalar::Lanes;
+use crate::shape::Plain;
+use bytemuck::Zeroable;
+
+/// Factors of the mean Jacobian of the stages for all `L` eigenvalues, by the plan: what an iteration takes that need
+/// not be exact.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct MeanFactors<M: Dae, E: Plain, const L: usize> {
+    blocks: M::Factors<[[Complex<E, L>; 1]; 1]>,
+    rows: ArrayK<M, [[Complex<E, L>; 1]; 1]>,
+}
+
+impl<M: Dae, E: Plain, const L: usize> Clone for MeanFactors<M, E, L> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, E: Plain, const L: usize> Copy for MeanFactors<M, E, L> {}
+
+impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
+    /// Factors; a pivot that vanishes leaves elements that are not finite.
+    pub fn factor<const S: usize>(
+        &mut self,
+        jacobian: &M::Jacobian<[E; S]>,
+        basis: &Eigenbasis<E, S, L>,
+        h: E,
+    ) {
+        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_mut());
+        dispatch(AssembleMean {
+            plan,
+            jacobian: jacobian.as_ref(),
+            values: &basis.values,
+            h,
+            blocks: &mut *blocks,
+        });
+        sparse::factor(plan, blocks);
+    }
+
+    /// Solves the Newton system of the stages in place, equations in their slots.
+    pub fn solve<const S: usize>(&mut self, basis: &Eigenbasis<E, S, L>, b: &mut ArrayK<M, [[E; 1]; S]>) {
+        dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
+        sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), self.rows.as_mut());
+        dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
+    }
+}
+
+/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian; fill zero.
+struct AssembleMean<'a, E, const S: usize, const L: usize> {
+    plan: &'a Elimination,
+    jacobian: &'a [[E; S]],
+    values: &'a Complex<E, L>,
+    h: E,
+    blocks: &'a mut [[[Complex<E, L>; 1]; 1]],
+}
+
+impl<E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, E, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { plan, jacobian, values, h, blocks } = self;
+        let share = E::from_f64(1.0 / S as f64);
+        let scale = values.scaled(h * share);
+        let zero = Complex::zero();
+        blocks.fill([[zero]]);
+        for entry in plan.assembly {
+            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
+            if let Some(state) = jacobian.get(entry.state as usize) {
+                *element = scale.scaled(total(state));
+            }
+            if let Some(direct) = jacobian.get(entry.direct as usize) {
+                let direct = share * total(direct);
+                for re in &mut element.re {
+                    *re = *re + direct;
+                }
+            }
+        }
+    }
+}
+
+/// The sum over the stages.
+#[inline(always)]
+fn total<E: Lanes, const S: usize>(stages: &[E; S]) -> E {
+    let mut total = E::from_f64(0.0);
+    for &stage in stages {
+        total = total + stage;
+    }
+    total
+}
+
+struct Split<'a, T, const S: usize, const L: usize> {
+    basis: &'a Eigenbasis<T, S, L>,
+    b: &'a [[[T; 1]; S]],
+    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+}
+
+impl<T: Lanes, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
+            let mut stages = [T::from_f64(0.0); S];
+            stages.copy_from_slice(b.as_flattened());
+            *row = self.basis.split::<A>(&stages);
+        }
+    }
+}
+
+struct Join<'a, T, const S: usize, const L: usize> {
+    basis: &'a Eigenbasis<T, S, L>,
+    b: &'a mut [[[T; 1]; S]],
+    rows: &'a [[[Complex<T, L>; 1]; 1]],
+}
+
+impl<T: Lanes, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for ([[row]], b) in self.rows.iter().zip(self.b) {
+            b.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(row));
+        }
+    }
+}
