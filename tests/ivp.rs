@@ -193,7 +193,7 @@ fn akzo_nobel() {
 #[test]
 fn transistor_amplifier() {
     let problem = Problem::load("transistor_amplifier", 1e-2, 100.0);
-    follows!(variable::<TransistorAmplifier, 8, 0, 0>(problem, [1e-4, 1e-7], 1.0, states));
+    follows!(variable::<TransistorAmplifier, 8, 0, 0>(problem, [1e-4, 1e-7, 1e-10], 1.0, states));
     let mut problem = Problem::load("transistor_amplifier", 1e-2, 100.0);
     let y = problem.states;
     problem.states = vec![y[1] - y[0], y[2], y[4] - y[3], y[5], y[7] - y[6]];
