@@ -53,8 +53,8 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send + Slices<T> {
     /// The same with a number for each lane.
     type Wide<E: Lanes>: Slices<E>;
 
-    /// Bytes that are gone through again and again, besides the factors.
-    fn sweep<E: Lanes, const S: usize>() -> usize;
+    /// Bytes of the right-hand sides.
+    fn columns<E: Lanes, const S: usize>() -> usize;
 
     /// For several intervals at once.
     fn together<E: Lanes, const S: usize>(
@@ -69,15 +69,12 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send + Slices<T> {
     ) -> Result<&'a Self, Error>;
 }
 
-/// Columns that go through an elimination together.
-const PACKET: usize = 8;
-
 macro_rules! answer {
     ($type:ident, $call:ident($($lambda:ident)?), $columns:expr) => {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes> = $type<M, E>;
 
-            fn sweep<E: Lanes, const S: usize>() -> usize {
+            fn columns<E: Lanes, const S: usize>() -> usize {
                 size_of::<ArrayK<M, [E; S]>>() * $columns
             }
             fn together<E: Lanes, const S: usize>(
@@ -97,11 +94,7 @@ macro_rules! answer {
     };
 }
 answer!(Nominal, solve(), 1);
-answer!(Forward, forward(), columns::<M>());
-answer!(ForwardAdjoint, forward_adjoint(lambda), columns::<M>());
+answer!(Forward, forward(), M::Shape::NW);
+answer!(ForwardAdjoint, forward_adjoint(lambda), M::Shape::NW);
 answer!(Adjoint, adjoint(lambda), 1);
-answer!(Hessian, hessian(lambda), columns::<M>());
-
-const fn columns<M: Dae>() -> usize {
-    if M::Shape::NW < PACKET { M::Shape::NW } else { PACKET }
-}
+answer!(Hessian, hessian(lambda), M::Shape::NW);

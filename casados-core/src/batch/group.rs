@@ -17,7 +17,7 @@ use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 
 /// More lanes than any register has.
-const MOST_LANES: usize = 16;
+pub const MOST_LANES: usize = 16;
 
 type Place<V> = <Heap as Memory>::Nominal<V>;
 type Places<V> = <Heap as Memory>::Tape<V>;
@@ -147,8 +147,11 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         E::Cell: AsRef<[T]>,
     {
         for (y, step) in record.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
-            let (from, to) = (step.y.as_ref().as_flattened(), y.as_mut().as_flattened_mut());
-            dispatch(Unpack { from, lane, to });
+            let mut to: [&mut [T]; MOST_LANES] = Default::default();
+            if let Some(to) = to.get_mut(lane) {
+                *to = y.as_mut().as_flattened_mut();
+            }
+            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to });
         }
         Ok(())
     }
@@ -218,7 +221,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let mut good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
             let good = pass.forward(forward, n, count);
-            if let Some(record) = records.get_mut(n) {
+            // What belongs to the last step is still there on the way back.
+            if let (true, Some(record)) = (n + 1 < count, records.get_mut(n)) {
                 record.record(pass.work, forward);
             }
             good
@@ -227,14 +231,14 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref());
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            // What belongs to the last step is still there.
+            let mut sweep = &forward.sweep;
             if n + 1 < count {
-                record.recall(work);
+                sweep = record.recall(work);
             }
             good = E::and(good, hessian.backward.stages(work, coefficients));
             hessian.backward.advance(&work.linear);
             hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(record.sweep(), coefficients, work.inputs.time.step);
+            hessian.subtract(sweep, coefficients, work.inputs.time.step);
         }
         hessian.collect(forward);
         Ok((good, &hessian.result))
@@ -305,22 +309,32 @@ impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
     }
 }
 
-/// One lane of registers.
+/// The elements of registers, those of each lane in a slice of their own; lanes with an empty slice are left out.
 pub struct Unpack<'a, T, E> {
     pub from: &'a [E],
-    pub lane: usize,
-    pub to: &'a mut [T],
+    pub to: [&'a mut [T]; MOST_LANES],
 }
+
+/// So many elements of a lane are written at once.
+const BLOCK: usize = 4;
 
 impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
-        for (&from, to) in self.from.iter().zip(self.to) {
-            from.store(&mut cell);
-            if let Some(&element) = cell.as_ref().get(self.lane) {
-                *to = element;
+        let Self { from, mut to } = self;
+        let mut cells: [E::Cell; BLOCK] = bytemuck::Zeroable::zeroed();
+        for (block, from) in from.chunks(BLOCK).enumerate() {
+            for (&from, cell) in from.iter().zip(&mut cells) {
+                from.store(cell);
+            }
+            for (lane, to) in to.iter_mut().enumerate().take(E::LANES) {
+                let Some(to) = to.get_mut(block * BLOCK..) else { continue };
+                for (to, cell) in to.iter_mut().zip(&cells) {
+                    if let Some(&element) = cell.as_ref().get(lane) {
+                        *to = element;
+                    }
+                }
             }
         }
     }

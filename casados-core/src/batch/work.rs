@@ -3,7 +3,7 @@
 use super::answer::{Answer, Slices};
 #[cfg(feature = "parallel")]
 use super::error::BatchError;
-use super::group::{Finite, Group, Unpack};
+use super::group::{Finite, Group, MOST_LANES, Unpack};
 use super::intervals::{Inputs, Interval, vector};
 use super::statistics::BatchStatistics;
 use crate::error::Error;
@@ -21,12 +21,9 @@ use alloc::vec::Vec;
 use core::any::Any;
 use core::marker::PhantomData;
 
-/// More lanes than any register has.
-const MOST_LANES: usize = 16;
-
-/// Groups whose factors, and the columns that go through them, need more bytes are computed one interval after
-/// the other: what does not lie in the second-level cache is fetched from afar again and again.
-const WORKING_SET: usize = 1 << 20;
+/// Groups whose factors and right-hand sides need more bytes are computed one interval after the other: what does not
+/// lie in the second-level cache, which has half a megabyte or more, is fetched from afar again and again.
+const WORKING_SET: usize = 1 << 19;
 
 /// How many intervals are computed together.
 pub struct Width<M, R, const S: usize>(pub PhantomData<(M, R)>);
@@ -34,7 +31,7 @@ pub struct Width<M, R, const S: usize>(pub PhantomData<(M, R)>);
 impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Width<M, R, S> {
     type Output = usize;
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> usize {
-        let bytes = size_of::<M::Factors<[[E; S]; S]>>() + R::sweep::<E, S>();
+        let bytes = size_of::<M::Factors<[[E; S]; S]>>() + R::columns::<E, S>();
         // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
         if M::STRUCTURE.elimination.pivots.is_empty() || bytes > WORKING_SET { 1 } else { E::LANES }
     }
@@ -242,13 +239,15 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         }
         let mut verdict: E::Cell = bytemuck::Zeroable::zeroed();
         E::select(good, E::from_f64(1.0), E::from_f64(0.0)).store(&mut verdict);
-        for (lane, (done, result)) in done.iter_mut().zip(share.results.iter_mut()).enumerate() {
-            *done = intervals[lane].is_some() && lane < E::LANES && E::lane(&verdict, lane) != 0.0;
-            if *done {
-                for (from, to) in wide.slices().zip(result.slices_mut()) {
-                    dispatch(Unpack { from, lane, to });
-                }
-            }
+        for (lane, (done, interval)) in done.iter_mut().zip(intervals).enumerate().take(E::LANES) {
+            *done = interval.is_some() && E::lane(&verdict, lane) != 0.0;
+        }
+        let mut results = share.results.iter_mut();
+        let mut places = done.map(|done| results.next().filter(|_| done).map(Slices::slices_mut));
+        for from in wide.slices() {
+            let place = |lane: usize| places.get_mut(lane)?.as_mut()?.next();
+            let to = core::array::from_fn(place).map(Option::unwrap_or_default);
+            dispatch(Unpack { from, to });
         }
         let places = share.records.chunks_exact_mut(steps).zip(share.warm.iter_mut());
         for (lane, ((record, warm), done)) in places.zip(done).enumerate() {

@@ -57,37 +57,34 @@ impl<M: Dae, E: Lanes, const S: usize> HessianStep<M, E, S> {
         assign(&mut self.sweep, &forward.sweep);
     }
 
-    /// The derivatives of its stages.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn sweep(&self) -> &Sweep<M, ArrayW<M, E>, S> {
-        &self.sweep
-    }
-
-    /// Brings back what was remembered.
-    pub(crate) fn recall(&self, work: &mut Work<M, E, S>) {
+    /// Brings back what was remembered: the linearisation, and the derivatives of the stages.
+    pub(crate) fn recall(&self, work: &mut Work<M, E, S>) -> &Sweep<M, ArrayW<M, E>, S> {
         work.linear.copy_from(&self.linear);
+        &self.sweep
     }
 }
 
 impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
-    /// The way back.
+    /// The way back, with the derivatives of the `last` step, which is not recorded.
     ///
     /// # Errors
     /// A second derivative of the model that is not finite, a singular matrix.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn run(
         &mut self,
         work: &mut Work<M, T, S>,
         coefficients: &Coefficients<T, S>,
         steps: &[Step<M, T, S>],
         records: &[HessianStep<M, T, S>],
+        last: &Sweep<M, ArrayW<M, T>, S>,
         seed: &[T],
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
         self.begin(seed);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            // What belongs to the last step is still there.
+            let mut sweep = last;
             if n + 1 < steps.len() {
-                record.recall(work);
+                sweep = record.recall(work);
             }
             self.backward.step(work, coefficients, n, statistics)?;
             self.curvature(work, coefficients, n, step);
@@ -99,7 +96,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(&record.sweep, coefficients, work.inputs.time.step);
+            self.subtract(sweep, coefficients, work.inputs.time.step);
         }
         Ok(())
     }

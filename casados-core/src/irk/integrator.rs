@@ -477,7 +477,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
-            if let Some(record) = records.get_mut(n) {
+            // What belongs to the last step is still there on the way back.
+            if let (true, Some(record)) = (n + 1 < count, records.get_mut(n)) {
                 record.record(parts.work, forward);
             }
             Ok(())
@@ -488,6 +489,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.coefficients,
             parts.steps,
             records,
+            &forward.sweep,
             lambda.as_slice(),
             parts.statistics,
         )?;
