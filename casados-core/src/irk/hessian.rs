@@ -312,33 +312,32 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
                 add::<A, E, R>(value, d, row, g, column);
             }
         }
-        // Tiles of the triangle, each over all curved variables while it is in registers.
+        // Tiles of the triangle, each over all curved variables while it is in registers. The last ones lie over
+        // those before, and leave out what these have done.
+        let rows = if R::LEN < 4 { 1 } else { 4 };
         let mut row = 0;
-        while row + 4 <= R::LEN {
-            let mut column = 0;
-            while column < row + 4 {
-                if column + 8 <= R::LEN {
-                    tile::<A, E, R, 4, 8>(curved, d, g, sum, row, column);
-                    column += 8;
-                } else {
-                    tile::<A, E, R, 4, 1>(curved, d, g, sum, row, column);
-                    column += 1;
-                }
-            }
-            row += 4;
-        }
         while row < R::LEN {
+            let start = row.min(R::LEN - rows);
             let mut column = 0;
-            while column <= row {
-                if column + 8 <= R::LEN {
-                    tile::<A, E, R, 1, 8>(curved, d, g, sum, row, column);
+            while column < start + rows {
+                let skip = [row - start, 0];
+                if column + 8 <= R::LEN && rows == 4 {
+                    tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, column], skip);
                     column += 8;
+                } else if R::LEN >= 8 && column + 4 < R::LEN {
+                    let at = R::LEN - 8;
+                    tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, at], [skip[0], column - at]);
+                    column = R::LEN;
+                } else if rows == 4 {
+                    let at = column.min(R::LEN - 4);
+                    tile::<A, E, R, 4, 4>(curved, d, g, sum, [start, at], [skip[0], column - at]);
+                    column = at + 4;
                 } else {
-                    tile::<A, E, R, 1, 1>(curved, d, g, sum, row, column);
+                    tile::<A, E, R, 1, 1>(curved, d, g, sum, [start, column], skip);
                     column += 1;
                 }
             }
-            row += 1;
+            row = start + rows;
         }
     }
 }
@@ -353,15 +352,16 @@ fn add<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &m
     }
 }
 
-/// A tile of `sum −= Dᵀ G`; above the diagonal it may write what nobody reads.
+/// A tile of `sum −= Dᵀ G` from a row and a column on, but for the first ones that are to be skipped; above the diagonal
+/// it may write what nobody reads.
 #[inline(always)]
 fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
     curved: &[u32],
     d: &[R],
     g: &[R],
     sum: &mut [R],
-    row: usize,
-    column: usize,
+    [row, column]: [usize; 2],
+    skip: [usize; 2],
 ) {
     let mut tile = [[E::from_f64(0.0); COLUMNS]; ROWS];
     for &variable in curved {
@@ -372,8 +372,8 @@ fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: 
             A::subtract_row(tile, d, g);
         }
     }
-    for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)) {
-        for (&tile, sum) in tile.iter().zip(sum.as_mut().iter_mut().skip(column)) {
+    for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)).skip(skip[0]) {
+        for (&tile, sum) in tile.iter().zip(sum.as_mut().iter_mut().skip(column)).skip(skip[1]) {
             *sum = *sum + tile;
         }
     }
