@@ -314,6 +314,8 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
         }
         // Tiles of the triangle, each over all curved variables while it is in registers. The last ones lie over
         // those before, and leave out what these have done.
+        // Of numbers that are registers themselves, narrow ones.
+        let wide = const { size_of::<E>() <= 8 };
         let rows = if R::LEN < 4 { 1 } else { 4 };
         let mut row = 0;
         while row < R::LEN {
@@ -321,13 +323,17 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
             let mut column = 0;
             while column < start + rows {
                 let skip = [row - start, 0];
-                if column + 8 <= R::LEN && rows == 4 {
+                if wide && column + 8 <= R::LEN && rows == 4 {
                     tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, column], skip);
                     column += 8;
-                } else if R::LEN >= 8 && column + 4 < R::LEN {
+                } else if wide && R::LEN >= 8 && column + 4 < R::LEN {
                     let at = R::LEN - 8;
                     tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, at], [skip[0], column - at]);
                     column = R::LEN;
+                } else if !wide && rows == 4 {
+                    let at = column.min(R::LEN - 2);
+                    tile::<A, E, R, 4, 2>(curved, d, g, sum, [start, at], [skip[0], column - at]);
+                    column = at + 2;
                 } else if rows == 4 {
                     let at = column.min(R::LEN - 4);
                     tile::<A, E, R, 4, 4>(curved, d, g, sum, [start, at], [skip[0], column - at]);

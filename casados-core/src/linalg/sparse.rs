@@ -19,19 +19,22 @@ use crate::model::Elimination;
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 
-/// Calls a function for all columns, eight, four, two and one at a time.
+/// Calls a function for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at
+/// a time, or the packet of all stages would not fit them.
 macro_rules! packets {
     ($columns:expr, $function:ident($plan:ident, $blocks:ident, $rows:ident)) => {{
         let mut column = 0;
-        while column + 8 <= $columns {
-            $function::<A, E, R, S, 8>($plan, $blocks, $rows, column);
-            column += 8;
+        if const { size_of::<E>() <= 8 } {
+            while column + 8 <= $columns {
+                $function::<A, E, R, S, 8>($plan, $blocks, $rows, column);
+                column += 8;
+            }
+            if column + 4 <= $columns {
+                $function::<A, E, R, S, 4>($plan, $blocks, $rows, column);
+                column += 4;
+            }
         }
-        if column + 4 <= $columns {
-            $function::<A, E, R, S, 4>($plan, $blocks, $rows, column);
-            column += 4;
-        }
-        if column + 2 <= $columns {
+        while column + 2 <= $columns {
             $function::<A, E, R, S, 2>($plan, $blocks, $rows, column);
             column += 2;
         }
