@@ -1,4 +1,4 @@
-//! Kernels compiled twice: for every machine, and for those that multiply and add in one instruction.
+//! Kernels compiled for every machine, and for those that multiply and add in one instruction: AVX2, AVX-512.
 //!
 //! A plain x86-64 binary must run on machines without AVX2 and FMA. So a kernel is generic over its [`Arithmetic`],
 //! everything in it is inlined, and [`dispatch`] enters it through a function that is compiled for the better
@@ -14,27 +14,6 @@ pub trait Arithmetic {
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
     /// `target − left · right`
-    fn subtract_blocks<E: Field, const S: usize>(
-        target: &mut Block<E, S>,
-        left: &Block<E, S>,
-        right: &Block<E, S>,
-    );
-    /// `target − block · x`
-    fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]);
-    /// `target − factor · row`
-    fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]);
-    /// `target − a b`, element by element
-    fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]);
-}
-
-/// Rounded twice.
-pub struct Separate;
-
-impl Arithmetic for Separate {
-    #[inline(always)]
-    fn subtract<E: Field>(t: E, a: E, b: E) -> E {
-        t - a * b
-    }
     #[inline(always)]
     fn subtract_blocks<E: Field, const S: usize>(
         target: &mut Block<E, S>,
@@ -45,25 +24,38 @@ impl Arithmetic for Separate {
             Self::subtract_columns(target, left, right);
         }
     }
+    /// `target − block · x`
     #[inline(always)]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
         for (column, &x) in block.iter().zip(x) {
             for (target, &element) in target.iter_mut().zip(column) {
-                *target = *target - element * x;
+                *target = Self::subtract(*target, element, x);
             }
         }
     }
+    /// `target − factor · row`
     #[inline(always)]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
         for (target, &element) in target.iter_mut().zip(row) {
-            *target = *target - factor * element;
+            *target = Self::subtract(*target, factor, element);
         }
     }
+    /// `target − a b`, element by element
     #[inline(always)]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
         for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
-            *target = *target - a * b;
+            *target = Self::subtract(*target, a, b);
         }
+    }
+}
+
+/// Rounded twice.
+pub struct Separate;
+
+impl Arithmetic for Separate {
+    #[inline(always)]
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E {
+        t - a * b
     }
 }
 
