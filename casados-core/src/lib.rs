@@ -32,6 +32,7 @@ mod linalg;
 pub mod memory;
 pub mod model;
 pub mod options;
+pub mod qp;
 pub mod result;
 pub mod scalar;
 pub mod shape;

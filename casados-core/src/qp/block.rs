@@ -1,0 +1,99 @@
+//! Views of matrices in memory that somebody else laid out.
+
+use super::error::{Field, QpError};
+
+/// Where the elements of a matrix lie.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    pub field: Field,
+    pub stage: usize,
+    pub rows: usize,
+    pub columns: usize,
+    /// From one row to the next.
+    pub row: usize,
+    /// From one column to the next.
+    pub column: usize,
+}
+
+impl Shape {
+    fn index(&self, row: usize, column: usize) -> Option<usize> {
+        (row < self.rows && column < self.columns).then_some(row * self.row + column * self.column)
+    }
+}
+
+/// A matrix that can be read.
+#[derive(Clone, Copy, Debug)]
+pub struct Block<'a, T> {
+    pub(super) data: &'a [T],
+    pub(super) shape: Shape,
+}
+
+/// A matrix that can be read and written.
+#[derive(Debug)]
+pub struct BlockMut<'a, T> {
+    pub(super) data: &'a mut [T],
+    pub(super) shape: Shape,
+}
+
+impl<T: Copy> Block<'_, T> {
+    /// Rows and columns.
+    #[must_use]
+    pub fn shape(&self) -> (usize, usize) {
+        (self.shape.rows, self.shape.columns)
+    }
+    /// An element.
+    #[must_use]
+    pub fn get(&self, row: usize, column: usize) -> Option<T> {
+        self.data.get(self.shape.index(row, column)?).copied()
+    }
+}
+
+impl<T: Copy> BlockMut<'_, T> {
+    /// For reading.
+    #[must_use]
+    pub fn as_block(&self) -> Block<'_, T> {
+        Block { data: self.data, shape: self.shape }
+    }
+    /// An element; nothing where there is none.
+    pub fn set(&mut self, row: usize, column: usize, value: T) {
+        let index = self.shape.index(row, column);
+        if let Some(element) = index.and_then(|i| self.data.get_mut(i)) {
+            *element = value;
+        }
+    }
+    /// Every element, as a function of row and column.
+    pub fn fill_with(&mut self, mut element: impl FnMut(usize, usize) -> T) {
+        for column in 0..self.shape.columns {
+            for row in 0..self.shape.rows {
+                self.set(row, column, element(row, column));
+            }
+        }
+    }
+    /// All elements, column after column (`as_slice()` of a matrix of nalgebra).
+    ///
+    /// # Errors
+    /// [`QpError::Dimension`]
+    pub fn copy_from_columns(&mut self, columns: &[T]) -> Result<(), QpError> {
+        let Shape { field, stage, rows, columns: width, row, column } = self.shape;
+        if columns.len() != rows * width {
+            return Err(QpError::Dimension { field, stage, expected: rows * width, found: columns.len() });
+        }
+        for (j, source) in columns.chunks_exact(rows.max(1)).enumerate() {
+            let target = self.data.get_mut(j * column..).unwrap_or_default();
+            for (target, &value) in target.iter_mut().step_by(row.max(1)).zip(source) {
+                *target = value;
+            }
+        }
+        Ok(())
+    }
+    /// The diagonal; other elements become zero.
+    pub fn set_diagonal(&mut self, diagonal: impl IntoIterator<Item = T>)
+    where
+        T: Default,
+    {
+        self.fill_with(|_, _| T::default());
+        for (i, value) in diagonal.into_iter().enumerate() {
+            self.set(i, i, value);
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! Whether data makes sense, and how well a point satisfies the conditions of optimality.
+//!
+//! Written from the definition of the problem, element by element: independent of every solver.
+
+use super::block::Block;
+use super::error::{Field, QpError};
+use super::layout::StageDims;
+use super::problem::{Bounds, QpView, Stage};
+use super::solution::{Solution, SolutionStage};
+use super::statistics::Residuals;
+use crate::scalar::Real;
+
+/// Finds numbers that make no sense.
+///
+/// # Errors
+/// [`QpError::InvalidValue`], [`QpError::CrossedBounds`]
+pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
+    for (k, stage) in qp.stages().enumerate() {
+        let blocks = [
+            (Field::A, stage.a(), false),
+            (Field::B, stage.b(), false),
+            (Field::C, stage.c(), false),
+            (Field::D, stage.d(), false),
+            (Field::Q, stage.q(), true),
+            (Field::R, stage.r(), true),
+            (Field::S, stage.s(), false),
+        ];
+        for (field, block, symmetric) in blocks {
+            let (rows, columns) = block.shape();
+            for column in 0..columns {
+                for row in if symmetric { column } else { 0 }..rows {
+                    finite(field, k, column * rows + row, element(&block, row, column))?;
+                }
+            }
+        }
+        let vectors = [
+            (Field::Offset, stage.offset()),
+            (Field::GradientX, stage.gradient_x()),
+            (Field::GradientU, stage.gradient_u()),
+        ];
+        for (field, vector) in vectors {
+            for (i, &value) in vector.iter().enumerate() {
+                finite(field, k, i, value)?;
+            }
+        }
+        check_bounds(Field::StateBounds, k, &stage.x_bounds())?;
+        check_bounds(Field::ControlBounds, k, &stage.u_bounds())?;
+        check_bounds(Field::GeneralBounds, k, &stage.g_bounds())?;
+    }
+    Ok(())
+}
+
+fn finite<T: Real>(field: Field, stage: usize, index: usize, value: T) -> Result<(), QpError> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(QpError::InvalidValue { field, stage, index, value: value.to_f64() })
+    }
+}
+
+pub(super) fn check_bounds<T: Real>(
+    field: Field,
+    stage: usize,
+    bounds: &Bounds<'_, T>,
+) -> Result<(), QpError> {
+    let infinity = T::from_f64(f64::INFINITY);
+    for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
+        if lower <= upper && lower < infinity && upper > -infinity {
+            continue;
+        }
+        let (l, u) = (lower.to_f64(), upper.to_f64());
+        return Err(if l.is_nan() || l == f64::INFINITY {
+            QpError::InvalidValue { field, stage, index, value: l }
+        } else if u.is_nan() || u == f64::NEG_INFINITY {
+            QpError::InvalidValue { field, stage, index, value: u }
+        } else {
+            QpError::CrossedBounds { field, stage, index, lower: l, upper: u }
+        });
+    }
+    let penalties =
+        [bounds.lower_linear, bounds.upper_linear, bounds.lower_quadratic, bounds.upper_quadratic];
+    for (kind, penalties) in penalties.into_iter().enumerate() {
+        for (index, &penalty) in penalties.iter().enumerate() {
+            // A linear penalty may be infinite: then the bound is hard.
+            if !(penalty >= T::ZERO && (kind < 2 || penalty < infinity)) {
+                return Err(QpError::InvalidValue {
+                    field: Field::Penalty,
+                    stage,
+                    index,
+                    value: penalty.to_f64(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// How well a point satisfies the conditions of optimality of the QP, and its objective with penalties.
+///
+/// The variables `e` of soft bounds are eliminated: they are the violations, and the multiplier of a violated soft bound
+/// must be `linear + quadratic · e`; of one that is not violated it may be anything from zero to that.
+pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    qp: QpView<'_, T>,
+    solution: &Solution<T, D, M>,
+) -> (Residuals, f64) {
+    let mut result = Residuals::default();
+    let mut objective = 0.0;
+    // π_k, and x_{k+1}
+    let mut arriving: &[T] = &[];
+    let mut stages = solution.stages().peekable();
+    for data in qp.stages() {
+        let Some(point) = stages.next() else { break };
+        let next = stages.peek().map_or(&[][..], |next| next.x);
+        objective += gradient(&data, &point, arriving, &mut result.stationarity);
+        for (i, &next) in next.iter().enumerate() {
+            let mut sum = at(data.offset(), i) - next.to_f64();
+            sum += row(&data.a(), i, point.x) + row(&data.b(), i, point.u);
+            largest(&mut result.dynamics, sum);
+        }
+        let x = |i| at(point.x, i);
+        let u = |i| at(point.u, i);
+        let g = |i| row(&data.c(), i, point.x) + row(&data.d(), i, point.u);
+        objective += bounds(&data.x_bounds(), x, point.x_lower, point.x_upper, &mut result);
+        objective += bounds(&data.u_bounds(), u, point.u_lower, point.u_upper, &mut result);
+        objective += bounds(&data.g_bounds(), g, point.g_lower, point.g_upper, &mut result);
+        arriving = point.dynamics;
+    }
+    (result, objective)
+}
+
+fn largest(of: &mut f64, value: f64) {
+    // NaN stays.
+    if !(value.abs() <= *of) && !of.is_nan() {
+        *of = value.abs();
+    }
+}
+fn at<T: Real>(vector: &[T], index: usize) -> f64 {
+    vector.get(index).map_or(0.0, |v| v.to_f64())
+}
+fn element<T: Real>(block: &Block<'_, T>, row: usize, column: usize) -> T {
+    block.get(row, column).unwrap_or(T::ZERO)
+}
+/// A row times a vector.
+fn row<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
+    x.iter().enumerate().map(|(j, x)| element(block, row, j).to_f64() * x.to_f64()).sum()
+}
+/// A column times a vector.
+fn column<T: Real>(block: &Block<'_, T>, column: usize, y: &[T]) -> f64 {
+    y.iter().enumerate().map(|(i, y)| element(block, i, column).to_f64() * y.to_f64()).sum()
+}
+/// A row of a symmetric matrix, of which the lower triangle is there, times a vector.
+fn symmetric<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
+    let lower = |j: usize| element(block, row.max(j), row.min(j)).to_f64();
+    x.iter().enumerate().map(|(j, x)| lower(j) * x.to_f64()).sum()
+}
+
+/// Adds to the residual, and returns `½ vᵀ H v + hᵀ v`.
+fn gradient<T: Real>(
+    data: &Stage<'_, T>,
+    point: &SolutionStage<'_, T>,
+    arriving: &[T],
+    residual: &mut f64,
+) -> f64 {
+    let mut objective = 0.0;
+    for (i, x) in point.x.iter().enumerate() {
+        let quadratic = symmetric(&data.q(), i, point.x) + column(&data.s(), i, point.u);
+        let linear = at(data.gradient_x(), i);
+        objective += x.to_f64() * (0.5 * quadratic + linear);
+        let dynamics = column(&data.a(), i, point.dynamics) - at(arriving, i);
+        let bounds = at(point.x_upper, i) - at(point.x_lower, i);
+        let general = column(&data.c(), i, point.g_upper) - column(&data.c(), i, point.g_lower);
+        largest(residual, quadratic + linear + dynamics + bounds + general);
+    }
+    for (i, u) in point.u.iter().enumerate() {
+        let quadratic = symmetric(&data.r(), i, point.u) + row(&data.s(), i, point.x);
+        let linear = at(data.gradient_u(), i);
+        objective += u.to_f64() * (0.5 * quadratic + linear);
+        let bounds = at(point.u_upper, i) - at(point.u_lower, i);
+        let general = column(&data.d(), i, point.g_upper) - column(&data.d(), i, point.g_lower);
+        largest(residual, quadratic + linear + column(&data.b(), i, point.dynamics) + bounds + general);
+    }
+    objective
+}
+
+/// Adds to the residuals of bounds, and returns the penalties.
+fn bounds<T: Real>(
+    bounds: &Bounds<'_, T>,
+    value: impl Fn(usize) -> f64,
+    lower: &[T],
+    upper: &[T],
+    residuals: &mut Residuals,
+) -> f64 {
+    let mut penalties = 0.0;
+    for i in 0..lower.len() {
+        let value = value(i);
+        let sides = [
+            (
+                value - at(bounds.lower, i),
+                at(lower, i),
+                at(bounds.lower_linear, i),
+                at(bounds.lower_quadratic, i),
+            ),
+            (
+                at(bounds.upper, i) - value,
+                at(upper, i),
+                at(bounds.upper_linear, i),
+                at(bounds.upper_quadratic, i),
+            ),
+        ];
+        for (slack, multiplier, linear, quadratic) in sides {
+            largest(&mut residuals.inequalities, (-multiplier).max(0.0));
+            if slack == f64::INFINITY {
+                largest(&mut residuals.complementarity, multiplier);
+            } else if linear == f64::INFINITY {
+                largest(&mut residuals.inequalities, (-slack).max(0.0));
+                largest(&mut residuals.complementarity, slack.max(0.0) * multiplier);
+            } else {
+                let violation = (-slack).max(0.0);
+                let force = linear + quadratic * violation;
+                penalties += violation * (linear + 0.5 * quadratic * violation);
+                largest(&mut residuals.inequalities, (multiplier - force).max(0.0));
+                largest(&mut residuals.complementarity, slack.max(0.0) * multiplier);
+                largest(&mut residuals.complementarity, violation * (force - multiplier).max(0.0));
+            }
+        }
+    }
+    penalties
+}

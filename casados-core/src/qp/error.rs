@@ -1,0 +1,216 @@
+//! Every way in which a QP can end without a solution.
+
+use super::statistics::Residuals;
+use core::fmt;
+
+/// A part of a QP or of its solution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Field {
+    /// `A`
+    A,
+    /// `B`
+    B,
+    /// `b`, the constant part of the dynamics.
+    Offset,
+    /// `Q`
+    Q,
+    /// `R`
+    R,
+    /// `S`
+    S,
+    /// `q`
+    GradientX,
+    /// `r`
+    GradientU,
+    /// `C`
+    C,
+    /// `D`
+    D,
+    /// Bounds of the states.
+    StateBounds,
+    /// Bounds of the controls.
+    ControlBounds,
+    /// Bounds of the general constraints.
+    GeneralBounds,
+    /// Penalties of a soft constraint.
+    Penalty,
+    /// States, of a solution.
+    X,
+    /// Controls, of a solution.
+    U,
+    /// Multipliers, of a solution.
+    Multipliers,
+    /// The number of stages.
+    Stages,
+    /// Memory for the data of a QP.
+    Data,
+    /// Memory for a solution.
+    Solution,
+    /// Numbers that a solver works with.
+    Numbers,
+    /// Indices that a solver works with.
+    Indices,
+}
+
+/// The side of a constraint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The lower bound.
+    Lower,
+    /// The upper bound.
+    Upper,
+}
+
+/// Why there is no solution: what, at which stage, and the values that say so.
+///
+/// After `Infeasible`, `MaxIterations`, `Stalled` and `NotConvex` the solution holds the best iterate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum QpError {
+    /// A length is not what the dimensions ask for.
+    Dimension {
+        /// What is too short or too long.
+        field: Field,
+        /// The stage, 0 where it is the whole horizon.
+        stage: usize,
+        /// The length that is needed.
+        expected: usize,
+        /// The length that was given.
+        found: usize,
+    },
+    /// A lower bound is above the upper one.
+    CrossedBounds {
+        /// Which bounds.
+        field: Field,
+        /// The stage.
+        stage: usize,
+        /// The element.
+        index: usize,
+        /// Its lower bound.
+        lower: f64,
+        /// Its upper bound.
+        upper: f64,
+    },
+    /// A number is infinite or NaN and must not be (a bound may be infinite on its own side), or a penalty is negative.
+    InvalidValue {
+        /// Where.
+        field: Field,
+        /// The stage.
+        stage: usize,
+        /// The element; of matrices in column-major order.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// No point satisfies all constraints. This is the largest violation where their sum is smallest.
+    Infeasible {
+        /// Which bounds.
+        field: Field,
+        /// The stage.
+        stage: usize,
+        /// The element.
+        index: usize,
+        /// The side that is violated.
+        side: Side,
+        /// By how much.
+        violation: f64,
+    },
+    /// The Hessian is indefinite where the dynamics leave freedom: there is no minimum.
+    NotConvex {
+        /// The stage.
+        stage: usize,
+        /// The variable: a control, or, at stage 0, behind the controls a state.
+        index: usize,
+        /// The pivot, which must be positive.
+        pivot: f64,
+    },
+    /// The iterations were used up.
+    MaxIterations {
+        /// How many.
+        iterations: usize,
+        /// What they reached.
+        residuals: Residuals,
+    },
+    /// Steps became too short, or residuals no longer shrink: rounding errors, or an unbounded problem.
+    Stalled {
+        /// The iterations.
+        iterations: usize,
+        /// What they reached.
+        residuals: Residuals,
+    },
+    /// Memory could not be allocated.
+    OutOfMemory {
+        /// How much was asked for.
+        bytes: usize,
+    },
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::A => "A",
+            Self::B => "B",
+            Self::Offset => "the offset of the dynamics",
+            Self::Q => "Q",
+            Self::R => "R",
+            Self::S => "S",
+            Self::GradientX => "the gradient of x",
+            Self::GradientU => "the gradient of u",
+            Self::C => "C",
+            Self::D => "D",
+            Self::StateBounds => "the bounds of x",
+            Self::ControlBounds => "the bounds of u",
+            Self::GeneralBounds => "the bounds of the general constraints",
+            Self::Penalty => "a penalty",
+            Self::X => "x",
+            Self::U => "u",
+            Self::Multipliers => "the multipliers",
+            Self::Stages => "the number of stages",
+            Self::Data => "the memory of the QP",
+            Self::Solution => "the memory of the solution",
+            Self::Numbers => "the memory of the solver",
+            Self::Indices => "the indices of the solver",
+        })
+    }
+}
+
+impl fmt::Display for QpError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Dimension { field, stage, expected, found } => {
+                write!(f, "stage {stage}: {field} has {found} elements instead of {expected}")
+            }
+            Self::CrossedBounds { field, stage, index, lower, upper } => {
+                write!(f, "stage {stage}: element {index} of {field} is from {lower} to {upper}")
+            }
+            Self::InvalidValue { field, stage, index, value } => {
+                write!(f, "stage {stage}: element {index} of {field} is {value}")
+            }
+            Self::Infeasible { field, stage, index, side, violation } => {
+                let side = match side {
+                    Side::Lower => "lower",
+                    Side::Upper => "upper",
+                };
+                write!(
+                    f,
+                    "no point satisfies all constraints: at stage {stage}, element {index} of {field} misses its \
+                     {side} one by at least {violation:e}"
+                )
+            }
+            Self::NotConvex { stage, index, pivot } => write!(
+                f,
+                "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is {pivot:e}"
+            ),
+            Self::MaxIterations { iterations, residuals } => {
+                write!(f, "not solved after {iterations} iterations: {residuals}")
+            }
+            Self::Stalled { iterations, residuals } => {
+                write!(f, "no progress after {iterations} iterations: {residuals}")
+            }
+            Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
+        }
+    }
+}
+
+impl core::error::Error for QpError {}

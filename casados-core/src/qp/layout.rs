@@ -1,0 +1,258 @@
+//! Dimensions of the stages, and where each stage lies in flat memory.
+//!
+//! A stage has the variables `v = (x, u)`. Its matrices lie column after column, and every column begins at a
+//! multiple of [`pad`] numbers, so that whole registers can be read from it. What is padding is zero.
+
+use core::iter::FusedIterator;
+
+/// The dimensions of one stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct StageDims {
+    /// States `x`.
+    pub nx: usize,
+    /// Controls `u`. Those of the last stage cost something and are bounded, but move nothing.
+    pub nu: usize,
+    /// Rows of the general constraints `lg ≤ C x + D u ≤ ug`.
+    pub ng: usize,
+}
+
+impl StageDims {
+    /// `nx`, `nu`, `ng`
+    #[must_use]
+    pub const fn new(nx: usize, nu: usize, ng: usize) -> Self {
+        Self { nx, nu, ng }
+    }
+}
+
+/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of `bytes` bytes.
+#[must_use]
+pub(crate) const fn pad(n: usize, bytes: usize) -> usize {
+    let width = 64 / bytes;
+    n.div_ceil(width) * width
+}
+
+/// One stage, its dimensions, and where its parts begin in the arrays of the horizon.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Place {
+    /// The stage.
+    pub stage: usize,
+    /// States.
+    pub nx: usize,
+    /// Controls.
+    pub nu: usize,
+    /// General constraints.
+    pub ng: usize,
+    /// States of the next stage; none after the last one.
+    pub next: usize,
+    /// `nx + nu`
+    pub n: usize,
+    /// The distance from column to column, `n` padded; also the length of a vector `v`.
+    pub ld: usize,
+    /// The length of a vector of next states, padded.
+    pub ld_next: usize,
+    /// The length of a vector over all constraints: `ld` for the bounds, `ng` padded for the general ones.
+    pub rows: usize,
+    /// Columns of the factors: those of the variables that are eliminated at this stage.
+    pub pivots: usize,
+    /// Begin of the data.
+    pub data: usize,
+    /// Begin in vectors `v` of the horizon.
+    pub v: usize,
+    /// Begin in vectors of next states.
+    pub dynamics: usize,
+    /// Begin in vectors over constraints.
+    pub row: usize,
+    /// Begin in the factors.
+    pub factor: usize,
+}
+
+impl Place {
+    const fn new(stage: usize, dims: StageDims, next: usize, bytes: usize) -> Self {
+        let n = dims.nx + dims.nu;
+        let ld = pad(n, bytes);
+        Self {
+            stage,
+            nx: dims.nx,
+            nu: dims.nu,
+            ng: dims.ng,
+            next,
+            n,
+            ld,
+            ld_next: pad(next, bytes),
+            rows: ld + pad(dims.ng, bytes),
+            // The first state is eliminated like a control where it is not given.
+            pivots: if stage == 0 { n } else { dims.nu },
+            data: 0,
+            v: 0,
+            dynamics: 0,
+            row: 0,
+            factor: 0,
+        }
+    }
+    /// `[A B; C D]ᵀ`: a column for each next state and each general constraint.
+    pub const fn matrix(&self) -> usize {
+        self.ld * (self.next + self.ng)
+    }
+    /// `[Q Sᵀ; S R]`
+    pub const fn hessian(&self) -> usize {
+        self.ld * self.n
+    }
+    /// All data of the stage: matrix, Hessian, gradient, offset, and six vectors over its constraints.
+    pub const fn data_len(&self) -> usize {
+        self.matrix() + self.hessian() + self.ld + self.ld_next + 6 * self.rows
+    }
+    const fn factor_len(&self) -> usize {
+        self.ld * self.pivots
+    }
+    /// The same parts, behind those of `before`.
+    const fn after(mut self, before: &Self) -> Self {
+        self.data = before.data + before.data_len();
+        self.v = before.v + before.ld;
+        self.dynamics = before.dynamics + before.ld_next;
+        self.row = before.row + before.rows;
+        self.factor = before.factor + before.factor_len();
+        self
+    }
+    /// The same parts, before those of `after`.
+    const fn before(mut self, after: &Self) -> Self {
+        self.data = after.data.saturating_sub(self.data_len());
+        self.v = after.v.saturating_sub(self.ld);
+        self.dynamics = after.dynamics.saturating_sub(self.ld_next);
+        self.row = after.row.saturating_sub(self.rows);
+        self.factor = after.factor.saturating_sub(self.factor_len());
+        self
+    }
+    /// The place behind this one, of a stage that is empty: its begins are lengths.
+    const fn end(&self) -> Self {
+        Self {
+            stage: 0,
+            nx: 0,
+            nu: 0,
+            ng: 0,
+            next: 0,
+            n: 0,
+            ld: 0,
+            ld_next: 0,
+            rows: 0,
+            pivots: 0,
+            data: 0,
+            v: 0,
+            dynamics: 0,
+            row: 0,
+            factor: 0,
+        }
+        .after(self)
+    }
+}
+
+/// The places of all stages, forwards or backwards.
+#[derive(Clone, Debug)]
+pub(crate) struct Places<'a> {
+    dims: &'a [StageDims],
+    /// How many stages were taken from the front.
+    taken: usize,
+    /// States behind the last stage that is left.
+    next: usize,
+    bytes: usize,
+    front: Place,
+    back: Place,
+}
+
+impl<'a> Places<'a> {
+    /// Those of stages with numbers of type `T`.
+    pub fn new<T>(dims: &'a [StageDims]) -> Self {
+        let back = end::<T>(dims);
+        let front = Place::default();
+        Self { dims, taken: 0, next: 0, bytes: size_of::<T>(), front, back }
+    }
+}
+
+impl Iterator for Places<'_> {
+    type Item = Place;
+
+    #[inline]
+    fn next(&mut self) -> Option<Place> {
+        let (&first, rest) = self.dims.split_first()?;
+        let next = rest.first().map_or(self.next, |dims| dims.nx);
+        let place = Place::new(self.taken, first, next, self.bytes).after(&self.front);
+        (self.dims, self.front, self.taken) = (rest, place, self.taken + 1);
+        Some(place)
+    }
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.dims.len(), Some(self.dims.len()))
+    }
+}
+
+impl DoubleEndedIterator for Places<'_> {
+    #[inline]
+    fn next_back(&mut self) -> Option<Place> {
+        let (&last, rest) = self.dims.split_last()?;
+        let place = Place::new(self.taken + rest.len(), last, self.next, self.bytes).before(&self.back);
+        (self.dims, self.back, self.next) = (rest, place, last.nx);
+        Some(place)
+    }
+}
+
+impl ExactSizeIterator for Places<'_> {}
+impl FusedIterator for Places<'_> {}
+
+/// The place behind the last stage: its begins are the lengths of the arrays of the horizon.
+pub(crate) const fn end<T>(dims: &[StageDims]) -> Place {
+    let mut rest = dims;
+    let mut place = Place::new(0, StageDims::new(0, 0, 0), 0, size_of::<T>());
+    let mut stage = 0;
+    while let Some((&first, after)) = rest.split_first() {
+        let next = match after.first() {
+            Some(dims) => dims.nx,
+            None => 0,
+        };
+        place = Place::new(stage, first, next, size_of::<T>()).after(&place);
+        stage += 1;
+        rest = after;
+    }
+    place.end()
+}
+
+/// A part of a slice; an empty one where it ends too early, which the lengths checked on entry exclude.
+#[inline(always)]
+pub(crate) fn part<T>(slice: &[T], begin: usize, length: usize) -> &[T] {
+    slice.get(begin..).and_then(|rest| rest.get(..length)).unwrap_or_default()
+}
+
+/// As [`part`].
+#[inline(always)]
+pub(crate) fn part_mut<T>(slice: &mut [T], begin: usize, length: usize) -> &mut [T] {
+    slice.get_mut(begin..).and_then(|rest| rest.get_mut(..length)).unwrap_or_default()
+}
+
+/// The first numbers of a slice, which loses them.
+#[inline(always)]
+pub(crate) fn take<'a, T>(rest: &mut &'a [T], length: usize) -> &'a [T] {
+    let (first, second) = rest.split_at_checked(length).unwrap_or_default();
+    *rest = second;
+    first
+}
+
+/// As [`take`].
+#[inline(always)]
+pub(crate) fn take_mut<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
+    let (first, second) = core::mem::take(rest).split_at_mut_checked(length).unwrap_or_default();
+    *rest = second;
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn backwards_is_forwards_reversed() {
+        let dims = [(3, 2, 0), (9, 1, 4), (2, 12, 1), (5, 0, 2)].map(|(x, u, g)| StageDims::new(x, u, g));
+        let parts = |p: Place| [p.stage, p.n, p.next, p.data, p.v, p.dynamics, p.row, p.factor];
+        let forwards: alloc::vec::Vec<_> = Places::new::<f32>(&dims).map(parts).collect();
+        let mut backwards: alloc::vec::Vec<_> = Places::new::<f32>(&dims).rev().map(parts).collect();
+        backwards.reverse();
+        assert_eq!(forwards, backwards);
+        assert_eq!(forwards.iter().map(|p| p[2]).collect::<alloc::vec::Vec<_>>(), [9, 2, 5, 0]);
+    }
+}

@@ -1,0 +1,58 @@
+//! Quadratic programs with the structure of optimal control.
+//!
+//! ```text
+//! min  Σ_k ½ [x; u]ᵀ [Q Sᵀ; S R] [x; u] + qᵀ x + rᵀ u
+//!      x_{k+1} = A x_k + B u_k + b
+//!      lb ≤ (x, u) ≤ ub,   lg ≤ C x + D u ≤ ug      each side optional, each side hard or soft
+//! ```
+//!
+//! Dimensions may differ from stage to stage. The state at the start is fixed (two equal bounds), bounded or free.
+//!
+//! - [`Qp`] is the data, [`Solution`] a point with multipliers; both in memory of their owner, on the heap or not.
+//! - [`QpSolver`] is what every solver does.
+#![cfg_attr(
+    feature = "alloc",
+    doc = "
+```
+use casados_core::qp::{HeapQp, StageDims};
+
+// x₊ = x + u, from x₀ = 1, with |u| ≤ 0.4, three intervals.
+let mut dims = [StageDims::new(1, 1, 0); 4];
+dims[3].nu = 0;
+let mut qp = HeapQp::<f64>::new(&dims)?;
+for mut stage in qp.stages_mut() {
+    stage.a_mut().set(0, 0, 1.0);
+    stage.b_mut().set(0, 0, 1.0);
+    stage.q_mut().set(0, 0, 1.0);
+    stage.r_mut().set(0, 0, 0.1);
+    stage.u_bounds_mut().set(0, -0.4, 0.4);
+}
+qp.fix_initial_state(&[1.0])?;
+# Ok::<(), casados_core::qp::QpError>(())
+```
+"
+)]
+
+mod block;
+mod check;
+mod error;
+mod layout;
+#[cfg(feature = "alloc")]
+mod memory;
+mod problem;
+mod solution;
+mod solver;
+mod statistics;
+
+pub use block::{Block, BlockMut};
+pub use check::{check, residuals};
+pub use error::{Field, QpError, Side};
+pub use layout::StageDims;
+#[cfg(feature = "alloc")]
+pub use problem::HeapQp;
+pub use problem::{Bounds, BoundsMut, Qp, QpView, Stage, StageMut};
+#[cfg(feature = "alloc")]
+pub use solution::HeapSolution;
+pub use solution::{Solution, SolutionStage, SolutionStageMut, SolutionView};
+pub use solver::{QpSolver, Start};
+pub use statistics::{Residuals, Statistics};

@@ -1,0 +1,212 @@
+//! Solutions: variables and multipliers.
+
+use super::error::{Field, QpError};
+use super::layout::{Place, Places, StageDims, end, part, part_mut, take_mut};
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+use core::marker::PhantomData;
+
+/// A point of a QP and its multipliers, over memory of its owner: where solvers begin, and what they leave.
+///
+/// Signs: the gradient of the Lagrangian at stage `k` is
+/// `H v + h + [A B]ᵀ π_{k+1} − (π_k, 0) + λ_upper − λ_lower + [C D]ᵀ (λ_upper − λ_lower) = 0`, with `π_0 = 0` and all `λ ≥ 0`.
+#[derive(Clone, Debug)]
+pub struct Solution<T, D, M> {
+    dims: D,
+    memory: M,
+    number: PhantomData<T>,
+}
+
+/// A solution with its memory on the heap.
+#[cfg(feature = "alloc")]
+pub type HeapSolution<T = f64> = Solution<T, Vec<StageDims>, Vec<T>>;
+
+/// A solution, for solvers.
+#[derive(Debug)]
+pub struct SolutionView<'a, T> {
+    pub(super) dims: &'a [StageDims],
+    /// All `v = (x, u)`.
+    pub(super) v: &'a mut [T],
+    /// All `π`.
+    pub(super) dynamics: &'a mut [T],
+    /// Multipliers of lower bounds.
+    pub(super) lower: &'a mut [T],
+    /// Multipliers of upper bounds.
+    pub(super) upper: &'a mut [T],
+}
+
+/// What a solution has of one stage.
+#[derive(Clone, Copy, Debug)]
+pub struct SolutionStage<'a, T> {
+    /// `x`
+    pub x: &'a [T],
+    /// `u`
+    pub u: &'a [T],
+    /// `π_{k+1}`, the multipliers of `A x + B u + b − x₊ = 0`
+    pub dynamics: &'a [T],
+    /// Multipliers of the lower bounds of `x`
+    pub x_lower: &'a [T],
+    /// Multipliers of the upper bounds of `x`
+    pub x_upper: &'a [T],
+    /// Multipliers of the lower bounds of `u`
+    pub u_lower: &'a [T],
+    /// Multipliers of the upper bounds of `u`
+    pub u_upper: &'a [T],
+    /// Multipliers of the lower bounds of general constraints
+    pub g_lower: &'a [T],
+    /// Multipliers of the upper bounds of general constraints
+    pub g_upper: &'a [T],
+}
+
+/// As [`SolutionStage`], to be written.
+#[derive(Debug)]
+pub struct SolutionStageMut<'a, T> {
+    /// `x`
+    pub x: &'a mut [T],
+    /// `u`
+    pub u: &'a mut [T],
+    /// `π_{k+1}`, the multipliers of `A x + B u + b − x₊ = 0`
+    pub dynamics: &'a mut [T],
+    /// Multipliers of the lower bounds of `x`
+    pub x_lower: &'a mut [T],
+    /// Multipliers of the upper bounds of `x`
+    pub x_upper: &'a mut [T],
+    /// Multipliers of the lower bounds of `u`
+    pub u_lower: &'a mut [T],
+    /// Multipliers of the upper bounds of `u`
+    pub u_upper: &'a mut [T],
+    /// Multipliers of the lower bounds of general constraints
+    pub g_lower: &'a mut [T],
+    /// Multipliers of the upper bounds of general constraints
+    pub g_upper: &'a mut [T],
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Real> HeapSolution<T> {
+    /// A solution with its memory on the heap, all zero.
+    ///
+    /// # Errors
+    /// [`QpError::OutOfMemory`]
+    pub fn new(dims: &[StageDims]) -> Result<Self, QpError> {
+        Self::in_memory(super::memory::copy(dims)?, super::memory::zeros(Self::memory(dims))?)
+    }
+}
+
+impl<T: Real, D, M> Solution<T, D, M> {
+    /// How many numbers a solution takes.
+    #[must_use]
+    pub const fn memory(dims: &[StageDims]) -> usize {
+        let end = end::<T>(dims);
+        end.v + end.dynamics + 2 * end.row
+    }
+}
+
+impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, M> {
+    /// A solution in given memory, of at least [`Solution::memory`] numbers.
+    ///
+    /// # Errors
+    /// [`QpError::Dimension`] if there is less.
+    pub fn in_memory(dims: D, mut memory: M) -> Result<Self, QpError> {
+        let (expected, found) = (Self::memory(dims.as_ref()), memory.as_ref().len());
+        if found < expected {
+            return Err(QpError::Dimension { field: Field::Solution, stage: 0, expected, found });
+        }
+        memory.as_mut().fill(T::ZERO);
+        Ok(Self { dims, memory, number: PhantomData })
+    }
+    /// The dimensions of the stages.
+    #[must_use]
+    pub fn dims(&self) -> &[StageDims] {
+        self.dims.as_ref()
+    }
+    /// For solvers.
+    pub fn view_mut(&mut self) -> SolutionView<'_, T> {
+        let dims = self.dims.as_ref();
+        let (end, mut rest) = (end::<T>(dims), self.memory.as_mut());
+        SolutionView {
+            dims,
+            v: take_mut(&mut rest, end.v),
+            dynamics: take_mut(&mut rest, end.dynamics),
+            lower: take_mut(&mut rest, end.row),
+            upper: take_mut(&mut rest, end.row),
+        }
+    }
+    /// A stage.
+    #[must_use]
+    pub fn stage(&self, stage: usize) -> Option<SolutionStage<'_, T>> {
+        self.stages().nth(stage)
+    }
+    /// All stages, in order.
+    pub fn stages(&self) -> impl DoubleEndedIterator<Item = SolutionStage<'_, T>> + ExactSizeIterator {
+        let dims = self.dims.as_ref();
+        let (end, memory) = (end::<T>(dims), self.memory.as_ref());
+        let v = part(memory, 0, end.v);
+        let dynamics = part(memory, end.v, end.dynamics);
+        let lower = part(memory, end.v + end.dynamics, end.row);
+        let upper = part(memory, end.v + end.dynamics + end.row, end.row);
+        Places::new::<T>(dims).map(move |p| SolutionStage {
+            x: part(v, p.v, p.nx),
+            u: part(v, p.v + p.nx, p.nu),
+            dynamics: part(dynamics, p.dynamics, p.next),
+            x_lower: part(lower, p.row, p.nx),
+            x_upper: part(upper, p.row, p.nx),
+            u_lower: part(lower, p.row + p.nx, p.nu),
+            u_upper: part(upper, p.row + p.nx, p.nu),
+            g_lower: part(lower, p.row + p.ld, p.ng),
+            g_upper: part(upper, p.row + p.ld, p.ng),
+        })
+    }
+    /// A stage, to be written.
+    pub fn stage_mut(&mut self, stage: usize) -> Option<SolutionStageMut<'_, T>> {
+        let place = Places::new::<T>(self.dims.as_ref()).nth(stage)?;
+        Some(self.view_mut().into_stage(place))
+    }
+    /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last stages stay as they
+    /// are. Stages of different dimensions are not shifted into each other.
+    pub fn shift(&mut self) {
+        let SolutionView { dims, v, dynamics, lower, upper } = self.view_mut();
+        let places = Places::new::<T>(dims);
+        for (here, there) in places.clone().zip(places.skip(1)) {
+            if (here.nx, here.nu, here.ng) == (there.nx, there.nu, there.ng) {
+                v.copy_within(there.v..there.v + there.ld, here.v);
+                lower.copy_within(there.row..there.row + there.rows, here.row);
+                upper.copy_within(there.row..there.row + there.rows, here.row);
+            }
+            if here.next == there.next {
+                dynamics.copy_within(there.dynamics..there.dynamics + there.ld_next, here.dynamics);
+            }
+        }
+    }
+}
+
+impl<'a, T> SolutionView<'a, T> {
+    fn into_stage(self, p: Place) -> SolutionStageMut<'a, T> {
+        let mut v = part_mut(self.v, p.v, p.n);
+        let mut lower = part_mut(self.lower, p.row, p.rows);
+        let mut upper = part_mut(self.upper, p.row, p.rows);
+        let padding = p.ld - p.n;
+        let x_lower = take_mut(&mut lower, p.nx);
+        let x_upper = take_mut(&mut upper, p.nx);
+        let u_lower = take_mut(&mut lower, p.nu);
+        let u_upper = take_mut(&mut upper, p.nu);
+        take_mut(&mut lower, padding);
+        take_mut(&mut upper, padding);
+        SolutionStageMut {
+            x: take_mut(&mut v, p.nx),
+            u: take_mut(&mut v, p.nu),
+            dynamics: part_mut(self.dynamics, p.dynamics, p.next),
+            x_lower,
+            x_upper,
+            u_lower,
+            u_upper,
+            g_lower: take_mut(&mut lower, p.ng),
+            g_upper: take_mut(&mut upper, p.ng),
+        }
+    }
+    /// The same view for a shorter time.
+    pub fn reborrow(&mut self) -> SolutionView<'_, T> {
+        let Self { dims, v, dynamics, lower, upper } = self;
+        SolutionView { dims, v, dynamics, lower, upper }
+    }
+}

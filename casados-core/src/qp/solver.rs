@@ -1,0 +1,31 @@
+//! What every solver does.
+
+use super::error::QpError;
+use super::problem::QpView;
+use super::solution::SolutionView;
+use super::statistics::Statistics;
+
+/// Where a solver begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Start {
+    /// Somewhere.
+    #[default]
+    Cold,
+    /// At the point and multipliers in the memory of the solution: the solution of a similar QP. A solver that cannot
+    /// make use of it begins somewhere.
+    Warm,
+}
+
+/// A solver of QPs with the structure of optimal control.
+pub trait QpSolver<T> {
+    /// Solves a QP. The solution is in `solution` afterwards; after an error that comes from the run, the best iterate is.
+    ///
+    /// # Errors
+    /// [`QpError`]
+    fn solve(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: Start,
+        solution: SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError>;
+}
