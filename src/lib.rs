@@ -31,12 +31,12 @@
 #![forbid(unsafe_code)]
 
 pub use casados_core::*;
-pub use casados_macros::{dae, ode};
+pub use casados_macros::{dae, function, ode};
 
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {
     pub use casados_core::prelude::*;
-    pub use casados_macros::{dae, ode};
+    pub use casados_macros::{dae, function, ode};
 }
 
 /// The examples of the documentation are run.

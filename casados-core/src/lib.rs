@@ -27,6 +27,7 @@ pub mod batch;
 pub mod dual;
 pub mod erk;
 pub mod error;
+pub mod function;
 pub mod irk;
 mod linalg;
 pub mod memory;
@@ -48,6 +49,7 @@ pub use adaptive::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Radau};
 pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
 pub use erk::Erk;
 pub use error::Error;
+pub use function::{Function, GraphFunction};
 pub use irk::Irk;
 #[cfg(feature = "alloc")]
 pub use memory::Heap;
@@ -76,5 +78,5 @@ pub mod prelude {
         Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Midpoint, RadauIIA, Rk4,
         Tableau,
     };
-    pub use crate::{Dae, Erk, Error, Inline, Irk, Ode};
+    pub use crate::{Dae, Erk, Error, Function, Inline, Irk, Ode};
 }

@@ -157,6 +157,14 @@ pub trait Shape: 'static {
     type MatrixUC<T: Plain, const C: usize>: Matrix<T>;
     /// `SMatrix<T, NP, C>`
     type MatrixPC<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, C, NX>`: one row for each output of a function.
+    type MatrixCX<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, C, NZ>`
+    type MatrixCZ<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, C, NU>`
+    type MatrixCU<T: Plain, const C: usize>: Matrix<T>;
+    /// `SMatrix<T, C, NP>`
+    type MatrixCP<T: Plain, const C: usize>: Matrix<T>;
 }
 
 /// The dimensions of a model. The last three follow from the first four (see [`Shape`]); they are
@@ -222,4 +230,43 @@ impl<
     type MatrixZC<T: Plain, const C: usize> = SMatrix<T, NZ, C>;
     type MatrixUC<T: Plain, const C: usize> = SMatrix<T, NU, C>;
     type MatrixPC<T: Plain, const C: usize> = SMatrix<T, NP, C>;
+    type MatrixCX<T: Plain, const C: usize> = SMatrix<T, C, NX>;
+    type MatrixCZ<T: Plain, const C: usize> = SMatrix<T, C, NZ>;
+    type MatrixCU<T: Plain, const C: usize> = SMatrix<T, C, NU>;
+    type MatrixCP<T: Plain, const C: usize> = SMatrix<T, C, NP>;
+}
+
+/// The number of outputs of a function, and the arrays and matrices it gives beside the dimensions of a model.
+pub trait Outputs: 'static {
+    /// How many.
+    const NY: usize;
+    /// `[T; NY]`
+    type ArrayY<T: Plain>: Array<T>;
+    /// `SVector<T, NY>`
+    type VectorY<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NY, NY>`
+    type MatrixYY<T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NY, NX>`
+    type MatrixYX<D: Shape, T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NY, NZ>`
+    type MatrixYZ<D: Shape, T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NY, NU>`
+    type MatrixYU<D: Shape, T: Plain>: Matrix<T>;
+    /// `SMatrix<T, NY, NP>`
+    type MatrixYP<D: Shape, T: Plain>: Matrix<T>;
+}
+
+/// `NY` outputs.
+#[derive(Clone, Copy, Debug)]
+pub struct Count<const NY: usize>;
+
+impl<const NY: usize> Outputs for Count<NY> {
+    const NY: usize = NY;
+    type ArrayY<T: Plain> = [T; NY];
+    type VectorY<T: Plain> = SVector<T, NY>;
+    type MatrixYY<T: Plain> = SMatrix<T, NY, NY>;
+    type MatrixYX<D: Shape, T: Plain> = D::MatrixCX<T, NY>;
+    type MatrixYZ<D: Shape, T: Plain> = D::MatrixCZ<T, NY>;
+    type MatrixYU<D: Shape, T: Plain> = D::MatrixCU<T, NY>;
+    type MatrixYP<D: Shape, T: Plain> = D::MatrixCP<T, NY>;
 }

@@ -1,4 +1,4 @@
-//! The attributes `#[dae]` and `#[ode]`.
+//! The attributes `#[dae]`, `#[ode]` and `#[function]`.
 //!
 //! The entry is these few lines; everything else is an ordinary library over `proc_macro2`:
 //! `language` executes the model function symbolically and yields a graph, `graph` differentiates it,
@@ -23,7 +23,13 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Ode, attribute.into(), item.into()).into()
 }
 
-/// The item as it was written and, beside it, its model or the errors: an editor stays alive on a
+/// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event, a cost, a constraint.
+#[proc_macro_attribute]
+pub fn function(attribute: TokenStream, item: TokenStream) -> TokenStream {
+    expand(language::Form::Function, attribute.into(), item.into()).into()
+}
+
+/// The item as it was written and, beside it, its type or the errors: an editor stays alive on a
 /// model that is being written.
 fn expand(
     form: language::Form,
@@ -42,7 +48,11 @@ fn expand(
         }
         Err(error) => return emit::with_errors(attribute, item, &error),
     }
-    let models = language::read(form, attribute.clone(), item.clone()).and_then(|source| {
+    let expansion = language::read(form, attribute.clone(), item.clone()).and_then(|source| {
+        if form == language::Form::Function {
+            let functions: Vec<_> = source.models.into_iter().map(structure::analyse_function).collect();
+            return emit::expand_functions(source.item, source.place, &functions);
+        }
         let mut models = Vec::new();
         let mut mistakes = language::mistakes::Mistakes::default();
         for model in source.models {
@@ -54,5 +64,5 @@ fn expand(
         mistakes.none()?;
         emit::expand(source.item, source.place, &models)
     });
-    models.unwrap_or_else(|error| emit::with_errors(attribute, item, &error))
+    expansion.unwrap_or_else(|error| emit::with_errors(attribute, item, &error))
 }

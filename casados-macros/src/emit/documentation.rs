@@ -1,6 +1,6 @@
 //! What rustdoc says about a model.
 
-use crate::structure::Analysis;
+use crate::structure::{Analysis, Derivatives, FunctionAnalysis};
 use proc_macro2::TokenStream;
 use quote::quote;
 
@@ -23,7 +23,8 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
     let head: Vec<String> = parameters.into_iter().chain(head).collect();
     lines.push(row(&head));
     lines.push(row(&vec![String::from("---"); head.len()]));
-    for Analysis { model, jacobian, constant, hessian, operations, .. } in models {
+    for Analysis { model, derivatives, .. } in models {
+        let Derivatives { jacobian, constant, hessian, operations, .. } = derivatives;
         let variables = &model.variables;
         let numbers = [
             variables.x.len(),
@@ -35,6 +36,47 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
             hessian.len(),
             operations.residual as usize,
             operations.residual_jacobian as usize,
+            operations.adjoint as usize,
+            operations.hessian as usize,
+        ];
+        let instance = model.instance.iter().map(|instance| instance.value.to_string());
+        lines.push(row(&instance.chain(numbers.map(|n| n.to_string())).collect::<Vec<_>>()));
+    }
+    let lines = lines.into_iter().map(|line| if line.is_empty() { line } else { format!(" {line}") });
+    quote! {
+        #(#documentation)*
+        #separator
+        #(#[doc = #lines])*
+    }
+}
+
+/// The user's text, then what is known about the function.
+pub fn of_function(functions: &[FunctionAnalysis]) -> TokenStream {
+    let Some(first) = functions.first() else {
+        return TokenStream::new();
+    };
+    let documentation = &first.model.documentation;
+    let separator = (!documentation.is_empty()).then(|| quote!(#[doc = ""]));
+    let parameters = first.model.instance.iter().map(|i| format!("`{}`", i.name));
+    let head = ["outputs", "Jacobian", "constant", "Hessian", "`y`", "`∇(μᵀy)`", "`∇²(μᵀy)`"];
+    let head: Vec<String> = parameters.chain(head.map(String::from)).collect();
+    let mut lines = vec![
+        String::from(
+            "A function of the variables of a model: its outputs, structural non-zeros of its Jacobian (constant ones \
+             among them) and of the lower triangle of its Hessian, and operations per evaluation.",
+        ),
+        String::new(),
+        row(&head),
+        row(&vec![String::from("---"); head.len()]),
+    ];
+    for FunctionAnalysis { model, derivatives } in functions {
+        let Derivatives { jacobian, constant, hessian, operations, .. } = derivatives;
+        let numbers = [
+            model.residual.len(),
+            jacobian.len(),
+            constant.iter().filter(|&&constant| constant).count(),
+            hessian.len(),
+            operations.residual as usize,
             operations.adjoint as usize,
             operations.hessian as usize,
         ];

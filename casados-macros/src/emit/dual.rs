@@ -51,7 +51,7 @@ pub fn write(model: &Model) -> TokenStream {
     let call = quote!(#function::<#(#generics),*>(#(#arguments),*));
     let returned = if model.scalar { quote!([#call]) } else { quote!(::core::convert::Into::into(#call)) };
     let value = match form {
-        Form::Dae => quote!(casados_value),
+        Form::Dae | Form::Function => quote!(casados_value),
         Form::Ode => quote!(casados_variable(casados_row) - casados_value),
     };
     let ode = (*form == Form::Ode).then(|| {

@@ -1,8 +1,10 @@
 //! From graphs and structure to Rust.
 
 mod chunk;
+mod code;
 mod documentation;
 mod dual;
+mod function;
 mod model;
 mod routine;
 mod schedule;
@@ -11,7 +13,7 @@ mod structure;
 mod tests;
 
 use crate::language::{self, Instance, Model, Place};
-use crate::structure::Analysis;
+use crate::structure::{Analysis, FunctionAnalysis};
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
 
@@ -24,6 +26,21 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
     let implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
 
     let documentation = documentation::of_type(&original, models);
+    let Model { name, visibility, instance, .. } = &first.model;
+    assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+}
+
+/// The same for functions, whose types implement `Function`.
+pub fn expand_functions(
+    item: TokenStream,
+    place: Place,
+    functions: &[FunctionAnalysis],
+) -> syn::Result<TokenStream> {
+    let Some(first) = functions.first() else {
+        return Ok(item);
+    };
+    let implementations = functions.iter().map(function::write).collect::<syn::Result<TokenStream>>()?;
+    let documentation = documentation::of_function(functions);
     let Model { name, visibility, instance, .. } = &first.model;
     assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
 }

@@ -1,25 +1,22 @@
 //! The implementations of `Dae`, `GraphDae` and `Ode` for one model.
 
-use super::routine::Routine;
+use super::code::{self, MODEL, dimensions, ty};
 use super::structure;
-use crate::graph::Node;
 use crate::language::{Model, Variables};
-use crate::structure::Analysis;
+use crate::structure::{Analysis, Derivatives};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 /// Writes the implementations for one model.
 pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
-    let Analysis { model, jacobian, hessian, explicit, .. } = analysis;
-    let Model { name, variables, opaque, uses, krate, instance, .. } = model;
+    let Analysis { model, derivatives, explicit, .. } = analysis;
+    let Derivatives { jacobian, hessian, .. } = derivatives;
+    let Model { variables, opaque, krate, .. } = model;
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let [nk, nv, nw] = dimensions(variables);
     let (nj, nh, nb) = (jacobian.len(), hessian.len(), analysis.elimination.plan.blocks.len());
-    let code: TokenStream = code(analysis).parse()?;
-
-    let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
-    let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
+    let (code, ty) = (code::module(model, derivatives, &MODEL)?, ty(model));
     let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let structure = structure::write(analysis);
@@ -40,11 +37,7 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
         }
     });
     let implementations = quote! {
-        #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_variables)]
-        mod code {
-            use #krate::scalar::{Piece, Scalar};
-            #code
-        }
+        #code
 
         #[automatically_derived]
         impl #krate::Dae for #ty {
@@ -105,94 +98,5 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
 
         #ode
     };
-    Ok(if opaque.is_empty() {
-        quote! {
-            const _: () = { #implementations };
-        }
-    } else {
-        let length = Literal::usize_unsuffixed(opaque.len());
-        let parameters = instance.iter().map(|instance| {
-            let (name, ty, value) = (&instance.name, &instance.ty, Literal::u64_unsuffixed(instance.value));
-            quote!(#[allow(dead_code)] const #name: #ty = #value;)
-        });
-        quote! {
-            const _: () = {
-                #[allow(unused_imports)]
-                const CASADOS_CONSTANTS: [f64; #length] = {
-                    #(#uses)*
-                    #(#parameters)*
-                    [#(#opaque),*]
-                };
-                const _: () = {
-                    const C: [f64; #length] = CASADOS_CONSTANTS;
-                    #implementations
-                };
-            };
-        }
-    })
-}
-
-/// The functions that compute, as text: they are long and simple, and a parser is faster than a quote.
-fn code(analysis: &Analysis) -> String {
-    let Analysis { model, jacobian, constant, gradient, hessian, .. } = analysis;
-    let Model { variables, graph, residual, opaque, .. } = model;
-    let [nk, nv, ..] = dimensions(variables);
-    let (nj, nh) = (jacobian.len(), hessian.len());
-    let entries = || jacobian.iter().zip(constant).enumerate();
-    let equations = || residual.iter().enumerate().map(|(row, &node)| ("f", row, node));
-    let write = |routine: Routine| routine.write(graph, variables, opaque.len());
-
-    let code_residual = write(Routine {
-        name: "residual",
-        documentation: "`f(v)`:",
-        inputs: &[("v", nv)],
-        outputs: &[("f", nk)],
-        stores: equations().collect(),
-    });
-    let code_constants = write(Routine {
-        name: "jacobian_constants",
-        documentation: "The constant entries of the Jacobian:",
-        inputs: &[],
-        outputs: &[("jacobian", nj)],
-        stores: entries()
-            .filter(|(_, (_, constant))| **constant)
-            .map(|(index, ((_, _, node), _))| ("jacobian", index, *node))
-            .collect(),
-    });
-    // Row after row: what an equation and its derivatives share is used soon.
-    let mut rows: Vec<Vec<(&str, usize, Node)>> = equations().map(|store| vec![store]).collect();
-    for (index, ((row, _, node), constant)) in entries() {
-        if let (false, Some(stores)) = (*constant, rows.get_mut(*row as usize)) {
-            stores.push(("jacobian", index, *node));
-        }
-    }
-    let code_jacobian = write(Routine {
-        name: "residual_jacobian",
-        documentation: "`f(v)` and the entries of its Jacobian that are not constant:",
-        inputs: &[("v", nv)],
-        outputs: &[("f", nk), ("jacobian", nj)],
-        stores: rows.concat(),
-    });
-    let code_adjoint = write(Routine {
-        name: "adjoint",
-        documentation: "`∇(μᵀ f)`:",
-        inputs: &[("v", nv), ("mu", nk)],
-        outputs: &[("gradient", nv)],
-        stores: gradient.iter().take(nv - 1).enumerate().map(|(i, &node)| ("gradient", i, node)).collect(),
-    });
-    let code_hessian = write(Routine {
-        name: "hessian",
-        documentation: "The lower triangle of `∇²(μᵀ f)`:",
-        inputs: &[("v", nv), ("mu", nk)],
-        outputs: &[("hessian", nh)],
-        stores: hessian.iter().enumerate().map(|(i, entry)| ("hessian", i, entry.2)).collect(),
-    });
-    [code_residual, code_constants, code_jacobian, code_adjoint, code_hessian].concat()
-}
-
-/// `NK`, `NV` and `NW`.
-fn dimensions(variables: &Variables) -> [usize; 3] {
-    let Variables { x, z, u, p } = variables;
-    let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
-    [nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np]
+    Ok(code::enclose(model, &implementations))
 }

@@ -2,22 +2,21 @@
 
 use crate::graph::Node;
 use crate::language::Variables;
-use crate::structure::{Analysis, Elimination, Facts, Operations};
+use crate::structure::{Analysis, Derivatives, Elimination, Facts, FunctionAnalysis, Operations};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// The value of `Dae::STRUCTURE`.
 pub fn write(analysis: &Analysis) -> TokenStream {
-    let Analysis { model, jacobian, blocks, constant, hessian, linear, facts, operations, .. } = analysis;
+    let Analysis { model, derivatives, facts, .. } = analysis;
+    let Derivatives { jacobian, blocks, constant, hessian, linear, operations, .. } = derivatives;
     let krate = &model.krate;
     let name = model.name.to_string();
     let Variables { x, z, u, p } = &model.variables;
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let blocks = blocks.map(Literal::usize_unsuffixed);
-    let &Operations { residual, residual_jacobian, adjoint, hessian: second } = operations;
-    let [residual, residual_jacobian, adjoint, second] =
-        [residual, residual_jacobian, adjoint, second].map(Literal::u32_unsuffixed);
+    let operations = self::operations(krate, operations);
     let Facts { linear_in_state, constant_matrix, constant_rows, .. } = facts;
     let [trivial, quadratures, directions, curved] =
         [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved].map(|list| numbers(list));
@@ -41,13 +40,52 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             quadratures: &[#(#quadratures),*],
             directions: &[#(#directions),*],
             curved: &[#(#curved),*],
-            operations: #krate::model::Operations {
-                residual: #residual,
-                residual_jacobian: #residual_jacobian,
-                adjoint: #adjoint,
-                hessian: #second,
-            },
+            operations: #operations,
             elimination: #elimination,
+        }
+    }
+}
+
+/// The value of `Function::STRUCTURE`.
+pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
+    let FunctionAnalysis { model, derivatives } = analysis;
+    let Derivatives { jacobian, blocks, constant, hessian, linear, operations, .. } = derivatives;
+    let krate = &model.krate;
+    let name = model.name.to_string();
+    let Variables { x, z, u, p } = &model.variables;
+    let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
+    let blocks = blocks.map(Literal::usize_unsuffixed);
+    let operations = self::operations(krate, operations);
+    let variables: BTreeSet<u32> = derivatives.jacobian.iter().map(|entry| entry.1).collect();
+    let variables = numbers(&variables.into_iter().collect::<Vec<_>>());
+    quote! {
+        #krate::function::FunctionStructure {
+            name: #name,
+            x: &[#(#x),*],
+            z: &[#(#z),*],
+            u: &[#(#u),*],
+            p: &[#(#p),*],
+            jacobian: #jacobian,
+            blocks: [#(#blocks),*],
+            constant: &[#(#constant),*],
+            hessian: #hessian,
+            linear: &[#(#linear),*],
+            variables: &[#(#variables),*],
+            operations: #operations,
+        }
+    }
+}
+
+fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
+    let &Operations { residual, residual_jacobian, adjoint, hessian } = operations;
+    let [residual, residual_jacobian, adjoint, hessian] =
+        [residual, residual_jacobian, adjoint, hessian].map(Literal::u32_unsuffixed);
+    quote! {
+        #krate::model::Operations {
+            residual: #residual,
+            residual_jacobian: #residual_jacobian,
+            adjoint: #adjoint,
+            hessian: #hessian,
         }
     }
 }

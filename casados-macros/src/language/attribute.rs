@@ -1,4 +1,4 @@
-//! What stands in the brackets of `#[dae(...)]` and `#[ode(...)]`.
+//! What stands in the brackets of `#[dae(...)]`, `#[ode(...)]` and `#[function(...)]`.
 //!
 //! - `NX = [9, 15]`, `NX = 1..=5`, `NX = 9`: the values of a const parameter to make models of;
 //! - `(M, N) = [(1, 2), (3, 4)]`: of several together;
@@ -90,9 +90,10 @@ impl Arguments {
         sampling::resolve(&self.settings, variables)
     }
 
-    /// Dual models have no plan that nominal values and ranges could improve.
-    pub fn without_settings(&self) -> Result<()> {
-        let message = "a dual model has no elimination plan: nominal values and ranges would change nothing";
+    /// Dual models and functions have no plan that nominal values and ranges could improve.
+    pub fn without_settings(&self, what: &str) -> Result<()> {
+        let message =
+            format!("{what} has no elimination plan: nominal values and ranges would change nothing");
         self.settings.first().map_or(Ok(()), |setting| Err(Error::new(setting.span(), message)))
     }
 

@@ -76,9 +76,16 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
     if !signature::is_dual(&function) {
         return Ok(None);
     }
+    if form == Form::Function {
+        return Err(Error::new_spanned(
+            &function.sig.generics,
+            "a function of a model's variables is written with `f64` and without type parameters: its derivatives are \
+             found at compile time",
+        ));
+    }
     require_feature(&function, cfg!(feature = "num-dual"))?;
     let arguments = Arguments::read(attribute)?;
-    arguments.without_settings()?;
+    arguments.without_settings("a dual model")?;
     let mut consts = function.sig.generics.clone();
     consts.params =
         consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();

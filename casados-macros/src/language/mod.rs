@@ -50,6 +50,18 @@ pub enum Form {
     Dae,
     /// The function returns `ẋ`; the graph's residual is `ẋ − g(x, u, p, t)`.
     Ode,
+    /// The function returns any numbers `y(x, u, z, p, t)`; they stand for the residual.
+    Function,
+}
+
+impl Form {
+    /// What the function is, with its article.
+    pub fn what(self) -> &'static str {
+        match self {
+            Self::Dae | Self::Ode => "a model",
+            Self::Function => "a function of a model's variables",
+        }
+    }
 }
 
 /// Where the generated items go.
@@ -159,13 +171,17 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
             let models = models(&arguments, &template)?;
             Ok(Source { item: module.to_token_stream(), place: Place::Inside, models })
         }
-        other => {
-            Err(syn::Error::new_spanned(other, "a model is a function, or a module with a function in it"))
-        }
+        other => Err(syn::Error::new_spanned(
+            other,
+            format!("{} is a function, or a module with a function in it", form.what()),
+        )),
     }
 }
 
 fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>> {
+    if template.form == Form::Function {
+        arguments.without_settings("a function")?;
+    }
     let instances = arguments.instances(&template.function.sig.generics)?;
     let model = |instance| {
         let mut model = template.model(instance)?;

@@ -58,7 +58,7 @@ impl Template<'_> {
         self.check_length(&numbers, &variables)?;
         let spans = flatten::spans(&self.function.block, &value);
         let residual = match self.form {
-            Form::Dae => numbers,
+            Form::Dae | Form::Function => numbers,
             Form::Ode => (0u32..)
                 .zip(numbers)
                 .map(|(state, rate)| {
@@ -181,16 +181,17 @@ impl Template<'_> {
         let expected = match self.form {
             Form::Dae => nx + nz,
             Form::Ode => nx,
+            Form::Function => return Ok(()),
         };
         if residual.len() == expected {
             return Ok(());
         }
         let message = match self.form {
-            Form::Dae if nz == 0 => format!(
+            Form::Dae | Form::Function if nz == 0 => format!(
                 "the residual has {}, but `x` has {nx}: return one equation for each state",
                 numbers(residual.len())
             ),
-            Form::Dae => format!(
+            Form::Dae | Form::Function => format!(
                 "the residual has {}, but `x` and `z` have {nx} + {nz}: return one equation for each state",
                 numbers(residual.len())
             ),

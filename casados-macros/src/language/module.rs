@@ -31,6 +31,7 @@ pub fn model_function(form: Form, module: &mut ItemMod) -> Result<usize> {
         return Ok(index);
     }
     let needed = if form == Form::Dae { Role::Xdot } else { Role::X };
+    let kind = if form == Form::Function { "function" } else { "model" };
     let functions = || {
         items.iter().enumerate().filter_map(|(index, item)| match item {
             Item::Fn(function) if roles(function).any(|role| role == Some(needed)) => Some((index, function)),
@@ -44,7 +45,7 @@ pub fn model_function(form: Form, module: &mut ItemMod) -> Result<usize> {
     match candidates.as_slice() {
         [] => Err(Error::new(
             name.span(),
-            format!("no model in this module: a function with an argument `{}` is expected", needed.name()),
+            format!("no {kind} in this module: a function with an argument `{}` is expected", needed.name()),
         )),
         [(index, _)] => Ok(*index),
         several => match several.iter().find(|(_, function)| function.sig.ident == name) {
@@ -54,7 +55,7 @@ pub fn model_function(form: Form, module: &mut ItemMod) -> Result<usize> {
                     several.iter().map(|(_, function)| format!("`{}`", function.sig.ident)).collect();
                 Err(Error::new(
                     name.span(),
-                    format!("{} could each be the model: mark one with `#[model]`", names.join(", ")),
+                    format!("{} could each be the {kind}: mark one with `#[model]`", names.join(", ")),
                 ))
             }
         },

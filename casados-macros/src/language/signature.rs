@@ -61,7 +61,7 @@ pub struct Argument {
 
 /// The arguments of a model function, in its order.
 pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
-    check_qualifiers(function)?;
+    check_qualifiers(form, function)?;
     let mut arguments = Vec::<Argument>::new();
     let mut mistakes = Mistakes::default();
     for input in &function.sig.inputs {
@@ -78,11 +78,15 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
             "a `#[dae]` has an argument `xdot`, of the type of `x`; a function that returns `xdot` is an `#[ode]`",
         ));
     }
-    if form == Form::Ode && !has(Role::X) {
-        return Err(Error::new(
-            function.sig.ident.span(),
-            "a model has differential states: an argument `x`",
-        ));
+    if form != Form::Dae && !has(Role::X) {
+        let message = match form {
+            Form::Function => {
+                "a function has the arguments of its model, those that it does not use as well: `_x` has the type of the \
+                 model's `x`"
+            }
+            _ => "a model has differential states: an argument `x`",
+        };
+        return Err(Error::new(function.sig.ident.span(), message));
     }
     Ok(arguments)
 }
@@ -123,12 +127,14 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
     let arguments = match form {
         Form::Dae => "`xdot`, `x`, `z`, `u`, `p` and `t`",
         Form::Ode => "`x`, `u`, `p` and `t`",
+        Form::Function => "`x`, `z`, `u`, `p` and `t`",
     };
     let Pat::Ident(identifier) = pattern else {
         return Err(Error::new(
             pattern.span(),
             format!(
-                "arguments of a model are recognised by their names, {arguments}; take this one apart in the body"
+                "arguments of {} are recognised by their names, {arguments}; take this one apart in the body",
+                form.what()
             ),
         ));
     };
@@ -137,6 +143,11 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
             &identifier.ident,
             "an `#[ode]` returns `xdot`; a model with the argument `xdot` is a `#[dae]` and returns its residual",
         )),
+        (Some(Role::Xdot), Form::Function) => Err(Error::new_spanned(
+            &identifier.ident,
+            "a function of a model's variables does not see `xdot`, which exists at the stages of an integrator only: \
+             where it is needed, make it an algebraic state",
+        )),
         (Some(Role::Z), Form::Ode) => Err(Error::new_spanned(
             &identifier.ident,
             "an `#[ode]` has no algebraic states; write the model as a `#[dae]` with an equation for each of them",
@@ -144,13 +155,17 @@ fn role(form: Form, pattern: &Pat) -> Result<Role> {
         (Some(role), _) => Ok(role),
         (None, _) => Err(Error::new_spanned(
             &identifier.ident,
-            format!("unknown argument `{}`: the arguments of a model are {arguments}", identifier.ident),
+            format!(
+                "unknown argument `{}`: the arguments of {} are {arguments}",
+                identifier.ident,
+                form.what()
+            ),
         )),
     }
 }
 
 /// A model is a plain function.
-fn check_qualifiers(function: &ItemFn) -> Result<()> {
+fn check_qualifiers(form: Form, function: &ItemFn) -> Result<()> {
     let sig = &function.sig;
     let plain = "a model is a plain function of numbers";
     if let Some(token) = &sig.asyncness {
@@ -160,10 +175,11 @@ fn check_qualifiers(function: &ItemFn) -> Result<()> {
         return Err(Error::new_spanned(token, format!("{plain}: it cannot be variadic")));
     }
     if matches!(sig.output, syn::ReturnType::Default) {
-        return Err(Error::new(
-            sig.ident.span(),
-            "a model returns numbers: its residual (`#[dae]`) or `xdot` (`#[ode]`)",
-        ));
+        let message = match form {
+            Form::Function => "a function returns its outputs, as in `-> [f64; 2]`",
+            _ => "a model returns numbers: its residual (`#[dae]`) or `xdot` (`#[ode]`)",
+        };
+        return Err(Error::new(sig.ident.span(), message));
     }
     Ok(())
 }

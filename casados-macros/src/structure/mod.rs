@@ -15,10 +15,8 @@ pub use facts::Facts;
 pub use samples::Position;
 use std::collections::HashSet;
 
-/// A model with its derivatives and its structure.
-pub struct Analysis {
-    /// The model; its graph holds the derivatives too.
-    pub model: Model,
+/// The derivatives of a model or of a function of its variables.
+pub struct Derivatives {
     /// Non-zeros of the Jacobian `(equation, variable, value)`, by block (ẋ, x, z, u, p), row, column.
     pub jacobian: Vec<Entry>,
     /// Where each block begins in `jacobian`, and its end.
@@ -31,12 +29,28 @@ pub struct Analysis {
     pub hessian: Vec<Entry>,
     /// Equations that are linear in `(ẋ, x, z, u, p)` jointly.
     pub linear: Vec<bool>,
+    /// Numbers of operations.
+    pub operations: Operations,
+}
+
+/// A function with its derivatives.
+pub struct FunctionAnalysis {
+    /// The function; its graph holds the derivatives too.
+    pub model: Model,
+    /// Its derivatives.
+    pub derivatives: Derivatives,
+}
+
+/// A model with its derivatives and its structure.
+pub struct Analysis {
+    /// The model; its graph holds the derivatives too.
+    pub model: Model,
+    /// Its derivatives.
+    pub derivatives: Derivatives,
     /// What lets the engine leave work out.
     pub facts: Facts,
     /// For an explicit model: for each state its row and coefficient.
     pub explicit: Option<Vec<(u32, f64)>>,
-    /// Numbers of operations.
-    pub operations: Operations,
     /// How the Newton matrix is eliminated.
     pub elimination: Elimination,
 }
@@ -66,18 +80,36 @@ pub struct Operations {
 
 /// Derives everything, or says why the model is no index-1 DAE.
 pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
-    let names = &model.variables;
-    let ends = [names.x.len(), names.x.len(), names.z.len(), names.u.len(), names.p.len()];
-    let ends = ends.map({
-        let mut end = 0;
-        move |length| {
-            end += length as u32;
-            end
-        }
-    });
-    let variables = ends[4];
     check_length(&model)?;
+    let ends = ends(&model.variables);
+    let derivatives = differentiate(&mut model, ends);
+    let Derivatives { jacobian, blocks, constant, hessian, linear, .. } = &derivatives;
+    index::check(&model, jacobian, ends)?;
+    let facts = facts::find(&model.graph, (jacobian, *blocks, constant), hessian, linear, ends);
+    let explicit = explicit(&model, jacobian, ends);
+    let elimination = elimination(&model, jacobian, *blocks);
+    Ok(Analysis { model, derivatives, facts, explicit, elimination })
+}
 
+/// Derives everything about a function.
+pub fn analyse_function(mut model: Model) -> FunctionAnalysis {
+    let ends = ends(&model.variables);
+    let derivatives = differentiate(&mut model, ends);
+    FunctionAnalysis { model, derivatives }
+}
+
+/// Where each of the blocks `(ẋ, x, z, u, p)` ends among the variables.
+fn ends(names: &Variables) -> [u32; 5] {
+    let mut end = 0;
+    [names.x.len(), names.x.len(), names.z.len(), names.u.len(), names.p.len()].map(|length| {
+        end += length as u32;
+        end
+    })
+}
+
+/// Adds the derivatives to the graph.
+fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
+    let variables = ends[4];
     let graph = &mut model.graph;
     let mut jacobian = graph::jacobian(graph, &model.residual, variables);
     let block = |variable: u32| ends.partition_point(|&end| end <= variable);
@@ -86,9 +118,6 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     for (begin, index) in blocks.iter_mut().zip(0..) {
         *begin = jacobian.partition_point(|&(_, variable, _)| block(variable) < index);
     }
-    index::check(&model, &jacobian, ends)?;
-
-    let graph = &mut model.graph;
     let values: Vec<Node> = jacobian.iter().map(|entry| entry.2).collect();
     let constant: Vec<bool> =
         graph.degrees(&values, |_| true).iter().map(|&degree| degree == Degree::Constant).collect();
@@ -110,22 +139,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
         adjoint: graph.operations(&gradient),
         hessian: graph.operations(&hessian.iter().map(|entry| entry.2).collect::<Vec<_>>()),
     };
-    let facts = facts::find(graph, (&jacobian, blocks, &constant), &hessian, &linear, ends);
-    let explicit = explicit(&model, &jacobian, ends);
-    let elimination = elimination(&model, &jacobian, blocks);
-    Ok(Analysis {
-        model,
-        jacobian,
-        blocks,
-        constant,
-        gradient,
-        hessian,
-        linear,
-        facts,
-        explicit,
-        operations,
-        elimination,
-    })
+    Derivatives { jacobian, blocks, constant, gradient, hessian, linear, operations }
 }
 
 /// Plans the elimination of the Newton matrix.

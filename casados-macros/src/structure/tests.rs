@@ -54,16 +54,16 @@ fn explicit_model() {
         vec![mul(g, two, first), second]
     }));
     assert_eq!(analysis.explicit, Some(vec![(1, 1.0), (0, 2.0)]));
-    let positions: Vec<_> = analysis.jacobian.iter().map(|entry| (entry.0, entry.1)).collect();
+    let positions: Vec<_> = analysis.derivatives.jacobian.iter().map(|entry| (entry.0, entry.1)).collect();
     assert_eq!(positions, [(0, 1), (1, 0), (0, 2), (1, 3), (0, 4), (1, 5)]);
-    assert_eq!(analysis.blocks, [0, 2, 4, 4, 5, 6]);
-    assert_eq!(analysis.constant, [true, true, false, false, false, false]);
-    assert_eq!(analysis.linear, [false, false]);
-    let hessian: Vec<_> = analysis.hessian.iter().map(|entry| (entry.0, entry.1)).collect();
+    assert_eq!(analysis.derivatives.blocks, [0, 2, 4, 4, 5, 6]);
+    assert_eq!(analysis.derivatives.constant, [true, true, false, false, false, false]);
+    assert_eq!(analysis.derivatives.linear, [false, false]);
+    let hessian: Vec<_> = analysis.derivatives.hessian.iter().map(|entry| (entry.0, entry.1)).collect();
     assert_eq!(hessian, [(4, 2), (5, 3)]);
-    assert_eq!(analysis.gradient.len(), 6);
+    assert_eq!(analysis.derivatives.gradient.len(), 6);
     // u x₀, ẋ₁ −, 2 ·, p x₁, ẋ₀ −
-    assert_eq!(analysis.operations.residual, 5);
+    assert_eq!(analysis.derivatives.operations.residual, 5);
 }
 
 /// What is not explicit: a derivative twice, one with a varying or an unknown coefficient, an algebraic state.
@@ -81,15 +81,15 @@ fn implicit_models() {
     assert!(coefficient(|_, v| v[3]).explicit.is_none());
     let outside = coefficient(|g, _| g.opaque(0));
     assert!(outside.explicit.is_none());
-    assert_eq!(outside.constant, [true, true]);
-    assert_eq!(outside.linear, [true]);
+    assert_eq!(outside.derivatives.constant, [true, true]);
+    assert_eq!(outside.derivatives.linear, [true]);
     assert!(coefficient(|_, v| v[0]).explicit.is_none());
 
     let coupled = accepted(model([2, 0, 0, 0], |g, v| vec![sub(g, v[0], v[1]), sub(g, v[1], v[2])]));
     assert!(coupled.explicit.is_none());
     let algebraic = accepted(model([1, 1, 0, 0], |g, v| vec![sub(g, v[0], v[1]), sub(g, v[2], v[1])]));
     assert!(algebraic.explicit.is_none());
-    assert_eq!(algebraic.blocks, [0, 1, 3, 4, 4, 4]);
+    assert_eq!(algebraic.derivatives.blocks, [0, 1, 3, 4, 4, 4]);
 }
 
 #[test]
@@ -99,10 +99,10 @@ fn linear_equations() {
         let (with_time, product) = (mul(g, sine, v[2]), mul(g, v[2], v[4]));
         vec![sub(g, v[0], with_time), sub(g, v[1], product)]
     }));
-    assert_eq!(analysis.linear, [true, false]);
+    assert_eq!(analysis.derivatives.linear, [true, false]);
     // Time is no direction of derivatives, but the entry varies with it.
-    assert_eq!(analysis.constant, [true, true, false, false, false]);
-    assert!(analysis.jacobian.iter().all(|entry| entry.1 < 5));
+    assert_eq!(analysis.derivatives.constant, [true, true, false, false, false]);
+    assert!(analysis.derivatives.jacobian.iter().all(|entry| entry.1 < 5));
 }
 
 /// `ẋ₀ − 2 x₁`, `c ẋ₁ − sin(t) x₁ − u`, `ẋ₂ − p x₀²`, `z − x₀ − 1`: what varies with the state, with time, not at all.
@@ -293,7 +293,7 @@ fn derivatives_of_named_states() {
 fn residual_may_be_a_variable_or_a_constant() {
     let analysis = accepted(model([1, 0, 0, 0], |_, v| vec![v[0]]));
     assert_eq!(analysis.explicit, Some(vec![(0, 1.0)]));
-    assert_eq!(analysis.model.graph.op(analysis.gradient[0]), Op::Seed(0));
+    assert_eq!(analysis.model.graph.op(analysis.derivatives.gradient[0]), Op::Seed(0));
     assert!(
         reason(model([1, 0, 0, 0], |g, _| vec![g.constant(1.0)])).contains("equation 0 contains neither")
     );

@@ -1,0 +1,122 @@
+//! Functions of the variables of a model: integrands, events, costs, constraints.
+//!
+//! A function `y(x, z, u, p, t)` with `y ∈ R^{ny}` takes the variables of a model, one flat array
+//! `v = (ẋ, x, z, u, p, t)` as in [`Dae`](crate::Dae), and depends on all but `ẋ`. It belongs to every model of its
+//! dimensions: `F: Function<Shape = M::Shape>`. The attribute `#[function]` writes it, with its derivatives, from a
+//! Rust function that names the arguments of the model:
+//!
+//! ```text
+//! #[function]
+//! fn energy(x: [f64; 2], p: [f64; 1]) -> [f64; 2] {
+//!     [0.5 * x[1] * x[1], 0.5 * p[0] * x[0] * x[0]]
+//! }
+//! ```
+
+use crate::scalar::{Lanes, Scalar};
+use crate::shape::{Array, Outputs, Plain, Shape};
+use crate::structure::{Operations, Pattern};
+
+/// `[T; NY]` of a function: one element for each output.
+pub type ArrayY<F, T> = <<F as Function>::Outputs as Outputs>::ArrayY<T>;
+/// `[T; NV]` of a function: one element for each variable `(ẋ, x, z, u, p, t)` of its model.
+pub type ArrayV<F, T> = <<F as Function>::Shape as Shape>::ArrayV<T>;
+/// `SVector<T, NY>` of a function.
+pub type VectorY<F, T> = <<F as Function>::Outputs as Outputs>::VectorY<T>;
+/// `SMatrix<T, NY, NY>` of a function.
+pub type MatrixYY<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYY<T>;
+/// `SMatrix<T, NY, NX>` of a function.
+pub type MatrixYX<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYX<<F as Function>::Shape, T>;
+/// `SMatrix<T, NY, NZ>` of a function.
+pub type MatrixYZ<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYZ<<F as Function>::Shape, T>;
+/// `SMatrix<T, NY, NU>` of a function.
+pub type MatrixYU<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYU<<F as Function>::Shape, T>;
+/// `SMatrix<T, NY, NP>` of a function.
+pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as Function>::Shape, T>;
+
+/// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: written by `#[function]`.
+///
+/// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
+/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables but `t`.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a function of a model's variables",
+    note = "write it as `#[function] fn name(x: [f64; NX], ...) -> [f64; NY]` and use its type, `Name`"
+)]
+pub trait Function: 'static {
+    /// Dimensions of the model.
+    type Shape: Shape;
+    /// The number of outputs.
+    type Outputs: Outputs;
+    /// Values of the structural non-zeros of `∂y/∂(ẋ, x, z, u, p)`, of which `ẋ` has none.
+    type Jacobian<T: Plain>: Array<T>;
+    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ y)` over `(ẋ, x, z, u, p)`.
+    type Hessian<T: Plain>: Array<T>;
+    /// What is known about the function before it runs.
+    const STRUCTURE: FunctionStructure;
+
+    /// The value `y(v)`.
+    fn value<S: Lanes>(v: &ArrayV<Self, S::Cell>, y: &mut ArrayY<Self, S::Cell>);
+
+    /// The constant entries of the Jacobian; the others are left as they are. Called once for
+    /// every array that [`Function::value_jacobian`] will fill.
+    fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S::Cell>);
+
+    /// The value and the entries of the Jacobian that are not constant.
+    fn value_jacobian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        y: &mut ArrayY<Self, S::Cell>,
+        jacobian: &mut Self::Jacobian<S::Cell>,
+    );
+
+    /// The gradient `∇ᵥ(μᵀ y)` over `(ẋ, x, z, u, p)`. The elements of `ẋ` and the last, that of `t`, are set to zero.
+    fn adjoint<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayY<Self, S::Cell>,
+        gradient: &mut ArrayV<Self, S::Cell>,
+    );
+
+    /// All entries of the lower triangle of `∇²(μᵀ y)`.
+    fn hessian<S: Lanes>(
+        v: &ArrayV<Self, S::Cell>,
+        mu: &ArrayY<Self, S::Cell>,
+        hessian: &mut Self::Hessian<S::Cell>,
+    );
+}
+
+/// A function whose code is generic over every scalar: duals and complex numbers included, which is
+/// what independent checks of its derivatives need.
+pub trait GraphFunction: Function {
+    /// The value `y(v)`; `v` has `NV` elements and `y` has `NY`.
+    fn value_of<S: Scalar<Cell = S>>(v: &[S], y: &mut [S]);
+    /// The gradient `∇ᵥ(μᵀ y)`, as [`Function::adjoint`].
+    fn adjoint_of<S: Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]);
+}
+
+/// What is known about a function before it runs.
+#[derive(Clone, Copy, Debug)]
+pub struct FunctionStructure {
+    /// Name of the function.
+    pub name: &'static str,
+    /// Names of the differential states, such as `x[3]` or `cart.position`.
+    pub x: &'static [&'static str],
+    /// Names of the algebraic states.
+    pub z: &'static [&'static str],
+    /// Names of the controls.
+    pub u: &'static [&'static str],
+    /// Names of the parameters.
+    pub p: &'static [&'static str],
+    /// Non-zeros of the Jacobian: output, variable. In order of the blocks `y_ẋ` (empty), `y_x, y_z, y_u, y_p`, within
+    /// each by row, then by column.
+    pub jacobian: Pattern,
+    /// Where each of the five blocks begins in `jacobian`, and its end.
+    pub blocks: [usize; 6],
+    /// Entries of the Jacobian that are constant.
+    pub constant: &'static [bool],
+    /// Non-zeros of the lower triangle of `∇²(μᵀ y)`: variable ≥ variable.
+    pub hessian: Pattern,
+    /// Outputs that are linear in `(x, z, u, p)` jointly: they have no second derivatives.
+    pub linear: &'static [bool],
+    /// Variables that the function depends on, ascending: columns of `jacobian`.
+    pub variables: &'static [u32],
+    /// Numbers of arithmetic operations; what is called `f` there is `y`.
+    pub operations: Operations,
+}

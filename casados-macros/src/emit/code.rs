@@ -1,0 +1,144 @@
+//! What the implementations for a model and for a function have in common: a module with the functions that compute.
+
+use super::routine::Routine;
+use crate::graph::Node;
+use crate::language::{Model, Variables};
+use crate::structure::Derivatives;
+use proc_macro2::{Literal, TokenStream};
+use quote::quote;
+
+/// What the functions that compute are called.
+pub struct Names {
+    /// The function of the values,
+    pub value: &'static str,
+    /// of the values and the Jacobian.
+    pub value_jacobian: &'static str,
+    /// The array of the values.
+    pub output: &'static str,
+    /// The symbol in the documentation.
+    pub symbol: &'static str,
+}
+
+/// Of a model.
+pub const MODEL: Names =
+    Names { value: "residual", value_jacobian: "residual_jacobian", output: "f", symbol: "f" };
+
+/// Of a function.
+pub const FUNCTION: Names =
+    Names { value: "value", value_jacobian: "value_jacobian", output: "y", symbol: "y" };
+
+/// The type, with the values of its const parameters.
+pub fn ty(model: &Model) -> TokenStream {
+    let Model { name, instance, .. } = model;
+    let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
+    if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) }
+}
+
+/// The module `code`.
+pub fn module(model: &Model, derivatives: &Derivatives, names: &Names) -> syn::Result<TokenStream> {
+    let krate = &model.krate;
+    let code: TokenStream = text(model, derivatives, names).parse()?;
+    Ok(quote! {
+        #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_variables)]
+        mod code {
+            use #krate::scalar::{Piece, Scalar};
+            #code
+        }
+    })
+}
+
+/// The implementations where no name of theirs meets one of the user's; constants from outside are `C`.
+pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
+    let Model { opaque, uses, instance, .. } = model;
+    if opaque.is_empty() {
+        quote! {
+            const _: () = { #implementations };
+        }
+    } else {
+        let length = Literal::usize_unsuffixed(opaque.len());
+        let parameters = instance.iter().map(|instance| {
+            let (name, ty, value) = (&instance.name, &instance.ty, Literal::u64_unsuffixed(instance.value));
+            quote!(#[allow(dead_code)] const #name: #ty = #value;)
+        });
+        quote! {
+            const _: () = {
+                #[allow(unused_imports)]
+                const CASADOS_CONSTANTS: [f64; #length] = {
+                    #(#uses)*
+                    #(#parameters)*
+                    [#(#opaque),*]
+                };
+                const _: () = {
+                    const C: [f64; #length] = CASADOS_CONSTANTS;
+                    #implementations
+                };
+            };
+        }
+    }
+}
+
+/// The functions that compute, as text: they are long and simple, and a parser is faster than a quote.
+fn text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
+    let Derivatives { jacobian, constant, gradient, hessian, .. } = derivatives;
+    let Model { variables, graph, residual, opaque, .. } = model;
+    let [_, nv, _] = dimensions(variables);
+    let (ny, Names { value, value_jacobian, output, symbol }) = (residual.len(), names);
+    let (nj, nh) = (jacobian.len(), hessian.len());
+    let entries = || jacobian.iter().zip(constant).enumerate();
+    let equations = || residual.iter().enumerate().map(|(row, &node)| (*output, row, node));
+    let write = |routine: Routine| routine.write(graph, variables, opaque.len());
+
+    let code_residual = write(Routine {
+        name: value,
+        documentation: &format!("`{symbol}(v)`:"),
+        inputs: &[("v", nv)],
+        outputs: &[(output, ny)],
+        stores: equations().collect(),
+    });
+    let code_constants = write(Routine {
+        name: "jacobian_constants",
+        documentation: "The constant entries of the Jacobian:",
+        inputs: &[],
+        outputs: &[("jacobian", nj)],
+        stores: entries()
+            .filter(|(_, (_, constant))| **constant)
+            .map(|(index, ((_, _, node), _))| ("jacobian", index, *node))
+            .collect(),
+    });
+    // Row after row: what an equation and its derivatives share is used soon.
+    let mut rows: Vec<Vec<(&str, usize, Node)>> = equations().map(|store| vec![store]).collect();
+    for (index, ((row, _, node), constant)) in entries() {
+        if let (false, Some(stores)) = (*constant, rows.get_mut(*row as usize)) {
+            stores.push(("jacobian", index, *node));
+        }
+    }
+    let code_jacobian = write(Routine {
+        name: value_jacobian,
+        documentation: &format!("`{symbol}(v)` and the entries of its Jacobian that are not constant:"),
+        inputs: &[("v", nv)],
+        outputs: &[(output, ny), ("jacobian", nj)],
+        stores: rows.concat(),
+    });
+    let code_adjoint = write(Routine {
+        name: "adjoint",
+        documentation: &format!("`∇(μᵀ {symbol})`:"),
+        inputs: &[("v", nv), ("mu", ny)],
+        outputs: &[("gradient", nv)],
+        stores: gradient.iter().take(nv - 1).enumerate().map(|(i, &node)| ("gradient", i, node)).collect(),
+    });
+    let code_hessian = write(Routine {
+        name: "hessian",
+        documentation: &format!("The lower triangle of `∇²(μᵀ {symbol})`:"),
+        inputs: &[("v", nv), ("mu", ny)],
+        outputs: &[("hessian", nh)],
+        stores: hessian.iter().enumerate().map(|(i, entry)| ("hessian", i, entry.2)).collect(),
+    });
+    [code_residual, code_constants, code_jacobian, code_adjoint, code_hessian].concat()
+}
+
+/// `NK`, `NV` and `NW`.
+pub fn dimensions(variables: &Variables) -> [usize; 3] {
+    let Variables { x, z, u, p } = variables;
+    let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
+    [nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np]
+}
