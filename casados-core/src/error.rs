@@ -75,6 +75,17 @@ pub enum Error {
         /// The unknown `(ẋ, z)`, or the element of the result in column-major order.
         index: usize,
     },
+    /// A function that is integrated along has a value that is not finite.
+    NonFiniteFunction {
+        /// Its name.
+        function: &'static str,
+        /// Which of its outputs.
+        output: usize,
+        /// The value.
+        value: f64,
+        /// Where.
+        at: Place,
+    },
     /// No step size was short enough: an adaptive integrator cannot get beyond this time.
     StepSizeUnderflow {
         /// The time that was reached.
@@ -250,6 +261,9 @@ impl fmt::Display for Error {
                     f,
                     "the numbers overflow in step {step}, at element {index} of the unknowns or of a result"
                 )
+            }
+            Error::NonFiniteFunction { function, output, value, at } => {
+                write!(f, "output {output} of the function {function} is {value} at {at}")
             }
             Error::StepSizeUnderflow { t, h, reason } => {
                 let reason = match reason {

@@ -34,6 +34,7 @@ pub mod memory;
 pub mod model;
 pub mod options;
 pub mod qp;
+pub mod quadrature;
 pub mod result;
 pub mod scalar;
 pub mod shape;
@@ -56,6 +57,7 @@ pub use memory::Heap;
 pub use memory::{Inline, mode};
 pub use model::{Dae, GraphDae, Ode};
 pub use options::Options;
+pub use quadrature::{LeastSquares, Quadrature};
 pub use scalar::{Field, Lanes, Real, Scalar};
 pub use shape::{Dims, Shape};
 pub use statistics::Statistics;
@@ -73,6 +75,7 @@ pub mod prelude {
     #[cfg(feature = "alloc")]
     pub use crate::memory::Heap;
     pub use crate::options::{Jacobian, Newton, Options, Start};
+    pub use crate::quadrature::{LeastSquares, Quadrature};
     pub use crate::result::Seeds;
     pub use crate::tableau::{
         Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Midpoint, RadauIIA, Rk4,

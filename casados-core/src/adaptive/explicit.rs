@@ -14,6 +14,7 @@ use crate::error::{Error, Place, Refusal};
 use crate::memory::Heap;
 use crate::model::{ArrayK, ArrayX, Dae, Ode, VectorX};
 use crate::options::Options;
+use crate::quadrature::Along;
 use crate::result::{Dense, Forward, Hessian, Nominal};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Array, Matrix, Shape};
@@ -225,14 +226,26 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Erk<M, B, S, T, Heap> {
-    fn solve(&mut self, at: &At<'_, M, T>, h: T, _: &[T]) -> Result<&Nominal<M, T>, Error> {
+    fn solve(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        _: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         go(self, at)?;
-        Erk::solve(self, at.x, at.u, h)
+        Erk::solve_along(self, at.x, at.u, h, along)
     }
 
-    fn forward(&mut self, at: &At<'_, M, T>, h: T, _: &[T]) -> Result<&Forward<M, T>, Error> {
+    fn forward(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        _: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error> {
         go(self, at)?;
-        Erk::forward(self, at.x, at.u, h)
+        Erk::forward_along(self, at.x, at.u, h, along)
     }
 
     fn hessian(
@@ -241,9 +254,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Erk<M, B, S, 
         h: T,
         _: &[T],
         lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         go(self, at)?;
-        Erk::hessian(self, at.x, at.u, h, lambda)
+        Erk::hessian_along(self, at.x, at.u, h, lambda, along)
     }
 
     fn adjoint(
@@ -253,9 +267,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Erk<M, B, S, 
         _: &[T],
         lambda: &VectorX<M, T>,
         gradient: &mut [T],
+        along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         go(self, at)?;
-        let adjoint = Erk::adjoint(self, at.x, at.u, h, lambda)?;
+        let adjoint = Erk::adjoint_along(self, at.x, at.u, h, lambda, along)?;
         super::replay::stack(adjoint, gradient);
         Ok(())
     }

@@ -10,6 +10,7 @@ use super::tape::Tape;
 use crate::error::{Argument, Error};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::quadrature::{Along, reborrow};
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -164,7 +165,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             let span = self.begin(x0, u, t_end)?;
             self.check_frozen(span)?;
             let Self { base, consistent, tape, state, .. } = self;
-            Frozen { base, consistent, tape, span }.solve::<B>(state, x0)?;
+            Frozen { base, consistent, tape, span }.solve::<B>(state, x0, None)?;
         } else {
             let record = self.options.keep_steps;
             self.run(x0, u, t_end, record, |_, _| Ok(()))?;
@@ -256,9 +257,20 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         u: &VectorU<M, T>,
         t_end: T,
     ) -> Result<&Forward<M, T>, Error> {
+        self.forward_along(x0, u, t_end, None)
+    }
+
+    /// As [`Integrator::forward`], with an integrand.
+    pub(super) fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error> {
         self.steps(x0, u, t_end)?;
         let (mut frozen, state, memory, _) = self.parts()?;
-        frozen.forward::<B>(state, x0, memory, None)?;
+        frozen.forward::<B>(state, x0, memory, None, along)?;
         Ok(&memory.hessian.first.forward)
     }
 
@@ -273,11 +285,23 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         t_end: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
+        self.adjoint_along(x0, u, t_end, lambda, None)
+    }
+
+    /// As [`Integrator::adjoint`], with an integrand.
+    pub(super) fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, u, t_end)?;
         let (mut frozen, state, memory, _) = self.parts()?;
-        frozen.solve::<B>(state, x0)?;
-        frozen.adjoint::<B>(state, lambda, memory)?;
+        frozen.solve::<B>(state, x0, reborrow(&mut along))?;
+        frozen.adjoint::<B>(state, lambda, memory, along)?;
         Ok(&memory.adjoint)
     }
 
@@ -292,13 +316,39 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         t_end: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
+        self.hessian_along(x0, u, t_end, lambda, None)
+    }
+
+    /// As [`Integrator::hessian`], with an integrand.
+    pub(super) fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, u, t_end)?;
         let (mut frozen, state, memory, history) = self.parts()?;
         history.clear();
-        frozen.forward::<B>(state, x0, memory, Some(history))?;
-        frozen.hessian::<B>(state, lambda, memory, history)?;
+        frozen.forward::<B>(state, x0, memory, Some(history), reborrow(&mut along))?;
+        frozen.hessian::<B>(state, lambda, memory, history, along)?;
         Ok(&memory.hessian)
+    }
+
+    /// As [`Integrator::solve`], with an integrand: the steps are taken again, to rounding.
+    pub(super) fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.steps(x0, u, t_end)?;
+        let (mut frozen, state, ..) = self.parts()?;
+        frozen.solve::<B>(state, x0, along)?;
+        Ok(&self.base.result)
     }
 
     /// Following calls take the steps of the last successful one, whatever they are given, and solve them to rounding:

@@ -8,8 +8,9 @@
 //! are not stiff.
 //!
 //! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
-//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `integrator` what users see.
+//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `along` an integrand, `integrator` what users see.
 
+mod along;
 mod consistent;
 mod control;
 mod explicit;

@@ -7,6 +7,7 @@ use crate::irk::Integrator;
 use crate::memory::Heap;
 use crate::model::{Dae, VectorX};
 use crate::options::{Options, Start};
+use crate::quadrature::Along;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -18,12 +19,24 @@ pub trait Replay<M: Dae, T: Real> {
     ///
     /// # Errors
     /// Those of Newton's method.
-    fn solve(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Nominal<M, T>, Error>;
+    fn solve(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error>;
     /// The same with derivatives.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix.
-    fn forward(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Forward<M, T>, Error>;
+    fn forward(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>;
     /// The same with second derivatives of `λᵀx` at its end.
     ///
     /// # Errors
@@ -34,6 +47,7 @@ pub trait Replay<M: Dae, T: Real> {
         h: T,
         y: &[T],
         lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
     /// The gradient of `λᵀx` at its end with respect to `(x, u, p)`, written one after the other.
     ///
@@ -46,6 +60,7 @@ pub trait Replay<M: Dae, T: Real> {
         y: &[T],
         lambda: &VectorX<M, T>,
         gradient: &mut [T],
+        along: Along<'_, '_, M, T>,
     ) -> Result<(), Error>;
     /// The unknowns of the stages that were found.
     ///
@@ -94,14 +109,26 @@ impl<M: Dae, T: Real, const S: usize> Replay<M, T> for Single<M, T, S>
 where
     RadauIIA<S>: Method<S>,
 {
-    fn solve(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Nominal<M, T>, Error> {
+    fn solve(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         go(self, at, y)?;
-        Integrator::solve(self, at.x, at.u, h)
+        Integrator::solve_along(self, at.x, at.u, h, along)
     }
 
-    fn forward(&mut self, at: &At<'_, M, T>, h: T, y: &[T]) -> Result<&Forward<M, T>, Error> {
+    fn forward(
+        &mut self,
+        at: &At<'_, M, T>,
+        h: T,
+        y: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error> {
         go(self, at, y)?;
-        Integrator::forward(self, at.x, at.u, h)
+        Integrator::forward_along(self, at.x, at.u, h, along)
     }
 
     fn hessian(
@@ -110,9 +137,10 @@ where
         h: T,
         y: &[T],
         lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         go(self, at, y)?;
-        Integrator::hessian(self, at.x, at.u, h, lambda)
+        Integrator::hessian_along(self, at.x, at.u, h, lambda, along)
     }
 
     fn adjoint(
@@ -122,9 +150,10 @@ where
         y: &[T],
         lambda: &VectorX<M, T>,
         gradient: &mut [T],
+        along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         go(self, at, y)?;
-        let adjoint = Integrator::adjoint(self, at.x, at.u, h, lambda)?;
+        let adjoint = Integrator::adjoint_along(self, at.x, at.u, h, lambda, along)?;
         stack(adjoint, gradient);
         Ok(())
     }

@@ -4,6 +4,8 @@
 //! x_{n+1} = Φ_n(x_n, u, p)        V_{n+1} = ∂Φ_n/∂x V_n + ∂Φ_n/∂(u, p)        λ_n = (∂Φ_n/∂x)ᵀ λ_{n+1}
 //! d²(λᵀ x_N)/dw² = Σ_n D_nᵀ ∇²(λ_{n+1}ᵀ Φ_n) D_n        D_n = d(x_n, u, p)/dw
 //! ```
+//!
+//! An integrand takes part step by step: forwards with the derivatives of its stages by `(x₀, u, p)`, backwards in `λ_n`.
 
 use super::consistent::{At, Consistent};
 use super::replay::Replay;
@@ -14,6 +16,7 @@ use crate::error::Error;
 use crate::irk::{check_result, not_finite, split};
 use crate::linalg::axpy;
 use crate::model::{ArrayW, ArrayX, Dae, VectorX, VectorZ};
+use crate::quadrature::{Along, Backwards, Chained, Integrand, begin, finish};
 use crate::result::{Adjoint, Forward, Hessian};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
@@ -88,11 +91,19 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     ///
     /// # Errors
     /// Those of Newton's method.
-    pub fn solve<B: Engine<M, T>>(&mut self, state: &mut B::State, x0: &VectorX<M, T>) -> Result<(), Error> {
+    pub fn solve<B: Engine<M, T>>(
+        &mut self,
+        state: &mut B::State,
+        x0: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<(), Error> {
+        begin(&mut along);
         self.steps::<B>(state, x0, |replay, at, h, y, _| {
-            let nominal = replay.solve(at, h, y)?;
+            let mut chained = chain(&mut along, None, false);
+            let nominal = replay.solve(at, h, y, dynamic(&mut chained))?;
             Ok((nominal.x, nominal.z))
-        })
+        })?;
+        finish(&mut along)
     }
 
     /// The solution and its derivatives; `history` takes `V_n` of each step, if it is wanted.
@@ -105,7 +116,10 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         x0: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         mut history: Option<&mut Vec<T>>,
+        mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
+        begin(&mut along);
+        let second = history.is_some();
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
         let Memory { v: [v, next], hessian, row, .. } = memory;
         let result = &mut hessian.first.forward;
@@ -122,7 +136,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                     history.extend_from_slice(row.as_ref());
                 }
             }
-            let forward = replay.forward(at, h, y)?;
+            let mut chained = chain(&mut along, Some(v), second);
+            let forward = replay.forward(at, h, y, dynamic(&mut chained))?;
             let at = |i: usize, w: usize| {
                 if w < nx {
                     T::ZERO
@@ -161,6 +176,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             }
         }
         result.nominal = self.base.result;
+        finish(&mut along)?;
         check_result(result, count)
     }
 
@@ -173,6 +189,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         state: &mut B::State,
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
+        mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         let Memory { lambda: now, gradient: [step_gradient, gradient], adjoint, .. } = memory;
@@ -185,8 +202,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let replay = B::replay(state, entry.level)?;
+            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             replay
-                .adjoint(&at, entry.h, y, now, step_gradient.as_mut())
+                .adjoint(&at, entry.h, y, now, step_gradient.as_mut(), dynamic(&mut backwards))
                 .map_err(|error| in_step(error, step))?;
             let (states, others) = step_gradient.as_ref().split_at(nx);
             now.as_mut_slice().copy_from_slice(states);
@@ -213,6 +231,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         lambda: &VectorX<M, T>,
         memory: &mut Memory<M, T>,
         history: &[T],
+        mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu, np, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NP, M::Shape::NW);
         let Memory { lambda: now, gradient: [_, gradient], hessian, step: local, product, sum, .. } = memory;
@@ -228,7 +247,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let replay = B::replay(state, entry.level)?;
-            let second = replay.hessian(&at, entry.h, y, now).map_err(|error| in_step(error, step))?;
+            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            let second = replay.hessian(&at, entry.h, y, now, dynamic(&mut backwards));
+            let second = second.map_err(|error| in_step(error, step))?;
             *now = second.first.grad_x0;
             let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());
             for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(parts) {
@@ -254,6 +275,11 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                 axpy(T::ONE, row.as_ref(), sum.as_mut());
             }
         }
+        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
+            for (sum, second) in sum.as_mut().iter_mut().zip(second) {
+                axpy(T::ONE, second.as_ref(), sum.as_mut());
+            }
+        }
         let sum = sum.as_ref();
         // To the last bit symmetric: of the two that differ by rounding the lower one.
         let at = |r: usize, c: usize| if r >= c { sum[r].as_ref()[c] } else { sum[c].as_ref()[r] };
@@ -273,6 +299,25 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             finite(row.as_ref())?;
         }
         Ok(())
+    }
+}
+
+/// The integrand of one step of the interval.
+fn chain<'a, M: Dae, T: Real>(
+    along: &'a mut Along<'_, '_, M, T>,
+    v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
+    second: bool,
+) -> Option<Chained<'a, M, T>> {
+    along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
+}
+
+fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T>>(integrand: &'a mut Option<Q>) -> Along<'a, 'a, M, T>
+where
+    Q: 'a,
+{
+    match integrand {
+        Some(integrand) => Some(integrand),
+        None => None,
     }
 }
 
@@ -339,9 +384,10 @@ fn finite<T: Real>(values: &[T]) -> Result<(), Error> {
 /// An error of a step is one of the run.
 fn in_step(mut error: Error, number: usize) -> Error {
     match &mut error {
-        Error::NonFiniteModel { at, .. } | Error::Singular { at, .. } | Error::NotConverged { at, .. } => {
-            at.step = number;
-        }
+        Error::NonFiniteModel { at, .. }
+        | Error::NonFiniteFunction { at, .. }
+        | Error::Singular { at, .. }
+        | Error::NotConverged { at, .. } => at.step = number,
         Error::Overflow { step, .. } => *step = number,
         _ => {}
     }

@@ -5,6 +5,7 @@
 //! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
 //! ```
 
+use super::along::Along;
 use super::forward::Variation;
 use super::step::{Grid, Point, Record, Scheme, add, check};
 use crate::error::{Error, Place, Quantity};
@@ -37,7 +38,8 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     }
 
     /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of every
-    /// stage for the Hessian.
+    /// stage for the Hessian. An integrand takes part if there is one seed.
+    #[expect(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
         scheme: &Scheme<M, T, S>,
@@ -46,6 +48,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         records: &[Record<M, T, S>],
         columns: usize,
         mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
+        along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         M::jacobian_constants::<T>(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
@@ -53,7 +56,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         }
         for (step, record) in records.iter().enumerate().rev() {
             let multipliers = multipliers.as_deref_mut().map(|of_steps| &mut of_steps[step]);
-            self.step(scheme, grid, point, record, step, columns, multipliers)?;
+            self.step(scheme, grid, point, record, step, columns, multipliers, along)?;
         }
         Ok(())
     }
@@ -68,6 +71,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         step: usize,
         columns: usize,
         mut multipliers: Option<&mut [ArrayK<M, T>; S]>,
+        along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         for stage in (0..S).rev() {
             let at = Place { step, stage, iteration: 0 };
@@ -79,6 +83,12 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                     row.factor * self.forward.dxi[row.state].as_ref()[0]
                 });
                 self.pull_one(point, &mu, at)?;
+                if let Some(integrand) = along {
+                    // ξ̄_i += h b_i φ_x, λ_w += h b_i φ_w
+                    integrand.point().0.copy_from_slice(point.v.as_ref());
+                    let gradient = integrand.adjoint(grid.h * scheme.b[stage], at)?;
+                    add(T::ONE, gradient, self.gradient.as_mut());
+                }
                 self.keep(stage);
                 if let Some(multipliers) = &mut multipliers {
                     multipliers[stage] = mu;

@@ -28,6 +28,15 @@ impl<M: Ode, T: Real> Curvature<M, T> {
         }
     }
 
+    /// Adds a matrix of which the lower triangle is there.
+    pub fn add_lower(&mut self, lower: &[ArrayW<M, T>]) {
+        for (i, row) in lower.iter().enumerate() {
+            for (j, value) in row.as_ref().iter().enumerate().take(i + 1) {
+                self.sum[j][i] = self.sum[j][i] + *value;
+            }
+        }
+    }
+
     /// Completes the lower triangle.
     pub fn mirror(&mut self) {
         for i in 0..M::Shape::NW {

@@ -1,6 +1,7 @@
 //! The calls of an explicit integrator: each answers one question, with nothing else computed.
 
 use super::adjoint::Sweep;
+use super::along::{Along, begin, finish, forward};
 use super::forward::{Seeded, Unit, Variation, write};
 use super::hessian::Curvature;
 use super::step::{Base, Counts, Grid, Record, Scheme};
@@ -197,11 +198,24 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Input or model values that are not finite, parameters that were never set, overflow, and in the
     /// first call of a mode [`Error::OutOfMemory`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
+        self.solve_along(x0, u, h, None)
+    }
+
+    /// As [`Integrator::solve`], with an integrand.
+    pub(crate) fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
         let grid = self.begin(x0, u, h)?;
+        begin(&mut along);
         let base = W::nominal(&mut self.base)?;
-        let run = base.run(&self.scheme, grid);
+        let run = base.run(&self.scheme, grid, &mut along);
         self.counts = base.point.counts;
         run?;
+        finish(&mut along)?;
         let Base { x, result, .. } = base;
         result.x.as_mut_slice().copy_from_slice(x.as_ref());
         Ok(result)
@@ -215,12 +229,31 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
+        self.forward_along(x0, u, h, None)
+    }
+
+    /// As [`Integrator::forward`], with an integrand.
+    pub(crate) fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
         let grid = self.begin(x0, u, h)?;
+        begin(&mut along);
         let base = W::nominal(&mut self.base)?;
         let ForwardMemory { sweep, result } = W::forward(&mut self.forward)?;
-        let run = sweep.forward.run(&self.scheme, grid, base, Unit, |_, _, _| Ok(()));
+        let scheme = &self.scheme;
+        let run = sweep.forward.run(scheme, grid, base, Unit, |point, dxi, at| {
+            forward(&mut along, point, dxi, grid.h * scheme.b[at.stage], false, at)
+        });
         self.counts = base.point.counts;
         run?;
+        finish(&mut along)?;
         write_forward(grid, base, &sweep.forward, &mut result.forward)?;
         Ok(&result.forward)
     }
@@ -273,17 +306,31 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
+        self.adjoint_along(x0, u, h, lambda, None)
+    }
+
+    /// As [`Integrator::adjoint`], with an integrand.
+    pub(crate) fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
         finite(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
+        begin(&mut along);
         let base = W::nominal(&mut self.base)?;
         let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
         let records = W::tape(&mut self.trajectory, grid.steps)?;
         sweep.seed(1, |x, _| lambda.as_slice()[x]);
         let run = base
-            .record(&self.scheme, grid, records)
-            .and_then(|()| sweep.run(&self.scheme, grid, &mut base.point, records, 1, None));
+            .record(&self.scheme, grid, records, &mut along)
+            .and_then(|()| sweep.run(&self.scheme, grid, &mut base.point, records, 1, None, &mut along));
         self.counts = base.point.counts;
         run?;
+        finish(&mut along)?;
         write_gradient(sweep, 0..1, result, 0)?;
         write_state(base, &mut result.nominal);
         Ok(result)
@@ -309,7 +356,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let sweep = &mut W::forward(&mut self.forward)?.sweep;
         let records = W::tape(&mut self.trajectory, grid.steps)?;
         let mut result = Adjoint::zeroed();
-        let run = base.record(&self.scheme, grid, records);
+        let run = base.record(&self.scheme, grid, records, &mut None);
         self.counts = base.point.counts;
         run?;
         // As many seeds at once as the memory holds: one row of directions.
@@ -317,7 +364,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         for first in (0..C).step_by(most) {
             let columns = most.min(C - first);
             sweep.seed(columns, |x, column| lambdas[(x, first + column)]);
-            let run = sweep.run(&self.scheme, grid, &mut base.point, records, columns, None);
+            let run = sweep.run(&self.scheme, grid, &mut base.point, records, columns, None, &mut None);
             self.counts = base.point.counts;
             run?;
             write_gradient(sweep, 0..columns, &mut result, first)?;
@@ -377,6 +424,22 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
+        self.hessian_along(x0, u, h, lambda, None)
+    }
+
+    /// As [`Integrator::hessian`], with an integrand.
+    pub(crate) fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        begin(&mut along);
         finite(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.base)?;
@@ -393,17 +456,19 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         sweep.seed(1, |x, _| lambda.as_slice()[x]);
         curvature.start();
         let mut run = || {
-            base.record(scheme, grid, records)?;
-            sweep.run(scheme, grid, &mut base.point, records, 1, Some(multipliers))?;
+            base.record(scheme, grid, records, &mut None)?;
+            sweep.run(scheme, grid, &mut base.point, records, 1, Some(multipliers), &mut along)?;
             base.x = start;
             base.point.counts.steps = 0;
             variation.run(scheme, grid, base, Unit, |point, dxi, at| {
+                forward(&mut along, point, dxi, grid.h * scheme.b[at.stage], true, at)?;
                 curvature.add(scheme, point, &multipliers[at.step][at.stage], dxi, at)
             })
         };
         let run = run();
         self.counts = base.point.counts;
         run?;
+        finish(&mut along)?;
 
         write_forward(grid, base, variation, &mut result.first.forward)?;
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
@@ -413,6 +478,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
                 return Err(Error::Overflow { step: 0, index: w });
             }
             *gradient_element(&mut result.first, w, nx, nu) = value;
+        }
+        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
+            curvature.add_lower(second);
         }
         write_hessian(curvature, result)?;
         Ok(result)

@@ -9,6 +9,7 @@
 //! There is no dense output: an explicit method has no polynomial through its stages that keeps its order.
 
 mod adjoint;
+mod along;
 mod forward;
 mod hessian;
 mod integrator;

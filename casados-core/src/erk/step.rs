@@ -1,5 +1,6 @@
 //! One step of an explicit method: the stages one after the other, and the end.
 
+use super::along::Along;
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::result::Nominal;
@@ -168,11 +169,16 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
         grid: Grid<T>,
         point: &mut Point<M, T>,
         step: usize,
+        along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         for stage in 0..S {
             let at = Place { step, stage, iteration: 0 };
             point.go(scheme, grid, self, at)?;
             point.derivative(scheme, &mut self.k[stage], at)?;
+            if let Some(integrand) = along {
+                integrand.point().0.copy_from_slice(point.v.as_ref());
+                integrand.value(grid.h * scheme.b[stage], at)?;
+            }
         }
         Ok(())
     }
@@ -211,27 +217,33 @@ pub(super) struct Base<M: Ode, T: Real, const S: usize> {
 }
 
 impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {
-    /// All steps, from `x` to `x`.
-    pub fn run(&mut self, scheme: &Scheme<M, T, S>, grid: Grid<T>) -> Result<(), Error> {
+    /// All steps, from `x` to `x`, with an integrand or without.
+    pub fn run(
+        &mut self,
+        scheme: &Scheme<M, T, S>,
+        grid: Grid<T>,
+        along: &mut Along<'_, '_, M, T>,
+    ) -> Result<(), Error> {
         for step in 0..grid.steps {
             self.record.x = self.x;
-            self.record.stages(scheme, grid, &mut self.point, step)?;
+            self.record.stages(scheme, grid, &mut self.point, step, along)?;
             self.record.end(scheme, grid, step, &mut self.x)?;
             self.point.counts.steps += 1;
         }
         Ok(())
     }
 
-    /// All steps, from `x` to `x`, each of them kept.
+    /// All steps, from `x` to `x`, each of them kept; with an integrand or without.
     pub fn record(
         &mut self,
         scheme: &Scheme<M, T, S>,
         grid: Grid<T>,
         records: &mut [Record<M, T, S>],
+        along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         for (step, record) in records.iter_mut().enumerate() {
             record.x = self.x;
-            record.stages(scheme, grid, &mut self.point, step)?;
+            record.stages(scheme, grid, &mut self.point, step, along)?;
             record.end(scheme, grid, step, &mut self.x)?;
             self.point.counts.steps += 1;
         }

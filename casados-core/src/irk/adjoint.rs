@@ -4,8 +4,9 @@
 //! Jᵀ μ = h (b ⊗ λ_{n+1}, 0)        λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i        λ_w −= Σ_i f_w,iᵀ μ_i
 //! ```
 
+use super::along::Along;
 use super::evaluate::entries;
-use super::record::{Coefficients, Linearization, Work, copy};
+use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::step::check;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
@@ -27,6 +28,12 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) gradient: ArrayW<M, [T; C]>,
     /// `μ`, one row per slot and stage.
     pub(crate) mu: ArrayK<M, [[T; C]; S]>,
+    /// What an integrand adds to the right-hand side of the unknowns at the stages,
+    pub(crate) source: ArrayK<M, [T; S]>,
+    /// and to `(λ_n, λ_w)`.
+    pub(crate) shift: ArrayW<M, T>,
+    /// Whether there is one.
+    pub(crate) sourced: bool,
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] Backward<M, T, S, C>);
 
@@ -38,6 +45,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
             *row = core::array::from_fn(|column| seeds[column * nx + state]);
         }
         self.gradient.as_mut().fill([E::from_f64(0.0); C]);
+        self.sourced = false;
     }
 
     /// `μ` of a step that is linearised, by the factors that are there; whether it satisfies its equations.
@@ -48,32 +56,53 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
 
     /// `μ`
     pub(crate) fn solve(&mut self, linear: &Linearization<M, E, S>, coefficients: &Coefficients<E, S>, h: E) {
-        let Self { lambda, mu, .. } = self;
+        let Self { lambda, mu, source, sourced, .. } = self;
         dispatch(RightHandSide { lambda: lambda.as_ref(), b: &coefficients.b, h, mu: mu.as_mut() });
+        if *sourced {
+            for (mu, source) in mu.as_mut().as_flattened_mut().iter_mut().zip(source.as_ref().as_flattened())
+            {
+                for mu in mu {
+                    *mu = *mu + *source;
+                }
+            }
+        }
         linear.factors.solve_transposed(mu);
     }
 
     /// `λ_n` from `λ_{n+1}` and `μ`.
     pub(crate) fn advance(&mut self, linear: &Linearization<M, E, S>) {
-        let Self { lambda, gradient, mu } = self;
+        let Self { lambda, gradient, mu, shift, sourced, .. } = self;
         let (jacobian, mu) = (linear.jacobian.as_ref(), mu.as_ref());
         let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
         dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda, gradient, model: PhantomData });
+        if *sourced {
+            let rows = lambda.iter_mut().chain(gradient.iter_mut().skip(M::Shape::NX));
+            for (row, shift) in rows.zip(shift.as_ref()) {
+                for element in row {
+                    *element = *element + *shift;
+                }
+            }
+        }
     }
 }
 
 impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
-    /// `λ_n` from `λ_{n+1}` over a step that is linearised.
+    /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without.
     ///
     /// # Errors
-    /// [`Error::Singular`]
+    /// [`Error::Singular`]; an integrand that is not finite.
     pub(crate) fn step(
         &mut self,
         work: &mut Work<M, T, S>,
         coefficients: &Coefficients<T, S>,
         n: usize,
+        step: &Step<M, T, S>,
         statistics: &mut Statistics,
+        along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
+        if let Some(integrand) = along {
+            work.along_adjoint(coefficients, n, step, self, &mut **integrand)?;
+        }
         if !self.stages(work, coefficients) && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
             self.stages(work, coefficients);

@@ -8,12 +8,13 @@
 //! the middle comes first, `G = H D`, then the lower triangle of `Dᵀ G`.
 
 use super::adjoint::Backward;
+use super::along::Along;
 use super::evaluate::{Give, Take, not_finite};
 use super::forward::{ForwardMemory, Sweep};
 use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::linalg::{Arithmetic, Kernel, axpy, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, Pattern};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide};
@@ -79,6 +80,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
         last: &Sweep<M, ArrayW<M, T>, S>,
         seed: &[T],
         statistics: &mut Statistics,
+        mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(seed);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
@@ -86,7 +88,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
             if n + 1 < steps.len() {
                 sweep = record.recall(work);
             }
-            self.backward.step(work, coefficients, n, statistics)?;
+            self.backward.step(work, coefficients, n, step, statistics, &mut along)?;
             self.curvature(work, coefficients, n, step);
             if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
                 return Err(Error::NonFiniteModel {
@@ -103,6 +105,13 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
+    /// `sum += Σ Dᵀ ∇² D` of an integrand.
+    pub(crate) fn add(&mut self, second: &[ArrayW<M, E>]) {
+        for (sum, second) in self.sum.as_mut().iter_mut().zip(second) {
+            axpy(E::from_f64(1.0), second.as_ref(), sum.as_mut());
+        }
+    }
+
     /// Before the last step.
     pub(crate) fn begin(&mut self, seed: &[E]) {
         self.backward.start(seed);
@@ -236,16 +245,16 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
 }
 
 /// The rows of `D` at a stage that enter second derivatives.
-struct Rows<'a, E, R, const S: usize> {
-    curved: &'static [u32],
-    nx: usize,
-    nz: usize,
-    v: &'a [R],
-    dy: &'a [[R; S]],
-    a: &'a [E; S],
-    h: E,
-    stage: usize,
-    d: &'a mut [R],
+pub(super) struct Rows<'a, E, R, const S: usize> {
+    pub curved: &'static [u32],
+    pub nx: usize,
+    pub nz: usize,
+    pub v: &'a [R],
+    pub dy: &'a [[R; S]],
+    pub a: &'a [E; S],
+    pub h: E,
+    pub stage: usize,
+    pub d: &'a mut [R],
 }
 
 impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Rows<'_, E, R, S> {
@@ -283,14 +292,14 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Rows<'_, E, R, S> {
 }
 
 /// `sum −= Dᵀ H D` at a stage, the lower triangle, with `H` given by its own.
-struct Subtract<'a, E, R, const S: usize> {
-    pattern: Pattern,
-    curved: &'static [u32],
-    entries: &'a [[E; S]],
-    stage: usize,
-    d: &'a [R],
-    g: &'a mut [R],
-    sum: &'a mut [R],
+pub(crate) struct Subtract<'a, E, R, const S: usize> {
+    pub pattern: Pattern,
+    pub curved: &'static [u32],
+    pub entries: &'a [[E; S]],
+    pub stage: usize,
+    pub d: &'a [R],
+    pub g: &'a mut [R],
+    pub sum: &'a mut [R],
 }
 
 impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
@@ -386,7 +395,7 @@ fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: 
 }
 
 /// A block on the diagonal, from its lower triangle.
-fn symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
+pub(crate) fn symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
     for r in 0..A::ROWS {
         for c in 0..=r {
             let value = lower[offset + r][offset + c];

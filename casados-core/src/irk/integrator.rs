@@ -1,5 +1,6 @@
 //! The integrator as its users see it.
 
+use super::along::{Along, begin, finish, reborrow};
 use super::dense::Point;
 use super::forward::ForwardMemory;
 use super::hessian::{HessianMemory, HessianStep};
@@ -199,7 +200,23 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// See [`Integrator`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
-        self.run.steps(&Arguments { x0, u, h }, |_, _, _, _| Ok(()))?;
+        self.solve_along(x0, u, h, None)
+    }
+
+    /// As [`Integrator::solve`], with an integrand.
+    pub(crate) fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        begin(&mut along);
+        self.run.steps(&Arguments { x0, u, h }, |parts, n, step, _| match &mut along {
+            Some(integrand) => parts.work.along_value(parts.coefficients, n, step, &mut **integrand),
+            None => Ok(()),
+        })?;
+        finish(&mut along)?;
         self.sweep = None;
         Ok(&self.run.keep()?.result)
     }
@@ -242,7 +259,21 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        Ok(&self.differentiate(&Arguments { x0, u, h }, None)?.forward)
+        self.forward_along(x0, u, h, None)
+    }
+
+    /// As [`Integrator::forward`], with an integrand.
+    pub(crate) fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        Ok(&self.differentiate(&Arguments { x0, u, h }, None, along)?.forward)
     }
 
     /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the derivatives.
@@ -260,26 +291,32 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         check(Argument::Lambda, lambda.as_slice())?;
-        self.differentiate(&Arguments { x0, u, h }, Some(lambda.as_slice()))
+        self.differentiate(&Arguments { x0, u, h }, Some(lambda.as_slice()), None)
     }
 
     fn differentiate(
         &mut self,
         arguments: &Arguments<'_, M, T>,
         lambda: Option<&[T]>,
+        mut along: Along<'_, '_, M, T>,
     ) -> Result<&ForwardAdjoint<M, T>, Error>
     where
         W: WithForward,
     {
         self.sweep = None;
+        begin(&mut along);
         let forward = W::forward(&mut self.forward)?;
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
-            Ok(())
+            match &mut along {
+                Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
+                None => Ok(()),
+            }
         })?;
         forward.finish(parts.work, count - 1)?;
+        finish(&mut along)?;
         if let Some(lambda) = lambda {
             forward.gradient(lambda)?;
         }
@@ -391,7 +428,22 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<1>,
     {
-        self.backward(&Arguments { x0, u, h }, lambda.as_slice())
+        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), None)
+    }
+
+    /// As [`Integrator::adjoint`], with an integrand.
+    pub(crate) fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error>
+    where
+        W: WithAdjoint<1>,
+    {
+        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), along)
     }
 
     /// The solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of `lambdas`.
@@ -408,22 +460,27 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<C>,
     {
-        self.backward(&Arguments { x0, u, h }, lambdas.as_slice())
+        self.backward(&Arguments { x0, u, h }, lambdas.as_slice(), None)
     }
 
     fn backward<const C: usize>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
         seeds: &[T],
+        mut along: Along<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T, C>, Error>
     where
         W: WithAdjoint<C>,
     {
         check(Argument::Lambda, seeds)?;
+        begin(&mut along);
         let memory = W::adjoint(&mut self.adjoint)?;
         let count = self.run.options.steps;
         // On the way forth only the last step is linearised: it is where the way back begins.
         let mut parts = self.run.steps(arguments, |parts, n, step, exact| {
+            if let Some(integrand) = &mut along {
+                parts.work.along_value(parts.coefficients, n, step, &mut **integrand)?;
+            }
             if n + 1 == count { parts.linearize(n, step, exact) } else { Ok(()) }
         })?;
         memory.backward.start(seeds);
@@ -431,9 +488,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
             }
-            memory.backward.step(parts.work, parts.coefficients, n, parts.statistics)?;
+            memory.backward.step(parts.work, parts.coefficients, n, step, parts.statistics, &mut along)?;
         }
         memory.finish(parts.work)?;
+        finish(&mut along)?;
         self.sweep = None;
         self.run.keep()?;
         Ok(&memory.result)
@@ -468,7 +526,23 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
+        self.hessian_along(x0, u, h, lambda, None)
+    }
+
+    /// As [`Integrator::hessian`], with an integrand.
+    pub(crate) fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
         check(Argument::Lambda, lambda.as_slice())?;
+        begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;
         let forward = W::forward(&mut self.forward)?;
@@ -477,6 +551,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
+            if let Some(integrand) = &mut along {
+                parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
+            }
             // What belongs to the last step is still there on the way back.
             if let (true, Some(record)) = (n + 1 < count, records.get_mut(n)) {
                 record.record(parts.work, forward);
@@ -484,6 +561,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             Ok(())
         })?;
         forward.finish(parts.work, count - 1)?;
+        finish(&mut along)?;
         memory.run(
             parts.work,
             parts.coefficients,
@@ -492,7 +570,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             &forward.sweep,
             lambda.as_slice(),
             parts.statistics,
+            reborrow(&mut along),
         )?;
+        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
+            memory.add(second);
+        }
         memory.finish(forward)?;
         self.run.keep()?;
         self.sweep = Some(count - 1);

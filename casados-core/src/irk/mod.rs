@@ -13,10 +13,11 @@
 //! accurate methods its value at the end is the last stage.
 //!
 //! One file for each thing: `evaluate` the model at the stages, `newton` and, where that does not arrive, `pivoted`,
-//! `step`, `forward`, `adjoint`, `hessian`, `verify` what was solved, `dense`; `record` is the memory, `run` what all
+//! `step`, `forward`, `adjoint`, `hessian`, `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all
 //! calls share, `integrator` what users see.
 
 mod adjoint;
+mod along;
 mod dense;
 mod evaluate;
 mod forward;
@@ -36,8 +37,8 @@ pub use integrator::Integrator;
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
-    evaluate::{dot, not_finite},
-    forward::{check_result, split},
+    evaluate::dot,
+    forward::check_result,
     pivoted::unknown_name,
     record::{Coefficients, Step, Work},
     run::check,
@@ -45,6 +46,13 @@ pub(crate) use self::{
 };
 #[cfg(feature = "alloc")]
 pub(crate) use hessian::{HessianMemory, HessianStep};
+// What integrands are computed with too.
+pub(crate) use self::{
+    evaluate::not_finite,
+    forward::split,
+    hessian::{Subtract, symmetric},
+    step::check as check_values,
+};
 
 use crate::memory::Memory;
 use crate::model::Dae;

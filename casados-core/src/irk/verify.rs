@@ -85,6 +85,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         dispatch(VerifyAdjoint::<M, E, S, C> {
             lambda: backward.lambda.as_ref(),
             mu: backward.mu.as_ref(),
+            source: if backward.sourced { backward.source.as_ref() } else { &[] },
             a: &coefficients.a,
             b: &coefficients.b,
             h: self.inputs.time.step,
@@ -255,6 +256,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for VerifyForward<'_,
 struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {
     lambda: &'a [[E; C]],
     mu: &'a [[[E; C]; S]],
+    /// Right-hand sides of an integrand, the same for all seeds.
+    source: &'a [[E; S]],
     a: &'a [[E; S]; S],
     b: &'a [E; S],
     h: E,
@@ -268,7 +271,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { lambda, mu, a, b, h, jacobian, sums, sizes, .. } = self;
+        let Self { lambda, mu, source, a, b, h, jacobian, sums, sizes, .. } = self;
         let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
         sums.fill([zero; S]);
         sizes.fill([zero; S]);
@@ -304,6 +307,13 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
                         total[i] = A::subtract(total[i], -ha, xi[j]);
                         size[i] = A::subtract(size[i], -ha.abs(), xi_size[j]);
                     }
+                }
+            }
+            if let Some(source) = source.get(unknown) {
+                for ((total, size), &source) in total.iter_mut().zip(&mut size).zip(source) {
+                    let right = sum(&[source; C], false);
+                    *total = *total - right;
+                    *size = *size + right.abs();
                 }
             }
             for (&total, &size) in total.iter().zip(&size) {

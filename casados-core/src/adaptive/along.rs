@@ -1,0 +1,75 @@
+//! An integrand beside an adaptive integration; see [`quadrature`](crate::quadrature).
+
+use super::integrator::Integrator;
+use super::sealed::Engine;
+use crate::error::Error;
+use crate::model::{Dae, VectorU, VectorX};
+use crate::quadrature::{Integrand, With};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with those of the solution; see
+    /// [`quadrature`](crate::quadrature).
+    ///
+    /// The steps are chosen for the states, then taken again to rounding: value and derivatives belong to each other.
+    pub fn with<'a, Q: Integrand<M, T> + ?Sized>(&'a mut self, integrand: &'a mut Q) -> With<'a, Self, Q> {
+        With { integrator: self, integrand }
+    }
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'_, Integrator<M, B, T>, Q> {
+    /// See [`Integrator::solve`]; the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn solve(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.integrator.solve_along(x0, u, t_end, Some(self.integrand))
+    }
+
+    /// See [`Integrator::forward`]; the integral and its derivatives.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn forward(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+    ) -> Result<&Forward<M, T>, Error> {
+        self.integrator.forward_along(x0, u, t_end, Some(self.integrand))
+    }
+
+    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
+        self.integrator.adjoint_along(x0, u, t_end, lambda, Some(self.integrand))
+    }
+
+    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn hessian(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        self.integrator.hessian_along(x0, u, t_end, lambda, Some(self.integrand))
+    }
+}

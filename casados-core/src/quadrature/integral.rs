@@ -1,0 +1,122 @@
+//! The integrals of all outputs of a function.
+
+use super::memory::{ArrayW, Memory};
+use super::{Integrand, sealed};
+use crate::error::{Error, Place};
+use crate::function::{ArrayY, Function, MatrixYP, MatrixYU, MatrixYX, VectorY};
+use crate::irk::{check_values, split};
+use crate::linalg::axpy;
+use crate::model::Dae;
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain};
+use bytemuck::Zeroable;
+
+/// `q = ∫ l dt` of the outputs of a function `F`, along the solution of an integrator that takes it along.
+///
+/// | call of the integrator | what is there afterwards |
+/// | --- | --- |
+/// | `solve` | `q` |
+/// | `forward` | `q` and its derivatives |
+/// | `adjoint` | `q`; the gradient is that of `λᵀx + νᵀq` |
+/// | `hessian` | `q` and its derivatives; gradient and Hessian are those of `λᵀx + νᵀq` |
+///
+/// What a call does not compute is zero after it. After an error the values mean nothing.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Quadrature<F: Function, T: Plain = f64> {
+    /// `q`
+    pub q: VectorY<F, T>,
+    /// `∂q/∂x₀`
+    pub dq_dx0: MatrixYX<F, T>,
+    /// `∂q/∂u`
+    pub dq_du: MatrixYU<F, T>,
+    /// `∂q/∂p`
+    pub dq_dp: MatrixYP<F, T>,
+    /// `ν`: what the outputs are multiplied by in gradients and Hessians; zero unless it is set.
+    pub nu: VectorY<F, T>,
+    dq: ArrayY<F, ArrayW<F, T>>,
+    memory: Memory<F, T>,
+}
+
+impl<F: Function, T: Plain> Default for Quadrature<F, T> {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl<F: Function, T: Plain> Quadrature<F, T> {
+    /// One that is its own memory.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::zeroed()
+    }
+
+    /// One on the heap, for models that are large.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    #[cfg(feature = "alloc")]
+    pub fn boxed() -> Result<alloc::boxed::Box<Self>, Error> {
+        bytemuck::allocation::try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<Self>() })
+    }
+}
+
+impl<F: Function, T: Plain> sealed::Sealed for Quadrature<F, T> {}
+
+impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrature<F, T> {
+    fn begin(&mut self) {
+        self.q.as_mut_slice().fill(T::ZERO);
+        for row in self.dq.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        self.memory.begin();
+    }
+
+    fn variables(&self) -> &'static [u32] {
+        F::STRUCTURE.variables
+    }
+
+    fn point(&mut self) -> (&mut [T], &mut [ArrayW<F, T>]) {
+        (self.memory.v.as_mut(), self.memory.d.as_mut())
+    }
+
+    fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
+        self.memory.value(at)?;
+        axpy(weight, self.memory.y.as_ref(), self.q.as_mut_slice());
+        Ok(())
+    }
+
+    fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error> {
+        let Self { q, dq, memory, nu, .. } = self;
+        memory.forward(at)?;
+        axpy(weight, memory.y.as_ref(), q.as_mut_slice());
+        for (dq, dy) in dq.as_mut().iter_mut().zip(memory.dy.as_ref()) {
+            axpy(weight, dy.as_ref(), dq.as_mut());
+        }
+        if second {
+            memory.mu.as_mut().copy_from_slice(nu.as_slice());
+            memory.curvature(weight);
+        }
+        Ok(())
+    }
+
+    fn adjoint(&mut self, weight: T, _: Place) -> Result<&[T], Error> {
+        self.memory.mu.as_mut().copy_from_slice(self.nu.as_slice());
+        Ok(self.memory.adjoint(weight))
+    }
+
+    fn second(&self) -> Option<&[ArrayW<F, T>]> {
+        Some(self.memory.second.as_ref())
+    }
+
+    fn finish(&mut self) -> Result<(), Error> {
+        let Self { q, dq, dq_dx0, dq_du, dq_dp, .. } = self;
+        for (output, row) in dq.as_ref().iter().enumerate() {
+            split(row.as_ref(), output, dq_dx0, dq_du, dq_dp);
+        }
+        check_values(q.as_slice(), 0)?;
+        check_values(dq_dx0.as_slice(), 0)?;
+        check_values(dq_du.as_slice(), 0)?;
+        check_values(dq_dp.as_slice(), 0)
+    }
+}

@@ -1,0 +1,188 @@
+//! Half of the integral of a weighted square, and the matrix of Gauss and Newton.
+
+use super::memory::{ArrayW, Memory};
+use super::{Integrand, sealed};
+use crate::error::{Error, Place};
+use crate::function::{Function, MatrixYY};
+use crate::irk::{check_values, symmetric};
+use crate::linalg::axpy;
+use crate::model::Dae;
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain, Shape};
+use bytemuck::Zeroable;
+
+/// `φ = ½ ∫ rᵀ W r dt` of the outputs of a function `F`, along the solution of an integrator that takes it along.
+///
+/// ```text
+/// ∇φ = ∫ (dr/dw)ᵀ W r dt        H = ∫ (dr/dw)ᵀ W (dr/dw) dt        w = (x₀, u, p)
+/// ```
+///
+/// `H` is the Hessian of `φ` without the second derivatives of `r`: the matrix of Gauss and Newton, positive semidefinite
+/// if `W` and the weights `b_i` of the method are.
+///
+/// | call of the integrator | what is there afterwards |
+/// | --- | --- |
+/// | `solve` | `φ` |
+/// | `forward` | `φ`, its gradient, `H` |
+/// | `adjoint` | `φ`; the gradient that is returned is that of `λᵀx + φ` |
+/// | `hessian` | `φ`, its gradient, `H`; gradient and Hessian that are returned are the exact ones of `λᵀx + φ` |
+///
+/// What a call does not compute is zero after it. After an error the values mean nothing.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct LeastSquares<F: Function, T: Plain = f64> {
+    /// `φ`
+    pub value: T,
+    /// `∂φ/∂x₀`
+    pub grad_x0: <F::Shape as Shape>::VectorX<T>,
+    /// `∂φ/∂u`
+    pub grad_u: <F::Shape as Shape>::VectorU<T>,
+    /// `∂φ/∂p`
+    pub grad_p: <F::Shape as Shape>::VectorP<T>,
+    /// `H`, the block of `x₀` and `x₀`.
+    pub h_xx: <F::Shape as Shape>::MatrixXX<T>,
+    /// `H`, the block of `x₀` and `u`.
+    pub h_xu: <F::Shape as Shape>::MatrixXU<T>,
+    /// `H`, the block of `u` and `u`.
+    pub h_uu: <F::Shape as Shape>::MatrixUU<T>,
+    /// `H`, the block of `x₀` and `p`.
+    pub h_xp: <F::Shape as Shape>::MatrixXP<T>,
+    /// `H`, the block of `u` and `p`.
+    pub h_up: <F::Shape as Shape>::MatrixUP<T>,
+    /// `H`, the block of `p` and `p`.
+    pub h_pp: <F::Shape as Shape>::MatrixPP<T>,
+    /// `W`, symmetric.
+    pub weights: MatrixYY<F, T>,
+    gradient: ArrayW<F, T>,
+    /// `H`, its lower triangle.
+    sum: ArrayW<F, ArrayW<F, T>>,
+    row: ArrayW<F, T>,
+    memory: Memory<F, T>,
+}
+
+impl<F: Function, T: Real> LeastSquares<F, T> {
+    /// One that is its own memory, with the weights `W`, which are symmetric.
+    #[must_use]
+    pub fn new(weights: &MatrixYY<F, T>) -> Self {
+        Self { weights: *weights, ..Zeroable::zeroed() }
+    }
+
+    /// One on the heap, for models that are large.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    #[cfg(feature = "alloc")]
+    pub fn boxed(weights: &MatrixYY<F, T>) -> Result<alloc::boxed::Box<Self>, Error> {
+        let zeroed = bytemuck::allocation::try_zeroed_box();
+        let mut boxed: alloc::boxed::Box<Self> =
+            zeroed.map_err(|()| Error::OutOfMemory { bytes: size_of::<Self>() })?;
+        boxed.weights = *weights;
+        Ok(boxed)
+    }
+
+    /// `μ = W r`, and `½ rᵀ W r`.
+    fn multiply(&mut self) -> T {
+        let Self { weights, memory: Memory { y, mu, .. }, .. } = self;
+        let mut square = T::ZERO;
+        for (k, mu) in mu.as_mut().iter_mut().enumerate() {
+            let products = y.as_ref().iter().enumerate().map(|(l, y)| weights[(k, l)] * *y);
+            *mu = products.fold(T::ZERO, |sum, product| sum + product);
+            square = square + y[k] * *mu;
+        }
+        T::from_f64(0.5) * square
+    }
+}
+
+impl<F: Function, T: Plain> sealed::Sealed for LeastSquares<F, T> {}
+
+impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSquares<F, T> {
+    fn begin(&mut self) {
+        self.value = T::ZERO;
+        self.gradient.as_mut().fill(T::ZERO);
+        for row in self.sum.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        self.memory.begin();
+    }
+
+    fn variables(&self) -> &'static [u32] {
+        F::STRUCTURE.variables
+    }
+
+    fn point(&mut self) -> (&mut [T], &mut [ArrayW<F, T>]) {
+        (self.memory.v.as_mut(), self.memory.d.as_mut())
+    }
+
+    fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
+        self.memory.value(at)?;
+        self.value = self.value + weight * self.multiply();
+        Ok(())
+    }
+
+    fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error> {
+        self.memory.forward(at)?;
+        self.value = self.value + weight * self.multiply();
+        let Self { weights, gradient, sum, row, memory, .. } = self;
+        let dy = memory.dy.as_ref();
+        for (k, (dr, mu)) in dy.iter().zip(memory.mu.as_ref()).enumerate() {
+            axpy(weight * *mu, dr.as_ref(), gradient.as_mut());
+            // Row k of W dr/dw.
+            row.as_mut().fill(T::ZERO);
+            for (l, dr) in dy.iter().enumerate() {
+                axpy(weights[(k, l)], dr.as_ref(), row.as_mut());
+            }
+            for (i, sum) in sum.as_mut().iter_mut().enumerate() {
+                axpy(weight * dr.as_ref()[i], &row.as_ref()[..=i], &mut sum.as_mut()[..=i]);
+            }
+        }
+        if second {
+            memory.curvature(weight);
+        }
+        Ok(())
+    }
+
+    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
+        self.memory.value(at)?;
+        self.multiply();
+        Ok(self.memory.adjoint(weight))
+    }
+
+    fn second(&self) -> Option<&[ArrayW<F, T>]> {
+        Some(self.memory.second.as_ref())
+    }
+
+    fn finish(&mut self) -> Result<(), Error> {
+        let (nx, nu) = (F::Shape::NX, F::Shape::NU);
+        let (states, others) = self.gradient.as_ref().split_at(nx);
+        let (controls, parameters) = others.split_at(nu);
+        self.grad_x0.as_mut_slice().copy_from_slice(states);
+        self.grad_u.as_mut_slice().copy_from_slice(controls);
+        self.grad_p.as_mut_slice().copy_from_slice(parameters);
+        let rows = self.sum.as_ref();
+        symmetric(&mut self.h_xx, rows, 0);
+        symmetric(&mut self.h_uu, rows, nx);
+        symmetric(&mut self.h_pp, rows, nx + nu);
+        transposed(&mut self.h_xu, rows, [0, nx]);
+        transposed(&mut self.h_xp, rows, [0, nx + nu]);
+        transposed(&mut self.h_up, rows, [nx, nx + nu]);
+        // The exact Hessian has these terms too.
+        for (second, row) in self.memory.second.as_mut().iter_mut().zip(rows) {
+            axpy(T::ONE, row.as_ref(), second.as_mut());
+        }
+        check_values(&[self.value], 0)?;
+        check_values(self.gradient.as_ref(), 0)?;
+        for (i, row) in self.sum.as_ref().iter().enumerate() {
+            check_values(&row.as_ref()[..=i], 0)?;
+        }
+        Ok(())
+    }
+}
+
+/// A block above the diagonal, from the lower triangle.
+fn transposed<T: Plain, R: AsRef<[T]>, A: Matrix<T>>(block: &mut A, lower: &[R], [row, column]: [usize; 2]) {
+    for c in 0..A::COLUMNS {
+        for r in 0..A::ROWS {
+            block[(r, c)] = lower[column + c].as_ref()[row + r];
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! A function at a stage, and the products of its derivatives with those of its variables.
+
+use crate::error::{Error, Place};
+use crate::function::{ArrayV, ArrayY, Function};
+use crate::irk::{Subtract, not_finite};
+use crate::linalg::{axpy, dispatch};
+use crate::scalar::Real;
+use crate::shape::{Plain, Shape};
+use bytemuck::Zeroable;
+
+/// `[T; NW]` of a function.
+pub(super) type ArrayW<F, T> = <<F as Function>::Shape as Shape>::ArrayW<T>;
+
+/// Memory of a stage.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(super) struct Memory<F: Function, T: Plain> {
+    /// The variables.
+    pub v: ArrayV<F, T>,
+    /// Their derivatives `D`.
+    pub d: ArrayV<F, ArrayW<F, T>>,
+    pub y: ArrayY<F, T>,
+    pub jacobian: F::Jacobian<T>,
+    /// `dy = y_v D`
+    pub dy: ArrayY<F, ArrayW<F, T>>,
+    /// Multipliers of the outputs.
+    pub mu: ArrayY<F, T>,
+    pub gradient: ArrayV<F, T>,
+    hessian: F::Hessian<T>,
+    entries: F::Hessian<[T; 1]>,
+    /// `G = H D`
+    g: ArrayV<F, ArrayW<F, T>>,
+    /// The sum of `Dᵀ H D`, its lower triangle.
+    pub second: ArrayW<F, ArrayW<F, T>>,
+}
+
+impl<F: Function, T: Real> Memory<F, T> {
+    pub fn begin(&mut self) {
+        F::jacobian_constants::<T>(&mut self.jacobian);
+        for row in self.second.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+    }
+
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    pub fn value(&mut self, at: Place) -> Result<(), Error> {
+        F::value::<T>(&self.v, &mut self.y);
+        self.check(at)
+    }
+
+    /// `y` and `dy`.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    pub fn forward(&mut self, at: Place) -> Result<(), Error> {
+        let Self { v, y, jacobian, d, dy, .. } = self;
+        F::value_jacobian::<T>(v, y, jacobian);
+        for row in dy.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        for (entry, value) in jacobian.as_ref().iter().enumerate() {
+            let (output, variable) = F::STRUCTURE.jacobian.at(entry);
+            if let (Some(dy), Some(d)) = (dy.as_mut().get_mut(output), d.as_ref().get(variable)) {
+                axpy(*value, d.as_ref(), dy.as_mut());
+            }
+        }
+        self.check(at)
+    }
+
+    /// `weight ∇(μᵀy)`
+    pub fn adjoint(&mut self, weight: T) -> &[T] {
+        for mu in self.mu.as_mut() {
+            *mu = weight * *mu;
+        }
+        F::adjoint::<T>(&self.v, &self.mu, &mut self.gradient);
+        self.gradient.as_ref()
+    }
+
+    /// `second += weight Dᵀ ∇²(μᵀy) D`
+    pub fn curvature(&mut self, weight: T) {
+        let Self { v, mu, d, hessian, entries, g, second, .. } = self;
+        F::hessian::<T>(v, mu, hessian);
+        for (entry, value) in entries.as_mut().iter_mut().zip(hessian.as_ref()) {
+            // What is subtracted below.
+            *entry = [-(weight * *value)];
+        }
+        dispatch(Subtract {
+            pattern: F::STRUCTURE.hessian,
+            curved: F::STRUCTURE.variables,
+            entries: entries.as_ref(),
+            stage: 0,
+            d: d.as_ref(),
+            g: g.as_mut(),
+            sum: second.as_mut(),
+        });
+    }
+
+    fn check(&self, at: Place) -> Result<(), Error> {
+        match not_finite(self.y.as_ref()) {
+            None => Ok(()),
+            Some((output, value)) => {
+                Err(Error::NonFiniteFunction { function: F::STRUCTURE.name, output, value, at })
+            }
+        }
+    }
+}

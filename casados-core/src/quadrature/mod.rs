@@ -1,0 +1,115 @@
+//! Integrals of functions along the solution, with the sensitivities of the integrator.
+//!
+//! ```text
+//! q = ∫ l(x, z, u, p, t) dt ≈ Σ_n Σ_i h b_i l_i        l_i = l(ξ_i, z_i, u, p, t_n + c_i h)
+//! ```
+//!
+//! is what the method would give for additional states `q̇ = l`, at the cost of evaluating `l` at the stages. Its
+//! derivatives are exact ones of this sum, with `D_i = d(ξ_i, z_i, u, p)/dw`:
+//!
+//! ```text
+//! dq/dw = Σ h b_i l_v D_i
+//! Jᵀ μ = h (b ⊗ λ, 0) + ∂/∂(k, z) Σ h b_i νᵀl_i        the adjoint of λᵀx + νᵀq
+//! d²(λᵀx + νᵀq)/dw² = Σ D_iᵀ (h b_i ∇²(νᵀl) − ∇²(μ_iᵀ f))_i D_i
+//! ```
+//!
+//! [`Quadrature`] integrates all outputs of a [`Function`](crate::Function); [`LeastSquares`] half of a weighted square of
+//! them, with the matrix of Gauss and Newton. An integrator takes one along: `irk.with(&mut cost).hessian(...)`.
+//!
+//! Integrands are evaluated one stage after the other. An adaptive integrator chooses its steps for the states, not for the
+//! integral.
+
+mod integral;
+mod least_squares;
+mod memory;
+#[cfg(feature = "alloc")]
+mod wrapped;
+
+pub use integral::Quadrature;
+pub use least_squares::LeastSquares;
+#[cfg(feature = "alloc")]
+pub(crate) use wrapped::{Backwards, Chained};
+
+use crate::error::{Error, Place};
+use crate::model::{ArrayW, Dae};
+use crate::scalar::Real;
+
+pub(crate) mod sealed {
+    pub trait Sealed {}
+}
+
+/// What an integrator can take along: [`Quadrature`] and [`LeastSquares`].
+///
+/// Its methods are for integrators.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not an integrand for the model `{M}` with numbers `{T}`",
+    note = "`Quadrature<F, T>` and `LeastSquares<F, T>` are, of a `#[function]` `F` whose arguments have the dimensions of those \
+            of the model"
+)]
+pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
+    /// Forgets the last interval.
+    #[doc(hidden)]
+    fn begin(&mut self);
+    /// The variables that it depends on.
+    #[doc(hidden)]
+    fn variables(&self) -> &'static [u32];
+    /// A place for the variables at a stage, and one for their derivatives `D`, of which the rows of
+    /// [`Integrand::variables`] count.
+    #[doc(hidden)]
+    fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]);
+    /// Adds the value at the point.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn value(&mut self, weight: T, at: Place) -> Result<(), Error>;
+    /// Adds the value at the point and its derivatives; those of second order that `hessian` is made of, if they are wanted.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn forward(&mut self, weight: T, second: bool, at: Place) -> Result<(), Error>;
+    /// The gradient at the point over all variables, times the weight.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error>;
+    /// The lower triangle of the sum of `Dᵀ ∇² D`, if there is one.
+    #[doc(hidden)]
+    fn second(&self) -> Option<&[ArrayW<M, T>]>;
+    /// Writes the results.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`]
+    #[doc(hidden)]
+    fn finish(&mut self) -> Result<(), Error>;
+}
+
+/// An integrator with an integrand: its calls are those of the integrator, and gradients and Hessians those of
+/// `λᵀx + νᵀq`; see [`Integrand`].
+pub struct With<'a, I, Q: ?Sized> {
+    pub(crate) integrator: &'a mut I,
+    pub(crate) integrand: &'a mut Q,
+}
+
+/// An integrand, or none.
+pub(crate) type Along<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
+
+pub(crate) fn begin<M: Dae, T: Real>(along: &mut Along<'_, '_, M, T>) {
+    if let Some(integrand) = along {
+        integrand.begin();
+    }
+}
+
+pub(crate) fn finish<M: Dae, T: Real>(along: &mut Along<'_, '_, M, T>) -> Result<(), Error> {
+    along.as_mut().map_or(Ok(()), |integrand| integrand.finish())
+}
+
+/// The same integrand for a while.
+pub(crate) fn reborrow<'a, M: Dae, T: Real>(along: &'a mut Along<'_, '_, M, T>) -> Along<'a, 'a, M, T> {
+    match along {
+        Some(integrand) => Some(&mut **integrand),
+        None => None,
+    }
+}

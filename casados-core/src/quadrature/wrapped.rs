@@ -1,0 +1,100 @@
+//! The integrand of one step of many: what it adds up belongs to the whole interval.
+
+use super::{Integrand, sealed};
+use crate::error::{Error, Place};
+use crate::linalg::axpy;
+use crate::model::{ArrayW, ArrayX, Dae};
+use crate::scalar::Real;
+use crate::shape::{Array, Shape};
+
+/// Derivatives by `(x_n, u, p)` become derivatives by `(x₀, u, p)`: `D_i V_n`.
+pub(crate) struct Chained<'a, M: Dae, T: Real> {
+    pub inner: &'a mut dyn Integrand<M, T>,
+    /// `V_n = dx_n/dw`, where derivatives are taken.
+    pub v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
+    /// Whether second derivatives are wanted.
+    pub second: bool,
+}
+
+impl<M: Dae, T: Real> sealed::Sealed for Chained<'_, M, T> {}
+
+impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
+    fn begin(&mut self) {}
+
+    fn variables(&self) -> &'static [u32] {
+        self.inner.variables()
+    }
+
+    fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]) {
+        self.inner.point()
+    }
+
+    fn value(&mut self, weight: T, at: Place) -> Result<(), Error> {
+        self.inner.value(weight, at)
+    }
+
+    fn forward(&mut self, weight: T, _: bool, at: Place) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let v = self.v.map_or(&[][..], |v| v.as_ref());
+        let variables = self.inner.variables();
+        let (_, rows) = self.inner.point();
+        for variable in variables {
+            let Some(row) = rows.get_mut(*variable as usize) else { continue };
+            let mut sum = ArrayW::<M, T>::from_fn(|w| if w < nx { T::ZERO } else { row[w] });
+            for (d, v) in row.as_ref().iter().zip(v) {
+                axpy(*d, v.as_ref(), sum.as_mut());
+            }
+            *row = sum;
+        }
+        self.inner.forward(weight, self.second, at)
+    }
+
+    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
+        self.inner.adjoint(weight, at)
+    }
+
+    fn second(&self) -> Option<&[ArrayW<M, T>]> {
+        None
+    }
+
+    fn finish(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+/// Takes part in adjoints alone: all else was done on the way forth.
+pub(crate) struct Backwards<'a, M: Dae, T: Real>(pub &'a mut dyn Integrand<M, T>);
+
+impl<M: Dae, T: Real> sealed::Sealed for Backwards<'_, M, T> {}
+
+impl<M: Dae, T: Real> Integrand<M, T> for Backwards<'_, M, T> {
+    fn begin(&mut self) {}
+
+    fn variables(&self) -> &'static [u32] {
+        &[]
+    }
+
+    fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]) {
+        self.0.point()
+    }
+
+    fn value(&mut self, _: T, _: Place) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn forward(&mut self, _: T, _: bool, _: Place) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn adjoint(&mut self, weight: T, at: Place) -> Result<&[T], Error> {
+        self.0.adjoint(weight, at)
+    }
+
+    fn second(&self) -> Option<&[ArrayW<M, T>]> {
+        None
+    }
+
+    fn finish(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+}
