@@ -11,12 +11,15 @@ pub struct Options {
     pub newton: Newton,
     /// Where Newton's method starts.
     pub start: Start,
+    /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's summation): for
+    /// thousands of steps in one interval, where the rounding errors of `x` would add up.
+    pub compensated: bool,
 }
 
 impl Default for Options {
     /// One step; Newton to rounding, from zero.
     fn default() -> Self {
-        Self { steps: 1, newton: Newton::default(), start: Start::default() }
+        Self { steps: 1, newton: Newton::default(), start: Start::default(), compensated: false }
     }
 }
 

@@ -141,13 +141,13 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
 
     fn take(&mut self, t: T, h: T) -> Result<(), Error> {
         let Memory { point, record, end, end_slope, .. } = &mut *self.memory;
-        let grid = Grid { start: t, h, steps: 1 };
+        let grid = Grid { start: t, h, steps: 1, compensated: false };
         for stage in 1..S {
             let at = Place { step: 0, stage, iteration: 0 };
             point.go(&self.scheme, grid, record, at)?;
             point.derivative(&self.scheme, &mut record.k[stage], at)?;
         }
-        record.end(&self.scheme, grid, 0, end)?;
+        record.end(&self.scheme, grid, 0, end, None)?;
         Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)
     }
 

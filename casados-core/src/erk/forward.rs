@@ -101,10 +101,10 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
             directions.add(i, T::ONE, row);
         }
         for step in 0..grid.steps {
-            let Base { point, record, x, .. } = &mut *base;
+            let Base { point, record, x, rest, .. } = &mut *base;
             record.x = *x;
             self.stages(scheme, grid, point, record, step, directions, &mut at_stage)?;
-            record.end(scheme, grid, step, x)?;
+            record.end(scheme, grid, step, x, grid.compensated.then_some(rest))?;
             self.end(scheme, grid.h, columns);
             point.counts.steps += 1;
         }

@@ -500,8 +500,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         base.x.as_mut().copy_from_slice(x0.as_slice());
         let first = 2 * M::Shape::NX;
         base.point.v.as_mut()[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
-        let steps = self.options.steps;
-        Ok(Grid { start: self.start, h: h / T::from_f64(steps as f64), steps })
+        let Options { steps, compensated, .. } = self.options;
+        Ok(Grid { start: self.start, h: h / T::from_f64(steps as f64), steps, compensated })
     }
 }
 

@@ -4,7 +4,7 @@ use super::along::Along;
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::result::Nominal;
-use crate::scalar::Real;
+use crate::scalar::{Real, two_sum};
 use crate::shape::{Array, Shape};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -64,6 +64,8 @@ pub(crate) struct Grid<T> {
     /// Of one step.
     pub h: T,
     pub steps: usize,
+    /// Whether sums over the steps are compensated.
+    pub compensated: bool,
 }
 
 /// One step: its start and the derivatives at its stages.
@@ -183,25 +185,33 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
         Ok(())
     }
 
-    /// `x_{n+1} = x_n + h Σ_i b_i k_i`
+    /// `x_{n+1} = x_n + h Σ_i b_i k_i`; `rest` is what was rounded off from `x_n`, if sums are compensated.
     pub fn end(
         &self,
         scheme: &Scheme<M, T, S>,
         grid: Grid<T>,
         step: usize,
         end: &mut ArrayX<M, T>,
+        rest: Option<&mut ArrayX<M, T>>,
     ) -> Result<(), Error> {
         end.as_mut().fill(T::ZERO);
         for (&b, k) in scheme.b.iter().zip(&self.k) {
             add(b, k.as_ref(), end.as_mut());
         }
-        for (index, (end, &x)) in end.as_mut().iter_mut().zip(self.x.as_ref()).enumerate() {
-            *end = x + grid.h * *end;
-            if !end.is_finite() {
-                return Err(Error::Overflow { step, index });
+        let increments = end.as_mut().iter_mut().zip(self.x.as_ref());
+        match rest {
+            None => increments.for_each(|(end, &x)| *end = x + grid.h * *end),
+            Some(rest) => {
+                for ((end, &x), rest) in increments.zip(rest.as_mut()) {
+                    let before = if step == 0 { T::ZERO } else { *rest };
+                    [*end, *rest] = two_sum(x, before + grid.h * *end);
+                }
             }
         }
-        Ok(())
+        match end.as_ref().iter().position(|end| !end.is_finite()) {
+            Some(index) => Err(Error::Overflow { step, index }),
+            None => Ok(()),
+        }
     }
 }
 
@@ -213,6 +223,8 @@ pub(super) struct Base<M: Ode, T: Real, const S: usize> {
     pub record: Record<M, T, S>,
     /// The state at the end of the step.
     pub x: ArrayX<M, T>,
+    /// What was rounded off from it, if sums are compensated.
+    pub rest: ArrayX<M, T>,
     pub result: Nominal<M, T>,
 }
 
@@ -227,7 +239,7 @@ impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {
         for step in 0..grid.steps {
             self.record.x = self.x;
             self.record.stages(scheme, grid, &mut self.point, step, along)?;
-            self.record.end(scheme, grid, step, &mut self.x)?;
+            self.record.end(scheme, grid, step, &mut self.x, grid.compensated.then_some(&mut self.rest))?;
             self.point.counts.steps += 1;
         }
         Ok(())
@@ -244,7 +256,7 @@ impl<M: Ode, T: Real, const S: usize> Base<M, T, S> {
         for (step, record) in records.iter_mut().enumerate() {
             record.x = self.x;
             record.stages(scheme, grid, &mut self.point, step, along)?;
-            record.end(scheme, grid, step, &mut self.x)?;
+            record.end(scheme, grid, step, &mut self.x, grid.compensated.then_some(&mut self.rest))?;
             self.point.counts.steps += 1;
         }
         Ok(())

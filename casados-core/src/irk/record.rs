@@ -118,6 +118,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize> {
     pub(crate) given: ArrayK<M, T>,
     /// The state at the start of the step, then at its end.
     pub(crate) x: ArrayX<M, T>,
+    /// What was rounded off from it, if sums are compensated.
+    pub(crate) rest: ArrayX<M, T>,
     /// Variables of the model, each at all stages.
     pub(crate) points: ArrayV<M, [T; S]>,
     /// The residual at all stages.

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::model::{ArrayK, Dae};
 use crate::options::Options;
-use crate::scalar::{Field, Lanes, Real};
+use crate::scalar::{Field, Lanes, Real, two_sum};
 use crate::shape::{Matrix, Shape, assign};
 use crate::statistics::Statistics;
 
@@ -23,6 +23,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         self.place_inputs();
         // The same input gives the same bits in every call: nothing of the last one is taken over.
         self.validity = Default::default();
+        self.rest.as_mut().fill(E::from_f64(0.0));
     }
 
     /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued.
@@ -56,12 +57,18 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     pub(crate) fn advance(
         &mut self,
         coefficients: &Coefficients<E, S>,
+        compensated: bool,
         step: &Step<M, E, S>,
         n: usize,
         count: usize,
     ) {
         let h = self.inputs.time.step;
-        dispatch(Advance { x: self.x.as_mut(), y: step.y.as_ref(), b: &coefficients.b, h });
+        let (x, y, b) = (self.x.as_mut(), step.y.as_ref(), &coefficients.b);
+        if compensated {
+            dispatch(AdvanceCompensated { x, rest: self.rest.as_mut(), y, b, h });
+        } else {
+            dispatch(Advance { x, y, b, h });
+        }
         if n == 0 {
             algebraic::<M, E, S>(self.result.z0.as_mut_slice(), &step.y, &coefficients.start);
         }
@@ -94,7 +101,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
             step.x = self.x;
             let exact = self.solve(coefficients, options, from, n, before, step, statistics)?;
-            self.advance(coefficients, step, n, count);
+            self.advance(coefficients, options.compensated, step, n, count);
             if let Some((index, _)) = not_finite(self.x.as_ref()) {
                 return Err(Error::Overflow { step: n, index });
             }
@@ -260,6 +267,26 @@ impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
         let Self { x, y, b, h } = self;
         for (x, k) in x.iter_mut().zip(y) {
             *x = *x + h * dot(b, k);
+        }
+    }
+}
+
+/// `x + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
+struct AdvanceCompensated<'a, E, const S: usize> {
+    x: &'a mut [E],
+    rest: &'a mut [E],
+    y: &'a [[E; S]],
+    b: &'a [E; S],
+    h: E,
+}
+
+impl<E: Field, const S: usize> Kernel for AdvanceCompensated<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { x, rest, y, b, h } = self;
+        for ((x, rest), k) in x.iter_mut().zip(rest).zip(y) {
+            [*x, *rest] = two_sum(*x, *rest + h * dot(b, k));
         }
     }
 }

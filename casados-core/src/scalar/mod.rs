@@ -16,6 +16,15 @@ use crate::shape::Plain;
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
+/// `a + b`, rounded, and what rounding left of it: their sum is exact (D. Knuth).
+#[inline(always)]
+pub(crate) fn two_sum<E: Field>(a: E, b: E) -> [E; 2] {
+    let sum = a + b;
+    let second = sum - a;
+    let first = sum - second;
+    [sum, (a - first) + (b - second)]
+}
+
 /// A number that lies in memory as itself.
 macro_rules! own_cell {
     () => {
