@@ -260,7 +260,7 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             step.x = work.x;
             work.start(coefficients, from, n, before, &mut step.y);
             let Step { x, y } = &mut *step;
-            let solved = work.newton(coefficients, &options.newton, n, x, y, statistics);
+            let solved = work.newton(coefficients, options, n, x, y, statistics);
             work.advance(coefficients, options.compensated, step, n, count);
             good = E::and(good, solved.converged);
             let mut pass = Pass { options, coefficients, statistics, work, steps: &mut [], from: From::Zero };

@@ -24,13 +24,16 @@
 use super::record::{Coefficients, Work};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
-use crate::options::{Jacobian, Newton};
+use crate::options::{Jacobian, Options};
 use crate::scalar::{Lanes, Scalar};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 1.0;
+/// Where sums over the steps are compensated, what an iteration leaves undone must not add up either: it has the same sign
+/// in every step.
+const LITTLE: f64 = 1.0 / 64.0;
 
 /// So often the mean Jacobian is renewed in a step before the stages' own are taken.
 const MEANS: usize = 3;
@@ -132,15 +135,16 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     pub(crate) fn newton(
         &mut self,
         coefficients: &Coefficients<E, S>,
-        options: &Newton,
+        options: &Options,
         step: usize,
         x: &ArrayX<M, E>,
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
     ) -> Solved<E> {
+        let Options { newton: options, compensated, .. } = options;
         let test = options.fixed_iterations.is_none();
         let most = options.fixed_iterations.unwrap_or(options.max_iterations);
-        let rounding = ROUNDING * E::EPSILON;
+        let rounding = if *compensated { LITTLE } else { ROUNDING } * E::EPSILON;
         let rule = Rule {
             tolerance: options.tolerance.max(rounding),
             stagnation: E::STAGNATION,

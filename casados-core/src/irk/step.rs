@@ -130,7 +130,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         self.start(coefficients, from, n, before, &mut step.y);
         let Step { x, y } = step;
         if !M::STRUCTURE.elimination.pivots.is_empty() {
-            let solved = self.newton(coefficients, &options.newton, n, x, y, statistics);
+            let solved = self.newton(coefficients, options, n, x, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
