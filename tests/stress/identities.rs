@@ -1,11 +1,9 @@
 //! Identities that hold to rounding whatever the model: adjoint and forward sensitivities are transposes of each other,
 //! Hessians are symmetric and derivatives of gradients, calls repeat their bits, Gauss methods keep quadratic invariants.
 
-mod interval;
-
+use super::interval::{check, options};
 use casados::testing::Integrator;
 use casados::{Erk, Gauss, Irk, RadauIIA, Rk4, dae, ode};
-use interval::{check, options};
 use nalgebra::SVector;
 
 /// A fully implicit model with every kind of variable: `z` and parameters that enter nonlinearly, time, a state-dependent

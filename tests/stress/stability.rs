@@ -1,7 +1,6 @@
 //! The discrete stability function `R(z)`, through the integrators: `x₊ = R(λh) x` on `ẋ = λ x`.
 
-mod systems;
-
+use crate::{explicit, system};
 use casados::{
     Butcher6, DormandPrince5, DormandPrince8, Erk, Euler, Gauss, Heun, Irk, Method, Midpoint, Options,
     RadauIIA, Rk4, Tableau,
@@ -47,7 +46,7 @@ macro_rules! stability {
 
 /// `(z, R(z))` of the exact Padé approximants.
 fn reference(family: &str, s: usize) -> Vec<(Complex<f64>, Complex<f64>)> {
-    let data: Value = serde_json::from_str(include_str!("data/stability.json")).unwrap();
+    let data: Value = serde_json::from_str(include_str!("../data/stability.json")).unwrap();
     let rows = data[family][s.to_string()].as_array().unwrap();
     let number = |row: &Value, i: usize| row[i].as_f64().unwrap();
     let rows: Vec<_> = rows

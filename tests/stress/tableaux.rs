@@ -33,7 +33,7 @@ macro_rules! for_explicit {
 }
 
 fn reference() -> Value {
-    serde_json::from_str(include_str!("data/tableaux.json")).unwrap()
+    serde_json::from_str(include_str!("../data/tableaux.json")).unwrap()
 }
 
 /// C99 hexadecimal floating point with 13 hexadecimal digits, normal numbers.

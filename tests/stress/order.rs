@@ -1,7 +1,6 @@
 //! Order of convergence of every method, down to rounding.
 
-mod systems;
-
+use crate::{explicit, system};
 use casados::testing::{Convergence, convergence};
 use casados::{
     Butcher6, DormandPrince5, DormandPrince8, Erk, Error, Euler, Gauss, Heun, Irk, Method, Midpoint, Options,

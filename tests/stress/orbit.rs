@@ -1,0 +1,47 @@
+//! A planet around a sun, and how much a method changes what the planet keeps.
+
+use casados::ode;
+use casados::testing::Integrator;
+use nalgebra::{SVector, vector};
+
+/// `q̈ = −q/|q|³`
+#[ode]
+pub fn kepler(x: [f64; 4]) -> [f64; 4] {
+    let [x, y, vx, vy] = x;
+    let square = x * x + y * y;
+    let cube = square * square.sqrt();
+    [vx, vy, -x / cube, -y / cube]
+}
+
+/// The length of a step: 80 in an orbit.
+pub const STEP: f64 = core::f64::consts::TAU / 80.0;
+
+/// At the perihelion; semi-major axis one, period 2π.
+pub fn perihelion(eccentricity: f64) -> SVector<f64, 4> {
+    vector![1.0 - eccentricity, 0.0, 0.0, ((1.0 + eccentricity) / (1.0 - eccentricity)).sqrt()]
+}
+
+fn angular_momentum(x: &SVector<f64, 4>) -> f64 {
+    x[0] * x[3] - x[1] * x[2]
+}
+
+fn energy(x: &SVector<f64, 4>) -> f64 {
+    (x[2] * x[2] + x[3] * x[3]) / 2.0 - 1.0 / x[0].hypot(x[1])
+}
+
+/// The largest relative changes of angular momentum and energy, looked at after each of so many intervals, from an orbit of
+/// eccentricity 0.6.
+pub fn changes(integrator: &mut impl Integrator<Kepler>, intervals: usize, h: f64) -> [f64; 2] {
+    let mut x = perihelion(0.6);
+    let start = [angular_momentum(&x), energy(&x)];
+    let mut worst = [0.0f64; 2];
+    for _ in 0..intervals {
+        x = integrator.solve(&x, &SVector::zeros(), h).expect("an orbit").x;
+        for (worst, (now, start)) in
+            worst.iter_mut().zip([angular_momentum(&x), energy(&x)].iter().zip(start))
+        {
+            *worst = worst.max((now / start - 1.0).abs());
+        }
+    }
+    worst
+}
