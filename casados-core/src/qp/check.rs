@@ -43,6 +43,13 @@ pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
                 finite(field, k, i, value)?;
             }
         }
+    }
+    check_all_bounds(qp)
+}
+
+/// Finds bounds and penalties that make no sense.
+pub(super) fn check_all_bounds<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
+    for (k, stage) in qp.stages().enumerate() {
         check_bounds(Field::StateBounds, k, &stage.x_bounds())?;
         check_bounds(Field::ControlBounds, k, &stage.u_bounds())?;
         check_bounds(Field::GeneralBounds, k, &stage.g_bounds())?;
@@ -58,11 +65,7 @@ fn finite<T: Real>(field: Field, stage: usize, index: usize, value: T) -> Result
     }
 }
 
-pub(super) fn check_bounds<T: Real>(
-    field: Field,
-    stage: usize,
-    bounds: &Bounds<'_, T>,
-) -> Result<(), QpError> {
+fn check_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
     let infinity = T::from_f64(f64::INFINITY);
     for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
         if lower <= upper && lower < infinity && upper > -infinity {

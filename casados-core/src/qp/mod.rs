@@ -36,6 +36,7 @@ qp.fix_initial_state(&[1.0])?;
 mod block;
 mod check;
 mod error;
+mod interior;
 mod layout;
 #[cfg(feature = "alloc")]
 mod memory;
@@ -47,6 +48,9 @@ mod statistics;
 pub use block::{Block, BlockMut};
 pub use check::{check, residuals};
 pub use error::{Field, QpError, Side};
+#[cfg(feature = "alloc")]
+pub use interior::HeapInteriorPoint;
+pub use interior::{InteriorPoint, InteriorPointOptions, Store};
 pub use layout::StageDims;
 #[cfg(feature = "alloc")]
 pub use problem::HeapQp;

@@ -2,6 +2,7 @@
 
 use super::error::{Field, QpError};
 use super::layout::{Place, Places, StageDims, end, part, part_mut, take_mut};
+use super::problem::QpView;
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -203,6 +204,23 @@ impl<'a, T> SolutionView<'a, T> {
             g_lower: take_mut(&mut lower, p.ng),
             g_upper: take_mut(&mut upper, p.ng),
         }
+    }
+    /// Whether it is a solution of such a QP.
+    pub(super) fn fits(&self, qp: QpView<'_, T>) -> Result<(), QpError> {
+        let (expected, found) = (qp.dims.len(), self.dims.len());
+        if expected != found {
+            return Err(QpError::Dimension { field: Field::Stages, stage: 0, expected, found });
+        }
+        for (stage, (a, b)) in qp.dims.iter().zip(self.dims).enumerate() {
+            for (field, expected, found) in
+                [(Field::X, a.nx, b.nx), (Field::U, a.nu, b.nu), (Field::GeneralBounds, a.ng, b.ng)]
+            {
+                if expected != found {
+                    return Err(QpError::Dimension { field, stage, expected, found });
+                }
+            }
+        }
+        Ok(())
     }
     /// The same view for a shorter time.
     pub fn reborrow(&mut self) -> SolutionView<'_, T> {

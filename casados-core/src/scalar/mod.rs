@@ -248,6 +248,24 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     }
 }
 
+/// Whole registers over slices of numbers of type `T`.
+#[doc(hidden)]
+pub trait Packed<T>: Lanes {
+    /// The whole registers of a slice.
+    fn cells(numbers: &[T]) -> &[Self::Cell];
+    /// The whole registers of a slice.
+    fn cells_mut(numbers: &mut [T]) -> &mut [Self::Cell];
+    /// `self − a b`, rounded once where the machine has an instruction for it.
+    fn minus_product(self, a: Self, b: Self) -> Self;
+}
+
+/// A computation on slices that is made in registers of whatever width.
+#[doc(hidden)]
+pub trait Registers<T> {
+    /// To be `#[inline(always)]`, with everything that it calls.
+    fn run<E: Packed<T>>(self);
+}
+
 /// A computation that can be made with any register of numbers of type `T`.
 #[doc(hidden)]
 pub trait Widest<T> {
@@ -258,13 +276,19 @@ pub trait Widest<T> {
 }
 
 /// One real number: `f32` or `f64`.
-pub trait Real: Lanes<Cell = Self, Mask = bool> + PartialOrd + Default {
+pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default {
     /// Zero.
     const ZERO: Self;
     /// One.
     const ONE: Self;
     /// As `f64`, exactly.
     fn to_f64(self) -> f64;
+
+    /// Runs a computation on slices, compiled for the widest registers that this machine has.
+    #[doc(hidden)]
+    fn registers<C: Registers<Self>>(computation: C) {
+        computation.run::<Self>();
+    }
 
     /// Runs a computation with the widest register of such numbers that this machine has; not with those of two
     /// numbers where there are any wider ones.

@@ -1,7 +1,7 @@
 //! `f32` and `f64`.
 
-use super::lanes::{blocks, side_by_side, widest_register};
-use super::{Field, Lanes, Real, Scalar, own_cell};
+use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
+use super::{Field, Lanes, Packed, Real, Scalar, own_cell};
 
 /// The methods of one real type, from `std` where it is there and from `libm` elsewhere.
 macro_rules! real {
@@ -152,10 +152,26 @@ macro_rules! real {
             }
         }
 
+        impl Packed<$t> for $t {
+            #[inline(always)]
+            fn cells(numbers: &[$t]) -> &[$t] {
+                numbers
+            }
+            #[inline(always)]
+            fn cells_mut(numbers: &mut [$t]) -> &mut [$t] {
+                numbers
+            }
+            #[inline(always)]
+            fn minus_product(self, a: $t, b: $t) -> $t {
+                self - a * b
+            }
+        }
+
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
             widest_register!($($registers)*);
+            packed_registers!($($registers)*);
             #[inline(always)]
             fn to_f64(self) -> f64 {
                 self as f64

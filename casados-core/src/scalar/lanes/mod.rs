@@ -117,6 +117,56 @@ macro_rules! widest_register {
 }
 pub(crate) use widest_register;
 
+/// Runs a computation on slices in a function that is compiled for the registers.
+#[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
+macro_rules! packed_registers {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        #[inline]
+        fn registers<C: crate::scalar::Registers<Self>>(computation: C) {
+            use crate::scalar::Scalar;
+            use crate::scalar::lanes::{Inside, Level, level, $base};
+            match level() {
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx512 => {
+                    use crate::scalar::lanes::$avx512 as Register;
+                    Register::<$most>::vectorize(Inside::<Register<$most>, _, Self>::new(computation));
+                }
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx2 => {
+                    use crate::scalar::lanes::$avx2 as Register;
+                    Register::<$more>::vectorize(Inside::<Register<$more>, _, Self>::new(computation));
+                }
+                Level::Single => computation.run::<Self>(),
+                _ => $base::<$few>::vectorize(Inside::<$base<$few>, _, Self>::new(computation)),
+            }
+        }
+    };
+}
+#[cfg(not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))))]
+macro_rules! packed_registers {
+    ($($register:tt)*) => {};
+}
+pub(crate) use packed_registers;
+
+/// A computation as the piece of code that a register enters.
+pub struct Inside<E, C, T>(C, core::marker::PhantomData<(E, T)>);
+
+impl<E, C, T> Inside<E, C, T> {
+    /// With registers of type `E`.
+    pub fn new(computation: C) -> Self {
+        Self(computation, core::marker::PhantomData)
+    }
+}
+
+impl<T, E: crate::scalar::Packed<T>, C: crate::scalar::Registers<T>> crate::scalar::Piece
+    for Inside<E, C, T>
+{
+    #[inline(always)]
+    fn run(self) {
+        self.0.run::<E>();
+    }
+}
+
 /// Products of blocks with their columns in registers. Left to itself the compiler puts rows into registers, and
 /// transposes every block for it.
 #[cfg(target_arch = "x86_64")]

@@ -5,7 +5,7 @@ use super::functions::{self, Double, Single};
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
-use crate::scalar::{Field, Lanes, Piece, Scalar};
+use crate::scalar::{Field, Lanes, Packed, Piece, Scalar};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -230,6 +230,21 @@ macro_rules! register {
             #[inline(always)]
             fn not(a: Self::Mask) -> Self::Mask {
                 $ops::mask_not(a)
+            }
+        }
+
+        impl Packed<$element> for $name<{ $ops::WIDTH }> {
+            #[inline(always)]
+            fn cells(numbers: &[$element]) -> &[Self::Cell] {
+                numbers.as_chunks().0
+            }
+            #[inline(always)]
+            fn cells_mut(numbers: &mut [$element]) -> &mut [Self::Cell] {
+                numbers.as_chunks_mut().0
+            }
+            #[inline(always)]
+            fn minus_product(self, a: Self, b: Self) -> Self {
+                self.subtract_product(a, b)
             }
         }
 

@@ -1,0 +1,333 @@
+//! Products of small dense matrices, in tiles of registers.
+//!
+//! All matrices lie column after column, and columns are whole registers apart. Rows of a tile are registers of `X`,
+//! its columns are elements of `Y` in all lanes: twelve sums, three registers and one broadcast fill the sixteen
+//! registers of AVX2. Everything is inlined into the function that was compiled for `E`.
+
+use crate::qp::layout::part;
+use crate::scalar::{Packed, Real};
+use core::ops::Range;
+
+/// Columns of a tile.
+const WIDTH: usize = 4;
+
+/// A matrix to be read, and the distance of its columns.
+#[derive(Clone, Copy)]
+pub struct Columns<'a, T> {
+    /// From the first element on.
+    pub data: &'a [T],
+    /// The distance.
+    pub ld: usize,
+}
+
+impl<'a, T> Columns<'a, T> {
+    /// The matrix without some columns.
+    #[inline(always)]
+    pub fn skip(self, columns: usize) -> Self {
+        Self { data: self.data.get(columns * self.ld..).unwrap_or_default(), ld: self.ld }
+    }
+    /// The matrix without some rows. Its last column is shorter.
+    #[inline(always)]
+    pub fn below(self, rows: usize) -> Self {
+        Self { data: self.data.get(rows..).unwrap_or_default(), ld: self.ld }
+    }
+}
+
+/// What a product is subtracted from; zero where it ends.
+#[derive(Clone, Copy)]
+pub enum Source<'a, T> {
+    /// Zero.
+    Zero,
+    /// The target itself.
+    Target,
+    /// Another matrix.
+    Matrix(Columns<'a, T>),
+}
+
+impl<T> Source<'_, T> {
+    #[inline(always)]
+    fn skip(self, columns: usize) -> Self {
+        if let Source::Matrix(matrix) = self { Source::Matrix(matrix.skip(columns)) } else { self }
+    }
+    #[inline(always)]
+    fn below(self, rows: usize) -> Self {
+        if let Source::Matrix(matrix) = self { Source::Matrix(matrix.below(rows)) } else { self }
+    }
+}
+
+/// A number in every lane.
+#[inline(always)]
+pub fn splat<T: Real, E: Packed<T>>(value: T) -> E {
+    E::from_f64(value.to_f64())
+}
+
+/// `sums − X Yᵀ` for `R` registers of rows of `X` and `C` rows of `Y`, over `depth` columns.
+#[inline(always)]
+fn tile<T: Real, E: Packed<T>, const R: usize, const C: usize>(
+    sums: &mut [[E; R]; C],
+    mut x: &[E::Cell],
+    x_ld: usize,
+    mut y: &[T],
+    y_ld: usize,
+    depth: usize,
+) {
+    for _ in 0..depth {
+        let (Some(column), Some(row)) = (x.first_chunk::<R>(), y.first_chunk::<C>()) else { return };
+        let mut registers = [E::from_f64(0.0); R];
+        for (register, cell) in registers.iter_mut().zip(column) {
+            *register = E::load(cell);
+        }
+        for (sums, &factor) in sums.iter_mut().zip(row) {
+            let factor = splat::<T, E>(factor);
+            for (sum, &register) in sums.iter_mut().zip(&registers) {
+                *sum = sum.minus_product(register, factor);
+            }
+        }
+        x = x.get(x_ld..).unwrap_or_default();
+        y = y.get(y_ld..).unwrap_or_default();
+    }
+}
+
+/// A tile of `target = source − X Yᵀ`.
+#[inline(always)]
+fn update<T: Real, E: Packed<T>, const R: usize, const C: usize>(
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    depth: usize,
+) {
+    let mut sums = [[E::from_f64(0.0); R]; C];
+    let (mut columns, ld) = match source {
+        Source::Zero => (&[][..], 0),
+        Source::Target => (&*target, target_ld),
+        Source::Matrix(matrix) => (matrix.data, matrix.ld),
+    };
+    for sums in &mut sums {
+        let Some(cells) = E::cells(columns).first_chunk::<R>() else { break };
+        for (sum, cell) in sums.iter_mut().zip(cells) {
+            *sum = E::load(cell);
+        }
+        columns = columns.get(ld..).unwrap_or_default();
+    }
+    tile::<T, E, R, C>(&mut sums, E::cells(x.data), x.ld / E::LANES, y.data, y.ld, depth);
+    let mut columns = target;
+    for sums in &sums {
+        let Some(cells) = E::cells_mut(columns).first_chunk_mut::<R>() else { return };
+        for (sum, cell) in sums.iter().zip(cells) {
+            sum.store(cell);
+        }
+        columns = columns.get_mut(target_ld..).unwrap_or_default();
+    }
+}
+
+/// Some rows of `C` columns of `target = source − X Yᵀ`; all begin at the first row that is wanted.
+#[inline(always)]
+fn strip<T: Real, E: Packed<T>, const C: usize>(
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    rows: usize,
+    depth: usize,
+) {
+    let mut left = rows.div_ceil(E::LANES);
+    let mut row = 0;
+    while left > 0 {
+        let target = target.get_mut(row..).unwrap_or_default();
+        let (source, x) = (source.below(row), x.below(row));
+        // Four registers are better two and two than three and one.
+        let done = if left == 3 || left > 4 {
+            update::<T, E, 3, C>(target, target_ld, source, x, y, depth);
+            3
+        } else if left >= 2 {
+            update::<T, E, 2, C>(target, target_ld, source, x, y, depth);
+            2
+        } else {
+            update::<T, E, 1, C>(target, target_ld, source, x, y, depth);
+            1
+        };
+        left -= done;
+        row += done * E::LANES;
+    }
+}
+
+/// Which rows of a product are wanted.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// All.
+    Full,
+    /// Those from the diagonal on; above it some may be written as well.
+    Lower,
+}
+
+/// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
+///
+/// Columns are taken four at a time from the first one on: up to three more than asked for are written if the target has
+/// them, and rows up to whole registers. In `Y` the first column of the target is row 0.
+#[inline(always)]
+pub fn product<T: Real, E: Packed<T>>(
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    (rows, columns, depth): (usize, Range<usize>, usize),
+    part: Part,
+) {
+    let mut column = columns.start;
+    while column < columns.end {
+        let first = if part == Part::Lower { column / E::LANES * E::LANES } else { 0 };
+        let target = target.get_mut(column * target_ld + first..).unwrap_or_default();
+        let source = source.skip(column).below(first);
+        let rows = rows.saturating_sub(first);
+        strip::<T, E, WIDTH>(target, target_ld, source, x.below(first), y.below(column), rows, depth);
+        column += WIDTH;
+    }
+}
+
+/// `target − X y`, `rows` elements, over `depth` columns.
+#[inline(always)]
+pub fn subtract<T: Real, E: Packed<T>>(
+    target: &mut [T],
+    x: Columns<'_, T>,
+    y: &[T],
+    rows: usize,
+    depth: usize,
+) {
+    let mut left = rows.div_ceil(E::LANES);
+    let mut cells = E::cells_mut(target);
+    let mut x_cells = E::cells(x.data);
+    let ld = x.ld / E::LANES;
+    while left > 0 {
+        let done = if left >= 6 {
+            subtract_rows::<T, E, 6>(cells, x_cells, ld, y, depth);
+            6
+        } else if left >= 3 {
+            subtract_rows::<T, E, 3>(cells, x_cells, ld, y, depth);
+            3
+        } else {
+            subtract_rows::<T, E, 1>(cells, x_cells, ld, y, depth);
+            1
+        };
+        left -= done;
+        cells = cells.get_mut(done..).unwrap_or_default();
+        x_cells = x_cells.get(done..).unwrap_or_default();
+    }
+}
+
+#[inline(always)]
+fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
+    target: &mut [E::Cell],
+    x: &[E::Cell],
+    ld: usize,
+    y: &[T],
+    depth: usize,
+) {
+    let Some(target) = target.first_chunk_mut::<R>() else { return };
+    let mut sums = [[E::from_f64(0.0); R]];
+    for sums in &mut sums {
+        for (sum, cell) in sums.iter_mut().zip(&*target) {
+            *sum = E::load(cell);
+        }
+    }
+    tile::<T, E, R, 1>(&mut sums, x, ld, y, 1, depth);
+    for sums in &sums {
+        for (sum, cell) in sums.iter().zip(&mut *target) {
+            sum.store(cell);
+        }
+    }
+}
+
+/// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must be zero in one of them.
+#[inline(always)]
+pub fn add_transposed<T: Real, E: Packed<T>>(
+    target: &mut [T],
+    x: Columns<'_, T>,
+    v: &[T],
+    rows: usize,
+    columns: usize,
+) {
+    let registers = rows.div_ceil(E::LANES);
+    let v = E::cells(v).get(..registers).unwrap_or_default();
+    let (fours, rest) = target.get_mut(..columns).unwrap_or_default().as_chunks_mut::<WIDTH>();
+    let mut x = x;
+    for target in fours {
+        let dots = dots::<T, E, WIDTH>(x, v);
+        for (target, dot) in target.iter_mut().zip(dots) {
+            *target = *target + dot;
+        }
+        x = x.skip(WIDTH);
+    }
+    for target in rest {
+        let [dot] = dots::<T, E, 1>(x, v);
+        *target = *target + dot;
+        x = x.skip(1);
+    }
+}
+
+/// Products of the first `C` columns with `v`.
+#[inline(always)]
+fn dots<T: Real, E: Packed<T>, const C: usize>(x: Columns<'_, T>, v: &[E::Cell]) -> [T; C] {
+    let mut columns = [&[][..]; C];
+    let mut rest = x.data;
+    for column in &mut columns {
+        *column = E::cells(rest).get(..v.len()).unwrap_or_default();
+        rest = rest.get(x.ld..).unwrap_or_default();
+    }
+    let mut sums = [E::from_f64(0.0); C];
+    for (i, v) in v.iter().enumerate() {
+        let v = E::load(v);
+        for (sum, column) in sums.iter_mut().zip(&columns) {
+            if let Some(cell) = column.get(i) {
+                *sum = sum.minus_product(E::load(cell), v);
+            }
+        }
+    }
+    let mut dots = [T::ZERO; C];
+    for (dot, sum) in dots.iter_mut().zip(sums) {
+        *dot = -total::<T, E>(sum);
+    }
+    dots
+}
+
+/// `target − factor · column`
+#[inline(always)]
+pub fn subtract_column<T: Real, E: Packed<T>>(target: &mut [T], factor: T, column: &[T]) {
+    let factor = splat::<T, E>(factor);
+    for (target, cell) in E::cells_mut(target).iter_mut().zip(E::cells(column)) {
+        E::load(target).minus_product(E::load(cell), factor).store(target);
+    }
+}
+
+/// `target · factor`
+#[inline(always)]
+pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
+    let factor = splat::<T, E>(factor);
+    for target in E::cells_mut(target) {
+        (E::load(target) * factor).store(target);
+    }
+}
+
+/// The sum over the lanes.
+#[inline(always)]
+pub fn total<T: Real, E: Packed<T>>(register: E) -> T {
+    let mut cell = <E::Cell as bytemuck::Zeroable>::zeroed();
+    register.store(&mut cell);
+    (0..E::LANES).fold(T::ZERO, |sum, lane| sum + T::from_f64(E::lane(&cell, lane)))
+}
+
+/// The upper triangle from the lower one.
+#[inline(always)]
+pub fn mirror<T: Real>(matrix: &mut [T], ld: usize, n: usize) {
+    for column in 0..n {
+        for row in column + 1..n {
+            let below = part(matrix, column * ld + row, 1).first().copied().unwrap_or(T::ZERO);
+            if let Some(above) = matrix.get_mut(row * ld + column) {
+                *above = below;
+            }
+        }
+    }
+}

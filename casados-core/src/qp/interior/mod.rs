@@ -1,0 +1,152 @@
+//! The library's own solver: a primal-dual interior point with Mehrotra's predictor and corrector, whose linear systems
+//! are solved by a Riccati recursion.
+
+mod kernels;
+mod newton;
+mod options;
+mod riccati;
+mod run;
+mod sides;
+mod store;
+mod vector;
+
+pub use options::InteriorPointOptions;
+pub use store::Store;
+
+use super::check::check_all_bounds;
+use super::error::{Field, QpError};
+use super::layout::StageDims;
+use super::problem::QpView;
+use super::solution::SolutionView;
+use super::solver::{QpSolver, Start};
+use super::statistics::Statistics;
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+use core::marker::PhantomData;
+use newton::Iterate;
+use riccati::First;
+use run::Run;
+use sides::{Counts, Penalties, Sides, count, is_first_fixed};
+
+/// An interior point that exploits the structure of optimal control.
+///
+/// Each iteration costs one Riccati factorisation, `O(N (nx + nu)³)`, and two solves. With the feature `alloc` its memory is
+/// on the heap, and is allocated by the first call and by calls with larger problems only. Elsewhere see
+/// [`InteriorPoint::in_memory`].
+///
+/// Violated bounds of an infeasible problem are found by solving it once more with all bounds soft.
+#[derive(Clone, Debug)]
+pub struct InteriorPoint<T, N, I> {
+    /// Options, which may be changed between calls.
+    pub options: InteriorPointOptions,
+    numbers: N,
+    indices: I,
+    number: PhantomData<T>,
+}
+
+/// An interior point with its memory on the heap.
+#[cfg(feature = "alloc")]
+pub type HeapInteriorPoint<T = f64> = InteriorPoint<T, Vec<T>, Vec<u32>>;
+
+#[cfg(feature = "alloc")]
+impl<T: Real> HeapInteriorPoint<T> {
+    /// A solver without memory: the first call allocates it.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::in_memory(Vec::new(), Vec::new())
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<T: Real> Default for HeapInteriorPoint<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, N, I> InteriorPoint<T, N, I> {
+    /// How many numbers and indices the solver takes for a problem with so many finite bounds (each side for itself), soft
+    /// ones among them, and equations (pairs of equal hard bounds) beside the state at the start.
+    ///
+    /// To locate what makes a problem infeasible it takes as much as if all were soft.
+    #[must_use]
+    pub const fn memory(dims: &[StageDims], bounds: usize, soft: usize, equations: usize) -> (usize, usize) {
+        let counts = Counts { lower: bounds, upper: 0, soft, equations };
+        (Iterate::<T>::memory(dims, &counts), counts.indices())
+    }
+}
+
+impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
+    /// A solver in given memory, of the lengths that [`InteriorPoint::memory`] tells.
+    pub fn in_memory(numbers: N, indices: I) -> Self {
+        Self { options: InteriorPointOptions::new::<T>(), numbers, indices, number: PhantomData }
+    }
+
+    /// One run of the method.
+    fn run(
+        &mut self,
+        qp: QpView<'_, T>,
+        penalties: Penalties,
+        start: Start,
+        solution: &mut SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
+        let fixed = is_first_fixed(qp);
+        let counts = count(qp, fixed, penalties);
+        let length = Iterate::<T>::memory(qp.dims, &counts);
+        let mut numbers = self.numbers.at_least(length, Field::Numbers)?;
+        let mut indices = self.indices.at_least(counts.indices(), Field::Indices)?;
+        numbers.fill(T::ZERO);
+        let sides = Sides::list(qp, fixed, penalties, counts, &mut numbers, &mut indices);
+        let first = if fixed { First::Fixed } else { First::Free };
+        let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
+        let mut result = Ok(Statistics::default());
+        let scale = if let Penalties::Elastic(weight) = penalties { weight } else { 1.0 };
+        T::registers(Run {
+            iterate: &mut iterate,
+            options: &self.options,
+            start,
+            scale,
+            solution,
+            result: &mut result,
+        });
+        result
+    }
+
+    /// The bound that is violated most where all together are violated least.
+    fn locate(&mut self, qp: QpView<'_, T>, solution: &mut SolutionView<'_, T>) -> Option<QpError> {
+        // Violations have to cost more than anything else could gain.
+        let largest = |all: &[T]| all.iter().fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
+        let gradients = qp.stages().map(|s| largest(s.gradient_x()).max(largest(s.gradient_u())));
+        let weight = 1e4 * (1.0 + gradients.fold(0.0, f64::max));
+        let _ = self.run(qp, Penalties::Elastic(weight), Start::Cold, solution);
+        run::worst(qp, solution, 1e2 * self.options.tolerance)
+    }
+}
+
+impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I> {
+    fn solve(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: Start,
+        mut solution: SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
+        check_all_bounds(qp)?;
+        solution.fits(qp)?;
+        let result = self.run(qp, Penalties::Given, start, &mut solution);
+        match result {
+            Err(QpError::MaxIterations { .. } | QpError::Stalled { .. }) if self.options.locate => {
+                // A number that is not finite is found here, not in every call.
+                super::check::check(qp)?;
+                match self.locate(qp, &mut solution) {
+                    Some(infeasible) => Err(infeasible),
+                    None => {
+                        let _ = self.run(qp, Penalties::Given, start, &mut solution);
+                        result
+                    }
+                }
+            }
+            result => result,
+        }
+    }
+}

@@ -1,0 +1,476 @@
+//! One iterate of the interior point, its residuals, and the step from it.
+
+use super::kernels::{Columns, add_transposed, subtract};
+use super::riccati::{Equations, First, Riccati};
+use super::sides::{Counts, Sides, set};
+use super::vector::{
+    add_scaled, dot, largest_negative_product, largest_negative_ratio, largest_product, largest_size, shrink,
+};
+use crate::qp::error::QpError;
+use crate::qp::layout::{Place, Places, StageDims, end, pad, part, part_mut, take_mut};
+use crate::qp::problem::QpView;
+use crate::qp::solution::SolutionView;
+use crate::qp::solver::Start;
+use crate::qp::statistics::Residuals;
+use crate::scalar::{Packed, Real};
+
+/// A point, its multipliers and residuals. Vectors over rows are `v` and the values of general constraints of each stage.
+///
+/// The residuals of linear conditions are not computed again in every iteration: a step of length `α` leaves `1 − α` of
+/// them. The multipliers of the dynamics are not needed for that, and come from a recursion at the end.
+pub struct Iterate<'a, T> {
+    pub qp: QpView<'a, T>,
+    pub first: First,
+    pub riccati: Riccati<'a, T>,
+    pub sides: Sides<'a, T>,
+    /// `v` and `C x + D u`
+    pub v: &'a mut [T],
+    /// `Δ`
+    pub step: &'a mut [T],
+    /// Gradient of the Lagrangian.
+    pub stationarity: &'a mut [T],
+    /// Right-hand side of Newton's equations.
+    gradient: &'a mut [T],
+    /// Weights of rows.
+    weights: &'a mut [T],
+    /// `A x + B u + b − x₊`
+    pub dynamics: &'a mut [T],
+    /// The multiplier of a given state at the start.
+    pub initial: &'a mut [T],
+    /// `Σ s λ` over the number of pairs.
+    pub mu: T,
+}
+
+const fn first_nx(dims: &[StageDims]) -> usize {
+    match dims.first() {
+        Some(first) => first.nx,
+        None => 0,
+    }
+}
+
+impl<'a, T: Real> Iterate<'a, T> {
+    /// How many numbers it takes.
+    pub const fn memory(dims: &[StageDims], counts: &Counts) -> usize {
+        let end = end::<T>(dims);
+        Riccati::<T>::memory(dims) + counts.numbers() + 5 * end.row + end.dynamics + first_nx(dims)
+    }
+
+    /// In memory that is zero.
+    pub fn new(qp: QpView<'a, T>, first: First, sides: Sides<'a, T>, numbers: &mut &'a mut [T]) -> Self {
+        let (end, initial) = (end::<T>(qp.dims), first_nx(qp.dims));
+        Self {
+            qp,
+            first,
+            riccati: Riccati::new(qp.dims, numbers),
+            sides,
+            v: take_mut(numbers, end.row),
+            step: take_mut(numbers, end.row),
+            stationarity: take_mut(numbers, end.row),
+            gradient: take_mut(numbers, end.row),
+            weights: take_mut(numbers, end.row),
+            dynamics: take_mut(numbers, end.dynamics),
+            initial: take_mut(numbers, if first == First::Fixed { initial } else { 0 }),
+            mu: T::ZERO,
+        }
+    }
+
+    /// `1 / ε` of equations: they are satisfied up to `ε Δy`, and the next step takes what is left.
+    fn equation_weight() -> T {
+        T::ONE / T::from_f64(T::EPSILON).sqrt()
+    }
+
+    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
+    /// Lagrangian in `x` zero, and the gradient in `u`. Returns the objective.
+    #[inline(always)]
+    pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
+        self.evaluate_values::<E>();
+        let sides = &mut self.sides;
+        // Forces of the constraints, by rows.
+        let forces = &mut *self.gradient;
+        forces.fill(T::ZERO);
+        let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
+        let (of_lower, of_upper) = sides.multiplier.split_at_checked(lower.len()).unwrap_or_default();
+        scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
+        scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
+        scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
+        let mut objective = T::ZERO;
+        for place in Places::new::<T>(self.qp.dims).rev() {
+            let Place { nx, n, ng, ld, next, .. } = place;
+            let data = part(self.qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let hessian = part(data, place.matrix(), place.hessian());
+            let linear = part(data, place.gradient(), ld);
+            let g = part_mut(self.stationarity, place.row, ld);
+            let v = part(self.v, place.row, ld);
+            g.fill(T::ZERO);
+            symmetric(g, hessian, ld, v, n);
+            for ((g, &linear), &v) in g.iter_mut().zip(linear).zip(v) {
+                objective = objective + v * (T::from_f64(0.5) * *g + linear);
+                *g = *g + linear;
+            }
+            let force = part(self.gradient, place.row, place.rows);
+            for (g, &force) in g.iter_mut().zip(force) {
+                *g = *g + force;
+            }
+            let minus = &mut *self.riccati.minus;
+            for (minus, &pi) in minus.iter_mut().zip(part(multipliers, place.dynamics, next)) {
+                *minus = -pi;
+            }
+            for (minus, &force) in part_mut(minus, next, ng).iter_mut().zip(part(force, ld, ng)) {
+                *minus = -force;
+            }
+            subtract::<T, E>(g, matrix, minus, n, next + ng);
+            if place.stage > 0 {
+                // π is what makes this part zero.
+                let before = place.dynamics.saturating_sub(pad(nx, size_of::<T>()));
+                for (pi, g) in part_mut(multipliers, before, nx).iter_mut().zip(part_mut(g, 0, nx)) {
+                    *pi = *g;
+                    *g = T::ZERO;
+                }
+            } else if self.first == First::Fixed {
+                // What is left is the multiplier of the given state.
+                let given = part_mut(g, 0, nx);
+                part_mut(self.initial, 0, nx).copy_from_slice(given);
+                given.fill(T::ZERO);
+            }
+        }
+        objective + self.penalties()
+    }
+
+    /// General constraints, dynamics, and what belongs to sides.
+    #[inline(always)]
+    pub fn evaluate_values<E: Packed<T>>(&mut self) {
+        let mut rest = &mut *self.v;
+        for place in Places::new::<T>(self.qp.dims) {
+            let Place { n, ng, ld, next, .. } = place;
+            let data = part(self.qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let (v, general) = take_mut(&mut rest, place.rows).split_at_mut_checked(ld).unwrap_or_default();
+            let general = part_mut(general, 0, ng);
+            general.fill(T::ZERO);
+            add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
+            let dynamics = part_mut(self.dynamics, place.dynamics, next);
+            let offset = part(data, place.offset(), next);
+            for ((dynamics, &offset), &coming) in dynamics.iter_mut().zip(offset).zip(&*rest) {
+                *dynamics = offset - coming;
+            }
+            add_transposed::<T, E>(dynamics, matrix, v, n, next);
+        }
+        let sides = &mut self.sides;
+        sides.gather(self.v, |value, bound| value - bound, |value, bound| bound - value);
+        for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
+        {
+            *residual = value - slack;
+        }
+        let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
+        for (&side, &violation) in sides.soft.iter().zip(violations) {
+            if let Some(residual) = sides.residual.get_mut(side as usize) {
+                *residual = *residual + violation;
+            }
+        }
+        part_mut(sides.residual, sides.counts.sides(), sides.counts.soft).fill(T::ZERO);
+        let equations = sides.equations.iter().zip(&*sides.equation_bound).zip(&mut *sides.equation_residual);
+        for ((&row, &bound), residual) in equations {
+            *residual = at(self.v, row) - bound;
+        }
+        self.mu = sides.mu::<E>();
+    }
+
+    fn penalties(&self) -> T {
+        let sides = &self.sides;
+        let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
+        let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
+        costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))
+    }
+
+    /// The residuals as they are known.
+    #[inline(always)]
+    pub fn residuals<E: Packed<T>>(&self) -> Residuals {
+        let sides = &self.sides;
+        let inequalities =
+            largest_size::<T, E>(sides.residual).max(largest_size::<T, E>(sides.equation_residual));
+        Residuals {
+            stationarity: largest_size::<T, E>(self.stationarity).to_f64(),
+            dynamics: largest_size::<T, E>(self.dynamics).to_f64(),
+            inequalities: inequalities.to_f64(),
+            complementarity: largest_product::<T, E>(T::ZERO, sides.slack, sides.multiplier).to_f64(),
+        }
+    }
+
+    /// Newton's step, with `s Δλ + λ Δs = s · target`. Changes of slacks and multipliers are those of pairs afterwards.
+    #[inline(always)]
+    pub fn newton<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
+        let weight = Self::equation_weight();
+        let sides = &mut self.sides;
+        sides.push(factor);
+        self.gradient.copy_from_slice(self.stationarity);
+        let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
+        let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
+        scatter(self.gradient, lower, of_lower, |g, &push| g + push);
+        scatter(self.gradient, upper, of_upper, |g, &push| g - push);
+        scatter(self.gradient, sides.equations, sides.equation_residual, |g, &residual| {
+            g + weight * residual
+        });
+        if factor {
+            self.weights.fill(T::ZERO);
+            scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
+            scatter(self.weights, sides.equations, sides.free, |sum, _| sum + weight);
+        }
+        let equations = Equations {
+            qp: self.qp,
+            first: self.first,
+            weights: self.weights,
+            gradient: self.gradient,
+            dynamics: self.dynamics,
+        };
+        self.riccati.solve::<E>(&equations, factor, self.step)?;
+        let sides = &mut self.sides;
+        sides.gather(self.step, |value, _| value, |value, _| -value);
+        sides.steps();
+        Ok(())
+    }
+
+    /// Goes a part of the step.
+    #[inline(always)]
+    pub fn advance<E: Packed<T>>(&mut self, alpha: T) {
+        let weight = Self::equation_weight();
+        let left = T::ONE - alpha;
+        add_scaled(self.v, alpha, self.step);
+        shrink(self.stationarity, left);
+        shrink(self.dynamics, left);
+        let sides = &mut self.sides;
+        shrink(sides.residual, left);
+        add_scaled(sides.slack, alpha, sides.slack_step);
+        add_scaled(sides.multiplier, alpha, sides.multiplier_step);
+        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
+        for ((&row, free), residual) in equations {
+            let change = at(self.step, row);
+            *free = *free - alpha * weight * (change + *residual);
+            *residual = *residual + alpha * change;
+        }
+        if self.riccati.regularised > 0 {
+            // A pivot that was made larger is a force that keeps its variable where it is.
+            for place in Places::new::<T>(self.qp.dims) {
+                let added = self.riccati.added.get(place.v..).unwrap_or_default();
+                let step = part(self.step, place.row, place.n);
+                let residual = part_mut(self.stationarity, place.row, place.n);
+                for ((residual, &added), &step) in residual.iter_mut().zip(added).zip(step) {
+                    if added > T::ZERO {
+                        *residual = *residual - alpha * added * step;
+                    }
+                }
+            }
+        }
+        self.mu = self.sides.mu::<E>();
+    }
+}
+
+impl<T: Real> Sides<'_, T> {
+    /// `Σ s λ` over the number of pairs.
+    #[inline(always)]
+    pub fn mu<E: Packed<T>>(&self) -> T {
+        let pairs = self.counts.pairs().max(1);
+        dot::<T, E>(self.slack, self.multiplier) / T::from_f64(pairs as f64)
+    }
+
+    /// A function of the value of the row and the bound, for every side, into `scratch`.
+    #[inline(always)]
+    fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
+        let count = self.counts.lower;
+        let (lower_rows, upper_rows) = self.rows.split_at_checked(count).unwrap_or_default();
+        let (lower_bounds, upper_bounds) = self.bound.split_at_checked(count).unwrap_or_default();
+        let (lower_values, upper_values) = self.scratch.split_at_mut_checked(count).unwrap_or_default();
+        for ((target, &row), &bound) in lower_values.iter_mut().zip(lower_rows).zip(lower_bounds) {
+            *target = lower(at(values, row), bound);
+        }
+        for ((target, &row), &bound) in upper_values.iter_mut().zip(upper_rows).zip(upper_bounds) {
+            *target = upper(at(values, row), bound);
+        }
+    }
+
+    /// Slacks at least this far from zero, with multipliers from a solution or such that all products are equal.
+    /// `scratch` has the distances from the bounds.
+    pub fn begin(&mut self, start: Start, distance: T, solution: &SolutionView<'_, T>) {
+        let sides = self.counts.sides();
+        for (slack, &value) in self.slack.iter_mut().zip(&*self.scratch).take(sides) {
+            *slack = value.max(distance);
+        }
+        for (i, (multiplier, &row)) in self.multiplier.iter_mut().zip(&*self.rows).enumerate() {
+            let given = if i < self.counts.lower { &*solution.lower } else { &*solution.upper };
+            let slack = self.slack.get(i).copied().unwrap_or(T::ONE);
+            *multiplier = match start {
+                Start::Cold => distance * distance / slack,
+                Start::Warm => at(given, row).max(distance * distance / slack),
+            };
+        }
+        if start == Start::Warm {
+            for (free, &row) in self.free.iter_mut().zip(&*self.equations) {
+                *free = at(solution.lower, row) - at(solution.upper, row);
+            }
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let side = side as usize;
+            let (Some(&linear), Some(&quadratic)) = (self.linear.get(j), self.quadratic.get(j)) else {
+                break;
+            };
+            let (Some(&value), Some(slack), Some(multiplier)) =
+                (self.scratch.get(side), self.slack.get(side).copied(), self.multiplier.get(side).copied())
+            else {
+                break;
+            };
+            // The gradient with respect to the violation vanishes from the start: λ + ν = linear + quadratic e.
+            let violation = (slack - value).max(distance);
+            let force = linear + quadratic * violation;
+            let least = T::from_f64(0.01) * force;
+            let multiplier = if multiplier < force - least { multiplier.max(least) } else { force - least };
+            set(self.multiplier, side, multiplier);
+            set(self.slack, sides + j, violation);
+            set(self.multiplier, sides + j, force - multiplier);
+        }
+    }
+
+    /// `Σ s λ` over the number of pairs after a part of the predictor.
+    #[inline(always)]
+    pub fn mu_after<E: Packed<T>>(&self, alpha: T, mu: T) -> T {
+        let pairs = self.counts.pairs().max(1);
+        let products = dot::<T, E>(self.slack_step, self.multiplier_step) / T::from_f64(pairs as f64);
+        (T::ONE - alpha) * mu + alpha * alpha * products
+    }
+
+    /// The predictor: `s Δλ + λ Δs = −s λ`.
+    #[inline(always)]
+    pub fn aim_at_zero(&mut self) {
+        for ((inverse, &slack), (target, &multiplier)) in
+            self.inverse.iter_mut().zip(&*self.slack).zip(self.target.iter_mut().zip(&*self.multiplier))
+        {
+            *inverse = T::ONE / slack;
+            *target = -multiplier;
+        }
+    }
+
+    /// The corrector: `s Δλ + λ Δs = σμ − s λ − Δs Δλ` of the predictor.
+    #[inline(always)]
+    pub fn aim_at(&mut self, sigma_mu: T) {
+        let steps = self.slack_step.iter().zip(&*self.multiplier_step);
+        let pairs = self.multiplier.iter().zip(&*self.inverse);
+        for ((target, (&ds, &dl)), (&multiplier, &inverse)) in self.target.iter_mut().zip(steps).zip(pairs) {
+            *target = (sigma_mu - ds * dl) * inverse - multiplier;
+        }
+    }
+
+    /// What the sides add to the gradient of Newton's equations, into `scratch`, and their weights.
+    #[inline(always)]
+    fn push(&mut self, weights: bool) {
+        if weights {
+            for ((weight, &multiplier), &inverse) in
+                self.weight.iter_mut().zip(&*self.multiplier).zip(&*self.inverse)
+            {
+                *weight = multiplier * inverse;
+            }
+        }
+        let pairs = self.target.iter().zip(&*self.residual);
+        for ((push, &weight), (&target, &residual)) in self.scratch.iter_mut().zip(&*self.weight).zip(pairs) {
+            *push = weight * residual - target;
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let Some(soft) = self.soft_side(j, side as usize) else { break };
+            if weights {
+                set(self.weight, side as usize, soft.weight);
+            }
+            let residual = at(self.residual, side);
+            set(self.scratch, side as usize, soft.weight * residual - soft.target);
+        }
+    }
+
+    /// Changes of slacks from the changes of rows in `scratch`, and of multipliers.
+    #[inline(always)]
+    fn steps(&mut self) {
+        let sides = self.counts.sides();
+        for ((step, &change), &residual) in
+            self.slack_step.iter_mut().zip(&*self.scratch).zip(&*self.residual).take(sides)
+        {
+            *step = change + residual;
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let Some(soft) = self.soft_side(j, side as usize) else { break };
+            let Some(step) = self.slack_step.get_mut(side as usize) else { break };
+            let violation = (soft.sum - soft.stiffness * *step) * soft.inverse;
+            *step = *step + violation;
+            set(self.slack_step, sides + j, violation);
+        }
+        let pairs = self.multiplier.iter().zip(&*self.inverse);
+        let steps = self.multiplier_step.iter_mut().zip(&*self.slack_step).zip(&*self.target);
+        for (((step, &slack), &target), (&multiplier, &inverse)) in steps.zip(pairs) {
+            *step = target - multiplier * inverse * slack;
+        }
+    }
+
+    /// A soft side with its violation eliminated.
+    #[inline(always)]
+    fn soft_side(&self, j: usize, side: usize) -> Option<Soft<T>> {
+        let violation = self.counts.sides() + j;
+        let stiffness = *self.multiplier.get(side)? * *self.inverse.get(side)?;
+        let other = *self.multiplier.get(violation)? * *self.inverse.get(violation)?;
+        let quadratic = *self.quadratic.get(j)?;
+        let target = *self.target.get(side)?;
+        let inverse = T::ONE / (quadratic + stiffness + other);
+        let sum = target + *self.target.get(violation)?;
+        Some(Soft {
+            weight: stiffness * (quadratic + other) * inverse,
+            target: target - stiffness * sum * inverse,
+            sum,
+            stiffness,
+            inverse,
+        })
+    }
+
+    /// How far the step can go before a slack or a multiplier vanishes, at most 1.
+    #[inline(always)]
+    pub fn longest<E: Packed<T>>(&self) -> T {
+        let ratio = largest_negative_product::<T, E>(T::ONE, self.slack_step, self.inverse);
+        T::ONE / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
+    }
+}
+
+/// What a soft side is to the others.
+struct Soft<T> {
+    weight: T,
+    target: T,
+    sum: T,
+    stiffness: T,
+    inverse: T,
+}
+
+/// An element; zero if there is none.
+#[inline(always)]
+fn at<T: Real>(slice: &[T], index: u32) -> T {
+    slice.get(index as usize).copied().unwrap_or(T::ZERO)
+}
+
+/// Changes rows by values that belong to them.
+#[inline(always)]
+fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
+    for (&row, value) in rows.iter().zip(values) {
+        if let Some(target) = target.get_mut(row as usize) {
+            *target = change(*target, value);
+        }
+    }
+}
+
+/// `target + H v`, of which the lower triangle is there.
+#[inline(always)]
+fn symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
+    for (j, column) in h.chunks_exact(ld.max(1)).take(n).enumerate() {
+        let Some(&here) = v.get(j) else { return };
+        let (Some(below), Some(v_below)) = (column.get(j + 1..n), v.get(j + 1..n)) else { return };
+        let mut sum = column.get(j).map_or(T::ZERO, |&d| d * here);
+        let target_below = target.get_mut(j + 1..n).unwrap_or_default();
+        for ((target, &h), &v) in target_below.iter_mut().zip(below).zip(v_below) {
+            *target = *target + h * here;
+            sum = sum + h * v;
+        }
+        if let Some(target) = target.get_mut(j) {
+            *target = *target + sum;
+        }
+    }
+}

@@ -1,0 +1,403 @@
+//! The Riccati recursion: Newton's equations of a horizon, stage by stage from its end.
+//!
+//! ```text
+//! min  Σ ½ Δᵀ (H + weights) Δ + gᵀ Δ     Δx₊ = [A B] Δ + r
+//! M = H + diag(w) + [A B]ᵀ P₊ [A B] + [C D]ᵀ diag(w) [C D]
+//! M_uu = L Lᵀ,   K = M_xu L⁻ᵀ,   P = M_xx − K Kᵀ
+//! ```
+//!
+//! `(K; L)` is what is kept of a stage: a panel with a column for each control. The controls of a stage are few, so that
+//! this classical form needs less than the one with the square root of `P`.
+
+use super::kernels::{
+    Columns, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column,
+};
+use crate::qp::error::QpError;
+use crate::qp::layout::{Place, Places, StageDims, end, pad, part, part_mut, take_mut};
+use crate::qp::problem::QpView;
+use crate::scalar::{Packed, Real};
+
+/// How the first state is determined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum First {
+    /// It is given.
+    Fixed,
+    /// It is eliminated like controls.
+    Free,
+}
+
+/// Memory of the recursion.
+pub struct Riccati<'a, T> {
+    /// `M` of the stage at work.
+    m: &'a mut [T],
+    /// `−[A B]ᵀ P₊` and `−[C D]ᵀ diag(w)`
+    w: &'a mut [T],
+    /// `P`
+    p: &'a mut [T],
+    /// `(K; L)` of all stages, then the factor of `P` at the start.
+    panels: &'a mut [T],
+    /// Reciprocals of pivots.
+    inverse: &'a mut [T],
+    /// What was added to pivots.
+    pub added: &'a mut [T],
+    /// `L⁻¹ g_u`
+    y: &'a mut [T],
+    /// `−P₊ r`
+    offset: &'a mut [T],
+    /// The gradient of the stage at work.
+    g: &'a mut [T],
+    /// `−(p₊ + P₊ r)`, and the negative gradient of general constraints.
+    pub minus: &'a mut [T],
+    /// Pivots that were made larger.
+    pub regularised: usize,
+}
+
+/// The largest dimensions.
+#[derive(Default)]
+struct Largest {
+    n: usize,
+    ld: usize,
+    nx: usize,
+    next_and_ng: usize,
+}
+
+impl Largest {
+    const fn of<T>(dims: &[StageDims]) -> Self {
+        let (mut largest, mut rest) = (Self { n: 0, ld: 0, nx: 0, next_and_ng: 0 }, dims);
+        while let Some((&first, after)) = rest.split_first() {
+            let next = match after.first() {
+                Some(next) => next.nx,
+                None => 0,
+            };
+            largest.n = max(largest.n, first.nx + first.nu);
+            largest.nx = max(largest.nx, first.nx);
+            largest.next_and_ng = max(largest.next_and_ng, next + first.ng);
+            rest = after;
+        }
+        largest.ld = pad(largest.n, size_of::<T>());
+        largest
+    }
+}
+
+const fn max(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
+}
+
+/// Products write up to three columns more than they are asked for.
+const MORE: usize = 3;
+
+impl<'a, T: Real> Riccati<'a, T> {
+    /// How many numbers it takes.
+    pub const fn memory(dims: &[StageDims]) -> usize {
+        let (largest, end) = (Largest::of::<T>(dims), end::<T>(dims));
+        let Largest { n, ld, nx, next_and_ng } = largest;
+        let matrices = ld * (n + MORE) + ld * (next_and_ng + MORE) + pad(nx, size_of::<T>()) * (nx + MORE);
+        matrices + end.factor + 3 * end.v + end.dynamics + ld + pad(next_and_ng, size_of::<T>())
+    }
+    /// In memory that is zero.
+    pub fn new(dims: &[StageDims], memory: &mut &'a mut [T]) -> Self {
+        let (Largest { n, ld, nx, next_and_ng }, end) = (Largest::of::<T>(dims), end::<T>(dims));
+        Self {
+            m: take_mut(memory, ld * (n + MORE)),
+            w: take_mut(memory, ld * (next_and_ng + MORE)),
+            p: take_mut(memory, pad(nx, size_of::<T>()) * (nx + MORE)),
+            panels: take_mut(memory, end.factor),
+            inverse: take_mut(memory, end.v),
+            added: take_mut(memory, end.v),
+            y: take_mut(memory, end.v),
+            offset: take_mut(memory, end.dynamics),
+            g: take_mut(memory, ld),
+            minus: take_mut(memory, pad(next_and_ng, size_of::<T>())),
+            regularised: 0,
+        }
+    }
+}
+
+/// Newton's equations.
+#[derive(Clone, Copy)]
+pub struct Equations<'a, T> {
+    pub qp: QpView<'a, T>,
+    pub first: First,
+    /// Weights of bounds and general constraints.
+    pub weights: &'a [T],
+    /// Gradient, over variables and general constraints.
+    pub gradient: &'a [T],
+    /// `r`
+    pub dynamics: &'a [T],
+}
+
+impl<T: Real> Riccati<'_, T> {
+    /// Solves Newton's equations, for a new matrix or for that of the last time. `step` is `Δ`, with the changes of the general
+    /// constraints.
+    ///
+    /// # Errors
+    /// [`QpError::NotConvex`]
+    #[inline(always)]
+    pub fn solve<E: Packed<T>>(
+        &mut self,
+        equations: &Equations<'_, T>,
+        factor: bool,
+        step: &mut [T],
+    ) -> Result<(), QpError> {
+        if factor {
+            self.backward::<E, true>(equations)?;
+        } else {
+            self.backward::<E, false>(equations)?;
+        }
+        self.forward::<E>(equations, step);
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn backward<E: Packed<T>, const FACTOR: bool>(
+        &mut self,
+        equations: &Equations<'_, T>,
+    ) -> Result<(), QpError> {
+        let Equations { qp, first, weights, gradient, dynamics } = *equations;
+        if FACTOR {
+            self.regularised = 0;
+        }
+        for place in Places::new::<T>(qp.dims).rev() {
+            let Place { nx, nu, n, ng, ld, next, ld_next, .. } = place;
+            let data = part(qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            // −(p₊ + P₊ r), behind the end of the horizon nothing; then the general constraints.
+            let offset = part_mut(self.offset, place.dynamics, ld_next);
+            if FACTOR {
+                offset.fill(T::ZERO);
+                let p = Columns { data: &*self.p, ld: ld_next };
+                subtract::<T, E>(offset, p, part(dynamics, place.dynamics, next), next, next);
+            }
+            for (minus, &offset) in self.minus.iter_mut().zip(part(offset, 0, next)) {
+                *minus = *minus + offset;
+            }
+            let general = part(gradient, place.row + ld, ng);
+            for (minus, &general) in part_mut(self.minus, next, ng).iter_mut().zip(general) {
+                *minus = -general;
+            }
+            if FACTOR {
+                self.factor_stage::<E>(&place, first, data, part(weights, place.row, place.rows))?;
+            }
+            let g = part_mut(self.g, 0, ld);
+            g.copy_from_slice(part(gradient, place.row, g.len()));
+            subtract::<T, E>(g, matrix, self.minus, n, next + ng);
+            let panel = part(self.panels, place.factor, ld * place.pivots);
+            let inverse = part(self.inverse, place.v, ld);
+            let y = part_mut(self.y, place.v, ld);
+            eliminate::<T, E>(g, panel, ld, part(inverse, nx, nu), part_mut(y, nx, nu), nx);
+            if place.stage == 0 {
+                if first == First::Free {
+                    let panel = panel.get(nu * ld..).unwrap_or_default();
+                    eliminate::<T, E>(g, panel, ld, part(inverse, 0, nx), part_mut(y, 0, nx), 0);
+                }
+                break;
+            }
+            for (minus, &g) in part_mut(self.minus, 0, nx).iter_mut().zip(&*g) {
+                *minus = -g;
+            }
+        }
+        Ok(())
+    }
+
+    /// `M`, its factors, and `P`.
+    #[inline(always)]
+    fn factor_stage<E: Packed<T>>(
+        &mut self,
+        place: &Place,
+        first: First,
+        data: &[T],
+        weights: &[T],
+    ) -> Result<(), QpError> {
+        let Place { nx, nu, n, ng, ld, next, ld_next, stage, .. } = *place;
+        let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+        let hessian = Source::Matrix(Columns { data: part(data, place.matrix(), place.hessian()), ld });
+        let p = Columns { data: &*self.p, ld: ld_next };
+        product::<T, E>(self.w, ld, Source::Zero, matrix, p, (n, 0..next, next), Part::Full);
+        for (i, &weight) in part(weights, ld, ng).iter().enumerate() {
+            let column = (next + i) * ld;
+            for (w, &c) in part_mut(self.w, column, ld).iter_mut().zip(part(matrix.data, column, ld)) {
+                *w = -c * weight;
+            }
+        }
+        let w = Columns { data: &*self.w, ld };
+        // Columns are computed four at a time. The first with a control among them are needed whole.
+        let whole = nx / 4 * 4;
+        if stage > 0 || first == First::Free {
+            product::<T, E>(self.m, ld, hessian, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
+        }
+        product::<T, E>(self.m, ld, hessian, matrix, w, (n, whole..n, next + ng), Part::Full);
+        let mut largest = T::ZERO;
+        for (diagonal, &weight) in self.m.iter_mut().step_by(ld + 1).zip(weights).take(n) {
+            *diagonal = *diagonal + weight;
+            largest = diagonal.abs().max(largest);
+        }
+
+        let inverse = part_mut(self.inverse, place.v, ld);
+        let added = part_mut(self.added, place.v, ld);
+        let (before, panel) = self.m.split_at_mut_checked(nx * ld).unwrap_or_default();
+        let panel = part_mut(panel, 0, nu * ld);
+        let pivots = Pivots { inverse: part_mut(inverse, nx, nu), added: part_mut(added, nx, nu), largest };
+        let not_convex = |index: usize, pivot: T| QpError::NotConvex { stage, index, pivot: pivot.to_f64() };
+        self.regularised += cholesky::<T, E>(panel, ld, nx, n, pivots).map_err(|(i, p)| not_convex(i, p))?;
+        let kept = part_mut(self.panels, place.factor, ld * place.pivots);
+        part_mut(kept, 0, nu * ld).copy_from_slice(panel);
+        if stage == 0 && first == First::Fixed {
+            return Ok(());
+        }
+        let panel = Columns { data: part(kept, 0, nu * ld), ld };
+        let ld_x = pad(nx, size_of::<T>());
+        let source = Source::Matrix(Columns { data: before, ld });
+        product::<T, E>(self.p, ld_x, source, panel, panel, (nx, 0..nx, nu), Part::Lower);
+        if stage > 0 {
+            mirror(self.p, ld_x, nx);
+            return Ok(());
+        }
+        let start = part_mut(kept, nu * ld, nx * ld);
+        for (start, p) in start.chunks_exact_mut(ld.max(1)).zip(self.p.chunks_exact(ld_x.max(1))) {
+            for (start, &p) in start.iter_mut().zip(p) {
+                *start = p;
+            }
+        }
+        let pivots = Pivots { inverse: part_mut(inverse, 0, nx), added: part_mut(added, 0, nx), largest };
+        self.regularised +=
+            cholesky::<T, E>(start, ld, 0, nx, pivots).map_err(|(i, p)| not_convex(nu + i, p))?;
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn forward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, step: &mut [T]) {
+        let Equations { qp, first, dynamics, .. } = *equations;
+        let mut rest = step;
+        for place in Places::new::<T>(qp.dims) {
+            let Place { nx, nu, n, ng, ld, next, .. } = place;
+            let here = take_mut(&mut rest, place.rows);
+            let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
+            let panel = part(self.panels, place.factor, ld * place.pivots);
+            let inverse = part(self.inverse, place.v, ld);
+            let y = part(self.y, place.v, ld);
+            let (v, general) = here.split_at_mut_checked(ld).unwrap_or_default();
+            if place.stage == 0 {
+                v.fill(T::ZERO);
+                if first == First::Free {
+                    part_mut(v, 0, nx).copy_from_slice(part(y, 0, nx));
+                    let panel = panel.get(nu * ld..).unwrap_or_default();
+                    substitute(part_mut(v, 0, nx), panel, ld, 0, part(inverse, 0, nx));
+                }
+            }
+            part_mut(v, nx, nu).fill(T::ZERO);
+            let u = part_mut(self.g, 0, nu);
+            u.copy_from_slice(part(y, nx, nu));
+            add_transposed::<T, E>(u, Columns { data: panel, ld }, v, nx, nu);
+            substitute(u, panel, ld, nx, part(inverse, nx, nu));
+            part_mut(v, nx, nu).copy_from_slice(u);
+            let coming = part_mut(rest, 0, next);
+            coming.copy_from_slice(part(dynamics, place.dynamics, coming.len()));
+            add_transposed::<T, E>(coming, matrix, v, n, next);
+            let general = part_mut(general, 0, ng);
+            general.fill(T::ZERO);
+            add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
+        }
+    }
+}
+
+/// `y = L⁻¹ g_u`, and `g − (K; L) y` for what is left.
+#[inline(always)]
+fn eliminate<T: Real, E: Packed<T>>(
+    g: &mut [T],
+    panel: &[T],
+    ld: usize,
+    inverse: &[T],
+    y: &mut [T],
+    row: usize,
+) {
+    for (i, ((column, &inverse), y)) in panel.chunks_exact(ld.max(1)).zip(inverse).zip(y).enumerate() {
+        *y = g.get(row + i).map_or(T::ZERO, |&g| g * inverse);
+        subtract_column::<T, E>(g, *y, column);
+    }
+}
+
+/// `u = −L⁻ᵀ u`, where `L` begins at some row of its panel.
+#[inline(always)]
+fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T]) {
+    for i in (0..u.len()).rev() {
+        let column = part(panel, i * ld + row, u.len());
+        let (before, after) = u.split_at_mut_checked(i + 1).unwrap_or_default();
+        let Some(here) = before.last_mut() else { return };
+        let below = column.get(i + 1..).unwrap_or_default();
+        let sum = below.iter().zip(&*after).fold(-*here, |sum, (&l, &u)| sum - l * u);
+        *here = inverse.get(i).map_or(T::ZERO, |&inverse| sum * inverse);
+    }
+}
+
+/// What is kept of pivots.
+struct Pivots<'a, T> {
+    inverse: &'a mut [T],
+    added: &'a mut [T],
+    /// The largest element of the diagonal.
+    largest: T,
+}
+
+/// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the other rows of the panel are
+/// multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were replaced by something large: the solution then does
+/// not move in their direction.
+///
+/// # Errors
+/// A pivot that is negative by more than rounding, and its index.
+#[inline(always)]
+fn cholesky<T: Real, E: Packed<T>>(
+    panel: &mut [T],
+    ld: usize,
+    row: usize,
+    rows: usize,
+    pivots: Pivots<'_, T>,
+) -> Result<usize, (usize, T)> {
+    let Pivots { inverse, added, largest } = pivots;
+    let mut regularised = 0;
+    let epsilon = T::from_f64(T::EPSILON);
+    let noise = T::from_f64(T::EPSILON * 4.0 * rows as f64);
+    for (diagonal, inverse) in panel.get(row..).unwrap_or_default().iter().step_by(ld + 1).zip(&mut *inverse)
+    {
+        *inverse = *diagonal;
+    }
+    let count = inverse.len();
+    let mut begin = 0;
+    while begin < count {
+        // Rows of a product begin at a multiple of its width.
+        let width = (count - begin).min(4 - (row + begin) % 4);
+        let (done, group) = panel.split_at_mut_checked(begin * ld).unwrap_or_default();
+        if begin > 0 {
+            let done = Columns { data: &*done, ld };
+            let y = done.below(row + begin);
+            product::<T, E>(group, ld, Source::Target, done, y, (rows, 0..width, begin), Part::Full);
+        }
+        for i in 0..width {
+            let (column, rest) =
+                group.get_mut(i * ld..).unwrap_or_default().split_at_mut_checked(ld).unwrap_or_default();
+            let index = begin + i;
+            let (Some(&found), Some(inverse), Some(added)) =
+                (column.get(row + index), inverse.get_mut(index), added.get_mut(index))
+            else {
+                break;
+            };
+            let mut pivot = found;
+            *added = T::ZERO;
+            // `inverse` is still what the diagonal was before elimination.
+            if !(pivot > noise * *inverse) {
+                if !(pivot >= -epsilon.sqrt() * largest) {
+                    return Err((index, pivot));
+                }
+                pivot = if largest > T::ZERO { largest } else { T::ONE };
+                *added = pivot - found;
+                regularised += 1;
+            }
+            *inverse = T::ONE / pivot.sqrt();
+            scale::<T, E>(column, *inverse);
+            for (j, other) in rest.chunks_exact_mut(ld.max(1)).take(width - 1 - i).enumerate() {
+                let factor = column.get(row + index + 1 + j).copied().unwrap_or(T::ZERO);
+                subtract_column::<T, E>(other, factor, column);
+            }
+        }
+        begin += width;
+    }
+    Ok(regularised)
+}

@@ -1,0 +1,179 @@
+//! The iterations.
+
+use super::newton::Iterate;
+use super::options::InteriorPointOptions;
+use super::riccati::First;
+use crate::qp::error::{QpError, Side};
+use crate::qp::layout::{Places, part, part_mut};
+use crate::qp::problem::{QpView, Row};
+use crate::qp::solution::SolutionView;
+use crate::qp::solver::Start;
+use crate::qp::statistics::Statistics;
+use crate::scalar::{Packed, Real, Registers};
+
+/// One run of the method.
+pub struct Run<'r, 'a, 's, T> {
+    pub iterate: &'r mut Iterate<'a, T>,
+    pub options: &'r InteriorPointOptions,
+    pub start: Start,
+    /// The size of penalties.
+    pub scale: f64,
+    pub solution: &'r mut SolutionView<'s, T>,
+    pub result: &'r mut Result<Statistics, QpError>,
+}
+
+impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, options, start, scale, solution, result } = self;
+        iterate.begin::<E>(options, start, scale, solution);
+        *result = iterate.iterations::<E>(options, solution);
+        iterate.store(solution);
+    }
+}
+
+/// Slacks and multipliers keep this part of what they have.
+const BOUNDARY: f64 = 0.995;
+
+impl<T: Real> Iterate<'_, T> {
+    #[inline(always)]
+    fn begin<E: Packed<T>>(
+        &mut self,
+        options: &InteriorPointOptions,
+        start: Start,
+        scale: f64,
+        solution: &mut SolutionView<'_, T>,
+    ) {
+        if start == Start::Warm {
+            for place in Places::new::<T>(self.qp.dims) {
+                part_mut(self.v, place.row, place.n).copy_from_slice(part(solution.v, place.v, place.n));
+            }
+        }
+        if let (First::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
+            let x0 = stage.x_bounds().lower;
+            part_mut(self.v, 0, x0.len()).copy_from_slice(x0);
+        }
+        self.evaluate_values::<E>();
+        let distance =
+            if start == Start::Warm { options.warm_distance } else { (options.start_mu * scale).sqrt() };
+        self.sides.begin(start, T::from_f64(distance), solution);
+        // Only now are slacks what they are.
+        let _ = self.evaluate::<E>(solution.dynamics);
+    }
+
+    #[inline(always)]
+    fn iterations<E: Packed<T>>(
+        &mut self,
+        options: &InteriorPointOptions,
+        solution: &mut SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
+        let mut statistics = Statistics::default();
+        let mut short = 0;
+        loop {
+            statistics.residuals = self.residuals::<E>();
+            if statistics.residuals.largest() <= options.tolerance {
+                // What is known of the residuals is what rounding has left of them: now they are computed.
+                let objective = self.evaluate::<E>(solution.dynamics);
+                let before = statistics.residuals;
+                statistics.residuals = self.residuals::<E>();
+                statistics.objective = objective.to_f64();
+                if statistics.residuals.largest() <= options.tolerance {
+                    return Ok(statistics);
+                }
+                if statistics.refinements > 3 {
+                    return Err(QpError::Stalled { iterations: statistics.iterations, residuals: before });
+                }
+                statistics.refinements += 1;
+            }
+            let (iterations, residuals) = (statistics.iterations, statistics.residuals);
+            if iterations >= options.max_iterations {
+                let _ = self.evaluate::<E>(solution.dynamics);
+                return Err(QpError::MaxIterations { iterations, residuals });
+            }
+            self.sides.aim_at_zero();
+            self.newton::<E>(true)?;
+            statistics.factorisations += 1;
+            statistics.regularised += self.riccati.regularised;
+            let mut alpha = self.sides.longest::<E>();
+            if self.sides.counts.pairs() > 0 {
+                let after = self.sides.mu_after::<E>(alpha, self.mu);
+                let ratio = after / self.mu;
+                self.sides.aim_at(self.mu * ratio * ratio * ratio);
+                self.newton::<E>(false)?;
+                alpha = self.sides.longest::<E>();
+                if alpha < T::ONE {
+                    alpha = alpha * T::from_f64(BOUNDARY);
+                }
+            }
+            statistics.iterations += 1;
+            if !(alpha > T::ZERO) || !super::vector::largest_size::<T, E>(self.step).is_finite() {
+                return Err(QpError::Stalled { iterations, residuals });
+            }
+            short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
+            if short > 4 {
+                let _ = self.evaluate::<E>(solution.dynamics);
+                return Err(QpError::Stalled { iterations, residuals });
+            }
+            self.advance::<E>(alpha);
+        }
+    }
+
+    /// The point and its multipliers.
+    fn store(&mut self, solution: &mut SolutionView<'_, T>) {
+        for place in Places::new::<T>(self.qp.dims) {
+            part_mut(solution.v, place.v, place.n).copy_from_slice(part(self.v, place.row, place.n));
+        }
+        solution.lower.fill(T::ZERO);
+        solution.upper.fill(T::ZERO);
+        let sides = &self.sides;
+        for (i, (&row, &multiplier)) in sides.rows.iter().zip(&*sides.multiplier).enumerate() {
+            let side = if i < sides.counts.lower { &mut *solution.lower } else { &mut *solution.upper };
+            super::sides::set(side, row as usize, multiplier);
+        }
+        let mut equation = |row: usize, force: T| {
+            super::sides::set(solution.lower, row, force.max(T::ZERO));
+            super::sides::set(solution.upper, row, (-force).max(T::ZERO));
+        };
+        for (&row, &free) in sides.equations.iter().zip(&*sides.free) {
+            equation(row as usize, free);
+        }
+        if self.first == First::Fixed {
+            for (row, &force) in self.initial.iter().enumerate() {
+                equation(row, force);
+            }
+        }
+    }
+}
+
+/// The largest violation of a hard bound, if it is larger than a tolerance relative to the bound.
+pub fn worst<T: Real>(qp: QpView<'_, T>, solution: &SolutionView<'_, T>, tolerance: f64) -> Option<QpError> {
+    let mut worst = (0.0, None);
+    for place in Places::new::<T>(qp.dims) {
+        let data = part(qp.data, place.data, place.data_len());
+        let v = part(solution.v, place.v, place.ld);
+        let vector = |row| part(data, place.row_data(row), place.rows);
+        for index in (0..place.n).chain(place.ld..place.ld + place.ng) {
+            let value = if index < place.n {
+                v.get(index).map_or(0.0, |v| v.to_f64())
+            } else {
+                let column = part(data, (place.next + index - place.ld) * place.ld, place.n);
+                column.iter().zip(v).map(|(c, v)| c.to_f64() * v.to_f64()).sum()
+            };
+            let at = |row| vector(row).get(index).map_or(0.0, |b| b.to_f64());
+            let sides = [
+                (Side::Lower, at(Row::Lower), at(Row::LowerLinear), 1.0),
+                (Side::Upper, at(Row::Upper), at(Row::UpperLinear), -1.0),
+            ];
+            for (side, bound, penalty, sign) in sides {
+                let violation = sign * (bound - value);
+                if penalty.is_infinite() && violation > tolerance * (1.0 + bound.abs()) && violation > worst.0
+                {
+                    let (field, index) = place.name(index);
+                    let stage = place.stage;
+                    worst = (violation, Some(QpError::Infeasible { field, stage, index, side, violation }));
+                }
+            }
+        }
+    }
+    worst.1
+}

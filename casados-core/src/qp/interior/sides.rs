@@ -1,0 +1,249 @@
+//! The sides of constraints that exist, in one list over the whole horizon.
+//!
+//! A side is a row (a variable, or a general constraint) and a sign: `σ (c v − bound) + e = s ≥ 0` with a multiplier `λ ≥ 0`.
+//! Lower sides come first, then upper ones. A soft side has a violation `e ≥ 0` with a multiplier `ν ≥ 0` of its own; these
+//! pairs `(e, ν)` lie behind the pairs `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds
+//! that are hard are an equation, with a multiplier without sign.
+
+use crate::qp::layout::{Places, part, take_mut};
+use crate::qp::problem::{QpView, Row};
+use crate::scalar::Real;
+
+/// What violations of bounds cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Penalties {
+    /// What the problem says.
+    Given,
+    /// This, linearly, where the problem says that there are none.
+    Elastic(f64),
+}
+
+/// How many there are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Lower sides.
+    pub lower: usize,
+    /// Upper sides.
+    pub upper: usize,
+    /// Soft ones among them.
+    pub soft: usize,
+    /// Equations.
+    pub equations: usize,
+}
+
+impl Counts {
+    /// All sides.
+    pub const fn sides(&self) -> usize {
+        self.lower + self.upper
+    }
+    /// All pairs of complementary variables.
+    pub const fn pairs(&self) -> usize {
+        self.sides() + self.soft
+    }
+    /// How many numbers the arrays take.
+    pub const fn numbers(&self) -> usize {
+        8 * self.pairs() + 2 * self.sides() + 3 * self.equations + 2 * self.soft
+    }
+    /// How many indices the lists take.
+    pub const fn indices(&self) -> usize {
+        self.sides() + self.equations + self.soft
+    }
+}
+
+/// A row with its bounds and penalties.
+struct Constraint<T> {
+    row: usize,
+    lower: T,
+    upper: T,
+    /// Linear and quadratic.
+    lower_penalty: (T, T),
+    upper_penalty: (T, T),
+}
+
+/// What one side of a constraint is.
+enum Kind<T> {
+    Absent,
+    Hard,
+    Soft(T, T),
+}
+
+fn kind<T: Real>(bound: T, (linear, quadratic): (T, T), penalties: Penalties) -> Kind<T> {
+    if !bound.is_finite() {
+        return Kind::Absent;
+    }
+    match penalties {
+        _ if linear.is_finite() => {
+            // A violation that costs nothing is allowed.
+            if linear > T::ZERO || quadratic > T::ZERO { Kind::Soft(linear, quadratic) } else { Kind::Absent }
+        }
+        Penalties::Given => Kind::Hard,
+        Penalties::Elastic(weight) => Kind::Soft(T::from_f64(weight), T::ZERO),
+    }
+}
+
+/// Whether the state at the start is given: hard and equal bounds of every component.
+pub fn is_first_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
+    let Some(stage) = qp.stage(0) else { return true };
+    let b = stage.x_bounds();
+    let equal = b.lower.iter().zip(b.upper).all(|(l, u)| l == u);
+    equal && b.lower_linear.iter().chain(b.upper_linear).all(|p| !p.is_finite())
+}
+
+/// Calls `f` for every constraint of the horizon that is not the given state at the start.
+fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constraint<T>)) {
+    for place in Places::new::<T>(qp.dims) {
+        let data = part(qp.data, place.data, place.data_len());
+        let vector = |row| part(data, place.row_data(row), place.rows);
+        let bounds = vector(Row::Lower).iter().zip(vector(Row::Upper));
+        let lower = vector(Row::LowerLinear).iter().zip(vector(Row::LowerQuadratic));
+        let upper = vector(Row::UpperLinear).iter().zip(vector(Row::UpperQuadratic));
+        let skipped = if place.stage == 0 && fixed { place.nx } else { 0 };
+        for (i, ((bounds, lower), upper)) in bounds.zip(lower).zip(upper).enumerate().skip(skipped) {
+            f(Constraint {
+                row: place.row + i,
+                lower: *bounds.0,
+                upper: *bounds.1,
+                lower_penalty: (*lower.0, *lower.1),
+                upper_penalty: (*upper.0, *upper.1),
+            });
+        }
+    }
+}
+
+impl<T: Real> Constraint<T> {
+    /// Whether it is an equation, and otherwise its sides.
+    fn kinds(&self, penalties: Penalties) -> (bool, Kind<T>, Kind<T>) {
+        let lower = kind(self.lower, self.lower_penalty, penalties);
+        let upper = kind(self.upper, self.upper_penalty, penalties);
+        let equation = matches!((&lower, &upper), (Kind::Hard, Kind::Hard)) && self.lower == self.upper;
+        (equation, lower, upper)
+    }
+}
+
+/// How many sides there are.
+pub fn count<T: Real>(qp: QpView<'_, T>, fixed: bool, penalties: Penalties) -> Counts {
+    let mut counts = Counts::default();
+    constraints(qp, fixed, |constraint| {
+        let (equation, lower, upper) = constraint.kinds(penalties);
+        if equation {
+            counts.equations += 1;
+            return;
+        }
+        counts.lower += usize::from(!matches!(lower, Kind::Absent));
+        counts.upper += usize::from(!matches!(upper, Kind::Absent));
+        counts.soft += usize::from(matches!(lower, Kind::Soft(..)));
+        counts.soft += usize::from(matches!(upper, Kind::Soft(..)));
+    });
+    counts
+}
+
+/// All sides, and what an interior point keeps of each.
+pub struct Sides<'a, T> {
+    pub counts: Counts,
+    /// Rows of sides.
+    pub rows: &'a mut [u32],
+    /// Rows of equations.
+    pub equations: &'a mut [u32],
+    /// Sides that are soft.
+    pub soft: &'a mut [u32],
+    /// Slacks `s` of sides, then violations `e`.
+    pub slack: &'a mut [T],
+    /// Multipliers `λ`, then `ν`.
+    pub multiplier: &'a mut [T],
+    /// `σ (c v − bound) + e − s`; behind the sides zero
+    pub residual: &'a mut [T],
+    /// Changes of slacks.
+    pub slack_step: &'a mut [T],
+    /// Changes of multipliers.
+    pub multiplier_step: &'a mut [T],
+    /// `1 / s`
+    pub inverse: &'a mut [T],
+    /// What `s Δλ + λ Δs` is to be, over `s`.
+    pub target: &'a mut [T],
+    /// Room for something.
+    pub scratch: &'a mut [T],
+    /// What a side adds to the Hessian.
+    pub weight: &'a mut [T],
+    /// Bounds.
+    pub bound: &'a mut [T],
+    /// Linear penalties of soft sides.
+    pub linear: &'a mut [T],
+    /// Quadratic penalties of soft sides.
+    pub quadratic: &'a mut [T],
+    /// Multipliers of equations.
+    pub free: &'a mut [T],
+    /// `c v − bound` of equations.
+    pub equation_residual: &'a mut [T],
+    /// Right-hand sides of equations.
+    pub equation_bound: &'a mut [T],
+}
+
+impl<'a, T: Real> Sides<'a, T> {
+    /// Lists the sides.
+    pub fn list(
+        qp: QpView<'_, T>,
+        fixed: bool,
+        penalties: Penalties,
+        counts: Counts,
+        numbers: &mut &'a mut [T],
+        indices: &mut &'a mut [u32],
+    ) -> Self {
+        let (pairs, sides) = (counts.pairs(), counts.sides());
+        let list = Self {
+            counts,
+            rows: take_mut(indices, sides),
+            equations: take_mut(indices, counts.equations),
+            soft: take_mut(indices, counts.soft),
+            slack: take_mut(numbers, pairs),
+            multiplier: take_mut(numbers, pairs),
+            residual: take_mut(numbers, pairs),
+            slack_step: take_mut(numbers, pairs),
+            multiplier_step: take_mut(numbers, pairs),
+            inverse: take_mut(numbers, pairs),
+            target: take_mut(numbers, pairs),
+            scratch: take_mut(numbers, pairs),
+            weight: take_mut(numbers, sides),
+            bound: take_mut(numbers, sides),
+            linear: take_mut(numbers, counts.soft),
+            quadratic: take_mut(numbers, counts.soft),
+            free: take_mut(numbers, counts.equations),
+            equation_residual: take_mut(numbers, counts.equations),
+            equation_bound: take_mut(numbers, counts.equations),
+        };
+        let (mut lower, mut upper, mut soft, mut equations) = (0, counts.lower, 0, 0);
+        constraints(qp, fixed, |constraint| {
+            let row = constraint.row as u32;
+            let (equation, lower_kind, upper_kind) = constraint.kinds(penalties);
+            if equation {
+                set(list.equations, equations, row);
+                set(list.equation_bound, equations, constraint.lower);
+                equations += 1;
+                return;
+            }
+            for (kind, at, bound) in
+                [(lower_kind, &mut lower, constraint.lower), (upper_kind, &mut upper, constraint.upper)]
+            {
+                if let Kind::Soft(linear, quadratic) = kind {
+                    set(list.soft, soft, *at as u32);
+                    set(list.quadratic, soft, quadratic);
+                    set(list.linear, soft, linear);
+                    soft += 1;
+                }
+                if !matches!(kind, Kind::Absent) {
+                    set(list.rows, *at, row);
+                    set(list.bound, *at, bound);
+                    *at += 1;
+                }
+            }
+        });
+        list
+    }
+}
+
+/// An element, if there is one.
+#[inline(always)]
+pub fn set<T>(slice: &mut [T], index: usize, value: T) {
+    if let Some(element) = slice.get_mut(index) {
+        *element = value;
+    }
+}

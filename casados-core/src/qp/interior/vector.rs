@@ -1,0 +1,96 @@
+//! Sums and extremes over long vectors, in registers.
+
+use crate::scalar::{Packed, Real};
+
+/// Whole registers of a slice, and the rest.
+macro_rules! split {
+    ($slice:expr) => {
+        (E::cells($slice), $slice.get($slice.len() / E::LANES * E::LANES..).unwrap_or_default())
+    };
+}
+
+/// `Σ a b`
+#[inline(always)]
+pub fn dot<T: Real, E: Packed<T>>(a: &[T], b: &[T]) -> T {
+    let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
+    let mut sums = [E::from_f64(0.0); 2];
+    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+        let sum = &mut sums[i % 2];
+        *sum = sum.minus_product(E::load(a), E::load(b));
+    }
+    let whole = -super::kernels::total::<T, E>(sums[0] + sums[1]);
+    a_rest.iter().zip(b_rest).fold(whole, |sum, (&a, &b)| sum + a * b)
+}
+
+/// The largest `a b`, at least `least`. NaN is not seen.
+#[inline(always)]
+pub fn largest_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
+    let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
+    let mut largest = super::kernels::splat::<T, E>(least);
+    for (a, b) in a.iter().zip(b) {
+        largest = (E::load(a) * E::load(b)).max(largest);
+    }
+    let whole = extreme::<T, E>(largest);
+    a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (a * b).max(largest))
+}
+
+/// The largest `−a b`, at least `least`.
+#[inline(always)]
+pub fn largest_negative_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
+    let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
+    let mut largest = super::kernels::splat::<T, E>(least);
+    for (a, b) in a.iter().zip(b) {
+        largest = (-(E::load(a) * E::load(b))).max(largest);
+    }
+    let whole = extreme::<T, E>(largest);
+    a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a * b)).max(largest))
+}
+
+/// The largest `−a / b`, at least `least`.
+#[inline(always)]
+pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
+    let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
+    let mut largest = super::kernels::splat::<T, E>(least);
+    for (a, b) in a.iter().zip(b) {
+        largest = (-(E::load(a) / E::load(b))).max(largest);
+    }
+    let whole = extreme::<T, E>(largest);
+    a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a / b)).max(largest))
+}
+
+/// The largest `|a|`.
+#[inline(always)]
+pub fn largest_size<T: Real, E: Packed<T>>(a: &[T]) -> T {
+    let (a, rest) = split!(a);
+    let mut largest = E::from_f64(0.0);
+    for a in a {
+        largest = E::load(a).abs().max(largest);
+    }
+    let whole = extreme::<T, E>(largest);
+    rest.iter().fold(whole, |largest, a| a.abs().max(largest))
+}
+
+/// The largest lane.
+#[inline(always)]
+fn extreme<T: Real, E: Packed<T>>(register: E) -> T {
+    let mut cell = <E::Cell as bytemuck::Zeroable>::zeroed();
+    register.store(&mut cell);
+    let first = T::from_f64(E::lane(&cell, 0));
+    (1..E::LANES).fold(first, |largest, lane| T::from_f64(E::lane(&cell, lane)).max(largest))
+}
+
+/// `a + factor · b`
+#[inline(always)]
+pub fn add_scaled<T: Real>(a: &mut [T], factor: T, b: &[T]) {
+    for (a, &b) in a.iter_mut().zip(b) {
+        *a = *a + factor * b;
+    }
+}
+
+/// `factor · a`
+#[inline(always)]
+pub fn shrink<T: Real>(a: &mut [T], factor: T) {
+    for a in a {
+        *a = *a * factor;
+    }
+}
