@@ -227,14 +227,6 @@ pub(crate) fn part_mut<T>(slice: &mut [T], begin: usize, length: usize) -> &mut 
 
 /// The first numbers of a slice, which loses them.
 #[inline(always)]
-pub(crate) fn take<'a, T>(rest: &mut &'a [T], length: usize) -> &'a [T] {
-    let (first, second) = rest.split_at_checked(length).unwrap_or_default();
-    *rest = second;
-    first
-}
-
-/// As [`take`].
-#[inline(always)]
 pub(crate) fn take_mut<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
     let (first, second) = core::mem::take(rest).split_at_mut_checked(length).unwrap_or_default();
     *rest = second;

@@ -5,7 +5,8 @@
 //! registers of AVX2. Everything is inlined into the function that was compiled for `E`.
 
 use crate::qp::layout::part;
-use crate::scalar::{Packed, Real};
+use crate::scalar::{Packed, Piece, Real};
+use core::marker::PhantomData;
 use core::ops::Range;
 
 /// Columns of a tile.
@@ -169,6 +170,52 @@ pub enum Part {
 /// them, and rows up to whole registers. In `Y` the first column of the target is row 0.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
+    target: &mut [T],
+    target_ld: usize,
+    source: Source<'_, T>,
+    x: Columns<'_, T>,
+    y: Columns<'_, T>,
+    (rows, columns, depth): (usize, Range<usize>, usize),
+    part: Part,
+) {
+    E::vectorize(Product::<T, E> {
+        target,
+        target_ld,
+        source,
+        x,
+        y,
+        rows,
+        columns,
+        depth,
+        part,
+        register: PhantomData,
+    });
+}
+
+/// A product as a function of its own: the tiles are many instructions.
+struct Product<'a, T, E> {
+    target: &'a mut [T],
+    target_ld: usize,
+    source: Source<'a, T>,
+    x: Columns<'a, T>,
+    y: Columns<'a, T>,
+    rows: usize,
+    columns: Range<usize>,
+    depth: usize,
+    part: Part,
+    register: PhantomData<E>,
+}
+
+impl<T: Real, E: Packed<T>> Piece for Product<'_, T, E> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { target, target_ld, source, x, y, rows, columns, depth, part, .. } = self;
+        tiles::<T, E>(target, target_ld, source, x, y, (rows, columns, depth), part);
+    }
+}
+
+#[inline(always)]
+fn tiles<T: Real, E: Packed<T>>(
     target: &mut [T],
     target_ld: usize,
     source: Source<'_, T>,

@@ -223,7 +223,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             gradient: self.gradient,
             dynamics: self.dynamics,
         };
-        self.riccati.solve::<E>(&equations, factor, self.step)?;
+        self.riccati.solve::<E>(equations, factor, self.step)?;
         let sides = &mut self.sides;
         sides.gather(self.step, |value, _| value, |value, _| -value);
         sides.steps();

@@ -15,7 +15,8 @@ use super::kernels::{
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, StageDims, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
-use crate::scalar::{Packed, Real};
+use crate::scalar::{Packed, Piece, Real};
+use core::marker::PhantomData;
 
 /// How the first state is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,35 +127,49 @@ pub struct Equations<'a, T> {
     pub dynamics: &'a [T],
 }
 
+/// A solve as a function of its own.
+struct Solve<'s, 'a, T, E> {
+    riccati: &'s mut Riccati<'a, T>,
+    equations: Equations<'s, T>,
+    factor: bool,
+    step: &'s mut [T],
+    result: &'s mut Result<(), QpError>,
+    register: PhantomData<E>,
+}
+
+impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { riccati, equations, factor, step, result, .. } = self;
+        *result = riccati.backward::<E>(&equations, factor);
+        if result.is_ok() {
+            riccati.forward::<E>(&equations, step);
+        }
+    }
+}
+
 impl<T: Real> Riccati<'_, T> {
     /// Solves Newton's equations, for a new matrix or for that of the last time. `step` is `Δ`, with the changes of the general
     /// constraints.
     ///
     /// # Errors
     /// [`QpError::NotConvex`]
-    #[inline(always)]
     pub fn solve<E: Packed<T>>(
         &mut self,
-        equations: &Equations<'_, T>,
+        equations: Equations<'_, T>,
         factor: bool,
         step: &mut [T],
     ) -> Result<(), QpError> {
-        if factor {
-            self.backward::<E, true>(equations)?;
-        } else {
-            self.backward::<E, false>(equations)?;
-        }
-        self.forward::<E>(equations, step);
-        Ok(())
+        let mut result = Ok(());
+        let register = PhantomData::<E>;
+        E::vectorize(Solve { riccati: self, equations, factor, step, result: &mut result, register });
+        result
     }
 
     #[inline(always)]
-    fn backward<E: Packed<T>, const FACTOR: bool>(
-        &mut self,
-        equations: &Equations<'_, T>,
-    ) -> Result<(), QpError> {
+    fn backward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, factor: bool) -> Result<(), QpError> {
         let Equations { qp, first, weights, gradient, dynamics } = *equations;
-        if FACTOR {
+        if factor {
             self.regularised = 0;
         }
         for place in Places::new::<T>(qp.dims).rev() {
@@ -163,7 +178,7 @@ impl<T: Real> Riccati<'_, T> {
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             // −(p₊ + P₊ r), behind the end of the horizon nothing; then the general constraints.
             let offset = part_mut(self.offset, place.dynamics, ld_next);
-            if FACTOR {
+            if factor {
                 offset.fill(T::ZERO);
                 let p = Columns { data: &*self.p, ld: ld_next };
                 subtract::<T, E>(offset, p, part(dynamics, place.dynamics, next), next, next);
@@ -175,7 +190,7 @@ impl<T: Real> Riccati<'_, T> {
             for (minus, &general) in part_mut(self.minus, next, ng).iter_mut().zip(general) {
                 *minus = -general;
             }
-            if FACTOR {
+            if factor {
                 self.factor_stage::<E>(&place, first, data, part(weights, place.row, place.rows))?;
             }
             let g = part_mut(self.g, 0, ld);
