@@ -54,9 +54,11 @@ impl<T: Real> Iterate<'_, T> {
             part_mut(self.v, 0, x0.len()).copy_from_slice(x0);
         }
         self.evaluate_values::<E>();
-        let distance =
-            if start == Start::Warm { options.warm_distance } else { (options.start_mu * scale).sqrt() };
-        self.sides.begin(start, T::from_f64(distance), solution);
+        let distance = match start {
+            Start::Warm => T::from_f64(options.warm_distance),
+            Start::Cold => T::from_f64(options.start_mu * scale).sqrt(),
+        };
+        self.sides.begin(start, distance, solution);
         // Only now are slacks what they are.
         let _ = self.evaluate::<E>(solution.dynamics);
     }
