@@ -111,6 +111,13 @@ pub enum Error {
         /// End of the interval.
         end: f64,
     },
+    /// Not one control for each interval, or no interval at all.
+    Intervals {
+        /// How many controls there are.
+        controls: usize,
+        /// How many ends of intervals there are.
+        ends: usize,
+    },
     /// The nodes of the tableau define no polynomial through the stages: there is no dense output, and
     /// there are no algebraic states at the ends of the interval.
     NoInterpolation,
@@ -279,6 +286,12 @@ impl fmt::Display for Error {
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
+            }
+            Error::Intervals { controls, ends } => {
+                write!(
+                    f,
+                    "{controls} controls for {ends} intervals: there is one for each, and at least one interval"
+                )
             }
             Error::NoInterpolation => f.write_str(
                 "the tableau is not that of a collocation method: there is no polynomial through its stages",

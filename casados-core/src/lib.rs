@@ -45,7 +45,7 @@ pub mod tableau;
 pub mod testing;
 
 #[cfg(feature = "alloc")]
-pub use adaptive::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Radau};
+pub use adaptive::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Piecewise, Radau};
 #[cfg(feature = "alloc")]
 pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
 pub use erk::Erk;
@@ -69,7 +69,7 @@ pub use tableau::{
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {
     #[cfg(feature = "alloc")]
-    pub use crate::adaptive::{Adaptive, AdaptiveOptions, Radau};
+    pub use crate::adaptive::{Adaptive, AdaptiveOptions, Piecewise, Radau};
     #[cfg(feature = "alloc")]
     pub use crate::batch::{Batch, BatchError, Intervals};
     #[cfg(feature = "alloc")]

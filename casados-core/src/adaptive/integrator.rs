@@ -30,19 +30,19 @@ use core::marker::PhantomData;
 /// model has no finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
 /// [`Error::OutOfMemory`]. Then the integrator is usable.
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
-    options: AdaptiveOptions,
-    base: Box<Base<M, T>>,
-    consistent: Consistent<M, T>,
-    state: B::State,
-    tape: Tape<T>,
-    statistics: AdaptiveStatistics,
+    pub(super) options: AdaptiveOptions,
+    pub(super) base: Box<Base<M, T>>,
+    pub(super) consistent: Consistent<M, T>,
+    pub(super) state: B::State,
+    pub(super) tape: Tape<T>,
+    pub(super) statistics: AdaptiveStatistics,
     parameters: bool,
-    start: T,
+    pub(super) start: T,
     /// The interval of the last successful call.
     last: Option<Span<T>>,
     /// The interval of the steps that are kept for following calls.
     frozen: Option<Span<T>>,
-    memory: Option<Box<Memory<M, T>>>,
+    pub(super) memory: Option<Box<Memory<M, T>>>,
     /// Derivatives at the start of each step.
     history: Vec<T>,
     method: PhantomData<fn() -> B>,
@@ -228,6 +228,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         check(Argument::T, &[t])?;
         let span = self.last.ok_or(Error::NoResult)?;
+        self.dense_in(span, t)
+    }
+
+    /// The solution at a time inside the interval whose steps are on the tape.
+    pub(super) fn dense_in(&mut self, span: Span<T>, t: T) -> Result<&Dense<M, T>, Error> {
         if !inside(t, span.start, span.end) {
             let (t, start, end) = (t.to_f64(), span.start.to_f64(), span.end.to_f64());
             return Err(Error::OutsideInterval { t, start, end });
@@ -371,7 +376,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     }
 
     /// What every call begins with.
-    fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
+    pub(super) fn begin(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+    ) -> Result<Span<T>, Error> {
         self.statistics = AdaptiveStatistics::default();
         check(Argument::X0, x0.as_slice())?;
         check(Argument::U, u.as_slice())?;
@@ -383,12 +393,18 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(Span { start: self.start, end: t_end })
     }
 
-    /// The steps that derivatives are taken of: chosen now, or frozen.
-    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+    /// Memory of derivatives.
+    pub(super) fn reserve(&mut self) -> Result<(), Error> {
         if self.memory.is_none() {
             let bytes = size_of::<Memory<M, T>>();
             self.memory = Some(try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?);
         }
+        Ok(())
+    }
+
+    /// The steps that derivatives are taken of: chosen now, or frozen.
+    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+        self.reserve()?;
         if self.frozen.is_some() {
             let span = self.begin(x0, u, t_end)?;
             return self.check_frozen(span);
@@ -418,7 +434,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok((Frozen { base, consistent, tape, span }, state, memory, history))
     }
 
-    fn run(
+    pub(super) fn run(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -438,7 +454,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
 }
 
 /// Whether a time lies in an interval of any direction.
-fn inside<T: Real>(t: T, start: T, end: T) -> bool {
+pub(super) fn inside<T: Real>(t: T, start: T, end: T) -> bool {
     if start <= end { start <= t && t <= end } else { end <= t && t <= start }
 }
 

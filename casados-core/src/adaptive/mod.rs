@@ -8,7 +8,7 @@
 //! are not stiff.
 //!
 //! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
-//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `along` an integrand, `integrator` what users see.
+//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `along` an integrand, `piecewise` intervals with controls of their own, `integrator` what users see.
 
 mod along;
 mod consistent;
@@ -18,6 +18,7 @@ mod integrator;
 mod norm;
 mod options;
 mod pairs;
+mod piecewise;
 mod replay;
 mod run;
 mod sensitivities;
@@ -27,6 +28,7 @@ mod tape;
 
 pub use integrator::Integrator;
 pub use options::AdaptiveOptions;
+pub use piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
 pub use statistics::AdaptiveStatistics;
 
 use crate::error::Error;

@@ -35,7 +35,7 @@ pub struct Memory<M: Dae, T: Plain> {
     /// The gradient of one step, and that of all.
     gradient: [ArrayW<M, T>; 2],
     /// The Hessian of one step, its product with `D`, and the sum of all.
-    step: ArrayW<M, ArrayW<M, T>>,
+    pub(super) step: ArrayW<M, ArrayW<M, T>>,
     product: ArrayW<M, ArrayW<M, T>>,
     sum: ArrayW<M, ArrayW<M, T>>,
     row: ArrayW<M, T>,
@@ -347,7 +347,7 @@ fn algebraic<M: Dae, T: Real>(
 }
 
 /// The blocks of a Hessian as one matrix.
-fn place<M: Dae, T: Real>(from: &Hessian<M, T>, to: &mut ArrayW<M, ArrayW<M, T>>) {
+pub(super) fn place<M: Dae, T: Real>(from: &Hessian<M, T>, to: &mut ArrayW<M, ArrayW<M, T>>) {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     for (r, row) in to.as_mut().iter_mut().enumerate() {
         for (c, element) in row.as_mut().iter_mut().enumerate() {
@@ -367,7 +367,7 @@ fn place<M: Dae, T: Real>(from: &Hessian<M, T>, to: &mut ArrayW<M, ArrayW<M, T>>
     }
 }
 
-fn fill<T, A: Matrix<T>>(matrix: &mut A, element: impl Fn(usize, usize) -> T) {
+pub(super) fn fill<T, A: Matrix<T>>(matrix: &mut A, element: impl Fn(usize, usize) -> T) {
     for c in 0..A::COLUMNS {
         for r in 0..A::ROWS {
             matrix[(r, c)] = element(r, c);

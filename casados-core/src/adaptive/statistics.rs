@@ -20,3 +20,17 @@ pub struct AdaptiveStatistics {
     /// Iterations of Newton's method, all steps together.
     pub iterations: usize,
 }
+
+impl AdaptiveStatistics {
+    /// What another interval took.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.steps += other.steps;
+        self.rejected += other.rejected;
+        self.failed += other.failed;
+        self.residuals += other.residuals;
+        self.jacobians += other.jacobians;
+        self.factorizations += other.factorizations;
+        self.dense += other.dense;
+        self.iterations += other.iterations;
+    }
+}

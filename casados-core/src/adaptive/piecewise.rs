@@ -1,0 +1,594 @@
+//! Integration over controls that are piecewise constant: an adaptive integration for each interval, one after the other,
+//! and the derivatives of all of them together.
+//!
+//! With `x_{k+1} = Φ_k(x_k, u_k, p)` and `W = (x₀, u₀, …, u_{N−1}, p)`:
+//!
+//! ```text
+//! V_{k+1} = ∂Φ_k/∂x V_k + ∂Φ_k/∂(u_k, p)        λ_k = (∂Φ_k/∂x)ᵀ λ_{k+1}
+//! d²(λᵀ x_N)/dW² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ Φ_k) D_k        D_k = d(x_k, u_k, p)/dW
+//! ```
+
+use super::consistent::place_inputs;
+use super::integrator::{Integrator, inside};
+use super::run::Span;
+use super::sealed::Engine;
+use super::sensitivities::{Frozen, Memory, fill, place};
+use super::statistics::AdaptiveStatistics;
+use super::tape::Tape;
+use crate::error::{Argument, Error};
+use crate::irk::check;
+use crate::linalg::axpy;
+use crate::model::{
+    ArrayK, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX,
+    VectorP, VectorU, VectorX,
+};
+use crate::result::{Dense, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// An adaptive integrator over intervals, each with a control of its own.
+///
+/// ```text
+/// let mut horizon = Piecewise::new(Adaptive::<Pendulum, Radau>::new(options)?);
+/// let end = horizon.forward(&x0, &controls, &ends)?;      // end.x, end.dx_dx0, end.dx_du[k], end.dx_dp
+/// ```
+///
+/// The first interval begins at the time that was set ([`Integrator::set_time`]), each of the others at the end of the one
+/// before. Steps end where intervals end.
+///
+/// # Errors
+/// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for each interval;
+/// [`Error::OutsideInterval`] if the ends are not in order, or not those of the steps that are kept.
+pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
+    integrator: Integrator<M, B, T>,
+    segments: Vec<Segment<M, T>>,
+    /// How many of them belong to the last successful call.
+    count: usize,
+    frozen: bool,
+    statistics: AdaptiveStatistics,
+    nominal: Nominal<M, T>,
+}
+
+/// The steps of one interval.
+struct Segment<M: Dae, T: Real> {
+    tape: Tape<T>,
+    span: Span<T>,
+    u: VectorU<M, T>,
+    x: VectorX<M, T>,
+    /// Start values of `(ẋ, z)`.
+    given: ArrayK<M, T>,
+    /// Derivatives at the start of each step.
+    history: Vec<T>,
+    /// `V_k`, row after row.
+    v: Vec<T>,
+}
+
+/// The solution at the end and its derivatives with respect to `x₀`, all controls, and `p`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PiecewiseForward<M: Dae, T: Real = f64> {
+    /// `x` and `z` at the end, `z0` at the start.
+    pub nominal: Nominal<M, T>,
+    /// `∂x/∂x₀`
+    pub dx_dx0: MatrixXX<M, T>,
+    /// `∂x/∂u_k`
+    pub dx_du: Vec<MatrixXU<M, T>>,
+    /// `∂x/∂p`
+    pub dx_dp: MatrixXP<M, T>,
+    /// `∂z/∂x₀` at the end.
+    pub dz_dx0: MatrixZX<M, T>,
+    /// `∂z/∂u_k` at the end.
+    pub dz_du: Vec<MatrixZU<M, T>>,
+    /// `∂z/∂p` at the end.
+    pub dz_dp: MatrixZP<M, T>,
+}
+
+/// The solution at the end and the gradient of `λᵀx`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PiecewiseAdjoint<M: Dae, T: Real = f64> {
+    /// `x` and `z` at the end, `z0` at the start.
+    pub nominal: Nominal<M, T>,
+    /// `∇(λᵀx)` with respect to `x₀`
+    pub grad_x0: VectorX<M, T>,
+    /// `∇(λᵀx)` with respect to `u_k`
+    pub grad_u: Vec<VectorU<M, T>>,
+    /// `∇(λᵀx)` with respect to `p`
+    pub grad_p: VectorP<M, T>,
+}
+
+/// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PiecewiseHessian<M: Dae, T: Real = f64> {
+    /// The solution and its derivatives.
+    pub forward: PiecewiseForward<M, T>,
+    /// The gradient.
+    pub adjoint: PiecewiseAdjoint<M, T>,
+    /// `∂²(λᵀx)/∂x₀²`
+    pub h_xx: MatrixXX<M, T>,
+    /// `∂²(λᵀx)/∂x₀∂u_k`
+    pub h_xu: Vec<MatrixXU<M, T>>,
+    /// `∂²(λᵀx)/∂u_j∂u_k`, row after row.
+    pub h_uu: Vec<MatrixUU<M, T>>,
+    /// `∂²(λᵀx)/∂x₀∂p`
+    pub h_xp: MatrixXP<M, T>,
+    /// `∂²(λᵀx)/∂u_k∂p`
+    pub h_up: Vec<MatrixUP<M, T>>,
+    /// `∂²(λᵀx)/∂p²`
+    pub h_pp: MatrixPP<M, T>,
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
+    /// Of an integrator, which keeps its options, tolerances, parameters and start time.
+    #[must_use]
+    pub fn new(integrator: Integrator<M, B, T>) -> Self {
+        let nominal = Nominal::zeroed();
+        let statistics = AdaptiveStatistics::default();
+        Self { integrator, segments: Vec::new(), count: 0, frozen: false, statistics, nominal }
+    }
+
+    /// The integrator, to set its parameters or its start time.
+    pub fn integrator(&mut self) -> &mut Integrator<M, B, T> {
+        &mut self.integrator
+    }
+
+    /// What the last call did in all intervals.
+    #[must_use]
+    pub fn statistics(&self) -> &AdaptiveStatistics {
+        &self.statistics
+    }
+
+    /// `x` and `z` at the end, and the consistent `z` at the start.
+    ///
+    /// # Errors
+    /// See [`Piecewise`].
+    pub fn solve(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.steps(x0, controls, ends)?;
+        if self.frozen {
+            self.replay(x0)?;
+        }
+        Ok(&self.nominal)
+    }
+
+    /// The solution at a time inside the last successful call's intervals; where two of them meet, that of the first.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
+        check(Argument::T, &[t])?;
+        let Self { integrator, segments, count, .. } = self;
+        let segments = segments.get_mut(..*count).unwrap_or_default();
+        let (Some(first), Some(last)) = (segments.first(), segments.last()) else {
+            return Err(Error::NoResult);
+        };
+        let (start, end) = (first.span.start.to_f64(), last.span.end.to_f64());
+        let outside = Error::OutsideInterval { t: t.to_f64(), start, end };
+        let holds = |segment: &&mut Segment<M, T>| inside(t, segment.span.start, segment.span.end);
+        let segment = segments.iter_mut().find(holds);
+        let segment = segment.ok_or(outside)?;
+        if segment.tape.entries().is_empty() {
+            // An interval without length; `z` there is that of the end, if all are.
+            (integrator.base.dense.x, integrator.base.dense.z) = (segment.x, self.nominal.z);
+            return Ok(&integrator.base.dense);
+        }
+        let parameters = integrator.base.parameters;
+        place_inputs::<M, T>(integrator.base.point.as_mut(), &segment.u, &parameters);
+        core::mem::swap(&mut integrator.tape, &mut segment.tape);
+        let result = integrator.dense_in(segment.span, t).map(|_| ());
+        core::mem::swap(&mut integrator.tape, &mut segment.tape);
+        result?;
+        Ok(&integrator.base.dense)
+    }
+
+    /// The solution at the end, and its derivatives with respect to `x₀`, all controls and `p`.
+    ///
+    /// # Errors
+    /// See [`Piecewise`].
+    pub fn forward(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+    ) -> Result<PiecewiseForward<M, T>, Error> {
+        self.steps(x0, controls, ends)?;
+        self.sweep(x0, false)
+    }
+
+    /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and `p`.
+    ///
+    /// # Errors
+    /// See [`Piecewise`].
+    pub fn adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<PiecewiseAdjoint<M, T>, Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.steps(x0, controls, ends)?;
+        self.replay(x0)?;
+        let Self { integrator, segments, count, nominal, .. } = self;
+        let mut result = PiecewiseAdjoint {
+            nominal: *nominal,
+            grad_x0: *lambda,
+            grad_u: filled(*count, VectorU::<M, T>::zeroed())?,
+            grad_p: VectorP::<M, T>::zeroed(),
+        };
+        for (segment, grad_u) in segments.iter_mut().zip(&mut result.grad_u).rev() {
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
+            frozen.adjoint::<B>(state, &result.grad_x0, memory, None)?;
+            result.grad_x0.as_mut_slice().copy_from_slice(memory.adjoint.grad_x0.as_slice());
+            grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
+            axpy(T::ONE, memory.adjoint.grad_p.as_slice(), result.grad_p.as_mut_slice());
+        }
+        Ok(result)
+    }
+
+    /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+    ///
+    /// # Errors
+    /// See [`Piecewise`].
+    pub fn hessian(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<PiecewiseHessian<M, T>, Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.steps(x0, controls, ends)?;
+        let forward = self.sweep(x0, true)?;
+        let Self { integrator, segments, count, nominal, .. } = self;
+        let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
+        let mut adjoint = PiecewiseAdjoint {
+            nominal: *nominal,
+            grad_x0: *lambda,
+            grad_u: filled(*count, VectorU::<M, T>::zeroed())?,
+            grad_p: VectorP::<M, T>::zeroed(),
+        };
+        let mut sum = filled(at.all() * at.all(), T::ZERO)?;
+        let mut product = filled(M::Shape::NW * at.all(), T::ZERO)?;
+        for (k, segment) in segments.iter_mut().enumerate().take(*count).rev() {
+            let history = core::mem::take(&mut segment.history);
+            let (mut frozen, state, memory, v) = segment.open(integrator)?;
+            frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, None)?;
+            let Memory { hessian, step, .. } = memory;
+            adjoint.grad_x0 = hessian.first.grad_x0;
+            if let Some(grad_u) = adjoint.grad_u.get_mut(k) {
+                *grad_u = hessian.first.grad_u;
+            }
+            axpy(T::ONE, hessian.first.grad_p.as_slice(), adjoint.grad_p.as_mut_slice());
+            place(hessian, step);
+            at.project(k, step.as_ref(), v, &mut product, &mut sum);
+            segment.history = history;
+        }
+        let h = |r: usize, c: usize| sum[r.max(c) * at.all() + r.min(c)];
+        let mut result = PiecewiseHessian {
+            forward,
+            adjoint,
+            h_xx: Zeroable::zeroed(),
+            h_xu: filled(*count, MatrixXU::<M, T>::zeroed())?,
+            h_uu: filled(*count * *count, MatrixUU::<M, T>::zeroed())?,
+            h_xp: Zeroable::zeroed(),
+            h_up: filled(*count, MatrixUP::<M, T>::zeroed())?,
+            h_pp: Zeroable::zeroed(),
+        };
+        fill(&mut result.h_xx, h);
+        fill(&mut result.h_xp, |r, c| h(r, at.p() + c));
+        fill(&mut result.h_pp, |r, c| h(at.p() + r, at.p() + c));
+        for (k, (xu, up)) in result.h_xu.iter_mut().zip(&mut result.h_up).enumerate() {
+            fill(xu, |r, c| h(r, at.u(k) + c));
+            fill(up, |r, c| h(at.u(k) + r, at.p() + c));
+        }
+        for (index, uu) in result.h_uu.iter_mut().enumerate() {
+            fill(uu, |r, c| h(at.u(index / *count) + r, at.u(index % *count) + c));
+        }
+        match sum.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(Error::Overflow { step: 0, index }),
+            None => Ok(result),
+        }
+    }
+
+    /// Following calls take the steps of the last successful one, whatever they are given, and solve them to rounding.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`]
+    pub fn freeze(&mut self) -> Result<(), Error> {
+        if self.count == 0 {
+            return Err(Error::NoResult);
+        }
+        self.frozen = true;
+        Ok(())
+    }
+
+    /// Following calls choose their steps again.
+    pub fn thaw(&mut self) {
+        self.frozen = false;
+    }
+
+    /// Takes all steps, or prepares those that are kept for other controls.
+    fn steps(&mut self, x0: &VectorX<M, T>, controls: &[VectorU<M, T>], ends: &[T]) -> Result<(), Error> {
+        let count = ends.len();
+        if controls.len() != count || count == 0 {
+            return Err(Error::Intervals { controls: controls.len(), ends: count });
+        }
+        self.statistics = AdaptiveStatistics::default();
+        self.integrator.reserve()?;
+        check(Argument::X0, x0.as_slice())?;
+        check(Argument::T, ends)?;
+        let start = self.integrator.start;
+        let last = ends.last().copied().unwrap_or(start);
+        let mut before = start;
+        for (u, end) in controls.iter().zip(ends) {
+            check(Argument::U, u.as_slice())?;
+            if !inside(*end, before, last) {
+                let (t, start, end) = (end.to_f64(), before.to_f64(), last.to_f64());
+                return Err(Error::OutsideInterval { t, start, end });
+            }
+            before = *end;
+        }
+        if self.frozen {
+            return self.check_frozen(start, controls, ends);
+        }
+        self.count = 0;
+        while self.segments.len() < count {
+            self.segments
+                .try_reserve(1)
+                .map_err(|_| Error::OutOfMemory { bytes: size_of::<Segment<M, T>>() })?;
+            self.segments.push(Segment::default());
+        }
+        let given = self.integrator.base.given;
+        let result = self.take(x0, controls, ends);
+        self.integrator.base.given = given;
+        self.integrator.start = start;
+        result?;
+        self.count = count;
+        Ok(())
+    }
+
+    fn take(&mut self, x0: &VectorX<M, T>, controls: &[VectorU<M, T>], ends: &[T]) -> Result<(), Error> {
+        let Self { integrator, segments, statistics, nominal, .. } = self;
+        let (nx, mut x) = (M::Shape::NX, *x0);
+        for (k, ((segment, u), end)) in segments.iter_mut().zip(controls).zip(ends).enumerate() {
+            let span = Span { start: integrator.start, end: *end };
+            (segment.x, segment.u, segment.span, segment.given) = (x, *u, span, integrator.base.given);
+            let result = integrator.run(&x, u, *end, true, |_, _| Ok(()));
+            statistics.add(&integrator.statistics);
+            result?;
+            core::mem::swap(&mut integrator.tape, &mut segment.tape);
+            x = integrator.base.result.x;
+            if k == 0 {
+                *nominal = integrator.base.result;
+            }
+            // Where there are several solutions, the next interval goes on with this one.
+            let point = integrator.base.point.as_ref();
+            let ends = point[..nx].iter().chain(&point[2 * nx..]);
+            for (given, end) in integrator.base.given.as_mut().iter_mut().zip(ends) {
+                *given = *end;
+            }
+            integrator.start = *end;
+        }
+        (nominal.x, nominal.z) = (integrator.base.result.x, integrator.base.result.z);
+        Ok(())
+    }
+
+    fn check_frozen(&mut self, start: T, controls: &[VectorU<M, T>], ends: &[T]) -> Result<(), Error> {
+        let segments = self.segments.get_mut(..self.count).unwrap_or_default();
+        let mut before = start;
+        for (segment, end) in segments.iter().zip(ends) {
+            for (t, expected) in [(before, segment.span.start), (*end, segment.span.end)] {
+                if t != expected {
+                    let (start, end) = (segment.span.start.to_f64(), segment.span.end.to_f64());
+                    return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
+                }
+            }
+            before = *end;
+        }
+        if segments.len() != ends.len() {
+            return Err(Error::Intervals { controls: segments.len(), ends: ends.len() });
+        }
+        for (segment, u) in segments.iter_mut().zip(controls) {
+            segment.u = *u;
+        }
+        Ok(())
+    }
+
+    /// All steps again, to rounding.
+    fn replay(&mut self, x0: &VectorX<M, T>) -> Result<(), Error> {
+        let Self { integrator, segments, count, nominal, .. } = self;
+        let mut x = *x0;
+        for (k, segment) in segments.iter_mut().enumerate().take(*count) {
+            segment.x = x;
+            let (mut frozen, state, ..) = segment.open(integrator)?;
+            frozen.solve::<B>(state, &x, None)?;
+            x = integrator.base.result.x;
+            collect(nominal, &integrator.base.result, k);
+        }
+        Ok(())
+    }
+
+    /// The same with derivatives, and what those of second order need.
+    fn sweep(&mut self, x0: &VectorX<M, T>, second: bool) -> Result<PiecewiseForward<M, T>, Error> {
+        let Self { integrator, segments, count, nominal, .. } = self;
+        let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
+        let (nx, width) = (M::Shape::NX, at.all());
+        let mut v = filled(nx * width, T::ZERO)?;
+        let mut next = filled(nx.max(M::Shape::NZ) * width, T::ZERO)?;
+        for x in 0..nx {
+            v[x * width + x] = T::ONE;
+        }
+        let mut result = PiecewiseForward {
+            nominal: *nominal,
+            dx_dx0: Zeroable::zeroed(),
+            dx_du: filled(*count, MatrixXU::<M, T>::zeroed())?,
+            dx_dp: Zeroable::zeroed(),
+            dz_dx0: Zeroable::zeroed(),
+            dz_du: filled(*count, MatrixZU::<M, T>::zeroed())?,
+            dz_dp: Zeroable::zeroed(),
+        };
+        let mut x = *x0;
+        for (k, segment) in segments.iter_mut().enumerate().take(*count) {
+            segment.x = x;
+            if second {
+                segment.v.clone_from(&v);
+            }
+            let mut history = core::mem::take(&mut segment.history);
+            history.clear();
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
+            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), None)?;
+            let local = &memory.hessian.first.forward;
+            x = local.nominal.x;
+            collect(nominal, &local.nominal, k);
+            if k + 1 == *count {
+                at.chain(k, &local.dz_dx0, &local.dz_du, &local.dz_dp, &v, &mut next);
+                fill(&mut result.dz_dx0, |r, c| next[r * width + c]);
+                fill(&mut result.dz_dp, |r, c| next[r * width + at.p() + c]);
+                for (k, du) in result.dz_du.iter_mut().enumerate() {
+                    fill(du, |r, c| next[r * width + at.u(k) + c]);
+                }
+            }
+            at.chain(k, &local.dx_dx0, &local.dx_du, &local.dx_dp, &v, &mut next);
+            v.copy_from_slice(&next[..nx * width]);
+            segment.history = history;
+        }
+        fill(&mut result.dx_dx0, |r, c| v[r * width + c]);
+        fill(&mut result.dx_dp, |r, c| v[r * width + at.p() + c]);
+        for (k, du) in result.dx_du.iter_mut().enumerate() {
+            fill(du, |r, c| v[r * width + at.u(k) + c]);
+        }
+        result.nominal = *nominal;
+        match v.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(Error::Overflow { step: 0, index }),
+            None => Ok(result),
+        }
+    }
+}
+
+/// The result at the end of interval `k`.
+fn collect<M: Dae, T: Real>(nominal: &mut Nominal<M, T>, interval: &Nominal<M, T>, k: usize) {
+    if k == 0 {
+        nominal.z0 = interval.z0;
+    }
+    (nominal.x, nominal.z) = (interval.x, interval.z);
+}
+
+impl<M: Dae, T: Real> Default for Segment<M, T> {
+    fn default() -> Self {
+        Self {
+            tape: Tape::default(),
+            span: Span { start: T::ZERO, end: T::ZERO },
+            u: Zeroable::zeroed(),
+            x: Zeroable::zeroed(),
+            given: Zeroable::zeroed(),
+            history: Vec::new(),
+            v: Vec::new(),
+        }
+    }
+}
+
+impl<M: Dae, T: Real> Segment<M, T> {
+    /// The steps of this interval, to be taken again and differentiated; `V_k`.
+    #[allow(clippy::type_complexity)]
+    fn open<'a, B: Engine<M, T>>(
+        &'a mut self,
+        integrator: &'a mut Integrator<M, B, T>,
+    ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
+        let Integrator { base, consistent, state, memory, .. } = integrator;
+        (base.u, base.given) = (self.u, self.given);
+        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
+        let memory = memory.as_deref_mut().ok_or(missing)?;
+        Ok((Frozen { base, consistent, tape: &mut self.tape, span: self.span }, state, memory, &self.v))
+    }
+}
+
+/// Where the directions `W = (x₀, u₀, …, u_{N−1}, p)` are.
+struct Columns<M> {
+    intervals: usize,
+    model: core::marker::PhantomData<M>,
+}
+
+impl<M: Dae> Columns<M> {
+    fn u(&self, k: usize) -> usize {
+        M::Shape::NX + k * M::Shape::NU
+    }
+
+    fn p(&self) -> usize {
+        self.u(self.intervals)
+    }
+
+    fn all(&self) -> usize {
+        self.p() + M::Shape::NP
+    }
+
+    /// `next = A V + (B at u_k, C at p)`, row after row.
+    fn chain<T: Real>(
+        &self,
+        k: usize,
+        a: &impl Matrix<T>,
+        b: &impl Matrix<T>,
+        c: &impl Matrix<T>,
+        v: &[T],
+        next: &mut [T],
+    ) {
+        let width = self.all();
+        for (r, row) in next.chunks_exact_mut(width).enumerate().take(rows(a)) {
+            row.fill(T::ZERO);
+            for (x, v) in v.chunks_exact(width).enumerate() {
+                axpy(a[(r, x)], v, row);
+            }
+            for (column, element) in row[self.u(k)..].iter_mut().enumerate().take(M::Shape::NU) {
+                *element = *element + b[(r, column)];
+            }
+            for (column, element) in row[self.p()..].iter_mut().enumerate() {
+                *element = *element + c[(r, column)];
+            }
+        }
+    }
+
+    /// `sum += Dᵀ H D`, the product `H D` first.
+    fn project<T: Real, R: AsRef<[T]>>(&self, k: usize, h: &[R], v: &[T], product: &mut [T], sum: &mut [T]) {
+        let (nx, nu, width) = (M::Shape::NX, M::Shape::NU, self.all());
+        // Where a local direction other than a state is.
+        let global = |w: usize| if w < nx + nu { self.u(k) + w - nx } else { self.p() + w - nx - nu };
+        for (row, h) in product.chunks_exact_mut(width).zip(h) {
+            row.fill(T::ZERO);
+            let (states, others) = h.as_ref().split_at(nx);
+            for (h, v) in states.iter().zip(v.chunks_exact(width)) {
+                axpy(*h, v, row);
+            }
+            for (w, h) in others.iter().enumerate() {
+                row[global(nx + w)] = row[global(nx + w)] + *h;
+            }
+        }
+        for (w, row) in product.chunks_exact(width).enumerate() {
+            match v.chunks_exact(width).nth(w) {
+                Some(v) => {
+                    for (v, sum) in v.iter().zip(sum.chunks_exact_mut(width)) {
+                        axpy(*v, row, sum);
+                    }
+                }
+                None => axpy(T::ONE, row, &mut sum[global(w) * width..][..width]),
+            }
+        }
+    }
+}
+
+fn rows<T, A: Matrix<T>>(_: &A) -> usize {
+    A::ROWS
+}
+
+/// # Errors
+/// [`Error::OutOfMemory`]
+fn filled<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> {
+    let mut list = Vec::new();
+    let bytes = length.saturating_mul(size_of::<V>());
+    list.try_reserve_exact(length).map_err(|_| Error::OutOfMemory { bytes })?;
+    list.resize(length, value);
+    Ok(list)
+}
