@@ -68,6 +68,23 @@ pub enum Error {
         /// Where it ended.
         at: Place,
     },
+    /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive integration starts, or Newton's
+    /// method does not find them from the values of `set_start`.
+    InconsistentStart {
+        /// The time.
+        t: f64,
+        /// The equation that is violated most.
+        equation: usize,
+        /// By how much: its residual where Newton's method ended.
+        residual: f64,
+        /// The unknown that the equations do not determine, or else the one that moved most: the state whose derivative
+        /// it is, or the algebraic state.
+        unknown: &'static str,
+        /// Its value where Newton's method ended.
+        value: f64,
+        /// Whether the equations do not determine it.
+        singular: bool,
+    },
     /// An unknown of the stages, or a result, is beyond the range of the number type.
     Overflow {
         /// The step.
@@ -263,6 +280,14 @@ impl fmt::Display for Error {
                 "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
                  relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
             ),
+            Error::InconsistentStart { t, equation, residual, unknown, value, singular } => {
+                write!(f, "there are no consistent derivatives and algebraic states at t = {t}: ")?;
+                match singular {
+                    true => write!(f, "the equations do not determine `{unknown}`, which is at {value:e}")?,
+                    false => write!(f, "Newton's method does not settle, with `{unknown}` at {value:e}")?,
+                }
+                write!(f, " where equation {equation} has the residual {residual:e}")
+            }
             Error::Overflow { step, index } => {
                 write!(
                     f,

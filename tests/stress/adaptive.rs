@@ -111,7 +111,7 @@ fn index_two() {
     let mut adaptive = Adaptive::<Hidden, Radau>::new(options(1e-6)).expect("valid");
     adaptive.set_parameters(&SVector::from([0.0])).expect("finite");
     match adaptive.solve(&zero(), &zero(), 1.0).map(|result| result.x) {
-        Err(Error::Singular { unknown, .. }) => assert_eq!(unknown, "z"),
+        Err(Error::InconsistentStart { unknown, singular: true, .. }) => assert_eq!(unknown, "z"),
         other => panic!("{other:?}"),
     }
     adaptive.set_parameters(&SVector::from([1.0])).expect("finite");

@@ -5,12 +5,13 @@
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
-use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
+use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::options::{Options, Start};
 use crate::result::Forward;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use crate::tableau::{Custom, Euler, Method};
+use bytemuck::Zeroable;
 
 /// Solves for `(ẋ, z)`.
 pub struct Consistent<M: Dae, T: Real> {
@@ -55,10 +56,12 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     /// From the start values in `y`: `(ẋ, z)` there; the number of points at which the model was evaluated.
     ///
     /// # Errors
-    /// Those of Newton's method, which name the equation or the unknown.
+    /// [`Error::InconsistentStart`]; the others of Newton's method.
     pub fn solve(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
         let euler = self.euler(at, y)?;
-        euler.solve(at.x, at.u, T::ZERO)?;
+        if let Err(error) = euler.solve(at.x, at.u, T::ZERO) {
+            return Err(explain(euler, error, at.t));
+        }
         y.as_mut().copy_from_slice(euler.stages()?);
         let statistics = euler.statistics();
         Ok(statistics.residuals + statistics.jacobians)
@@ -70,6 +73,38 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     /// As [`Consistent::solve`].
     pub fn forward(&mut self, at: &At<'_, M, T>, y: &ArrayK<M, T>) -> Result<&Forward<M, T>, Error> {
         self.euler(at, y)?.forward(at.x, at.u, T::ZERO)
+    }
+}
+
+/// What is inconsistent where Newton's method ended.
+fn explain<M: Dae, T: Real>(euler: &mut Integrator<M, Custom<1>, 1, T, Heap>, error: Error, t: T) -> Error {
+    let (unknown, worst) = match error {
+        Error::Singular { unknown, .. } => (unknown, None),
+        Error::NotConverged { unknown, equation, .. } => (unknown, Some(equation)),
+        other => return other,
+    };
+    let Ok(points) = euler.points() else { return error };
+    let mut v = ArrayV::<M, T>::zeroed();
+    for (v, [point]) in v.as_mut().iter_mut().zip(points.as_ref()) {
+        *v = *point;
+    }
+    let mut f = ArrayK::<M, T>::zeroed();
+    M::residual::<T>(&v, &mut f);
+    let f = f.as_ref();
+    let largest = || (0..f.len()).max_by(|a, b| f[*a].abs().to_f64().total_cmp(&f[*b].abs().to_f64()));
+    let equation = worst.or_else(largest).unwrap_or_default();
+    let (nx, (x, z)) = (M::Shape::NX, (M::STRUCTURE.x, M::STRUCTURE.z));
+    let state = x.iter().position(|name| *name == unknown);
+    let algebraic = z.iter().position(|name| *name == unknown).map(|index| 2 * nx + index);
+    let value = state.or(algebraic).and_then(|index| v.as_ref().get(index));
+    let number = |value: Option<&T>| value.map_or(f64::NAN, |value| value.to_f64());
+    Error::InconsistentStart {
+        t: t.to_f64(),
+        equation,
+        residual: number(f.get(equation)),
+        unknown,
+        value: number(value),
+        singular: worst.is_none(),
     }
 }
 

@@ -25,8 +25,8 @@ use core::marker::PhantomData;
 /// the start. They return a reference to results in the memory of the integrator.
 ///
 /// # Errors
-/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`]; [`Error::Singular`] and
-/// [`Error::NotConverged`] if there are no consistent `ẋ` and `z` at the start; [`Error::NonFiniteModel`] if the
+/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`]; [`Error::InconsistentStart`] if there are no
+/// consistent `ẋ` and `z` at the start, [`Error::Singular`] if no step can be solved; [`Error::NonFiniteModel`] if the
 /// model has no finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
 /// [`Error::OutOfMemory`]. Then the integrator is usable.
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {

@@ -370,7 +370,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         match self.consistent.solve(&at, start) {
             Ok(points) => self.statistics.residuals += points,
             // Without algebraic states all equations may still be solvable: the matrix of ẋ has not full rank.
-            Err(Error::Singular { .. }) if M::Shape::NZ == 0 => *start = Zeroable::zeroed(),
+            Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => {
+                *start = Zeroable::zeroed()
+            }
             Err(error) => return Err(error),
         }
         let start = *start;

@@ -180,6 +180,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
+    /// The variables at the stages where the last call ended, successful or not.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn points(&mut self) -> Result<&crate::model::ArrayV<M, [T; S]>, Error> {
+        self.run.points()
+    }
+
     /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages innermost.
     #[cfg(feature = "alloc")]
     pub(crate) fn stages(&mut self) -> Result<&[T], Error> {

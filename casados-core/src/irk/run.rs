@@ -6,6 +6,8 @@ use super::record::{Coefficients, Step, Work};
 use super::step::From;
 use crate::error::{Argument, Error};
 use crate::memory::Memory;
+#[cfg(feature = "alloc")]
+use crate::model::ArrayV;
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::options::{Options, Start};
 use crate::scalar::Real;
@@ -171,6 +173,12 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             self.warm = true;
         }
         Ok(())
+    }
+
+    /// The variables at the stages where the last call ended, successful or not.
+    #[cfg(feature = "alloc")]
+    pub fn points(&mut self) -> Result<&ArrayV<M, [T; S]>, Error> {
+        Ok(&W::nominal(&mut self.work)?.points)
     }
 
     /// The stages of every step, as a warm start.
