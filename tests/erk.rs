@@ -1,7 +1,7 @@
 //! Explicit integrators against an independent implementation over dual numbers.
 
 use casados::memory::{Inline, mode};
-use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure};
+use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, symmetric};
 use casados::tableau::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Method, Midpoint, Rk4};
 use casados::{Custom, Dae, Dims, Erk, Error, Lanes, Ode, Options, Tableau};
 use nalgebra::{SMatrix, SVector, vector};
@@ -38,7 +38,12 @@ impl Dae for Oscillator {
         trivial: &[],
         quadratures: &[],
         directions: &[0, 1, 2, 3],
+        column_of_direction: &[0, 1, 2, 3],
         curved: &[2, 3, 4, 5],
+        symmetric: &symmetric::<4, 8>(
+            &Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
+            &[2, 3, 4, 5],
+        ),
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,
     };

@@ -7,7 +7,10 @@
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
-pub use crate::structure::{Assembly, Cost, Elimination, Operations, Pattern, Pivot, Structure, all};
+pub use crate::structure::{
+    Assembly, Cost, Elimination, NO_COLUMN, Operations, Pattern, Pivot, Structure, Term, all, columns,
+    symmetric,
+};
 
 /// `[T; NX]` of a model.
 pub type ArrayX<M, T> = <<M as Dae>::Shape as Shape>::ArrayX<T>;

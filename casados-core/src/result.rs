@@ -7,7 +7,7 @@ use crate::model::{
     Dae, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX, MatrixZC,
     MatrixZP, MatrixZU, MatrixZX, VectorP, VectorU, VectorX, VectorZ,
 };
-use crate::shape::{Plain, plain};
+use crate::shape::{Array, Matrix, Plain, plain};
 use bytemuck::Zeroable;
 use core::ops::Deref;
 
@@ -219,3 +219,36 @@ contains!(Directional.nominal: Nominal, C);
 contains!(ForwardAdjoint.forward: Forward,);
 contains!(Hessian.first: ForwardAdjoint,);
 contains!(DenseForward.dense: Dense,);
+
+/// A row over the directions `(x₀, u, p)`, written to row `r` of three matrices.
+pub(crate) fn split<T: Plain>(
+    row: &[T],
+    r: usize,
+    x: &mut impl Matrix<T>,
+    u: &mut impl Matrix<T>,
+    p: &mut impl Matrix<T>,
+) {
+    let mut values = row.iter();
+    copy_row(&mut values, r, x);
+    copy_row(&mut values, r, u);
+    copy_row(&mut values, r, p);
+}
+
+fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
+    for column in 0..A::COLUMNS {
+        if let Some(value) = values.next() {
+            to[(r, column)] = *value;
+        }
+    }
+}
+
+/// A block on the diagonal, from its lower triangle.
+pub(crate) fn symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
+    for r in 0..A::ROWS {
+        for c in 0..=r {
+            let value = lower[offset + r][offset + c];
+            block[(r, c)] = value;
+            block[(c, r)] = value;
+        }
+    }
+}

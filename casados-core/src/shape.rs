@@ -51,6 +51,10 @@ pub trait Array<T>: Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[
     const LEN: usize;
     /// `[f(0), f(1), ...]`
     fn from_fn(f: impl FnMut(usize) -> T) -> Self;
+    /// The elements of arrays, one array after the other.
+    fn flat(arrays: &[Self]) -> &[T];
+    /// The elements of arrays, one array after the other.
+    fn flat_mut(arrays: &mut [Self]) -> &mut [T];
 }
 
 impl<T: Plain, const N: usize> Array<T> for [T; N] {
@@ -58,6 +62,14 @@ impl<T: Plain, const N: usize> Array<T> for [T; N] {
     #[inline(always)]
     fn from_fn(f: impl FnMut(usize) -> T) -> Self {
         core::array::from_fn(f)
+    }
+    #[inline(always)]
+    fn flat(arrays: &[Self]) -> &[T] {
+        arrays.as_flattened()
+    }
+    #[inline(always)]
+    fn flat_mut(arrays: &mut [Self]) -> &mut [T] {
+        arrays.as_flattened_mut()
     }
 }
 

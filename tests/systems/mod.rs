@@ -132,7 +132,7 @@ macro_rules! system {
         $(#[$doc])*
         struct $name;
         const _: () = {
-            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all};
+            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, symmetric};
             const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
             const JACOBIAN: usize = ($nx + $nz) * (NV - 1);
             const HESSIAN: usize = NV * (NV - 1) / 2;
@@ -161,7 +161,14 @@ macro_rules! system {
                     trivial: &[],
                     quadratures: &[],
                     directions: &all::<{ $nx + $nu + $np }>(),
+                    column_of_direction: &all::<{ $nx + $nu + $np }>(),
                     curved: &all::<{ 2 * $nx + $nz + $nu + $np }>(),
+                    symmetric: &const {
+                        symmetric::<{ NV - 1 }, { (NV - 1) * (NV - 1) }>(
+                            &Pattern { rows: &TRIANGLE[0], columns: &TRIANGLE[1] },
+                            &all::<{ NV - 1 }>(),
+                        )
+                    },
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
                     elimination: Elimination::NONE,
                 };

@@ -177,7 +177,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let count = pass.steps.len();
         let good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
-            pass.forward(forward, n, count)
+            pass.forward(forward, n, count, None)
         });
         forward.result.forward.nominal = pass.work.result;
         if adjoint {
@@ -220,10 +220,11 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let records = Heap::hessian_tape(&mut self.tape, count)?;
         let mut good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
-            let good = pass.forward(forward, n, count);
-            // What belongs to the last step is still there on the way back.
-            if let (true, Some(record)) = (n + 1 < count, records.get_mut(n)) {
-                record.record(pass.work, forward);
+            let Some(record) = records.get_mut(n) else { return yes::<E>() };
+            let good = pass.forward(forward, n, count, Some(record.curved()));
+            // That of the last step is still there on the way back.
+            if n + 1 < count {
+                record.record(pass.work);
             }
             good
         });
@@ -231,16 +232,15 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref());
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            let mut sweep = &forward.sweep;
             if n + 1 < count {
-                sweep = record.recall(work);
+                record.recall(work);
             }
             good = E::and(good, hessian.backward.stages(work, coefficients));
             hessian.backward.advance(&work.linear);
             hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(sweep, coefficients, work.inputs.time.step);
+            hessian.subtract(record);
         }
-        hessian.collect(forward);
+        hessian.collect(forward, None);
         Ok((good, &hessian.result))
     }
 }
@@ -274,10 +274,15 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
         self.work.linearize_planned(self.coefficients, n, step, exact, self.statistics);
     }
 
-    fn forward(&mut self, forward: &mut ForwardMemory<M, E, S>, n: usize, count: usize) -> E::Mask {
-        forward.begin(self.work, self.coefficients, n);
-        let good = forward.stages(self.work, self.coefficients, n);
-        forward.collect(self.work, self.coefficients, n, count);
+    fn forward(
+        &mut self,
+        forward: &mut ForwardMemory<M, E, S>,
+        n: usize,
+        count: usize,
+        curved: Option<&mut [E]>,
+    ) -> E::Mask {
+        let good = forward.advance(self.work, self.coefficients, n, curved);
+        forward.collect(self.coefficients, n, count);
         good
     }
 }

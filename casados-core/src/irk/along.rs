@@ -7,13 +7,11 @@
 //! ```
 
 use super::adjoint::Backward;
-use super::forward::Sweep;
-use super::hessian::Rows;
 use super::integrator::Integrator;
 use super::record::{Coefficients, Step, Work};
 use super::run::Parts;
+use super::sweep::Sweep;
 use crate::error::{Error, Place};
-use crate::linalg::dispatch;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorU, VectorX};
 pub(super) use crate::quadrature::{Along, begin, finish, reborrow};
@@ -102,19 +100,18 @@ impl<M: Dae, T: Real, const S: usize> Parts<'_, M, T, S> {
         &mut self,
         n: usize,
         step: &Step<M, T, S>,
-        sweep: &Sweep<M, ArrayW<M, T>, S>,
+        sweep: &Sweep<M, T, ArrayW<M, T>, S>,
         second: bool,
         integrand: &mut dyn Integrand<M, T>,
     ) -> Result<(), Error> {
         let Self { work, coefficients, .. } = self;
         let h = work.inputs.time.step;
         work.place(coefficients, n, &step.x, &step.y);
-        for (stage, (b, a)) in coefficients.b.iter().zip(&coefficients.a).enumerate() {
+        for (stage, b) in coefficients.b.iter().enumerate() {
             let integrand = work.point_of(stage, integrand);
-            let curved = integrand.variables();
-            let (v, dy, nx, nz) = (sweep.v.as_ref(), sweep.dy.as_ref(), M::Shape::NX, M::Shape::NZ);
+            let variables = integrand.variables();
             let (_, d) = integrand.point();
-            dispatch(Rows { curved, nx, nz, v, dy, a, h, stage, d });
+            sweep.write_rows(coefficients, h, stage, variables, d);
             integrand.forward(h * *b, second, Place { step: n, stage, iteration: 0 })?;
         }
         Ok(())

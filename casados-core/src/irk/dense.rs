@@ -5,14 +5,14 @@
 //! ```
 
 use super::evaluate::dot;
-use super::forward::{ForwardMemory, split};
+use super::forward::ForwardMemory;
 use super::record::{Inputs, Step};
 use super::step::{algebraic, check};
 use crate::error::{Argument, Error};
 use crate::model::Dae;
 use crate::result::Dense;
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::Matrix;
 use crate::tableau::Tableau;
 
 /// A time as a point of a step.
@@ -84,16 +84,17 @@ impl<T: Real, const S: usize> Point<T, S> {
         h: T,
         memory: &mut ForwardMemory<M, T, S>,
     ) -> Result<(), Error> {
-        let ForwardMemory { dense, sweep, row, .. } = memory;
-        for state in 0..M::Shape::NX {
-            sweep.differential(state, h, &self.weights, row);
-            check(row.as_ref(), self.step)?;
-            split(row.as_ref(), state, &mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
-        }
-        for state in 0..M::Shape::NZ {
-            sweep.algebraic(state, &self.lagrange, row);
-            check(row.as_ref(), self.step)?;
-            split(row.as_ref(), state, &mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
+        memory.interpolate(&self.weights.map(|weight| h * weight), &self.lagrange);
+        let dense = &memory.dense;
+        for values in [
+            dense.dx_dx0.as_slice(),
+            dense.dx_du.as_slice(),
+            dense.dx_dp.as_slice(),
+            dense.dz_dx0.as_slice(),
+            dense.dz_du.as_slice(),
+            dense.dz_dp.as_slice(),
+        ] {
+            check(values, self.step)?;
         }
         Ok(())
     }

@@ -6,193 +6,19 @@
 //!
 //! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
 
-use super::evaluate::entries;
+use super::directions::{Identity, Seeded};
 use super::record::{Coefficients, Work, copy};
 use super::step::check;
+use super::sweep::{Sweep, Target};
 use crate::error::Error;
-use crate::linalg::{Arithmetic, Kernel, axpy, dispatch, slot};
-use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
+use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::model::{ArrayW, Dae, NO_COLUMN};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Array, Matrix, Plain, Shape};
+use crate::shape::{Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
-use core::slice::{from_mut, from_ref};
-
-/// Derivatives of one step in directions that are the elements of `R`.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-pub struct Sweep<M: Dae, R: Plain, const S: usize> {
-    /// `dx_n/dw` at the start of the step.
-    pub(crate) v: ArrayX<M, R>,
-    /// `d(k, z)/dw` at its stages.
-    pub(crate) dy: ArrayK<M, [R; S]>,
-}
-copy!([M: Dae, R: Plain, const S: usize] Sweep<M, R, S>);
-
-/// How the directions depend on `w`.
-pub(crate) trait Directions<E, R> {
-    /// `row += factor · dw_index`
-    fn add(&self, index: usize, factor: E, row: &mut R);
-}
-
-/// One direction for each element of `w`.
-pub(crate) struct Identity;
-
-impl<E: Lanes, R: Array<E>> Directions<E, R> for Identity {
-    #[inline(always)]
-    fn add(&self, index: usize, factor: E, row: &mut R) {
-        if let Some(element) = row.as_mut().get_mut(index) {
-            *element = *element + factor;
-        }
-    }
-}
-
-/// The rows of a matrix: each direction is a column.
-pub(crate) struct Rows<'a, R>(pub &'a [R]);
-
-impl<E: Lanes, R: Array<E>> Directions<E, R> for Rows<'_, R> {
-    #[inline(always)]
-    fn add(&self, index: usize, factor: E, row: &mut R) {
-        if let Some(direction) = self.0.get(index) {
-            axpy(factor, direction.as_ref(), row.as_mut());
-        }
-    }
-}
-
-impl<M: Dae, R: Plain, const S: usize> Sweep<M, R, S> {
-    /// `V_0`
-    pub(crate) fn start<E: Lanes>(&mut self, directions: &impl Directions<E, R>)
-    where
-        R: Array<E>,
-    {
-        for (index, row) in self.v.as_mut().iter_mut().enumerate() {
-            row.as_mut().fill(E::from_f64(0.0));
-            directions.add(index, E::from_f64(1.0), row);
-        }
-    }
-
-    /// `dK` of a step that is linearised, the `first` of the interval or a later one.
-    pub(crate) fn stages<E: Lanes>(
-        &mut self,
-        work: &Work<M, E, S>,
-        directions: &impl Directions<E, R>,
-        first: bool,
-    ) where
-        R: Array<E>,
-    {
-        let Self { v, dy } = self;
-        let (v, jacobian) = (v.as_ref(), work.linear.jacobian.as_ref());
-        dispatch(RightHandSide::<M, E, R, _, S> {
-            v,
-            jacobian,
-            directions,
-            first,
-            dy: dy.as_mut(),
-            model: PhantomData,
-        });
-        work.linear.factors.solve(dy);
-    }
-
-    /// `V_{n+1}`
-    pub(crate) fn advance<E: Lanes>(&mut self, coefficients: &Coefficients<E, S>, h: E)
-    where
-        R: Array<E>,
-    {
-        dispatch(Combine { to: self.v.as_mut(), dy: self.dy.as_ref(), weights: &coefficients.b, h });
-    }
-
-    /// Derivatives `row` of `x` at the point of the step where the weights are `weights`.
-    pub(crate) fn differential<E: Lanes>(&self, state: usize, h: E, weights: &[E; S], row: &mut R)
-    where
-        R: Array<E>,
-    {
-        *row = self.v[state];
-        let (to, dy) = (from_mut(row), from_ref(&self.dy[state]));
-        dispatch(Combine { to, dy, weights, h });
-    }
-
-    /// Derivatives `row` of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
-    pub(crate) fn algebraic<E: Lanes>(&self, state: usize, lagrange: &[E; S], row: &mut R)
-    where
-        R: Array<E>,
-    {
-        row.as_mut().fill(E::from_f64(0.0));
-        let (to, dy) = (from_mut(row), from_ref(&self.dy[M::Shape::NX + state]));
-        dispatch(Combine { to, dy, weights: lagrange, h: E::from_f64(1.0) });
-    }
-}
-
-/// `−(f_x,i V_n + f_w,i)`, equations in their slots.
-struct RightHandSide<'a, M, E, R, D, const S: usize> {
-    v: &'a [R],
-    jacobian: &'a [[E; S]],
-    directions: &'a D,
-    first: bool,
-    dy: &'a mut [[R; S]],
-    model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, R: Array<E>, D: Directions<E, R>, const S: usize> Kernel
-    for RightHandSide<'_, M, E, R, D, S>
-{
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { v, jacobian, directions, first, dy, .. } = self;
-        let (structure, nx) = (&M::STRUCTURE, M::Shape::NX);
-        let blocks = structure.blocks;
-        // Of the first variable that is a direction, `u_0`: columns of the Jacobian minus this are `w`.
-        let shift = nx + M::Shape::NZ;
-        for row in dy.as_flattened_mut() {
-            row.as_mut().fill(E::from_f64(0.0));
-        }
-        for (r, c, values) in entries(structure, jacobian, blocks[1], blocks[2]) {
-            let Some(rows) = dy.get_mut(slot::<M>(r)) else { continue };
-            if first {
-                // The rows of V_0 are the directions.
-                for (row, &value) in rows.iter_mut().zip(values) {
-                    directions.add(c - nx, -value, row);
-                }
-            } else if let Some(v) = v.get(c - nx) {
-                for (row, &value) in rows.iter_mut().zip(values) {
-                    for (to, &from) in row.as_mut().iter_mut().zip(v.as_ref()) {
-                        *to = A::subtract(*to, value, from);
-                    }
-                }
-            }
-        }
-        for (r, c, values) in entries(structure, jacobian, blocks[3], blocks[5]) {
-            let Some(rows) = dy.get_mut(slot::<M>(r)) else { continue };
-            for (row, &value) in rows.iter_mut().zip(values) {
-                directions.add(c - shift, -value, row);
-            }
-        }
-    }
-}
-
-/// `to += h Σ_i weight_i dy_i`, row after row.
-struct Combine<'a, E, R, const S: usize> {
-    to: &'a mut [R],
-    dy: &'a [[R; S]],
-    weights: &'a [E; S],
-    h: E,
-}
-
-impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Combine<'_, E, R, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for (to, dy) in self.to.iter_mut().zip(self.dy) {
-            for (&weight, dy) in self.weights.iter().zip(dy) {
-                for (to, &dy) in to.as_mut().iter_mut().zip(dy.as_ref()) {
-                    *to = A::subtract(*to, -(self.h * weight), dy);
-                }
-            }
-        }
-    }
-}
 
 /// Memory of forward sensitivities.
 #[derive(Zeroable)]
@@ -200,57 +26,39 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Combine<'_, E, R, S> {
 pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: ForwardAdjoint<M, T>,
     pub(crate) dense: DenseForward<M, T>,
-    pub(crate) sweep: Sweep<M, ArrayW<M, T>, S>,
-    pub(crate) row: ArrayW<M, T>,
+    pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
-    /// `V_n`
-    pub(crate) fn begin(&mut self, work: &Work<M, E, S>, coefficients: &Coefficients<E, S>, n: usize) {
-        if n == 0 {
-            self.sweep.start(&Identity);
-        } else {
-            self.sweep.advance(coefficients, work.inputs.time.step);
-        }
-    }
-
-    /// The derivatives of the stages, by the factors that are there; whether they satisfy their equations.
-    pub(crate) fn stages(
+    /// A step that is linearised, by the factors that are there; whether the derivatives satisfy their equations.
+    pub(crate) fn advance(
         &mut self,
         work: &mut Work<M, E, S>,
         coefficients: &Coefficients<E, S>,
         n: usize,
+        curved: Option<&mut [E]>,
     ) -> E::Mask {
-        self.sweep.stages(work, &Identity, n == 0);
-        work.verify_forward(&self.sweep, coefficients, &Identity)
+        let directions = &Identity::<M>::ALL;
+        if n == 0 {
+            self.sweep.start(directions);
+        }
+        self.sweep.step(work, coefficients, directions, n == 0, curved)
     }
 
     /// What a step contributes to the result.
-    pub(crate) fn collect(
-        &mut self,
-        work: &Work<M, E, S>,
-        coefficients: &Coefficients<E, S>,
-        n: usize,
-        count: usize,
-    ) {
-        let Self { result, sweep, row, .. } = self;
-        let result = &mut result.forward;
+    pub(crate) fn collect(&mut self, coefficients: &Coefficients<E, S>, n: usize, count: usize) {
+        let Self { result: ForwardAdjoint { forward, .. }, sweep, .. } = self;
         if n == 0 {
-            for state in 0..M::Shape::NZ {
-                sweep.algebraic(state, &coefficients.start, row);
-                split(row.as_ref(), state, &mut result.dz0_dx0, &mut result.dz0_du, &mut result.dz0_dp);
-            }
+            let to = &mut Split::<M, _>::new(&mut forward.dz0_dx0, &mut forward.dz0_du, &mut forward.dz0_dp);
+            sweep.write_algebraic::<Identity<M>>(&coefficients.start, to);
         }
         if n + 1 == count {
-            for state in 0..M::Shape::NZ {
-                sweep.algebraic(state, &coefficients.end, row);
-                split(row.as_ref(), state, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
-            }
-            for state in 0..M::Shape::NX {
-                sweep.differential(state, work.inputs.time.step, &coefficients.b, row);
-                split(row.as_ref(), state, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
-            }
+            let to = &mut Split::<M, _>::new(&mut forward.dz_dx0, &mut forward.dz_du, &mut forward.dz_dp);
+            sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
+            let to = &mut Split::<M, _>::new(&mut forward.dx_dx0, &mut forward.dx_du, &mut forward.dx_dp);
+            to.fill_others();
+            sweep.write_end::<Identity<M>>(to);
         }
     }
 }
@@ -267,14 +75,25 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         n: usize,
         count: usize,
         statistics: &mut Statistics,
+        mut curved: Option<&mut [T]>,
     ) -> Result<(), Error> {
-        self.begin(work, coefficients, n);
-        if !self.stages(work, coefficients, n) && work.linear.factors.is_planned() {
+        let good = self.advance(work, coefficients, n, curved.as_deref_mut());
+        if !good && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
-            self.stages(work, coefficients, n);
+            self.sweep.repeat(work, coefficients, &Identity::<M>::ALL, n == 0, curved);
         }
-        self.collect(work, coefficients, n, count);
+        self.collect(coefficients, n, count);
         Ok(())
+    }
+
+    /// Derivatives at a point of the last step.
+    pub(crate) fn interpolate(&mut self, weights: &[T; S], lagrange: &[T; S]) {
+        let Self { dense, sweep, .. } = self;
+        let to = &mut Split::<M, _>::new(&mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
+        to.fill_others();
+        sweep.write_differential::<Identity<M>>(weights, to);
+        let to = &mut Split::<M, _>::new(&mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
+        sweep.write_algebraic::<Identity<M>>(lagrange, to);
     }
 
     /// # Errors
@@ -355,25 +174,65 @@ impl<E: Lanes> Kernel for Product<'_, E> {
     }
 }
 
-/// A row over the directions `(x₀, u, p)`, written to row `r` of three matrices.
-pub(crate) fn split<T: Plain>(
-    row: &[T],
-    r: usize,
-    x: &mut impl Matrix<T>,
-    u: &mut impl Matrix<T>,
-    p: &mut impl Matrix<T>,
-) {
-    let mut values = row.iter();
-    copy_row(&mut values, r, x);
-    copy_row(&mut values, r, u);
-    copy_row(&mut values, r, p);
+/// Three matrices of derivatives with respect to `x₀`, `u` and `p`, column after column.
+pub(crate) struct Split<'a, M, T> {
+    matrices: [&'a mut [T]; 3],
+    rows: usize,
+    model: PhantomData<M>,
 }
 
-fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>, r: usize, to: &mut A) {
-    for column in 0..A::COLUMNS {
-        if let Some(value) = values.next() {
-            to[(r, column)] = *value;
+impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
+    fn new<X: Matrix<T>>(x: &'a mut X, u: &'a mut impl Matrix<T>, p: &'a mut impl Matrix<T>) -> Self {
+        let matrices = [x.as_mut_slice(), u.as_mut_slice(), p.as_mut_slice()];
+        Self { matrices, rows: X::ROWS, model: PhantomData }
+    }
+
+    /// The column of `dw_index`.
+    #[inline(always)]
+    fn direction(&mut self, index: usize) -> &mut [T] {
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        let [x, u, p] = &mut self.matrices;
+        let (matrix, column) = if index < nx {
+            (x, index)
+        } else if index < nx + nu {
+            (u, index - nx)
+        } else {
+            (p, index - nx - nu)
+        };
+        matrix.get_mut(column * self.rows..(column + 1) * self.rows).unwrap_or_default()
+    }
+
+    /// The columns of `dx₊` in directions that have no influence.
+    fn fill_others(&mut self) {
+        for (index, &column) in M::STRUCTURE.column_of_direction.iter().enumerate() {
+            if column == NO_COLUMN {
+                let column = self.direction(index);
+                column.fill(T::from_f64(0.0));
+                if let Some(element) = column.get_mut(index) {
+                    *element = T::from_f64(1.0);
+                }
+            }
         }
+    }
+}
+
+impl<M: Dae, T: Lanes> Target<T> for Split<'_, M, T> {
+    #[inline(always)]
+    fn column(&mut self, column: usize) -> &mut [T] {
+        self.direction(M::STRUCTURE.directions.get(column).map_or(0, |&index| index as usize))
+    }
+}
+
+/// One matrix, column after column.
+struct Single<'a, T> {
+    matrix: &'a mut [T],
+    rows: usize,
+}
+
+impl<T: Lanes> Target<T> for Single<'_, T> {
+    #[inline(always)]
+    fn column(&mut self, column: usize) -> &mut [T] {
+        self.matrix.get_mut(column * self.rows..(column + 1) * self.rows).unwrap_or_default()
     }
 }
 
@@ -382,9 +241,9 @@ fn copy_row<'a, T: Plain, A: Matrix<T>>(values: &mut impl Iterator<Item = &'a T>
 #[zeroable(bound = "")]
 pub struct DirectionalMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) result: Directional<M, T, C>,
-    pub(crate) sweep: Sweep<M, [T; C], S>,
+    sweep: Sweep<M, T, [T; C], S>,
     /// The seeds, one row for each element of `w`.
-    pub(crate) seeds: ArrayW<M, [T; C]>,
+    seeds: ArrayW<M, [T; C]>,
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] DirectionalMemory<M, T, S, C>);
 
@@ -417,33 +276,24 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
         let Self { result, sweep, seeds } = self;
-        let directions = Rows(seeds.as_ref());
+        let directions = &Seeded(seeds.as_ref());
         if n == 0 {
-            sweep.start(&directions);
-        } else {
-            sweep.advance(coefficients, work.inputs.time.step);
+            sweep.start(directions);
         }
-        sweep.stages(work, &directions, n == 0);
-        if !work.verify_forward(sweep, coefficients, &directions) && work.linear.factors.is_planned() {
+        if !sweep.step(work, coefficients, directions, n == 0, None) && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
-            sweep.stages(work, &directions, n == 0);
+            sweep.repeat(work, coefficients, directions, n == 0, None);
         }
-        let mut row = [T::ZERO; C];
-        for state in 0..M::Shape::NZ {
-            if n == 0 {
-                sweep.algebraic(state, &coefficients.start, &mut row);
-                copy_row(&mut row.iter(), state, &mut result.dz0);
-            }
-            if n + 1 == count {
-                sweep.algebraic(state, &coefficients.end, &mut row);
-                copy_row(&mut row.iter(), state, &mut result.dz);
-            }
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        if n == 0 {
+            let to = &mut Single { matrix: result.dz0.as_mut_slice(), rows: nz };
+            sweep.write_algebraic::<Seeded<'_, T, C>>(&coefficients.start, to);
         }
         if n + 1 == count {
-            for state in 0..M::Shape::NX {
-                sweep.differential(state, work.inputs.time.step, &coefficients.b, &mut row);
-                copy_row(&mut row.iter(), state, &mut result.dx);
-            }
+            let to = &mut Single { matrix: result.dz.as_mut_slice(), rows: nz };
+            sweep.write_algebraic::<Seeded<'_, T, C>>(&coefficients.end, to);
+            let to = &mut Single { matrix: result.dx.as_mut_slice(), rows: nx };
+            sweep.write_end::<Seeded<'_, T, C>>(to);
         }
         Ok(())
     }

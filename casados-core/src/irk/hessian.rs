@@ -9,19 +9,24 @@
 
 use super::adjoint::Backward;
 use super::along::Along;
+use super::directions::{Identity, panel, panel_mut, panels};
 use super::evaluate::{Give, Take, not_finite};
-use super::forward::{ForwardMemory, Sweep};
+use super::forward::ForwardMemory;
 use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, axpy, dispatch, slot};
-use crate::model::{ArrayK, ArrayV, ArrayW, Dae, Pattern};
+use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide};
 use crate::shape::assign;
 use crate::shape::{Array, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// The columns of the widest panel.
+const PANEL: usize = 8;
 
 /// Memory of second-order sensitivities.
 #[derive(Zeroable)]
@@ -29,11 +34,9 @@ use bytemuck::Zeroable;
 pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: Hessian<M, T>,
     pub(crate) backward: Backward<M, T, S, 1>,
-    /// `D` at one stage.
-    d: ArrayV<M, ArrayW<M, T>>,
-    /// `G = H D` at one stage.
-    g: ArrayV<M, ArrayW<M, T>>,
-    /// The Hessian over `w`, its lower triangle.
+    /// `−H D` of a panel at all stages.
+    g: ArrayV<M, [[T; PANEL]; S]>,
+    /// The Hessian over the directions that have any influence, its lower triangle.
     sum: ArrayW<M, ArrayW<M, T>>,
     /// `μ` at all stages, in the order of the equations.
     mu: ArrayK<M, [T; S]>,
@@ -47,26 +50,30 @@ copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 #[zeroable(bound = "")]
 pub struct HessianStep<M: Dae, T: Plain, const S: usize> {
     linear: Linearization<M, T, S>,
-    sweep: Sweep<M, ArrayW<M, T>, S>,
+    /// The rows of `D` at all stages that enter second derivatives, in panels.
+    d: ArrayV<M, [ArrayW<M, T>; S]>,
 }
 copy!([M: Dae, T: Plain, const S: usize] HessianStep<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> HessianStep<M, E, S> {
-    /// Remembers a step on the way forth.
-    pub(crate) fn record(&mut self, work: &Work<M, E, S>, forward: &ForwardMemory<M, E, S>) {
-        self.linear.copy_from(&work.linear);
-        assign(&mut self.sweep, &forward.sweep);
+    /// Where the way forth writes `D`.
+    pub(crate) fn curved(&mut self) -> &mut [E] {
+        Array::flat_mut(self.d.as_mut().as_flattened_mut())
     }
 
-    /// Brings back what was remembered: the linearisation, and the derivatives of the stages.
-    pub(crate) fn recall(&self, work: &mut Work<M, E, S>) -> &Sweep<M, ArrayW<M, E>, S> {
+    /// Remembers the linearisation on the way forth.
+    pub(crate) fn record(&mut self, work: &Work<M, E, S>) {
+        self.linear.copy_from(&work.linear);
+    }
+
+    /// Brings it back.
+    pub(crate) fn recall(&self, work: &mut Work<M, E, S>) {
         work.linear.copy_from(&self.linear);
-        &self.sweep
     }
 }
 
 impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
-    /// The way back, with the derivatives of the `last` step, which is not recorded.
+    /// The way back; the linearisation of the last step is still there.
     ///
     /// # Errors
     /// A second derivative of the model that is not finite, a singular matrix.
@@ -77,16 +84,14 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
         coefficients: &Coefficients<T, S>,
         steps: &[Step<M, T, S>],
         records: &[HessianStep<M, T, S>],
-        last: &Sweep<M, ArrayW<M, T>, S>,
         seed: &[T],
         statistics: &mut Statistics,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(seed);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            let mut sweep = last;
             if n + 1 < steps.len() {
-                sweep = record.recall(work);
+                record.recall(work);
             }
             self.backward.step(work, coefficients, n, step, statistics, &mut along)?;
             self.curvature(work, coefficients, n, step);
@@ -98,20 +103,13 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(sweep, coefficients, work.inputs.time.step);
+            self.subtract(record);
         }
         Ok(())
     }
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
-    /// `sum += Σ Dᵀ ∇² D` of an integrand.
-    pub(crate) fn add(&mut self, second: &[ArrayW<M, E>]) {
-        for (sum, second) in self.sum.as_mut().iter_mut().zip(second) {
-            axpy(E::from_f64(1.0), second.as_ref(), sum.as_mut());
-        }
-    }
-
     /// Before the last step.
     pub(crate) fn begin(&mut self, seed: &[E]) {
         self.backward.start(seed);
@@ -146,27 +144,15 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     }
 
     /// `sum −= Σ_i D_iᵀ H_i D_i`
-    pub(crate) fn subtract(
-        &mut self,
-        sweep: &Sweep<M, ArrayW<M, E>, S>,
-        coefficients: &Coefficients<E, S>,
-        h: E,
-    ) {
-        let Self { d, g, sum, entries, .. } = self;
-        let curved = M::STRUCTURE.curved;
-        for stage in 0..S {
-            let (v, dy, nx, nz) = (sweep.v.as_ref(), sweep.dy.as_ref(), M::Shape::NX, M::Shape::NZ);
-            dispatch(Rows { curved, nx, nz, v, dy, a: &coefficients.a[stage], h, stage, d: d.as_mut() });
-            dispatch(Subtract {
-                pattern: M::STRUCTURE.hessian,
-                curved,
-                entries: entries.as_ref(),
-                stage,
-                d: d.as_ref(),
-                g: g.as_mut(),
-                sum: sum.as_mut(),
-            });
-        }
+    pub(crate) fn subtract(&mut self, record: &HessianStep<M, E, S>) {
+        let Self { g, sum, entries, .. } = self;
+        dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
+            entries: entries.as_ref(),
+            d: Array::flat(record.d.as_ref().as_flattened()),
+            g: g.as_mut(),
+            sum: sum.as_mut(),
+            model: PhantomData,
+        });
     }
 }
 
@@ -186,9 +172,9 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, 
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
-    /// The result, after the first step.
-    pub(crate) fn collect(&mut self, forward: &ForwardMemory<M, E, S>) {
-        let (nx, nu, np) = (M::Shape::NX, M::Shape::NU, M::Shape::NP);
+    /// The result, after the first step, and `more`: second derivatives of an integrand.
+    pub(crate) fn collect(&mut self, forward: &ForwardMemory<M, E, S>, more: Option<&[ArrayW<M, E>]>) {
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         let Self { result, backward, sum, .. } = self;
         assign(&mut result.first.forward, &forward.result.forward);
         for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
@@ -201,20 +187,39 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         for (to, [from]) in result.first.grad_p.as_mut_slice().iter_mut().zip(gradient) {
             *to = *from;
         }
-        symmetric(&mut result.h_xx, sum.as_ref(), 0);
-        symmetric(&mut result.h_uu, sum.as_ref(), nx);
-        symmetric(&mut result.h_pp, sum.as_ref(), nx + nu);
-        for x in 0..nx {
-            for u in 0..nu {
-                result.h_xu[(x, u)] = sum[nx + u][x];
-            }
-            for p in 0..np {
-                result.h_xp[(x, p)] = sum[nx + nu + p][x];
-            }
-        }
-        for u in 0..nu {
-            for p in 0..np {
-                result.h_up[(u, p)] = sum[nx + nu + p][nx + u];
+        let sum = Lower::<M, E> { sum, more };
+        let (u, p) = (nx, nx + nu);
+        sum.write(&mut result.h_xx, 0, 0);
+        sum.write(&mut result.h_uu, u, u);
+        sum.write(&mut result.h_pp, p, p);
+        sum.write(&mut result.h_xu, 0, u);
+        sum.write(&mut result.h_xp, 0, p);
+        sum.write(&mut result.h_up, u, p);
+    }
+}
+
+/// A symmetric matrix over the directions that have any influence, of which the lower triangle is known.
+struct Lower<'a, M: Dae, E: Plain> {
+    sum: &'a ArrayW<M, ArrayW<M, E>>,
+    /// What an integrand adds, over all directions.
+    more: Option<&'a [ArrayW<M, E>]>,
+}
+
+impl<M: Dae, E: Lanes> Lower<'_, M, E> {
+    /// Its part over the directions from `row` on and those from `column` on, which are not before them.
+    fn write<B: Matrix<E>>(&self, to: &mut B, row: usize, column: usize) {
+        for (c, to) in to.as_mut_slice().chunks_exact_mut(B::ROWS.max(1)).enumerate() {
+            let c = column + c;
+            let of_c = Identity::<M>::column(c);
+            for (r, to) in to.iter_mut().enumerate() {
+                let r = row + r;
+                *to = match (Identity::<M>::column(r), of_c) {
+                    (Some(r), Some(c)) => self.sum[r.max(c)][r.min(c)],
+                    _ => E::from_f64(0.0),
+                };
+                if let Some(more) = self.more.and_then(|more| more.get(r.max(c))) {
+                    *to = *to + more[r.min(c)];
+                }
             }
         }
     }
@@ -223,8 +228,12 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
 impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, forward: &ForwardMemory<M, T, S>) -> Result<(), Error> {
-        self.collect(forward);
+    pub(crate) fn finish(
+        &mut self,
+        forward: &ForwardMemory<M, T, S>,
+        more: Option<&[ArrayW<M, T>]>,
+    ) -> Result<(), Error> {
+        self.collect(forward, more);
         let result = &self.result;
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
         for values in [
@@ -244,163 +253,85 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     }
 }
 
-/// The rows of `D` at a stage that enter second derivatives.
-pub(super) struct Rows<'a, E, R, const S: usize> {
-    pub curved: &'static [u32],
-    pub nx: usize,
-    pub nz: usize,
-    pub v: &'a [R],
-    pub dy: &'a [[R; S]],
-    pub a: &'a [E; S],
-    pub h: E,
-    pub stage: usize,
-    pub d: &'a mut [R],
+/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own.
+struct Subtract<'a, M, E, R, const S: usize> {
+    entries: &'a [[E; S]],
+    d: &'a [E],
+    g: &'a mut [[[E; PANEL]; S]],
+    sum: &'a mut [R],
+    model: PhantomData<M>,
 }
 
-impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Rows<'_, E, R, S> {
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { curved, nx, nz, v, dy, a, h, stage, d } = self;
-        for &variable in curved {
-            let variable = variable as usize;
-            let Some(row) = d.get_mut(variable) else { continue };
-            if variable < nx {
-                if let Some(dk) = dy.get(variable) {
-                    *row = dk[stage];
-                }
-            } else if variable < 2 * nx {
-                let (Some(dk), Some(v)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
-                *row = *v;
-                for (&a, dk) in a.iter().zip(dk) {
-                    for (to, &dk) in row.as_mut().iter_mut().zip(dk.as_ref()) {
-                        *to = A::subtract(*to, -(h * a), dk);
-                    }
-                }
-            } else if variable < 2 * nx + nz {
-                if let Some(dz) = dy.get(variable - nx) {
-                    *row = dz[stage];
-                }
-            } else {
-                row.as_mut().fill(E::from_f64(0.0));
-                if let Some(element) = row.as_mut().get_mut(variable - nx - nz) {
-                    *element = E::from_f64(1.0);
-                }
-            }
-        }
+    fn run<A: Arithmetic>(mut self) {
+        panels!(M::STRUCTURE.directions.len(), E, column, W => self.panel::<A, W>(column));
     }
 }
 
-/// `sum −= Dᵀ H D` at a stage, the lower triangle, with `H` given by its own.
-pub(crate) struct Subtract<'a, E, R, const S: usize> {
-    pub pattern: Pattern,
-    pub curved: &'static [u32],
-    pub entries: &'a [[E; S]],
-    pub stage: usize,
-    pub d: &'a [R],
-    pub g: &'a mut [R],
-    pub sum: &'a mut [R],
-}
-
-impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
-    type Output = ();
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { pattern, curved, entries, stage, d, g, sum } = self;
-        for &row in curved {
-            if let Some(row) = g.get_mut(row as usize) {
-                row.as_mut().fill(E::from_f64(0.0));
+    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
+        let rows = M::STRUCTURE.curved.len() * S;
+        let (d, _) = panel::<E, W>(self.d, column, rows).as_chunks::<S>();
+        let g = self.g.as_flattened_mut().as_flattened_mut();
+        let (g, _) = panel_mut::<E, W>(g, 0, rows).as_chunks_mut::<S>();
+        // G = H D, row by row, each in registers.
+        let mut packet = [[E::from_f64(0.0); W]; S];
+        let mut terms = M::STRUCTURE.symmetric.iter().peekable();
+        while let Some(term) = terms.next() {
+            if let (Some(values), Some(d)) =
+                (self.entries.get(term.entry as usize), d.get(term.column as usize))
+            {
+                for ((packet, &value), d) in packet.iter_mut().zip(values).zip(d) {
+                    A::subtract_row(packet, -value, d);
+                }
+            }
+            if terms.peek().is_none_or(|next| next.row != term.row) {
+                if let Some(to) = g.get_mut(term.row as usize) {
+                    *to = packet;
+                }
+                packet = [[E::from_f64(0.0); W]; S];
             }
         }
-        // G = H D
-        let places = pattern.rows.iter().zip(pattern.columns);
-        for ((&row, &column), values) in places.zip(entries) {
-            let Some(&value) = values.get(stage) else { continue };
-            add::<A, E, R>(value, d, column, g, row);
-            if row != column {
-                add::<A, E, R>(value, d, row, g, column);
-            }
-        }
-        // Tiles of the triangle, each over all curved variables while it is in registers. The last ones lie over
-        // those before, and leave out what these have done.
-        // Of numbers that are registers themselves, narrow ones.
-        let wide = const { size_of::<E>() <= 8 };
-        let rows = if R::LEN < 4 { 1 } else { 4 };
-        let mut row = 0;
-        while row < R::LEN {
-            let start = row.min(R::LEN - rows);
-            let mut column = 0;
-            while column < start + rows {
-                let skip = [row - start, 0];
-                if wide && column + 8 <= R::LEN && rows == 4 {
-                    tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, column], skip);
-                    column += 8;
-                } else if wide && R::LEN >= 8 && column + 4 < R::LEN {
-                    let at = R::LEN - 8;
-                    tile::<A, E, R, 4, 8>(curved, d, g, sum, [start, at], [skip[0], column - at]);
-                    column = R::LEN;
-                } else if !wide && rows == 4 {
-                    let at = column.min(R::LEN - 2);
-                    tile::<A, E, R, 4, 2>(curved, d, g, sum, [start, at], [skip[0], column - at]);
-                    column = at + 2;
-                } else if rows == 4 {
-                    let at = column.min(R::LEN - 4);
-                    tile::<A, E, R, 4, 4>(curved, d, g, sum, [start, at], [skip[0], column - at]);
-                    column = at + 4;
+        let g = g.as_flattened();
+        panels!(M::STRUCTURE.directions.len(), E, row, V => {
+            if row >= column {
+                let d = panel::<E, V>(self.d, row, rows);
+                if const { V > 4 } {
+                    tiles::<A, E, R, V, 4, W>(d, g, self.sum, row, column);
                 } else {
-                    tile::<A, E, R, 1, 1>(curved, d, g, sum, [start, column], skip);
-                    column += 1;
+                    tiles::<A, E, R, V, V, W>(d, g, self.sum, row, column);
                 }
             }
-            row = start + rows;
-        }
+        });
     }
 }
 
-/// `g_to += value · d_from`
+/// `sum −= Dᵀ G` for the panels of `D` and `G` that begin with a row and a column; each tile is in registers while it goes
+/// through all variables at all stages. Above the diagonal it writes what nobody reads.
 #[inline(always)]
-fn add<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &mut [R], to: u32) {
-    let (Some(from), Some(to)) = (d.get(from as usize), g.get_mut(to as usize)) else { return };
-    let value = -value;
-    for (to, &from) in to.as_mut().iter_mut().zip(from.as_ref()) {
-        *to = A::subtract(*to, value, from);
-    }
-}
-
-/// A tile of `sum −= Dᵀ G` from a row and a column on, but for the first ones that are to be skipped; above the diagonal
-/// it may write what nobody reads.
-#[inline(always)]
-fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
-    curved: &[u32],
-    d: &[R],
-    g: &[R],
+fn tiles<A: Arithmetic, E: Lanes, R: Array<E>, const V: usize, const ROWS: usize, const W: usize>(
+    d: &[[E; V]],
+    g: &[[E; W]],
     sum: &mut [R],
-    [row, column]: [usize; 2],
-    skip: [usize; 2],
+    row: usize,
+    column: usize,
 ) {
-    let mut tile = [[E::from_f64(0.0); COLUMNS]; ROWS];
-    for &variable in curved {
-        let (Some(d), Some(g)) = (d.get(variable as usize), g.get(variable as usize)) else { continue };
-        let (Some(d), Some(g)) = (d.as_ref().get(row..), g.as_ref().get(column..)) else { continue };
-        let (Some(d), Some(g)) = (d.first_chunk::<ROWS>(), g.first_chunk::<COLUMNS>()) else { continue };
-        for (tile, &d) in tile.iter_mut().zip(d) {
-            A::subtract_row(tile, d, g);
+    for t in 0..V / ROWS {
+        let mut tile = [[E::from_f64(0.0); W]; ROWS];
+        for (d, g) in d.iter().zip(g) {
+            let Some(d) = d.as_chunks::<ROWS>().0.get(t) else { continue };
+            for (tile, &d) in tile.iter_mut().zip(d) {
+                A::subtract_row(tile, d, g);
+            }
         }
-    }
-    for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row)).skip(skip[0]) {
-        for (&tile, sum) in tile.iter().zip(sum.as_mut().iter_mut().skip(column)).skip(skip[1]) {
-            *sum = *sum + tile;
-        }
-    }
-}
-
-/// A block on the diagonal, from its lower triangle.
-pub(crate) fn symmetric<T: Plain, R: Array<T>, A: Matrix<T>>(block: &mut A, lower: &[R], offset: usize) {
-    for r in 0..A::ROWS {
-        for c in 0..=r {
-            let value = lower[offset + r][offset + c];
-            block[(r, c)] = value;
-            block[(c, r)] = value;
+        for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row + t * ROWS)) {
+            let columns = sum.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut::<W>());
+            for (sum, &tile) in columns.into_iter().flatten().zip(tile) {
+                *sum = *sum + tile;
+            }
         }
     }
 }

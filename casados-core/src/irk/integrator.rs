@@ -315,7 +315,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
+            forward.step(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
             match &mut along {
                 Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
                 None => Ok(()),
@@ -353,7 +353,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let first = done.map_or(0, |done| done + 1);
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;
-            forward.step(parts.work, parts.coefficients, n, usize::MAX, parts.statistics)?;
+            forward.step(parts.work, parts.coefficients, n, usize::MAX, parts.statistics, None)?;
         }
         self.sweep = Some(point.step);
         let h = parts.work.kept.time.step;
@@ -556,13 +556,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let records = W::hessian_tape(&mut self.hessian_tape, count)?;
         let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            forward.step(parts.work, parts.coefficients, n, count, parts.statistics)?;
+            let Some(record) = records.get_mut(n) else { return Ok(()) };
+            let curved = Some(record.curved());
+            forward.step(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
-            // What belongs to the last step is still there on the way back.
-            if let (true, Some(record)) = (n + 1 < count, records.get_mut(n)) {
-                record.record(parts.work, forward);
+            // That of the last step is still there on the way back.
+            if n + 1 < count {
+                record.record(parts.work);
             }
             Ok(())
         })?;
@@ -573,15 +575,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.coefficients,
             parts.steps,
             records,
-            &forward.sweep,
             lambda.as_slice(),
             parts.statistics,
             reborrow(&mut along),
         )?;
-        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
-            memory.add(second);
-        }
-        memory.finish(forward)?;
+        memory.finish(forward, along.as_ref().and_then(|integrand| integrand.second()))?;
         self.run.keep()?;
         self.sweep = Some(count - 1);
         Ok(&memory.result)

@@ -13,12 +13,14 @@
 //! accurate methods its value at the end is the last stage.
 //!
 //! One file for each thing: `evaluate` the model at the stages, `newton` and, where that does not arrive, `pivoted`,
-//! `step`, `forward`, `adjoint`, `hessian`, `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all
+//! `step`, `forward` by `sweep` over panels of `directions`, `adjoint`, `hessian`, `along` an integrand, `verify` what was solved,
+//! `dense`; `record` is the memory, `run` what all
 //! calls share, `integrator` what users see.
 
 mod adjoint;
 mod along;
 mod dense;
+mod directions;
 mod evaluate;
 mod forward;
 mod hessian;
@@ -28,6 +30,7 @@ mod pivoted;
 mod record;
 mod run;
 mod step;
+mod sweep;
 mod verify;
 
 pub use adjoint::AdjointMemory;
@@ -47,12 +50,7 @@ pub(crate) use self::{
 #[cfg(feature = "alloc")]
 pub(crate) use hessian::{HessianMemory, HessianStep};
 // What integrands are computed with too.
-pub(crate) use self::{
-    evaluate::not_finite,
-    forward::split,
-    hessian::{Subtract, symmetric},
-    step::check as check_values,
-};
+pub(crate) use self::{evaluate::not_finite, step::check as check_values};
 
 use crate::memory::Memory;
 use crate::model::Dae;

@@ -135,7 +135,7 @@ pub struct Work<M: Dae, T: Lanes, const S: usize> {
     pub(crate) mean: MeanFactors<M, T, S>,
     /// Where derivatives are tried on their equations: sums, and the sizes of their terms.
     pub(crate) probe: [ArrayV<M, [T; S]>; 2],
-    pub(crate) sums: [ArrayK<M, [T; S]>; 2],
+    pub(crate) terms: ArrayK<M, [T; S]>,
     /// One stage, for machines whose registers do not hold all of them.
     pub(crate) stage: Stage<M, T::Cell>,
     /// What the factors that are there are good for.

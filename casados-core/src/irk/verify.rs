@@ -6,9 +6,10 @@
 //! error) is held against the sizes of its terms, equation by equation: however equations and unknowns are scaled.
 
 use super::adjoint::Backward;
+use super::directions::{Directions, weight};
 use super::evaluate::entries;
-use super::forward::{Directions, Sweep};
 use super::record::{Coefficients, Work};
+use super::sweep::{STRANDS, Sweep};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::model::Dae;
 use crate::scalar::{Field, Lanes};
@@ -21,56 +22,31 @@ const ROUNDING: f64 = 4096.0;
 /// A residual is zero below this many ε of its terms.
 const RESIDUAL: f64 = 16.0;
 
-/// The weight of a direction in the first sum, or in the second.
-#[inline(always)]
-fn weight<E: Field>(direction: usize, second: bool) -> E {
-    let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;
-    E::from_f64(1.0 + 0.25 * rank as f64)
-}
-
 impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
     ///
     /// Where the directions happen to cancel in the sum, its rounding errors look large beside it. They hardly do in
     /// a second sum too.
-    pub(crate) fn verify_forward<R: Array<E>>(
+    pub(crate) fn verify_forward<R: Array<E>, D: Directions<E>>(
         &mut self,
-        sweep: &Sweep<M, R, S>,
+        sweep: &Sweep<M, E, R, S>,
         coefficients: &Coefficients<E, S>,
-        directions: &impl Directions<E, R>,
-    ) -> E::Mask {
-        let good = self.verify_sum(sweep, coefficients, directions, false);
-        if E::all(good) {
-            return good;
-        }
-        E::or(good, self.verify_sum(sweep, coefficients, directions, true))
-    }
-
-    fn verify_sum<R: Array<E>>(
-        &mut self,
-        sweep: &Sweep<M, R, S>,
-        coefficients: &Coefficients<E, S>,
-        directions: &impl Directions<E, R>,
+        directions: &D,
         second: bool,
     ) -> E::Mask {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
         let probe = self.probe[0].as_mut();
         let inputs = probe.get_mut(nx + nx + nz..).unwrap_or_default();
-        if let Some(inputs) = inputs.get_mut(..M::Shape::NU + M::Shape::NP) {
-            let row = R::from_fn(|_| E::from_f64(0.0));
-            dispatch(Inputs { directions, first: nx, row, inputs, second });
+        for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
+            *input = [directions.total(nx + w, second); S];
         }
-        let [sums, sizes] = &mut self.sums;
-        dispatch(VerifyForward::<M, E, R, S> {
-            v: sweep.v.as_ref(),
-            dy: sweep.dy.as_ref(),
+        dispatch(VerifyForward::<M, E, S> {
+            start_sums: sweep.start_sums.as_ref(),
+            stage_sums: sweep.sums.as_ref(),
             a: &coefficients.a,
             h: self.inputs.time.step,
             jacobian: self.linear.jacobian.as_ref(),
             probe,
-            sums: sums.as_mut(),
-            sizes: sizes.as_mut(),
-            second,
             model: PhantomData,
         })
     }
@@ -105,7 +81,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             f: self.f.as_ref(),
             points: self.points.as_ref(),
             jacobian: self.linear.jacobian.as_ref(),
-            sizes: self.sums[0].as_mut(),
+            sizes: self.terms.as_mut(),
             model: PhantomData,
         })
     }
@@ -142,26 +118,14 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
     }
 }
 
-/// The sum over all directions.
+/// The weighted sum over all seeds.
 #[inline(always)]
-fn sum<E: Field>(row: &[E], second: bool) -> E {
-    // In strands of eight, which a register holds.
-    let zero = E::from_f64(0.0);
-    let mut strands = [zero; 8];
-    let chunks = row.chunks_exact(8);
-    let mut rest = zero;
-    for (w, &value) in chunks.remainder().iter().enumerate() {
-        rest = rest + weight::<E>(w, second) * value;
+fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
+    let mut sum = E::from_f64(0.0);
+    for (seed, &value) in seeds.iter().enumerate() {
+        sum = sum + weight::<E>(seed, false) * value;
     }
-    for chunk in chunks {
-        for (w, (strand, &value)) in strands.iter_mut().zip(chunk).enumerate() {
-            *strand = *strand + weight::<E>(w, second) * value;
-        }
-    }
-    for strand in strands {
-        rest = rest + strand;
-    }
-    rest
+    sum
 }
 
 /// `|sum| ≤ ROUNDING ε size`
@@ -170,54 +134,28 @@ fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
     E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size)
 }
 
-/// Sums over all directions of the inputs `u` and `p`.
-struct Inputs<'a, E, R, D, const S: usize> {
-    directions: &'a D,
-    /// Of the first of them.
-    first: usize,
-    row: R,
-    inputs: &'a mut [[E; S]],
-    second: bool,
-}
-
-impl<E: Lanes, R: Array<E>, D: Directions<E, R>, const S: usize> Kernel for Inputs<'_, E, R, D, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { directions, first, mut row, inputs, second } = self;
-        for (w, input) in inputs.iter_mut().enumerate() {
-            row.as_mut().fill(E::from_f64(0.0));
-            directions.add(first + w, E::from_f64(1.0), &mut row);
-            *input = [sum(row.as_ref(), second); S];
-        }
-    }
-}
-
-struct VerifyForward<'a, M, E, R, const S: usize> {
-    v: &'a [R],
-    dy: &'a [[R; S]],
+struct VerifyForward<'a, M, E, const S: usize> {
+    start_sums: &'a [[E; STRANDS]],
+    stage_sums: &'a [[[E; STRANDS]; S]],
     a: &'a [[E; S]; S],
     h: E,
     jacobian: &'a [[E; S]],
     probe: &'a mut [[E; S]],
-    sums: &'a mut [[E; S]],
-    sizes: &'a mut [[E; S]],
-    second: bool,
     model: PhantomData<M>,
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for VerifyForward<'_, M, E, R, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { v, dy, a, h, jacobian, probe, sums, sizes, second, .. } = self;
-        let (nx, zero) = (v.len(), E::from_f64(0.0));
+        let Self { start_sums, stage_sums, a, h, jacobian, probe, .. } = self;
+        let (nx, zero) = (start_sums.len(), E::from_f64(0.0));
         let (xdot, rest) = probe.split_at_mut(nx.min(probe.len()));
         let (xi, rest) = rest.split_at_mut(nx.min(rest.len()));
-        for (((dy, v), xdot), xi) in dy.iter().zip(v).zip(xdot).zip(xi) {
-            *xi = [sum(v.as_ref(), second); S];
-            for (xdot, dk) in xdot.iter_mut().zip(dy) {
-                *xdot = sum(dk.as_ref(), second);
+        for (((stages, start), xdot), xi) in stage_sums.iter().zip(start_sums).zip(xdot).zip(xi) {
+            *xi = [total(start); S];
+            for (xdot, strands) in xdot.iter_mut().zip(stages) {
+                *xdot = total(strands);
             }
             for (xi, a) in xi.iter_mut().zip(a) {
                 for (&a, &dk) in a.iter().zip(xdot.iter()) {
@@ -225,32 +163,44 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for VerifyForward<'_,
                 }
             }
         }
-        for (dz, z) in dy.iter().skip(nx).zip(rest) {
-            for (z, dz) in z.iter_mut().zip(dz) {
-                *z = sum(dz.as_ref(), second);
+        for (stages, z) in stage_sums.iter().skip(nx).zip(rest) {
+            for (z, strands) in z.iter_mut().zip(stages) {
+                *z = total(strands);
             }
         }
-        sums.fill([zero; S]);
-        sizes.fill([zero; S]);
-        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
-            let (Some(sums), Some(sizes), Some(probe)) = (sums.get_mut(r), sizes.get_mut(r), probe.get(c))
-            else {
-                continue;
-            };
-            for (((sum, size), &value), &direction) in sums.iter_mut().zip(sizes).zip(values).zip(probe) {
-                let term = value * direction;
-                *sum = *sum + term;
-                *size = *size + term.abs();
+        // Equation by equation: the entries of a block of the Jacobian lie row by row.
+        let (mut good, mut begin) = (E::le(zero, zero), M::STRUCTURE.blocks);
+        for equation in 0..M::Shape::NK {
+            let (mut sums, mut sizes) = ([zero; S], [zero; S]);
+            for (begin, &end) in begin.iter_mut().zip(&M::STRUCTURE.blocks[1..]) {
+                for (r, c, values) in entries(&M::STRUCTURE, jacobian, *begin, end) {
+                    if r != equation {
+                        break;
+                    }
+                    *begin += 1;
+                    let Some(directions) = probe.get(c) else { continue };
+                    for (((sum, size), &value), &direction) in
+                        sums.iter_mut().zip(&mut sizes).zip(values).zip(directions)
+                    {
+                        let term = value * direction;
+                        *sum = *sum + term;
+                        *size = *size + term.abs();
+                    }
+                }
             }
-        }
-        let mut good = E::le(zero, zero);
-        for (sums, sizes) in sums.iter().zip(sizes.iter()) {
-            for (&sum, &size) in sums.iter().zip(sizes) {
+            for (&sum, &size) in sums.iter().zip(&sizes) {
                 good = E::and(good, is_small(sum, size));
             }
         }
         good
     }
+}
+
+/// The sum of all strands.
+#[inline(always)]
+fn total<E: Field>(strands: &[E; STRANDS]) -> E {
+    let [a, b, c, d] = *strands;
+    (a + b) + (c + d)
 }
 
 struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {
@@ -283,7 +233,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
                 continue;
             };
             for (((total, size), &value), mu) in sums.iter_mut().zip(sizes).zip(values).zip(mu) {
-                let term = value * sum(mu, false);
+                let term = value * sum(mu);
                 *total = *total + term;
                 *size = *size + term.abs();
             }
@@ -297,7 +247,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
             if let (true, Some(xi), Some(xi_size)) =
                 (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown))
             {
-                let right = lambda.get(unknown).map_or(zero, |lambda| sum(lambda, false));
+                let right = lambda.get(unknown).map_or(zero, |lambda| sum(lambda));
                 for i in 0..S {
                     let right = h * b[i] * right;
                     total[i] = total[i] - right;
@@ -311,7 +261,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
             }
             if let Some(source) = source.get(unknown) {
                 for ((total, size), &source) in total.iter_mut().zip(&mut size).zip(source) {
-                    let right = sum(&[source; C], false);
+                    let right = sum(&[source; C]);
                     *total = *total - right;
                     *size = *size + right.abs();
                 }

@@ -64,6 +64,11 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
         }
     }
 
+    /// The factors by the plan.
+    pub fn blocks(&self) -> &[Block<E, S>] {
+        self.blocks.as_ref()
+    }
+
     /// Whether the factors that are there are those of the plan.
     pub fn is_planned(&self) -> bool {
         !self.is_dense

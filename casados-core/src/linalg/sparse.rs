@@ -105,7 +105,7 @@ impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { plan, blocks, rows } = self;
-        packets!(R::LEN, solve_packet(plan, blocks, rows));
+        packets!(R::LEN, solve_packets(plan, blocks, rows));
     }
 }
 
@@ -129,8 +129,9 @@ impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'
     }
 }
 
+/// The part of [`solve`] for `W` columns, inside of a kernel.
 #[inline(always)]
-fn solve_packet<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     plan: &Elimination,
     blocks: &[Block<E, S>],
     rows: &mut [[R; S]],

@@ -1,8 +1,9 @@
 //! A function at a stage, and the products of its derivatives with those of its variables.
 
+use super::product::Subtract;
 use crate::error::{Error, Place};
 use crate::function::{ArrayV, ArrayY, Function};
-use crate::irk::{Subtract, not_finite};
+use crate::irk::not_finite;
 use crate::linalg::{axpy, dispatch};
 use crate::scalar::Real;
 use crate::shape::{Plain, Shape};

@@ -22,6 +22,7 @@
 mod integral;
 mod least_squares;
 mod memory;
+mod product;
 #[cfg(feature = "alloc")]
 mod wrapped;
 

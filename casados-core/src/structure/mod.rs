@@ -1,10 +1,12 @@
 //! What is known about a model before it runs: facts that the macro found in its graph, as constants.
 
 mod cost;
+mod curvature;
 mod describe;
 mod elimination;
 
 pub use cost::Cost;
+pub use curvature::{NO_COLUMN, Term, columns, symmetric};
 pub use elimination::{Assembly, Elimination, Pivot};
 
 /// What is known about a model before it runs.
@@ -51,8 +53,12 @@ pub struct Structure {
     /// have no derivative: the column of `dx₊/dw` is `e_j` for the state `j` and zero for a control or a
     /// parameter, and rows and columns of second derivatives are zero.
     pub directions: &'static [u32],
+    /// For each direction its position in `directions`, or [`NO_COLUMN`]: what [`columns`] makes of them.
+    pub column_of_direction: &'static [u32],
     /// Variables that occur in the pattern of the Hessian, ascending: only their rows of `D_i` enter second derivatives.
     pub curved: &'static [u32],
+    /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`] makes of it.
+    pub symmetric: &'static [Term],
     /// Numbers of arithmetic operations.
     pub operations: Operations,
     /// How the Newton matrix is eliminated.

@@ -3,7 +3,7 @@
 
 pub mod pendulum;
 
-use casados_core::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all};
+use casados_core::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, symmetric};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
 
@@ -77,7 +77,14 @@ impl Dae for Nonlinear {
         trivial: &[],
         quadratures: &[],
         directions: &[0, 1, 2, 3],
+        column_of_direction: &[0, 1, 2, 3],
         curved: &[0, 1, 2, 3, 4, 5, 6],
+        symmetric: &const {
+            symmetric::<7, 13>(
+                &Pattern { rows: &[2, 2, 2, 3, 4, 4, 5, 6], columns: &[0, 1, 2, 2, 3, 4, 5, 2] },
+                &[0, 1, 2, 3, 4, 5, 6],
+            )
+        },
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -171,7 +178,9 @@ impl Dae for Linear {
         trivial: &[],
         quadratures: &[],
         directions: &[0, 1, 2],
+        column_of_direction: &[0, 1, 2],
         curved: &[1, 4],
+        symmetric: &const { symmetric::<2, 2>(&Pattern { rows: &[4], columns: &[1] }, &[1, 4]) },
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -237,7 +246,9 @@ impl Dae for Fragile {
         trivial: &[],
         quadratures: &[],
         directions: &[0, 1],
+        column_of_direction: &[0, 1],
         curved: &[1, 2, 3],
+        symmetric: &const { symmetric::<3, 3>(&Pattern { rows: &[1, 3], columns: &[1, 2] }, &[1, 2, 3]) },
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -300,7 +311,9 @@ impl Dae for Algebraic {
         trivial: &[],
         quadratures: &[],
         directions: &[0],
+        column_of_direction: &[0],
         curved: &[0],
+        symmetric: &const { symmetric::<1, 1>(&Pattern { rows: &[0], columns: &[0] }, &[0]) },
         operations: NONE,
         elimination: Elimination::NONE,
     };
@@ -398,7 +411,11 @@ impl Dae for Rod {
         trivial: &[],
         quadratures: &[],
         directions: &all::<{ N + 1 }>(),
+        column_of_direction: &all::<{ N + 1 }>(),
         curved: &ROD_HESSIAN,
+        symmetric: &const {
+            symmetric::<N, N>(&Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN }, &ROD_HESSIAN)
+        },
         operations: NONE,
         elimination: Elimination::NONE,
     };

@@ -1,10 +1,12 @@
 //! A pendulum on a cart, differentiated with numbers `a + b ε₁ + c ε₂ + d ε₁ε₂`, `ε₁² = ε₂² = 0`.
 
 use super::{NONE, adjoint_of_jacobian};
-use casados_core::model::{ArrayK, ArrayV, Elimination, Pattern, Structure};
+use casados_core::model::{ArrayK, ArrayV, Elimination, Pattern, Structure, columns, symmetric};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
 use std::ops::{Add, Div, Mul, Sub};
+
+const HESSIAN: Pattern = Pattern { rows: &[5, 7, 7, 8, 8, 8], columns: &[5, 5, 7, 5, 7, 8] };
 
 /// `a + b ε₁ + c ε₂ + d ε₁ε₂`
 #[derive(Clone, Copy)]
@@ -100,7 +102,7 @@ impl Dae for Pendulum {
         },
         blocks: [0, 4, 10, 10, 12, 12],
         constant: &[false; 12],
-        hessian: Pattern { rows: &[5, 7, 7, 8, 8, 8], columns: &[5, 5, 7, 5, 7, 8] },
+        hessian: HESSIAN,
         linear: &[true, true, false, false],
         linear_in_state: false,
         constant_matrix: false,
@@ -108,7 +110,9 @@ impl Dae for Pendulum {
         trivial: &[],
         quadratures: &[0],
         directions: &[1, 2, 3, 4],
+        column_of_direction: &columns::<5>(&[1, 2, 3, 4]),
         curved: &[5, 7, 8],
+        symmetric: &symmetric::<3, 9>(&HESSIAN, &[5, 7, 8]),
         operations: NONE,
         elimination: Elimination::NONE,
     };

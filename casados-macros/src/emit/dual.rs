@@ -41,8 +41,8 @@ pub fn write(model: &Model) -> TokenStream {
     });
     let starts = [0, nx, 2 * nx, 2 * nx + nz, 2 * nx + nz + nu, nv - 1];
     let arguments = model.arguments.iter().map(|argument| self::argument(argument, starts));
-    let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lcurved] =
-        [nx, nz, nu, np, nk, nv, nw, nj, nh, nv - 1].map(Literal::usize_unsuffixed);
+    let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lcurved, lterms] =
+        [nx, nz, nu, np, nk, nv, nw, nj, nh, nv - 1, (nv - 1) * (nv - 1)].map(Literal::usize_unsuffixed);
     let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
     let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
     let text = name.to_string();
@@ -116,7 +116,14 @@ pub fn write(model: &Model) -> TokenStream {
                         trivial: &[],
                         quadratures: &[],
                         directions: &const { #krate::model::all::<#lw>() },
+                        column_of_direction: &const { #krate::model::all::<#lw>() },
                         curved: &const { #krate::model::all::<#lcurved>() },
+                        symmetric: &const {
+                            #krate::model::symmetric::<#lcurved, #lterms>(
+                                &#krate::model::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
+                                &#krate::model::all(),
+                            )
+                        },
                         operations: #krate::model::Operations {
                             residual: 0,
                             residual_jacobian: 0,

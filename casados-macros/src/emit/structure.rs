@@ -14,14 +14,20 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let krate = &model.krate;
     let name = model.name.to_string();
     let Variables { x, z, u, p } = &model.variables;
+    let width = Literal::usize_unsuffixed(x.len() + u.len() + p.len());
+    let terms = hessian.iter().map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum::<usize>();
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let blocks = blocks.map(Literal::usize_unsuffixed);
     let operations = self::operations(krate, operations);
     let Facts { linear_in_state, constant_matrix, constant_rows, .. } = facts;
     let [trivial, quadratures, directions, curved] =
         [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved].map(|list| numbers(list));
+    let [count, terms] = [curved.len(), terms].map(Literal::usize_unsuffixed);
     let elimination = elimination(analysis);
-    quote! {
+    quote! {{
+        const HESSIAN: #krate::model::Pattern = #hessian;
+        const DIRECTIONS: &[u32] = &[#(#directions),*];
+        const CURVED: &[u32; #count] = &[#(#curved),*];
         #krate::model::Structure {
             name: #name,
             x: &[#(#x),*],
@@ -31,19 +37,21 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             jacobian: #jacobian,
             blocks: [#(#blocks),*],
             constant: &[#(#constant),*],
-            hessian: #hessian,
+            hessian: HESSIAN,
             linear: &[#(#linear),*],
             linear_in_state: #linear_in_state,
             constant_matrix: #constant_matrix,
             constant_rows: &[#(#constant_rows),*],
             trivial: &[#(#trivial),*],
             quadratures: &[#(#quadratures),*],
-            directions: &[#(#directions),*],
-            curved: &[#(#curved),*],
+            directions: DIRECTIONS,
+            column_of_direction: &const { #krate::model::columns::<#width>(DIRECTIONS) },
+            curved: CURVED,
+            symmetric: &const { #krate::model::symmetric::<#count, #terms>(&HESSIAN, CURVED) },
             operations: #operations,
             elimination: #elimination,
         }
-    }
+    }}
 }
 
 /// The value of `Function::STRUCTURE`.

@@ -1,6 +1,6 @@
 //! A model written by hand, with a fault on request.
 
-use crate::model::{ArrayK, ArrayV, Dae, Elimination, GraphDae, Operations, Pattern, Structure};
+use crate::model::{ArrayK, ArrayV, Dae, Elimination, GraphDae, Operations, Pattern, Structure, symmetric};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Dims, Plain};
 
@@ -67,7 +67,9 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         trivial: if FAULT == TRIVIAL_DECLARED { &[0] } else { &[] },
         quadratures: if FAULT == QUADRATURE_DECLARED { &[0] } else { &[] },
         directions: if FAULT == DIRECTION_LEFT_OUT { &[0, 1] } else { &[0, 1, 2] },
+        column_of_direction: &[0, 1, 2],
         curved: if FAULT == CURVED_LEFT_OUT { &[1, 3] } else { &[1, 2, 3] },
+        symmetric: &const { symmetric::<3, 5>(&Pattern { rows: &[1, 2, 3], columns: &[1, 1, 1] }, &[1, 2, 3]) },
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,
     };

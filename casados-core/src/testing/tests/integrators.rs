@@ -178,7 +178,7 @@ fn convergence_order() {
 /// Real integrators with a model written by hand, against the closed form of its solution.
 mod logistic {
     use super::*;
-    use crate::model::{ArrayK, ArrayV, Dae, Elimination, Ode, Operations, Pattern, Structure};
+    use crate::model::{ArrayK, ArrayV, Dae, Elimination, Ode, Operations, Pattern, Structure, symmetric};
     use crate::options::Options;
     use crate::scalar::Lanes;
     use crate::shape::{Dims, Plain};
@@ -209,7 +209,11 @@ mod logistic {
             trivial: &[],
             quadratures: &[],
             directions: &[0, 1, 2],
+            column_of_direction: &[0, 1, 2],
             curved: &[1, 2, 3],
+            symmetric: &const {
+                symmetric::<3, 8>(&Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] }, &[1, 2, 3])
+            },
             operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
             elimination: Elimination::NONE,
         };

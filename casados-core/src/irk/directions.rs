@@ -1,0 +1,127 @@
+//! Directions of sensitivities, in panels.
+//!
+//! A panel is a few columns of everything that has a column for each direction: rows `[E; W]` that fit registers. Panels
+//! lie one after the other, so that all that is done to one happens in the nearest cache.
+
+use crate::model::{Dae, NO_COLUMN};
+use crate::scalar::{Field, Lanes};
+use core::marker::PhantomData;
+
+/// Evaluates an expression for each panel: from `$column` on, `$W` columns, eight, four, two or one; of numbers that
+/// are registers themselves two at most, or the stages of an unknown would not fit them.
+macro_rules! panels {
+    ($count:expr, $E:ty, $column:ident, $W:ident => $panel:expr) => {{
+        let mut $column = 0;
+        if const { size_of::<$E>() <= 8 && $count >= 8 } {
+            while $column + 8 <= const { $count } {
+                const $W: usize = 8;
+                $panel;
+                $column += 8;
+            }
+        }
+        if const { size_of::<$E>() <= 8 && $count % 8 >= 4 } {
+            const $W: usize = 4;
+            $panel;
+            $column += 4;
+        }
+        if const { size_of::<$E>() > 8 || $count % 4 >= 2 } {
+            while $column + 2 <= const { $count } {
+                const $W: usize = 2;
+                $panel;
+                $column += 2;
+            }
+        }
+        if const { $count % 2 == 1 } {
+            const $W: usize = 1;
+            $panel;
+        }
+    }};
+}
+pub(super) use panels;
+
+/// The rows of a panel that begins with a column, of a matrix with so many rows.
+#[inline(always)]
+pub(super) fn panel<E, const W: usize>(panels: &[E], column: usize, rows: usize) -> &[[E; W]] {
+    panels.get(column * rows..(column + W) * rows).unwrap_or_default().as_chunks().0
+}
+
+/// The rows of a panel that begins with a column, of a matrix with so many rows.
+#[inline(always)]
+pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows: usize) -> &mut [[E; W]] {
+    panels.get_mut(column * rows..(column + W) * rows).unwrap_or_default().as_chunks_mut().0
+}
+
+/// How the directions depend on `w`.
+pub(crate) trait Directions<E> {
+    /// How many there are.
+    const COUNT: usize;
+    /// `row += factor · dw_index`, in the columns from `column` on.
+    fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]);
+    /// `Σ_c weight_c dw_index,c` over all columns, with the weights of the first sum or the second.
+    fn total(&self, index: usize, second: bool) -> E;
+}
+
+/// One direction for each element of `w` that has any influence.
+pub(crate) struct Identity<M>(PhantomData<M>);
+
+impl<M> Identity<M> {
+    pub(crate) const ALL: Self = Self(PhantomData);
+}
+
+impl<M: Dae> Identity<M> {
+    /// The column of a direction.
+    #[inline(always)]
+    pub(crate) fn column(index: usize) -> Option<usize> {
+        let column = M::STRUCTURE.column_of_direction.get(index).copied().unwrap_or(NO_COLUMN);
+        (column != NO_COLUMN).then_some(column as usize)
+    }
+}
+
+impl<M: Dae, E: Lanes> Directions<E> for Identity<M> {
+    const COUNT: usize = M::STRUCTURE.directions.len();
+
+    #[inline(always)]
+    fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
+        let Some(of_index) = Self::column(index) else { return };
+        if let Some(element) = row.get_mut(of_index.wrapping_sub(column)) {
+            *element = *element + factor;
+        }
+    }
+
+    #[inline(always)]
+    fn total(&self, index: usize, second: bool) -> E {
+        Self::column(index).map_or(E::from_f64(0.0), |column| weight(column, second))
+    }
+}
+
+/// The rows of a matrix: each direction is a column.
+pub(crate) struct Seeded<'a, E, const C: usize>(pub &'a [[E; C]]);
+
+impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
+    const COUNT: usize = C;
+
+    #[inline(always)]
+    fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
+        let seeds = self.0.get(index).and_then(|row| row.get(column..)).unwrap_or_default();
+        for (element, &seed) in row.iter_mut().zip(seeds) {
+            *element = *element + factor * seed;
+        }
+    }
+
+    #[inline(always)]
+    fn total(&self, index: usize, second: bool) -> E {
+        let mut total = E::from_f64(0.0);
+        for (column, &seed) in self.0.get(index).into_iter().flatten().enumerate() {
+            total = total + weight::<E>(column, second) * seed;
+        }
+        total
+    }
+}
+
+/// The weight of a direction in the first sum over all of them, or in the second: neither equal nor alternating, so that
+/// no structure hides an error.
+#[inline(always)]
+pub(super) fn weight<E: Field>(direction: usize, second: bool) -> E {
+    let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;
+    E::from_f64(1.0 + 0.25 * rank as f64)
+}

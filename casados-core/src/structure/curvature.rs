@@ -1,0 +1,101 @@
+//! Tables that follow from the patterns: where the engine finds things without searching.
+
+use super::Pattern;
+
+/// No column: see [`Structure::column_of_direction`](super::Structure::column_of_direction).
+pub const NO_COLUMN: u32 = u32::MAX;
+
+/// A term of the product with the symmetric matrix `∇²(μᵀ f)`, of whose values the lower triangle is known. Rows and
+/// columns are positions in [`Structure::curved`](super::Structure::curved).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Term {
+    /// The row.
+    pub row: u32,
+    /// The column.
+    pub column: u32,
+    /// Its value, an index into the lower triangle.
+    pub entry: u32,
+}
+
+/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern, row by row; `curved` are
+/// the `C` variables that occur in it.
+#[must_use]
+pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved: &[u32; C]) -> [Term; N] {
+    let mut terms = [Term { row: 0, column: 0, entry: 0 }; N];
+    // Where the next term of each row goes.
+    let mut next = [0; C];
+    let mut entry = 0;
+    while entry < hessian.len() {
+        let (row, column) = hessian.at(entry);
+        let (row, column) = (position(curved, row), position(curved, column));
+        next[row] += 1;
+        if row != column {
+            next[column] += 1;
+        }
+        entry += 1;
+    }
+    let (mut row, mut sum) = (0, 0);
+    while row < C {
+        (next[row], sum) = (sum, sum + next[row]);
+        row += 1;
+    }
+    assert!(sum == N, "N must be the number of entries of the symmetric matrix");
+    let mut entry = 0;
+    while entry < hessian.len() {
+        let (row, column) = hessian.at(entry);
+        let (row, column) = (position(curved, row), position(curved, column));
+        terms[next[row]] = Term { row: row as u32, column: column as u32, entry: entry as u32 };
+        next[row] += 1;
+        if row != column {
+            terms[next[column]] = Term { row: column as u32, column: row as u32, entry: entry as u32 };
+            next[column] += 1;
+        }
+        entry += 1;
+    }
+    terms
+}
+
+/// For each of `N` directions its position among those that count, or [`NO_COLUMN`].
+#[must_use]
+pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {
+    let mut columns = [NO_COLUMN; N];
+    let mut column = 0;
+    while column < directions.len() {
+        columns[directions[column] as usize] = column as u32;
+        column += 1;
+    }
+    columns
+}
+
+/// Where a number is in an ascending list that has it.
+const fn position<const C: usize>(list: &[u32; C], number: usize) -> usize {
+    let (mut low, mut high) = (0, C);
+    while low + 1 < high {
+        let middle = low.midpoint(high);
+        if (list[middle] as usize) <= number {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_entry_is_met_in_its_row_and_in_its_column() {
+        // 3 7 9 with entries (3, 3), (7, 3), (9, 7), (9, 9).
+        let hessian = Pattern { rows: &[3, 7, 9, 9], columns: &[3, 3, 7, 9] };
+        let terms = symmetric::<3, 6>(&hessian, &[3, 7, 9]);
+        let found = terms.map(|Term { row, column, entry }| (row, column, entry));
+        assert_eq!(found, [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 2, 2), (2, 1, 2), (2, 2, 3)]);
+    }
+
+    #[test]
+    fn directions_without_influence_have_no_column() {
+        assert_eq!(columns::<4>(&[0, 2, 3]), [0, NO_COLUMN, 1, 2]);
+    }
+}
