@@ -189,11 +189,12 @@ fn akzo_nobel() {
     follows!(three::<AkzoNobel, 5, 1, 9>(problem(), TOLERANCES, 1e9, all));
 }
 
-/// Both forms: with a matrix of `ẋ` that has not full rank, and with algebraic states.
+/// Both forms: with a matrix of `ẋ` that has not full rank, and with algebraic states. At the tightest tolerance, the rounding
+/// errors of nodes at 6 V are above what Newton's method is asked for at nodes around 0 V.
 #[test]
 fn transistor_amplifier() {
     let problem = Problem::load("transistor_amplifier", 1e-2, 100.0);
-    follows!(variable::<TransistorAmplifier, 8, 0, 0>(problem, [1e-4, 1e-7, 1e-10], 1.0, states));
+    follows!(variable::<TransistorAmplifier, 8, 0, 0>(problem, [1e-4, 1e-7, 1e-10, 1e-12], 1.0, states));
     let mut problem = Problem::load("transistor_amplifier", 1e-2, 100.0);
     let y = problem.states;
     problem.states = vec![y[1] - y[0], y[2], y[4] - y[3], y[5], y[7] - y[6]];

@@ -32,6 +32,10 @@ const MORE_ITERATIONS: f64 = 2.5;
 /// An iteration that converges at this rate, or is over at once, keeps its Jacobian for the next step.
 pub(super) const FAST: f64 = 1e-3;
 
+/// Increments that shrink no more are rounding errors, if they are this small beside what is tolerated: of a state near zero that
+/// follows from large ones by an equation, they may be above the tolerance of the iteration.
+const NOISE: f64 = 0.01;
+
 /// Where a step begins and what it is measured by.
 pub struct Start<'a, M: Dae, T: Real> {
     /// The variables at its start: a solution of the equations.
@@ -371,6 +375,9 @@ where
             convergence.iterations = iteration;
             if !increment.is_finite() {
                 return Err(Failure::Diverges);
+            }
+            if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
+                return Ok(());
             }
             if iteration > 1 && iteration < most {
                 let rate: f64 = increment / last;
