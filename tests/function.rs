@@ -134,6 +134,20 @@ fn first_derivatives_three_ways() {
 }
 
 #[test]
+fn derivatives_by_the_time() {
+    for (v, _) in points() {
+        let mut rate = [f64::NAN; NY];
+        Outputs::time_derivative::<f64>(&v, &mut rate);
+        let mut y = [Complex::new(0.0, 0.0); NY];
+        Outputs::value_of(&stepped(&v, NV - 1), &mut y);
+        for (rate, y) in rate.iter().zip(y) {
+            assert!((rate - y.im / STEP).abs() <= 1e-15);
+        }
+        assert_eq!(rate, [v[7], 0.0, 0.0, 0.0]);
+    }
+}
+
+#[test]
 fn second_derivatives_three_ways() {
     for (v, mu) in points() {
         let own = hessian(&v, &mu);

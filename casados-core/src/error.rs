@@ -128,6 +128,20 @@ pub enum Error {
         /// End of the interval.
         end: f64,
     },
+    /// More events than are allowed: each comes sooner after the one before, or without end.
+    TooManyEvents {
+        /// The time that was reached.
+        t: f64,
+        /// How many events happened.
+        events: usize,
+    },
+    /// A function touches zero and does not cross it: the time of the event has no derivative.
+    Grazing {
+        /// Which event.
+        event: usize,
+        /// Its time.
+        t: f64,
+    },
     /// Not one control for each interval, or no interval at all.
     Intervals {
         /// How many controls there are.
@@ -311,6 +325,15 @@ impl fmt::Display for Error {
             }
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
+            }
+            Error::TooManyEvents { t, events } => {
+                write!(f, "t = {t} was reached after {events} events, and more are not allowed")
+            }
+            Error::Grazing { event, t } => {
+                write!(
+                    f,
+                    "event {event} touches zero without crossing it at t = {t}: its time has no derivative"
+                )
             }
             Error::Intervals { controls, ends } => {
                 write!(

@@ -36,7 +36,8 @@ pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as 
 /// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: written by `#[function]`.
 ///
 /// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
-/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables but `t`.
+/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables, by `t` only the first
+/// ones ([`Function::time_derivative`]).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a function of a model's variables",
     note = "write it as `#[function] fn name(x: [f64; NX], ...) -> [f64; NY]` and use its type, `Name`"
@@ -73,6 +74,9 @@ pub trait Function: 'static {
         mu: &ArrayY<Self, S::Cell>,
         gradient: &mut ArrayV<Self, S::Cell>,
     );
+
+    /// `∂y/∂t`
+    fn time_derivative<S: Lanes>(v: &ArrayV<Self, S::Cell>, rate: &mut ArrayY<Self, S::Cell>);
 
     /// All entries of the lower triangle of `∇²(μᵀ y)`.
     fn hessian<S: Lanes>(

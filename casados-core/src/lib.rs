@@ -45,7 +45,9 @@ pub mod tableau;
 pub mod testing;
 
 #[cfg(feature = "alloc")]
-pub use adaptive::{Adaptive, AdaptiveOptions, AdaptiveStatistics, Piecewise, Radau};
+pub use adaptive::{
+    Adaptive, AdaptiveOptions, AdaptiveStatistics, Crossing, Event, Hybrid, Piecewise, Radau,
+};
 #[cfg(feature = "alloc")]
 pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
 pub use erk::Erk;
@@ -69,7 +71,7 @@ pub use tableau::{
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {
     #[cfg(feature = "alloc")]
-    pub use crate::adaptive::{Adaptive, AdaptiveOptions, Piecewise, Radau};
+    pub use crate::adaptive::{Adaptive, AdaptiveOptions, Crossing, Event, Hybrid, Piecewise, Radau};
     #[cfg(feature = "alloc")]
     pub use crate::batch::{Batch, BatchError, Intervals};
     #[cfg(feature = "alloc")]

@@ -23,6 +23,28 @@ macro_rules! plain {
             }
         }
         impl<$($generics)*> Copy for $type {}
+        crate::shape::compared!([$($generics)*] $type { $($field),* });
+    };
+}
+pub(crate) use plain;
+
+/// The same for a struct that has a list among its fields.
+#[cfg(feature = "alloc")]
+macro_rules! listed {
+    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
+        impl<$($generics)*> Clone for $type {
+            fn clone(&self) -> Self {
+                Self { $($field: self.$field.clone()),* }
+            }
+        }
+        crate::shape::compared!([$($generics)*] $type { $($field),* });
+    };
+}
+#[cfg(feature = "alloc")]
+pub(crate) use listed;
+
+macro_rules! compared {
+    ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
         impl<$($generics)*> PartialEq for $type {
             fn eq(&self, other: &Self) -> bool {
                 true $(&& self.$field == other.$field)*
@@ -37,7 +59,7 @@ macro_rules! plain {
         }
     };
 }
-pub(crate) use plain;
+pub(crate) use compared;
 
 /// `to = from` without a copy on the stack, which an assignment makes where nothing is optimised.
 #[inline(always)]

@@ -382,7 +382,11 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
             step.interpolate(start, length, (time - start) / length, dense)
         };
-        after(&mut Accepted { evaluate: &mut evaluate, end }, &mut run.base.dense)?;
+        let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
+        after(&mut accepted, &mut run.base.dense)?;
+        if accepted.stop {
+            return Ok(x);
+        }
         x.as_mut_slice().copy_from_slice(step.end());
         step.advance();
         t = end;

@@ -8,11 +8,12 @@
 //! are not stiff.
 //!
 //! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
-//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `along` an integrand, `piecewise` intervals with controls of their own, `integrator` what users see.
+//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `along` an integrand, `piecewise` intervals with controls of their own, `events`, `integrator` what users see.
 
 mod along;
 mod consistent;
 mod control;
+mod events;
 mod explicit;
 mod integrator;
 mod norm;
@@ -21,11 +22,13 @@ mod pairs;
 mod piecewise;
 mod replay;
 mod run;
+mod segment;
 mod sensitivities;
 mod stages;
 mod statistics;
 mod tape;
 
+pub use events::{Crossing, Event, Hybrid, HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient};
 pub use integrator::Integrator;
 pub use options::AdaptiveOptions;
 pub use piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};

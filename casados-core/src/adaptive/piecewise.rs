@@ -8,23 +8,22 @@
 //! d²(λᵀ x_N)/dW² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ Φ_k) D_k        D_k = d(x_k, u_k, p)/dW
 //! ```
 
-use super::consistent::place_inputs;
 use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
-use super::sensitivities::{Frozen, Memory, fill, place};
+use super::segment::{Segment, add, dense, filled};
+use super::sensitivities::{Memory, fill, place};
 use super::statistics::AdaptiveStatistics;
-use super::tape::Tape;
 use crate::error::{Argument, Error};
 use crate::irk::check;
 use crate::linalg::axpy;
 use crate::model::{
-    ArrayK, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX,
-    VectorP, VectorU, VectorX,
+    Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX, VectorP,
+    VectorU, VectorX,
 };
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::{Matrix, Shape, listed};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
@@ -51,22 +50,7 @@ pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     nominal: Nominal<M, T>,
 }
 
-/// The steps of one interval.
-struct Segment<M: Dae, T: Real> {
-    tape: Tape<T>,
-    span: Span<T>,
-    u: VectorU<M, T>,
-    x: VectorX<M, T>,
-    /// Start values of `(ẋ, z)`.
-    given: ArrayK<M, T>,
-    /// Derivatives at the start of each step.
-    history: Vec<T>,
-    /// `V_k`, row after row.
-    v: Vec<T>,
-}
-
 /// The solution at the end and its derivatives with respect to `x₀`, all controls, and `p`.
-#[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseForward<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
@@ -85,7 +69,6 @@ pub struct PiecewiseForward<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end and the gradient of `λᵀx`.
-#[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseAdjoint<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
@@ -98,7 +81,6 @@ pub struct PiecewiseAdjoint<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
-#[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseHessian<M: Dae, T: Real = f64> {
     /// The solution and its derivatives.
     pub forward: PiecewiseForward<M, T>,
@@ -117,6 +99,10 @@ pub struct PiecewiseHessian<M: Dae, T: Real = f64> {
     /// `∂²(λᵀx)/∂p²`
     pub h_pp: MatrixPP<M, T>,
 }
+
+listed!([M: Dae, T: Real] PiecewiseForward<M, T> { nominal, dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp });
+listed!([M: Dae, T: Real] PiecewiseAdjoint<M, T> { nominal, grad_x0, grad_u, grad_p });
+listed!([M: Dae, T: Real] PiecewiseHessian<M, T> { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     /// Of an integrator, which keeps its options, tolerances, parameters and start time.
@@ -160,29 +146,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     /// # Errors
     /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
-        check(Argument::T, &[t])?;
-        let Self { integrator, segments, count, .. } = self;
-        let segments = segments.get_mut(..*count).unwrap_or_default();
-        let (Some(first), Some(last)) = (segments.first(), segments.last()) else {
-            return Err(Error::NoResult);
-        };
-        let (start, end) = (first.span.start.to_f64(), last.span.end.to_f64());
-        let outside = Error::OutsideInterval { t: t.to_f64(), start, end };
-        let holds = |segment: &&mut Segment<M, T>| inside(t, segment.span.start, segment.span.end);
-        let segment = segments.iter_mut().find(holds);
-        let segment = segment.ok_or(outside)?;
-        if segment.tape.entries().is_empty() {
-            // An interval without length; `z` there is that of the end, if all are.
-            (integrator.base.dense.x, integrator.base.dense.z) = (segment.x, self.nominal.z);
-            return Ok(&integrator.base.dense);
-        }
-        let parameters = integrator.base.parameters;
-        place_inputs::<M, T>(integrator.base.point.as_mut(), &segment.u, &parameters);
-        core::mem::swap(&mut integrator.tape, &mut segment.tape);
-        let result = integrator.dense_in(segment.span, t).map(|_| ());
-        core::mem::swap(&mut integrator.tape, &mut segment.tape);
-        result?;
-        Ok(&integrator.base.dense)
+        let Self { integrator, segments, count, nominal, .. } = self;
+        dense(integrator, segments.get_mut(..*count).unwrap_or_default(), nominal, t)
     }
 
     /// The solution at the end, and its derivatives with respect to `x₀`, all controls and `p`.
@@ -338,10 +303,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         }
         self.count = 0;
         while self.segments.len() < count {
-            self.segments
-                .try_reserve(1)
-                .map_err(|_| Error::OutOfMemory { bytes: size_of::<Segment<M, T>>() })?;
-            self.segments.push(Segment::default());
+            add(&mut self.segments)?;
         }
         let given = self.integrator.base.given;
         let result = self.take(x0, controls, ends);
@@ -478,35 +440,6 @@ fn collect<M: Dae, T: Real>(nominal: &mut Nominal<M, T>, interval: &Nominal<M, T
     (nominal.x, nominal.z) = (interval.x, interval.z);
 }
 
-impl<M: Dae, T: Real> Default for Segment<M, T> {
-    fn default() -> Self {
-        Self {
-            tape: Tape::default(),
-            span: Span { start: T::ZERO, end: T::ZERO },
-            u: Zeroable::zeroed(),
-            x: Zeroable::zeroed(),
-            given: Zeroable::zeroed(),
-            history: Vec::new(),
-            v: Vec::new(),
-        }
-    }
-}
-
-impl<M: Dae, T: Real> Segment<M, T> {
-    /// The steps of this interval, to be taken again and differentiated; `V_k`.
-    #[allow(clippy::type_complexity)]
-    fn open<'a, B: Engine<M, T>>(
-        &'a mut self,
-        integrator: &'a mut Integrator<M, B, T>,
-    ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
-        let Integrator { base, consistent, state, memory, .. } = integrator;
-        (base.u, base.given) = (self.u, self.given);
-        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
-        let memory = memory.as_deref_mut().ok_or(missing)?;
-        Ok((Frozen { base, consistent, tape: &mut self.tape, span: self.span }, state, memory, &self.v))
-    }
-}
-
 /// Where the directions `W = (x₀, u₀, …, u_{N−1}, p)` are.
 struct Columns<M> {
     intervals: usize,
@@ -581,14 +514,4 @@ impl<M: Dae> Columns<M> {
 
 fn rows<T, A: Matrix<T>>(_: &A) -> usize {
     A::ROWS
-}
-
-/// # Errors
-/// [`Error::OutOfMemory`]
-fn filled<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> {
-    let mut list = Vec::new();
-    let bytes = length.saturating_mul(size_of::<V>());
-    list.try_reserve_exact(length).map_err(|_| Error::OutOfMemory { bytes })?;
-    list.resize(length, value);
-    Ok(list)
 }

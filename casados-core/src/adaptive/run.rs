@@ -144,6 +144,8 @@ pub struct Accepted<'a, M: Dae, T: Real> {
     pub evaluate: Evaluate<'a, M, T>,
     /// The time at its end.
     pub end: T,
+    /// Set if the interval is to end with it.
+    pub stop: bool,
 }
 
 impl<M: Dae, T: Real> Run<'_, M, T> {
@@ -324,7 +326,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 interpolate(stages, x, stages.accepted(), time - t, h, dense);
                 Ok(())
             };
-            after(&mut Accepted { evaluate: &mut evaluate, end }, dense)?;
+            let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
+            after(&mut accepted, dense)?;
+            if accepted.stop {
+                return Ok(());
+            }
             stages.end(&mut self.base.point);
             t = end;
             if let Some(time) = self.base.point.as_mut().last_mut() {

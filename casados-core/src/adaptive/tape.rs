@@ -65,6 +65,16 @@ impl<T: Real> Tape<T> {
         numbers.split_at(states.min(numbers.len()))
     }
 
+    /// The last step has another length, and stages to it.
+    pub fn set_last(&mut self, h: T, states: usize, stages: &[T]) {
+        let Some(entry) = self.entries.last_mut() else { return };
+        entry.h = h;
+        let numbers = self.numbers.iter_mut().skip(entry.begin + states);
+        for (to, from) in numbers.zip(stages) {
+            *to = *from;
+        }
+    }
+
     /// The steps are taken again:
     pub fn rewrite(&mut self) {
         self.again.clear();

@@ -34,10 +34,28 @@ pub fn ty(model: &Model) -> TokenStream {
     if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) }
 }
 
-/// The module `code`.
-pub fn module(model: &Model, derivatives: &Derivatives, names: &Names) -> syn::Result<TokenStream> {
+/// The module `code`, with the derivatives by the time if they are wanted.
+pub fn module(
+    model: &Model,
+    derivatives: &Derivatives,
+    names: &Names,
+    time: Option<&[(u32, Node)]>,
+) -> syn::Result<TokenStream> {
     let krate = &model.krate;
-    let code: TokenStream = text(model, derivatives, names).parse()?;
+    let mut text = text(model, derivatives, names);
+    if let Some(time) = time {
+        let Model { variables, graph, residual, opaque, .. } = model;
+        let (rate, [_, nv, _]) = ("rate", dimensions(variables));
+        let routine = Routine {
+            name: "time_derivative",
+            documentation: "`∂y/∂t`, of the outputs that depend on it:",
+            inputs: &[("v", nv)],
+            outputs: &[(rate, residual.len())],
+            stores: time.iter().map(|&(row, node)| (rate, row as usize, node)).collect(),
+        };
+        text += &routine.write(graph, variables, opaque.len());
+    }
+    let code: TokenStream = text.parse()?;
     Ok(quote! {
         #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_variables)]
         mod code {

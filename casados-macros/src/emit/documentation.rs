@@ -69,7 +69,7 @@ pub fn of_function(functions: &[FunctionAnalysis]) -> TokenStream {
         row(&head),
         row(&vec![String::from("---"); head.len()]),
     ];
-    for FunctionAnalysis { model, derivatives } in functions {
+    for FunctionAnalysis { model, derivatives, .. } in functions {
         let Derivatives { jacobian, constant, hessian, operations, .. } = derivatives;
         let numbers = [
             model.residual.len(),

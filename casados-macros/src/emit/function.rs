@@ -9,15 +9,15 @@ use quote::quote;
 
 /// Writes the implementations for one function.
 pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
-    let FunctionAnalysis { model, derivatives } = analysis;
+    let FunctionAnalysis { model, derivatives, time } = analysis;
     let Derivatives { jacobian, hessian, .. } = derivatives;
     let Model { variables, opaque, krate, residual, .. } = model;
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let [nk, nv, nw] = dimensions(variables);
-    let (code, ty) = (code::module(model, derivatives, &FUNCTION)?, ty(model));
+    let (code, ty) = (code::module(model, derivatives, &FUNCTION, Some(time))?, ty(model));
     let numbers = [nx, nz, nu, np, nk, nv, nw, residual.len(), jacobian.len(), hessian.len(), nv - 1];
-    let [lx, lz, lu, lp, lk, lv, lw, ly, lj, lh, time] = numbers.map(Literal::usize_unsuffixed);
+    let [lx, lz, lu, lp, lk, lv, lw, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
     let structure = structure::of_function(analysis);
     // Constants from outside are an argument: the module of the code sees no name of the user's.
     let c = (!opaque.is_empty()).then(|| quote!(&C,));
@@ -54,7 +54,15 @@ pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
             #[inline]
             fn adjoint<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #ly], gradient: &mut [S::Cell; #lv]) {
                 code::adjoint::<S>(#c v, mu, gradient);
-                S::from_f64(0.0).store(&mut gradient[#time]);
+                S::from_f64(0.0).store(&mut gradient[#last]);
+            }
+
+            #[inline]
+            fn time_derivative<S: #krate::Lanes>(v: &[S::Cell; #lv], rate: &mut [S::Cell; #ly]) {
+                for rate in rate.iter_mut() {
+                    S::from_f64(0.0).store(rate);
+                }
+                code::time_derivative::<S>(#c v, rate);
             }
 
             #[inline]
@@ -76,7 +84,7 @@ pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
                     (v.first_chunk(), mu.first_chunk(), gradient.first_chunk_mut())
                 {
                     code::adjoint::<S>(#c v, mu, gradient);
-                    S::from_f64(0.0).store(&mut gradient[#time]);
+                    S::from_f64(0.0).store(&mut gradient[#last]);
                 }
             }
         }

@@ -16,7 +16,7 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let [nk, nv, nw] = dimensions(variables);
     let (nj, nh, nb) = (jacobian.len(), hessian.len(), analysis.elimination.plan.blocks.len());
-    let (code, ty) = (code::module(model, derivatives, &MODEL)?, ty(model));
+    let (code, ty) = (code::module(model, derivatives, &MODEL, None)?, ty(model));
     let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let structure = structure::write(analysis);

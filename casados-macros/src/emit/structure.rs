@@ -56,7 +56,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
 
 /// The value of `Function::STRUCTURE`.
 pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
-    let FunctionAnalysis { model, derivatives } = analysis;
+    let FunctionAnalysis { model, derivatives, .. } = analysis;
     let Derivatives { jacobian, blocks, constant, hessian, linear, operations, .. } = derivatives;
     let krate = &model.krate;
     let name = model.name.to_string();

@@ -39,6 +39,8 @@ pub struct FunctionAnalysis {
     pub model: Model,
     /// Its derivatives.
     pub derivatives: Derivatives,
+    /// `∂y/∂t`, of the outputs that depend on the time.
+    pub time: Vec<(u32, Node)>,
 }
 
 /// A model with its derivatives and its structure.
@@ -95,7 +97,10 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
 pub fn analyse_function(mut model: Model) -> FunctionAnalysis {
     let ends = ends(&model.variables);
     let derivatives = differentiate(&mut model, ends);
-    FunctionAnalysis { model, derivatives }
+    let time = ends[4];
+    let rows = graph::jacobian(&mut model.graph, &model.residual, time + 1);
+    let time = rows.into_iter().filter(|entry| entry.1 == time).map(|entry| (entry.0, entry.2)).collect();
+    FunctionAnalysis { model, derivatives, time }
 }
 
 /// Where each of the blocks `(ẋ, x, z, u, p)` ends among the variables.

@@ -1,0 +1,146 @@
+//! What an event is: where it happens, and what happens then.
+
+use crate::function::{ArrayY, Function};
+use crate::model::{ArrayV, ArrayX, Dae};
+use crate::scalar::Real;
+use crate::shape::{Outputs, Shape};
+use bytemuck::Zeroable;
+
+/// In which direction a function crosses zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Crossing {
+    /// From below.
+    Rising,
+    /// From above.
+    Falling,
+    /// Both.
+    Any,
+}
+
+impl Crossing {
+    /// Whether it goes from one sign to the other.
+    pub(super) fn matches(self, before: f64, after: f64) -> bool {
+        let rising = before < 0.0 && after >= 0.0;
+        let falling = before > 0.0 && after <= 0.0;
+        match self {
+            Self::Rising => rising,
+            Self::Falling => falling,
+            Self::Any => rising || falling,
+        }
+    }
+}
+
+/// A zero crossing of a function `g(x, u, p, t)`, where an integration ends or the state jumps to `j(x, u, p, t)`.
+pub struct Event<M: Dae, T: Real = f64> {
+    pub(super) crossing: Crossing,
+    pub(super) guard: Map<M, T>,
+    pub(super) jump: Option<Map<M, T>>,
+}
+
+impl<M: Dae, T: Real> Event<M, T> {
+    /// The integration ends where the only output of `G` crosses zero.
+    ///
+    /// That `G` has one output and does not depend on `z` is checked when the program is compiled.
+    #[must_use]
+    pub fn terminal<G: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
+        const { assert!(G::Outputs::NY == 1, "the function of an event has one output") };
+        Self { crossing, guard: Map::of::<G>(), jump: None }
+    }
+
+    /// Where the only output of `G` crosses zero, the state becomes what `J` returns of the state before.
+    ///
+    /// That `G` has one output and `J` one for each state, and that neither depends on `z`, is checked when the program is
+    /// compiled.
+    #[must_use]
+    pub fn jump<G: Function<Shape = M::Shape>, J: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
+        const { assert!(J::Outputs::NY == <M::Shape as Shape>::NX, "a jump has one output for each state") };
+        Self { jump: Some(Map::of::<J>()), ..Self::terminal::<G>(crossing) }
+    }
+}
+
+impl<M: Dae, T: Real> Clone for Event<M, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, T: Real> Copy for Event<M, T> {}
+
+impl<M: Dae, T: Real> core::fmt::Debug for Event<M, T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let mut event = f.debug_struct("Event");
+        event.field("crossing", &self.crossing).field("guard", &self.guard.name);
+        event.field("jump", &self.jump.map(|jump| jump.name)).finish()
+    }
+}
+
+/// A function with at most as many outputs as there are states.
+pub(super) struct Map<M: Dae, T: Real> {
+    pub name: &'static str,
+    value: fn(&ArrayV<M, T>, &mut [T]),
+    adjoint: fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>),
+    rate: fn(&ArrayV<M, T>, &mut [T]),
+}
+
+impl<M: Dae, T: Real> Clone for Map<M, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, T: Real> Copy for Map<M, T> {}
+
+/// `y` of a function, from one that writes it.
+fn outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F, T>)) {
+    let mut y = ArrayY::<F, T>::zeroed();
+    write(&mut y);
+    for (to, from) in to.iter_mut().zip(y.as_ref()) {
+        *to = *from;
+    }
+}
+
+impl<M: Dae, T: Real> Map<M, T> {
+    fn of<F: Function<Shape = M::Shape>>() -> Self {
+        const {
+            assert!(
+                F::STRUCTURE.blocks[2] == F::STRUCTURE.blocks[3],
+                "events and jumps do not depend on algebraic states: write them in terms of x, u, p and t"
+            );
+        }
+        Self {
+            name: F::STRUCTURE.name,
+            value: |v, y| outputs::<F, T>(y, |y| F::value::<T>(v, y)),
+            adjoint: |v, mu, gradient| {
+                let mut all = ArrayY::<F, T>::zeroed();
+                for (to, from) in all.as_mut().iter_mut().zip(mu) {
+                    *to = *from;
+                }
+                F::adjoint::<T>(v, &all, gradient);
+            },
+            rate: |v, y| outputs::<F, T>(y, |y| F::time_derivative::<T>(v, y)),
+        }
+    }
+
+    /// The first output.
+    pub fn first(&self, v: &ArrayV<M, T>) -> T {
+        let mut y = [T::ZERO];
+        (self.value)(v, &mut y);
+        y[0]
+    }
+
+    /// All outputs.
+    pub fn all(&self, v: &ArrayV<M, T>) -> ArrayX<M, T> {
+        let mut y = ArrayX::<M, T>::zeroed();
+        (self.value)(v, y.as_mut());
+        y
+    }
+
+    /// `∇(μᵀy)` and `μᵀ ∂y/∂t`.
+    pub fn gradient(&self, v: &ArrayV<M, T>, mu: &[T]) -> (ArrayV<M, T>, T) {
+        let mut gradient = ArrayV::<M, T>::zeroed();
+        (self.adjoint)(v, mu, &mut gradient);
+        let mut rate = ArrayX::<M, T>::zeroed();
+        let rate = rate.as_mut();
+        // A model without states has no event that depends on the time alone.
+        (self.rate)(v, rate);
+        (gradient, mu.iter().zip(rate).fold(T::ZERO, |sum, (mu, rate)| sum + *mu * *rate))
+    }
+}

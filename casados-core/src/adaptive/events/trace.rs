@@ -1,0 +1,378 @@
+//! From event to event: the steps up to each, shortened to its time, and what happens there.
+
+use super::super::consistent::{At, place_inputs};
+use super::super::run::Span;
+use super::super::sealed::Engine;
+use super::super::segment::add;
+use super::super::statistics::AdaptiveStatistics;
+use super::{Event, Hybrid, Moment, Occurrence};
+use crate::error::{Argument, Error, Place};
+use crate::irk::{check, not_finite};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// Each step is looked at in so many pieces: a function that crosses zero twice in one of them is not seen.
+const PIECES: usize = 4;
+/// A crossing is enclosed by so many bisections, to a millionth of a piece; then the step itself is made to end there.
+const BISECTIONS: usize = 20;
+/// By so many iterations of Newton's method at most.
+const ITERATIONS: usize = 20;
+/// So many units of rounding of its terms are zero.
+const ROUNDING: f64 = 64.0;
+
+/// A function that moves so much slower at the event than over the step before only touches zero.
+const GRAZING: f64 = 1e-8;
+
+/// A crossing: which event, and a time near it.
+type Found<T> = Option<(usize, T)>;
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
+    /// Integrates to the end, from event to event.
+    pub(super) fn trace(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+        self.statistics = AdaptiveStatistics::default();
+        self.count = 0;
+        self.solution.occurrences.clear();
+        self.solution.terminal = false;
+        self.integrator.reserve()?;
+        check(Argument::X0, x0.as_slice())?;
+        let (start, given) = (self.integrator.start, self.integrator.base.given);
+        let result = self.follow(x0, u, t_end);
+        (self.integrator.start, self.integrator.base.given) = (start, given);
+        if result.is_err() {
+            self.count = 0;
+        }
+        result
+    }
+
+    fn follow(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+        let mut x = *x0;
+        loop {
+            let k = self.count;
+            if self.segments.len() <= k {
+                add(&mut self.segments)?;
+            }
+            let found = self.until_event(k, &x, u, t_end)?;
+            self.count += 1;
+            if k == 0 {
+                self.solution.nominal = self.integrator.base.result;
+            }
+            let Some((index, t)) = found else {
+                let result = self.integrator.base.result;
+                (self.solution.nominal.x, self.solution.nominal.z) = (result.x, result.z);
+                self.solution.t = t_end;
+                return Ok(());
+            };
+            let Some(event) = self.events.get(index).copied() else { return Err(Error::NoResult) };
+            let t = self.shorten(k, &event, t)?;
+            let before = self.integrator.base.result.x;
+            let occurrences = &mut self.solution.occurrences;
+            if occurrences.len() >= self.most {
+                return Err(Error::TooManyEvents { t: t.to_f64(), events: occurrences.len() });
+            }
+            let bytes = size_of::<Occurrence<M, T>>();
+            occurrences.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes })?;
+            occurrences.push(Occurrence { event: index, t, before, after: before });
+            let Some(jump) = event.jump else {
+                // Where the state is, `z` is that of the equations there.
+                let y = self.slope(&before, u, t)?;
+                self.solution.nominal.x = before;
+                self.solution.nominal.z.as_mut_slice().copy_from_slice(&y.as_ref()[M::Shape::NX..]);
+                (self.solution.t, self.solution.terminal) = (t, true);
+                return Ok(());
+            };
+            self.go(k);
+            x.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());
+            finite(jump.name, x.as_slice(), k)?;
+            if let Some(occurrence) = self.solution.occurrences.get_mut(k) {
+                occurrence.after = x;
+            }
+            // The side of the solution on which the next steps begin.
+            self.integrator.base.given = self.slope(&x, u, t)?;
+            self.integrator.start = t;
+        }
+    }
+
+    /// The steps up to the one in which an event happens, or to the end.
+    fn until_event(
+        &mut self,
+        k: usize,
+        x: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+    ) -> Result<Found<T>, Error> {
+        let start = self.integrator.start;
+        let mut signs = self.signs(k, x, u, t_end)?;
+        let Self { integrator, segments, events, statistics, v, .. } = self;
+        let Some(segment) = segments.get_mut(k) else { return Ok(None) };
+        segment.span = Span { start, end: t_end };
+        (segment.x, segment.u, segment.given) = (*x, *u, integrator.base.given);
+        let (parameters, mut found, mut begin) = (integrator.base.parameters, None, start);
+        place_inputs::<M, T>(v.as_mut().as_mut(), u, &parameters);
+        let run = integrator.run(x, u, t_end, true, |step, dense| {
+            let length = step.end - begin;
+            let mut low = begin;
+            for piece in 1..=PIECES {
+                let part = T::from_f64(piece as f64 / PIECES as f64);
+                let high = if piece == PIECES { step.end } else { begin + part * length };
+                (step.evaluate)(high, dense)?;
+                for (index, (event, sign)) in events.iter().zip(&mut signs).enumerate() {
+                    let value = evaluate(event, v, &dense.x, high, k)?;
+                    if !event.crossing.matches(*sign, value) {
+                        // Zero is on the way from one side to the other.
+                        *sign = if value == 0.0 { *sign } else { value };
+                        continue;
+                    }
+                    let (mut a, mut b) = (low, high);
+                    for _ in 0..BISECTIONS {
+                        let middle = a + T::from_f64(0.5) * (b - a);
+                        (step.evaluate)(middle, dense)?;
+                        let value = evaluate(event, v, &dense.x, middle, k)?;
+                        if event.crossing.matches(*sign, value) {
+                            b = middle;
+                        } else {
+                            a = middle;
+                        }
+                    }
+                    let earlier =
+                        found.is_none_or(|(_, t): (usize, T)| (b - begin).abs() < (t - begin).abs());
+                    if earlier {
+                        found = Some((index, b));
+                    }
+                    // The bisection left the memory at another time.
+                    (step.evaluate)(high, dense)?;
+                }
+                if found.is_some() {
+                    step.stop = true;
+                    return Ok(());
+                }
+                low = high;
+            }
+            begin = step.end;
+            Ok(())
+        });
+        statistics.add(&integrator.statistics);
+        run?;
+        core::mem::swap(&mut integrator.tape, &mut segment.tape);
+        Ok(found)
+    }
+
+    /// On which side of zero each function begins. Where it is zero to rounding, it is on the side that it goes to.
+    fn signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Vec<f64>, Error> {
+        let (nx, start) = (M::Shape::NX, self.integrator.start);
+        let forward = if t_end < start { -1.0 } else { 1.0 };
+        let parameters = self.integrator.base.parameters;
+        place_inputs::<M, T>(self.v.as_mut().as_mut(), u, &parameters);
+        let mut signs = Vec::new();
+        let count = self.events.len();
+        signs.try_reserve(count).map_err(|_| Error::OutOfMemory { bytes: count * size_of::<f64>() })?;
+        let mut slope = None;
+        for index in 0..count {
+            let Some(event) = self.events.get(index).copied() else { break };
+            let value = evaluate(&event, &mut self.v, x, start, k)?;
+            let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
+            let mut size = (rate * start).to_f64().abs();
+            for (g, v) in gradient.as_ref().iter().zip(self.v.as_ref().as_ref()) {
+                size += (*g * *v).to_f64().abs();
+            }
+            if value.abs() > ROUNDING * T::EPSILON.to_f64() * size {
+                signs.push(value);
+                continue;
+            }
+            let y = match slope {
+                Some(y) => y,
+                None => *slope.insert(self.slope(x, u, start)?),
+            };
+            let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
+            let total = products.fold(rate, |sum, (g, f)| sum + *g * *f);
+            signs.push(forward * total.to_f64());
+        }
+        Ok(signs)
+    }
+
+    /// The last step of a segment is made to end where the event is: its time.
+    fn shorten(&mut self, k: usize, event: &Event<M, T>, t: T) -> Result<T, Error> {
+        let nx = M::Shape::NX;
+        let Some(step) = self.segments.get(k).and_then(|segment| segment.tape.entries().len().checked_sub(1))
+        else {
+            return Ok(t);
+        };
+        let Some(entry) = self.segments.get(k).and_then(|segment| segment.tape.entries().get(step).copied())
+        else {
+            return Ok(t);
+        };
+        let u = self.segments.get(k).map_or_else(Zeroable::zeroed, |segment| segment.u);
+        let (mut h, mut last) = (t - entry.t, T::ZERO);
+        for iteration in 0..ITERATIONS {
+            let x = self.end_of(k, step, h)?;
+            let time = entry.t + h;
+            let y = self.slope(&x, &u, time)?;
+            let value = T::from_f64(evaluate(event, &mut self.v, &x, time, k)?);
+            let (gradient, rate) = event.guard.gradient(&self.v, &[T::ONE]);
+            let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
+            let change = -value / products.fold(rate, |sum, (g, f)| sum + *g * *f);
+            let next = h + change;
+            // Within the step, as far as the polynomial was right; a crossing without slope stays where it was found.
+            let slack = T::from_f64(1e-3) * entry.h.abs();
+            let inside =
+                (next - h).abs() <= entry.h.abs() && (next - (t - entry.t)).abs() <= entry.h.abs() + slack;
+            if !change.is_finite() || !inside || (iteration > 3 && change.abs() >= last) {
+                break;
+            }
+            (h, last) = (next, change.abs());
+            let resolution = T::from_f64(T::EPSILON.to_f64()) * time.abs().max(entry.h.abs());
+            if last <= resolution {
+                break;
+            }
+        }
+        let x = self.end_of(k, step, h)?;
+        let end = entry.t + h;
+        if let Some(segment) = self.segments.get_mut(k) {
+            let stages = B::replay(&mut self.integrator.state, entry.level)?.stages()?;
+            segment.tape.set_last(h, nx, stages);
+            segment.span.end = end;
+        }
+        self.integrator.base.result.x = x;
+        Ok(end)
+    }
+
+    /// Where a step of another length ends.
+    fn end_of(&mut self, k: usize, step: usize, h: T) -> Result<VectorX<M, T>, Error> {
+        let Self { integrator, segments, .. } = self;
+        let (Some(segment), mut x) = (segments.get(k), VectorX::<M, T>::zeroed()) else {
+            return Err(Error::NoResult);
+        };
+        let Some(entry) = segment.tape.entries().get(step) else { return Err(Error::NoResult) };
+        let (states, y) = segment.tape.numbers(step, M::Shape::NX);
+        x.as_mut_slice().copy_from_slice(states);
+        let at = At { x: &x, u: &segment.u, p: &integrator.base.parameters, t: entry.t };
+        Ok(B::replay(&mut integrator.state, entry.level)?.solve(&at, h, y, None)?.x)
+    }
+
+    /// `(ẋ, z)` at a state.
+    fn slope(&mut self, x: &VectorX<M, T>, u: &VectorU<M, T>, t: T) -> Result<ArrayK<M, T>, Error> {
+        let base = &mut self.integrator.base;
+        let (nx, point) = (M::Shape::NX, base.point.as_ref());
+        // From where the last step ended.
+        let mut y = ArrayK::<M, T>::zeroed();
+        for (y, from) in y.as_mut().iter_mut().zip(point[..nx].iter().chain(&point[2 * nx..])) {
+            *y = *from;
+        }
+        let parameters: VectorP<M, T> = base.parameters;
+        let at = At { x, u, p: &parameters, t };
+        self.integrator.consistent.solve(&at, &mut y)?;
+        Ok(y)
+    }
+
+    /// Goes to where an event happened.
+    pub(super) fn go(&mut self, k: usize) {
+        let parameters = self.integrator.base.parameters;
+        let (Some(segment), Some(at)) = (self.segments.get(k), self.solution.occurrences.get(k)) else {
+            return;
+        };
+        place_inputs::<M, T>(self.v.as_mut().as_mut(), &segment.u, &parameters);
+        place::<M, T>(&mut self.v, &at.before, at.t);
+    }
+
+    /// What is known about the moment of the event that ends a segment, whose steps were just taken again.
+    ///
+    /// # Errors
+    /// [`Error::Grazing`]; no consistent derivative; a jump that is not finite.
+    #[allow(clippy::type_complexity)]
+    pub(super) fn moment(&mut self, k: usize) -> Result<Option<(Event<M, T>, Moment<M, T>)>, Error> {
+        let nx = M::Shape::NX;
+        let (Some(at), Some(segment)) = (self.solution.occurrences.get_mut(k), self.segments.get(k)) else {
+            return Ok(None);
+        };
+        at.before = self.integrator.base.result.x;
+        at.after = at.before;
+        let (index, t, u, before) = (at.event, at.t, segment.u, at.before);
+        let Some(event) = self.events.get(index).copied() else { return Ok(None) };
+        let slope = self.slope(&before, &u, t)?;
+        self.go(k);
+        let (guard, mut rate) = event.guard.gradient(&self.v, &[T::ONE]);
+        for (g, f) in guard.as_ref()[nx..2 * nx].iter().zip(slope.as_ref()) {
+            rate = rate + *g * *f;
+        }
+        self.check_slope(k, &event, index, rate)?;
+        let mut moment =
+            Moment { guard, rate, before: states::<M, T>(&slope), after: ArrayX::<M, T>::zeroed() };
+        if let Some(jump) = event.jump {
+            let mut after = VectorX::<M, T>::zeroed();
+            after.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());
+            finite(jump.name, after.as_slice(), k)?;
+            moment.after = states::<M, T>(&self.slope(&after, &u, t)?);
+            if let Some(at) = self.solution.occurrences.get_mut(k) {
+                at.after = after;
+            }
+        }
+        Ok(Some((event, moment)))
+    }
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
+    /// The slope at an event is one to divide by, beside the mean slope over the step that ends there.
+    ///
+    /// # Errors
+    /// [`Error::Grazing`]
+    fn check_slope(&mut self, k: usize, event: &Event<M, T>, index: usize, rate: T) -> Result<(), Error> {
+        let Some(segment) = self.segments.get(k) else { return Ok(()) };
+        let Some(step) = segment.tape.entries().len().checked_sub(1) else { return Ok(()) };
+        let Some(entry) = segment.tape.entries().get(step).copied() else { return Ok(()) };
+        let mut x = VectorX::<M, T>::zeroed();
+        x.as_mut_slice().copy_from_slice(segment.tape.numbers(step, M::Shape::NX).0);
+        let last = self.integrator.base.result.x;
+        let end = evaluate(event, &mut self.v, &last, entry.t + entry.h, k)?;
+        let start = evaluate(event, &mut self.v, &x, entry.t, k)?;
+        self.go(k);
+        let (change, expected) = ((end - start).abs(), (rate * entry.h).to_f64().abs());
+        if rate == T::ZERO || expected < GRAZING * change {
+            let t = (entry.t + entry.h).to_f64();
+            return Err(Error::Grazing { event: index, t });
+        }
+        Ok(())
+    }
+}
+
+/// `ẋ` of `(ẋ, z)`.
+fn states<M: Dae, T: Real>(y: &ArrayK<M, T>) -> ArrayX<M, T> {
+    let mut slope = ArrayX::<M, T>::zeroed();
+    slope.as_mut().copy_from_slice(&y.as_ref()[..M::Shape::NX]);
+    slope
+}
+
+/// The state and the time to where they lie among the variables.
+fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, t: T) {
+    let nx = M::Shape::NX;
+    let v = v.as_mut();
+    v[nx..2 * nx].copy_from_slice(x.as_slice());
+    if let Some(time) = v.last_mut() {
+        *time = t;
+    }
+}
+
+/// The function of an event at a state.
+fn evaluate<M: Dae, T: Real>(
+    event: &Event<M, T>,
+    v: &mut ArrayV<M, T>,
+    x: &VectorX<M, T>,
+    t: T,
+    k: usize,
+) -> Result<f64, Error> {
+    place::<M, T>(v, x, t);
+    let value = event.guard.first(v);
+    finite(event.guard.name, &[value], k)?;
+    Ok(value.to_f64())
+}
+
+/// # Errors
+/// [`Error::NonFiniteFunction`]
+fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
+    let at = Place { step, stage: 0, iteration: 0 };
+    match not_finite(values) {
+        None => Ok(()),
+        Some((output, value)) => Err(Error::NonFiniteFunction { function, output, value, at }),
+    }
+}

@@ -1,0 +1,112 @@
+//! The steps of one of several intervals that follow each other.
+
+use super::consistent::place_inputs;
+use super::integrator::{Integrator, inside};
+use super::run::Span;
+use super::sealed::Engine;
+use super::sensitivities::{Frozen, Memory};
+use super::tape::Tape;
+use crate::error::{Argument, Error};
+use crate::irk::check;
+use crate::model::{ArrayK, Dae, VectorU, VectorX};
+use crate::result::{Dense, Nominal};
+use crate::scalar::Real;
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// The steps of one interval.
+pub(super) struct Segment<M: Dae, T: Real> {
+    pub tape: Tape<T>,
+    pub span: Span<T>,
+    pub u: VectorU<M, T>,
+    pub x: VectorX<M, T>,
+    /// Start values of `(ẋ, z)`.
+    pub given: ArrayK<M, T>,
+    /// Derivatives at the start of each step.
+    pub history: Vec<T>,
+    /// `V_k`, row after row.
+    pub v: Vec<T>,
+}
+
+impl<M: Dae, T: Real> Default for Segment<M, T> {
+    fn default() -> Self {
+        Self {
+            tape: Tape::default(),
+            span: Span { start: T::ZERO, end: T::ZERO },
+            u: Zeroable::zeroed(),
+            x: Zeroable::zeroed(),
+            given: Zeroable::zeroed(),
+            history: Vec::new(),
+            v: Vec::new(),
+        }
+    }
+}
+
+impl<M: Dae, T: Real> Segment<M, T> {
+    /// The steps of this interval, to be taken again and differentiated; `V_k`.
+    #[allow(clippy::type_complexity)]
+    pub fn open<'a, B: Engine<M, T>>(
+        &'a mut self,
+        integrator: &'a mut Integrator<M, B, T>,
+    ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
+        let Integrator { base, consistent, state, memory, .. } = integrator;
+        (base.u, base.given) = (self.u, self.given);
+        let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
+        let memory = memory.as_deref_mut().ok_or(missing)?;
+        Ok((Frozen { base, consistent, tape: &mut self.tape, span: self.span }, state, memory, &self.v))
+    }
+}
+
+/// One more.
+///
+/// # Errors
+/// [`Error::OutOfMemory`]
+pub(super) fn add<M: Dae, T: Real>(segments: &mut Vec<Segment<M, T>>) -> Result<(), Error> {
+    let bytes = size_of::<Segment<M, T>>();
+    segments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes })?;
+    segments.push(Segment::default());
+    Ok(())
+}
+
+/// The solution at a time inside the intervals; where two of them meet, that of the first.
+///
+/// # Errors
+/// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+pub(super) fn dense<'a, M: Dae, B: Engine<M, T>, T: Real>(
+    integrator: &'a mut Integrator<M, B, T>,
+    segments: &mut [Segment<M, T>],
+    end: &Nominal<M, T>,
+    t: T,
+) -> Result<&'a Dense<M, T>, Error> {
+    check(Argument::T, &[t])?;
+    let (Some(first), Some(last)) = (segments.first(), segments.last()) else {
+        return Err(Error::NoResult);
+    };
+    let (start, last) = (first.span.start.to_f64(), last.span.end.to_f64());
+    let outside = Error::OutsideInterval { t: t.to_f64(), start, end: last };
+    let holds = |segment: &&mut Segment<M, T>| inside(t, segment.span.start, segment.span.end);
+    let segment = segments.iter_mut().find(holds);
+    let segment = segment.ok_or(outside)?;
+    if segment.tape.entries().is_empty() {
+        // An interval without length; `z` there is that of the end, if all are.
+        (integrator.base.dense.x, integrator.base.dense.z) = (segment.x, end.z);
+        return Ok(&integrator.base.dense);
+    }
+    let parameters = integrator.base.parameters;
+    place_inputs::<M, T>(integrator.base.point.as_mut(), &segment.u, &parameters);
+    core::mem::swap(&mut integrator.tape, &mut segment.tape);
+    let result = integrator.dense_in(segment.span, t).map(|_| ());
+    core::mem::swap(&mut integrator.tape, &mut segment.tape);
+    result?;
+    Ok(&integrator.base.dense)
+}
+
+/// # Errors
+/// [`Error::OutOfMemory`]
+pub(super) fn filled<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> {
+    let mut list = Vec::new();
+    let bytes = length.saturating_mul(size_of::<V>());
+    list.try_reserve_exact(length).map_err(|_| Error::OutOfMemory { bytes })?;
+    list.resize(length, value);
+    Ok(list)
+}
