@@ -1,16 +1,21 @@
 //! Products of small dense matrices, in tiles of registers.
 //!
 //! All matrices lie column after column, and columns are whole registers apart. Rows of a tile are registers of `X`,
-//! its columns are elements of `Y` in all lanes: twelve sums, three registers and one broadcast fill the sixteen
-//! registers of AVX2. Everything is inlined into the function that was compiled for `E`.
+//! its columns are elements of `Y` in all lanes: two registers times six elements are twelve sums, and with what they are
+//! computed from they leave one of the sixteen registers of AVX2 free. Three times four leave none, and the compiler
+//! then keeps sums in memory, which takes twice as long. Everything is inlined into the function that was compiled for `E`.
 
 use crate::qp::layout::part;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 use core::ops::Range;
 
-/// Columns of a tile.
-const WIDTH: usize = 4;
+/// Columns of a wide tile.
+const WIDE: usize = 6;
+/// Columns of a narrow tile: of what is left.
+const NARROW: usize = 4;
+/// A product writes up to so many columns more than it is asked for.
+pub const MORE: usize = WIDE - 1;
 
 /// A matrix to be read, and the distance of its columns.
 #[derive(Clone, Copy)]
@@ -139,17 +144,12 @@ fn strip<T: Real, E: Packed<T>, const C: usize>(
     while left > 0 {
         let target = target.get_mut(row..).unwrap_or_default();
         let (source, x) = (source.below(row), x.below(row));
-        // Four registers are better two and two than three and one.
-        let done = if left == 3 || left > 4 {
-            update::<T, E, 3, C>(target, target_ld, source, x, y, depth);
-            3
-        } else if left >= 2 {
+        let done = left.min(2);
+        if done == 2 {
             update::<T, E, 2, C>(target, target_ld, source, x, y, depth);
-            2
         } else {
             update::<T, E, 1, C>(target, target_ld, source, x, y, depth);
-            1
-        };
+        }
         left -= done;
         row += done * E::LANES;
     }
@@ -166,7 +166,7 @@ pub enum Part {
 
 /// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
 ///
-/// Columns are taken four at a time from the first one on: up to three more than asked for are written if the target has
+/// Columns are taken in tiles from the first one on: up to [`MORE`] than asked for are written if the target has
 /// them, and rows up to whole registers. In `Y` the first column of the target is row 0.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
@@ -230,8 +230,14 @@ fn tiles<T: Real, E: Packed<T>>(
         let target = target.get_mut(column * target_ld + first..).unwrap_or_default();
         let source = source.skip(column).below(first);
         let rows = rows.saturating_sub(first);
-        strip::<T, E, WIDTH>(target, target_ld, source, x.below(first), y.below(column), rows, depth);
-        column += WIDTH;
+        let (x, y) = (x.below(first), y.below(column));
+        if columns.end - column > NARROW && column + WIDE <= y.ld {
+            strip::<T, E, WIDE>(target, target_ld, source, x, y, rows, depth);
+            column += WIDE;
+        } else {
+            strip::<T, E, NARROW>(target, target_ld, source, x, y, rows, depth);
+            column += NARROW;
+        }
     }
 }
 
@@ -299,14 +305,14 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
 ) {
     let registers = rows.div_ceil(E::LANES);
     let v = E::cells(v).get(..registers).unwrap_or_default();
-    let (fours, rest) = target.get_mut(..columns).unwrap_or_default().as_chunks_mut::<WIDTH>();
+    let (fours, rest) = target.get_mut(..columns).unwrap_or_default().as_chunks_mut::<NARROW>();
     let mut x = x;
     for target in fours {
-        let dots = dots::<T, E, WIDTH>(x, v);
+        let dots = dots::<T, E, NARROW>(x, v);
         for (target, dot) in target.iter_mut().zip(dots) {
             *target = *target + dot;
         }
-        x = x.skip(WIDTH);
+        x = x.skip(NARROW);
     }
     for target in rest {
         let [dot] = dots::<T, E, 1>(x, v);

@@ -10,7 +10,7 @@
 //! this classical form needs less than the one with the square root of `P`.
 
 use super::kernels::{
-    Columns, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column,
+    Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column,
 };
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, StageDims, end, pad, part, part_mut, take_mut};
@@ -83,9 +83,6 @@ impl Largest {
 const fn max(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
 }
-
-/// Products write up to three columns more than they are asked for.
-const MORE: usize = 3;
 
 impl<'a, T: Real> Riccati<'a, T> {
     /// How many numbers it takes.
