@@ -51,6 +51,8 @@ pub enum Field {
     Numbers,
     /// Indices that a solver works with.
     Indices,
+    /// Options of a solver.
+    Settings,
 }
 
 /// The side of a constraint.
@@ -171,6 +173,7 @@ impl fmt::Display for Field {
             Self::Solution => "the memory of the solution",
             Self::Numbers => "the memory of the solver",
             Self::Indices => "the indices of the solver",
+            Self::Settings => "the settings of the solver",
         })
     }
 }

@@ -35,6 +35,8 @@ qp.fix_initial_state(&[1.0])?;
 
 mod block;
 mod check;
+#[cfg(feature = "clarabel")]
+mod clarabel;
 mod error;
 mod interior;
 mod layout;
@@ -43,10 +45,14 @@ mod memory;
 mod problem;
 mod solution;
 mod solver;
+#[cfg(feature = "clarabel")]
+mod sparse;
 mod statistics;
 
 pub use block::{Block, BlockMut};
 pub use check::{check, residuals};
+#[cfg(feature = "clarabel")]
+pub use clarabel::{Clarabel, SecondOrderCone};
 pub use error::{Field, QpError, Side};
 #[cfg(feature = "alloc")]
 pub use interior::HeapInteriorPoint;

@@ -1,0 +1,227 @@
+//! The solver clarabel behind the trait of this library (feature `clarabel`).
+
+use super::check::check;
+use super::error::{Field, QpError, Side};
+use super::layout::Places;
+use super::problem::QpView;
+use super::solution::SolutionView;
+use super::solver::{QpSolver, Start};
+pub use super::sparse::SecondOrderCone;
+use super::sparse::{Origin, Sparse, Triplets};
+use super::statistics::{Residuals, Statistics};
+use alloc::vec::Vec;
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+
+/// Clarabel's interior point for sparse problems.
+///
+/// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order cones, and shares no code with it.
+/// Every start is cold. Its symbolic factorisation is kept as long as the elements that are not zero stay the same.
+///
+/// Of an infeasible problem it names the constraint with the largest multiplier in the certificate, and a violation that at
+/// least one constraint must have.
+pub struct Clarabel {
+    /// Clarabel's own options.
+    pub settings: DefaultSettings<f64>,
+    /// Constraints beyond those of the QP. They are checked when a problem is solved.
+    pub cones: Vec<SecondOrderCone>,
+    kept: Option<Kept>,
+}
+
+/// A solver and the pattern that it is for.
+struct Kept {
+    solver: DefaultSolver<f64>,
+    p: CscMatrix<f64>,
+    k: CscMatrix<f64>,
+    cones: Vec<SupportedConeT<f64>>,
+}
+
+impl Default for Clarabel {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Clarabel {
+    /// A solver that is silent, with tolerances of 1e-9.
+    #[must_use]
+    pub fn new() -> Self {
+        let settings = DefaultSettings {
+            verbose: false,
+            presolve_enable: false,
+            tol_gap_abs: 1e-9,
+            tol_gap_rel: 1e-9,
+            tol_feas: 1e-9,
+            ..DefaultSettings::default()
+        };
+        Self { settings, cones: Vec::new(), kept: None }
+    }
+
+    fn check_cones(&self, qp: QpView<'_, f64>) -> Result<(), QpError> {
+        for cone in &self.cones {
+            let Some(stage) = qp.stage(cone.stage) else {
+                let (expected, found) = (cone.stage + 1, qp.dims().len());
+                return Err(QpError::Dimension { field: Field::Stages, stage: cone.stage, expected, found });
+            };
+            let (expected, found) = (cone.first.saturating_add(cone.count), stage.dims().ng);
+            let lower = stage.g_bounds().lower;
+            if expected > found || cone.count == 0 {
+                return Err(QpError::Dimension {
+                    field: Field::GeneralBounds,
+                    stage: cone.stage,
+                    expected,
+                    found,
+                });
+            }
+            for index in cone.first..expected {
+                let value = lower.get(index).copied().unwrap_or(0.0);
+                if !value.is_finite() {
+                    return Err(QpError::InvalidValue {
+                        field: Field::GeneralBounds,
+                        stage: cone.stage,
+                        index,
+                        value,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The solver, with new data.
+    fn prepare(&mut self, sparse: Sparse) -> Result<(&mut DefaultSolver<f64>, Sparse), QpError> {
+        let p = matrix(&sparse.p, sparse.q.len(), sparse.q.len());
+        let k = matrix(&sparse.k, sparse.b.len(), sparse.q.len());
+        let mut cones = alloc::vec![
+            SupportedConeT::ZeroConeT(sparse.equations),
+            SupportedConeT::NonnegativeConeT(
+                sparse.b.len() - sparse.equations - sparse.cones.iter().sum::<usize>()
+            ),
+        ];
+        cones.extend(sparse.cones.iter().map(|&count| SupportedConeT::SecondOrderConeT(count)));
+        let same = |kept: &Kept| {
+            let equal = |a: &CscMatrix<f64>, b: &CscMatrix<f64>| a.colptr == b.colptr && a.rowval == b.rowval;
+            equal(&kept.p, &p) && equal(&kept.k, &k) && (kept.k.m, &kept.cones) == (k.m, &cones)
+        };
+        let updated =
+            self.kept.as_mut().filter(|kept| same(kept)).is_some_and(|kept| {
+                kept.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
+            });
+        if !updated {
+            // What clarabel checks here are the dimensions, which are right by construction, and the user's settings.
+            let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, self.settings.clone());
+            let invalid =
+                QpError::InvalidValue { field: Field::Settings, stage: 0, index: 0, value: f64::NAN };
+            self.kept = Some(Kept { solver: solver.map_err(|_| invalid)?, p, k, cones });
+        }
+        match &mut self.kept {
+            Some(kept) => Ok((&mut kept.solver, sparse)),
+            None => Err(QpError::OutOfMemory { bytes: 0 }),
+        }
+    }
+}
+
+/// Sorted by columns and rows.
+fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
+    let mut elements: Vec<_> = triplets.elements.clone();
+    elements.sort_unstable_by_key(|&(column, row, _)| (column, row));
+    let mut starts = alloc::vec![0; columns + 1];
+    for &(column, ..) in &elements {
+        if let Some(count) = starts.get_mut(column + 1) {
+            *count += 1;
+        }
+    }
+    let mut sum = 0;
+    for start in &mut starts {
+        sum += *start;
+        *start = sum;
+    }
+    let indices = elements.iter().map(|e| e.1).collect();
+    let values = elements.iter().map(|e| e.2).collect();
+    CscMatrix { m: rows, n: columns, colptr: starts, rowval: indices, nzval: values }
+}
+
+impl QpSolver<f64> for Clarabel {
+    fn solve(
+        &mut self,
+        qp: QpView<'_, f64>,
+        _: Start,
+        solution: SolutionView<'_, f64>,
+    ) -> Result<Statistics, QpError> {
+        check(qp)?;
+        solution.fits(qp)?;
+        self.check_cones(qp)?;
+        let (solver, sparse) = self.prepare(Sparse::new(qp, &self.cones))?;
+        solver.solve();
+        let found = &solver.solution;
+        let SolutionView { v, dynamics, lower, upper, .. } = solution;
+        for (place, &column) in Places::new::<f64>(qp.dims()).zip(&sparse.columns) {
+            let from = found.x.get(column..column + place.n).unwrap_or_default();
+            for (v, &x) in v.get_mut(place.v..).unwrap_or_default().iter_mut().zip(from) {
+                *v = x;
+            }
+        }
+        lower.fill(0.0);
+        upper.fill(0.0);
+        for (origin, &z) in sparse.origins.iter().zip(&found.z) {
+            let (to, index, z) = match *origin {
+                Origin::Dynamics(i) => (&mut *dynamics, i, z),
+                Origin::Equation(i) if z >= 0.0 => (&mut *upper, i, z),
+                Origin::Equation(i) => (&mut *lower, i, -z),
+                Origin::Lower(i) | Origin::Cone(i) => (&mut *lower, i, z),
+                Origin::Upper(i) => (&mut *upper, i, z),
+                Origin::Sign => continue,
+            };
+            if let Some(to) = to.get_mut(index) {
+                *to = z;
+            }
+        }
+        let iterations = found.iterations as usize;
+        let residuals = Residuals {
+            stationarity: found.r_dual,
+            dynamics: found.r_prim,
+            inequalities: found.r_prim,
+            complementarity: (found.obj_val - found.obj_val_dual).abs(),
+        };
+        let objective = found.obj_val;
+        match found.status {
+            SolverStatus::Solved => Ok(Statistics {
+                iterations,
+                factorisations: iterations,
+                residuals,
+                objective,
+                ..Statistics::default()
+            }),
+            SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
+                Err(infeasible(qp, &sparse, &found.z))
+            }
+            SolverStatus::MaxIterations | SolverStatus::MaxTime => {
+                Err(QpError::MaxIterations { iterations, residuals })
+            }
+            _ => Err(QpError::Stalled { iterations, residuals }),
+        }
+    }
+}
+
+/// `Kᵀ z = 0` and `bᵀ z < 0` say that the largest violation is at least `−bᵀ z / Σ |z|`.
+fn infeasible(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
+    let product: f64 = sparse.b.iter().zip(z).map(|(b, z)| b * z).sum();
+    let violation = -product / z.iter().map(|z| z.abs()).sum::<f64>();
+    let mut largest = (0.0, 0, Side::Lower);
+    for (origin, z) in sparse.origins.iter().zip(z) {
+        let (row, side) = match *origin {
+            Origin::Equation(row) if *z > 0.0 => (row, Side::Upper),
+            Origin::Equation(row) | Origin::Lower(row) | Origin::Cone(row) => (row, Side::Lower),
+            Origin::Upper(row) => (row, Side::Upper),
+            Origin::Dynamics(_) | Origin::Sign => continue,
+        };
+        if z.abs() > largest.0 {
+            largest = (z.abs(), row, side);
+        }
+    }
+    let (_, row, side) = largest;
+    let place =
+        Places::new::<f64>(qp.dims()).find(|p| (p.row..p.row + p.rows).contains(&row)).unwrap_or_default();
+    let (field, index) = place.name(row - place.row);
+    QpError::Infeasible { field, stage: place.stage, index, side, violation }
+}

@@ -1,0 +1,235 @@
+//! A QP as one sparse problem: `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then sides, then cones.
+
+use super::layout::Places;
+use super::problem::{Bounds, QpView, Stage};
+use alloc::vec::Vec;
+
+/// Where a row comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Origin {
+    /// A row of the dynamics: where it lies in the multipliers of the dynamics.
+    Dynamics(usize),
+    /// Two equal bounds: where they lie in vectors over constraints.
+    Equation(usize),
+    /// A lower bound.
+    Lower(usize),
+    /// An upper bound.
+    Upper(usize),
+    /// The sign of a violation.
+    Sign,
+    /// An element of a cone.
+    Cone(usize),
+}
+
+/// Rows `first .. first + count` of the general constraints of a stage, less their lower bounds, lie in the second-order cone:
+/// the first of them is at least the length of the others. Their upper bounds have no meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SecondOrderCone {
+    /// The stage.
+    pub stage: usize,
+    /// Its first row.
+    pub first: usize,
+    /// How many rows.
+    pub count: usize,
+}
+
+/// Elements in any order, each column once.
+#[derive(Debug, Default)]
+pub struct Triplets {
+    pub elements: Vec<(usize, usize, f64)>,
+}
+
+impl Triplets {
+    fn add(&mut self, row: usize, column: usize, value: f64) {
+        if value != 0.0 {
+            self.elements.push((column, row, value));
+        }
+    }
+}
+
+/// The sparse problem.
+#[derive(Debug, Default)]
+pub struct Sparse {
+    /// The upper triangle.
+    pub p: Triplets,
+    pub q: Vec<f64>,
+    pub k: Triplets,
+    pub b: Vec<f64>,
+    /// What the rows are.
+    pub origins: Vec<Origin>,
+    /// Columns of the variables `v` of each stage.
+    pub columns: Vec<usize>,
+    /// How many rows are equations.
+    pub equations: usize,
+    /// Sizes of cones.
+    pub cones: Vec<usize>,
+}
+
+/// One row of a stage over its variables, before it has a sign and a right-hand side.
+struct Line<'a> {
+    stage: &'a Stage<'a, f64>,
+    column: usize,
+    /// A variable, or `n` + a general constraint.
+    index: usize,
+}
+
+impl Line<'_> {
+    fn add(&self, k: &mut Triplets, row: usize, sign: f64) {
+        let dims = self.stage.dims();
+        let n = dims.nx + dims.nu;
+        let Some(general) = self.index.checked_sub(n) else {
+            return k.add(row, self.column + self.index, sign);
+        };
+        for j in 0..dims.nx {
+            k.add(row, self.column + j, sign * self.stage.c().get(general, j).unwrap_or(0.0));
+        }
+        for j in 0..dims.nu {
+            k.add(row, self.column + dims.nx + j, sign * self.stage.d().get(general, j).unwrap_or(0.0));
+        }
+    }
+}
+
+/// The bounds of one row.
+struct Limits {
+    lower: (f64, f64, f64),
+    upper: (f64, f64, f64),
+}
+
+fn limits(bounds: &Bounds<'_, f64>, i: usize) -> Option<Limits> {
+    let at = |slice: &[f64]| slice.get(i).copied();
+    Some(Limits {
+        lower: (at(bounds.lower)?, at(bounds.lower_linear)?, at(bounds.lower_quadratic)?),
+        upper: (at(bounds.upper)?, at(bounds.upper_linear)?, at(bounds.upper_quadratic)?),
+    })
+}
+
+impl Sparse {
+    /// Of a QP.
+    pub fn new(qp: QpView<'_, f64>, cones: &[SecondOrderCone]) -> Self {
+        let mut sparse = Self::default();
+        for dims in qp.dims() {
+            sparse.columns.push(sparse.q.len());
+            sparse.q.resize(sparse.q.len() + dims.nx + dims.nu, 0.0);
+        }
+        for (stage, &column) in qp.stages().zip(&sparse.columns) {
+            cost(&mut sparse.p, &mut sparse.q, &stage, column);
+        }
+        for (k, (stage, place)) in qp.stages().zip(Places::new::<f64>(qp.dims())).enumerate() {
+            let (Some(&here), next) = (sparse.columns.get(k), sparse.columns.get(k + 1).copied()) else {
+                break;
+            };
+            for i in 0..place.next {
+                let row = sparse.row(
+                    Origin::Dynamics(place.dynamics + i),
+                    -stage.offset().get(i).copied().unwrap_or(0.0),
+                );
+                for j in 0..place.nx {
+                    sparse.k.add(row, here + j, stage.a().get(i, j).unwrap_or(0.0));
+                }
+                for j in 0..place.nu {
+                    sparse.k.add(row, here + place.nx + j, stage.b().get(i, j).unwrap_or(0.0));
+                }
+                sparse.k.add(row, next.map_or(0, |next| next + i), -1.0);
+            }
+        }
+        // Equations before inequalities, and these before cones.
+        for pass in 0..2 {
+            for (k, (stage, place)) in qp.stages().zip(Places::new::<f64>(qp.dims())).enumerate() {
+                let Some(&column) = sparse.columns.get(k) else { break };
+                let kinds = [stage.x_bounds(), stage.u_bounds(), stage.g_bounds()];
+                for (index, (bounds, i)) in
+                    kinds.iter().flat_map(|b| (0..b.lower.len()).map(move |i| (b, i))).enumerate()
+                {
+                    let general = index.checked_sub(place.n);
+                    let in_cone = |cone: &SecondOrderCone| {
+                        cone.stage == k
+                            && general.is_some_and(|g| (cone.first..cone.first + cone.count).contains(&g))
+                    };
+                    if cones.iter().any(in_cone) {
+                        continue;
+                    }
+                    let row = place.row + general.map_or(index, |general| place.ld + general);
+                    let Some(limits) = limits(bounds, i) else { continue };
+                    sparse.constraint(&Line { stage: &stage, column, index }, row, &limits, pass == 0);
+                }
+            }
+            if pass == 0 {
+                sparse.equations = sparse.b.len();
+            }
+        }
+        for cone in cones {
+            let (Some(stage), Some(&column)) = (qp.stage(cone.stage), sparse.columns.get(cone.stage)) else {
+                continue;
+            };
+            let Some(place) = Places::new::<f64>(qp.dims()).nth(cone.stage) else { continue };
+            for general in cone.first..cone.first + cone.count {
+                let lower = stage.g_bounds().lower.get(general).copied().unwrap_or(0.0);
+                let row = sparse.row(Origin::Cone(place.row + place.ld + general), -lower);
+                Line { stage: &stage, column, index: place.n + general }.add(&mut sparse.k, row, -1.0);
+            }
+            sparse.cones.push(cone.count);
+        }
+        sparse
+    }
+
+    fn row(&mut self, origin: Origin, b: f64) -> usize {
+        self.origins.push(origin);
+        self.b.push(b);
+        self.b.len() - 1
+    }
+
+    /// Two sides, or an equation.
+    fn constraint(&mut self, line: &Line<'_>, row: usize, limits: &Limits, equations: bool) {
+        let Limits { lower, upper } = limits;
+        let hard = lower.1.is_infinite() && upper.1.is_infinite();
+        if hard && lower.0 == upper.0 {
+            if equations {
+                let k = self.row(Origin::Equation(row), lower.0);
+                line.add(&mut self.k, k, 1.0);
+            }
+            return;
+        }
+        if equations {
+            return;
+        }
+        for (sign, &(bound, linear, quadratic), origin) in
+            [(-1.0, lower, Origin::Lower(row)), (1.0, upper, Origin::Upper(row))]
+        {
+            if bound.is_infinite() || (linear == 0.0 && quadratic == 0.0) {
+                continue;
+            }
+            let k = self.row(origin, sign * bound);
+            line.add(&mut self.k, k, sign);
+            if linear.is_finite() {
+                // A variable of its own for the violation.
+                let violation = self.q.len();
+                self.q.push(linear);
+                self.p.add(violation, violation, quadratic);
+                self.k.add(k, violation, -1.0);
+                let k = self.row(Origin::Sign, 0.0);
+                self.k.add(k, violation, -1.0);
+            }
+        }
+    }
+}
+
+fn cost(p: &mut Triplets, q: &mut [f64], stage: &Stage<'_, f64>, column: usize) {
+    let dims = stage.dims();
+    for i in 0..dims.nx {
+        for j in 0..=i {
+            p.add(column + j, column + i, stage.q().get(i, j).unwrap_or(0.0));
+        }
+    }
+    for i in 0..dims.nu {
+        for j in 0..dims.nx {
+            p.add(column + j, column + dims.nx + i, stage.s().get(i, j).unwrap_or(0.0));
+        }
+        for j in 0..=i {
+            p.add(column + dims.nx + j, column + dims.nx + i, stage.r().get(i, j).unwrap_or(0.0));
+        }
+    }
+    let linear = stage.gradient_x().iter().chain(stage.gradient_u());
+    for (q, &linear) in q.get_mut(column..).unwrap_or_default().iter_mut().zip(linear) {
+        *q = linear;
+    }
+}
