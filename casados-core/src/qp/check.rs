@@ -196,6 +196,12 @@ fn bounds<T: Real>(
     let mut penalties = 0.0;
     for i in 0..lower.len() {
         let value = value(i);
+        let hard = at(bounds.lower_linear, i).is_infinite() && at(bounds.upper_linear, i).is_infinite();
+        if hard && at(bounds.lower, i) == at(bounds.upper, i) {
+            // An equation: its multiplier, the difference of two, has no sign and no slack.
+            largest(&mut residuals.inequalities, value - at(bounds.lower, i));
+            continue;
+        }
         let sides = [
             (
                 value - at(bounds.lower, i),

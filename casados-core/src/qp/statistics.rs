@@ -20,7 +20,8 @@ impl Residuals {
     #[must_use]
     pub fn largest(&self) -> f64 {
         let all = [self.stationarity, self.dynamics, self.inequalities, self.complementarity];
-        all.into_iter().fold(0.0, |largest, r| if r <= largest { largest } else { r })
+        all.into_iter()
+            .fold(0.0, |largest: f64, r| if r <= largest || largest.is_nan() { largest } else { r })
     }
 }
 

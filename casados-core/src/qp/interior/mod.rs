@@ -135,9 +135,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         solution.fits(qp)?;
         let result = self.run(qp, Penalties::Given, start, &mut solution);
         match result {
+            // A number that is not finite is found here, not in every call.
+            Err(_) if super::check::check(qp).is_err() => super::check::check(qp).and(result),
             Err(QpError::MaxIterations { .. } | QpError::Stalled { .. }) if self.options.locate => {
-                // A number that is not finite is found here, not in every call.
-                super::check::check(qp)?;
                 match self.locate(qp, &mut solution) {
                     Some(infeasible) => Err(infeasible),
                     None => {

@@ -337,20 +337,28 @@ impl<T: Real> Sides<'_, T> {
         (T::ONE - alpha) * mu + alpha * alpha * products
     }
 
-    /// The predictor: `s Δλ + λ Δs = −s λ`.
+    /// The largest violation of a side, before anything else is in `scratch`.
     #[inline(always)]
-    pub fn aim_at_zero(&mut self) {
+    pub fn violation(&self) -> T {
+        part(self.scratch, 0, self.counts.sides())
+            .iter()
+            .fold(T::ZERO, |largest, &distance| (-distance).max(largest))
+    }
+
+    /// `s Δλ + λ Δs = μ − s λ`
+    #[inline(always)]
+    pub fn aim(&mut self, mu: T) {
         for ((inverse, &slack), (target, &multiplier)) in
             self.inverse.iter_mut().zip(&*self.slack).zip(self.target.iter_mut().zip(&*self.multiplier))
         {
             *inverse = T::ONE / slack;
-            *target = -multiplier;
+            *target = mu * *inverse - multiplier;
         }
     }
 
     /// The corrector: `s Δλ + λ Δs = σμ − s λ − Δs Δλ` of the predictor.
     #[inline(always)]
-    pub fn aim_at(&mut self, sigma_mu: T) {
+    pub fn correct(&mut self, sigma_mu: T) {
         let steps = self.slack_step.iter().zip(&*self.multiplier_step);
         let pairs = self.multiplier.iter().zip(&*self.inverse);
         for ((target, (&ds, &dl)), (&multiplier, &inverse)) in self.target.iter_mut().zip(steps).zip(pairs) {
@@ -395,7 +403,8 @@ impl<T: Real> Sides<'_, T> {
             let Some(soft) = self.soft_side(j, side as usize) else { break };
             let Some(step) = self.slack_step.get_mut(side as usize) else { break };
             let violation = (soft.sum - soft.stiffness * *step) * soft.inverse;
-            *step = *step + violation;
+            // Their sum, written such that it keeps its digits where the slack is small and its weight large.
+            *step = (soft.sum + soft.compliance * *step) * soft.inverse;
             set(self.slack_step, sides + j, violation);
         }
         let pairs = self.multiplier.iter().zip(&*self.inverse);
@@ -417,6 +426,7 @@ impl<T: Real> Sides<'_, T> {
         let sum = target + *self.target.get(violation)?;
         Some(Soft {
             weight: stiffness * (quadratic + other) * inverse,
+            compliance: quadratic + other,
             target: target - stiffness * sum * inverse,
             sum,
             stiffness,
@@ -438,6 +448,7 @@ struct Soft<T> {
     target: T,
     sum: T,
     stiffness: T,
+    compliance: T,
     inverse: T,
 }
 

@@ -7,7 +7,7 @@ pub struct InteriorPointOptions {
     pub tolerance: f64,
     /// Default 50.
     pub max_iterations: usize,
-    /// Where the products of slacks and multipliers begin. Default 10.
+    /// Where the products of slacks and multipliers begin. Default 1.
     pub start_mu: f64,
     /// Slacks and multipliers of a warm start are at least this. Default 0.01.
     pub warm_distance: f64,
@@ -21,6 +21,6 @@ impl InteriorPointOptions {
     #[must_use]
     pub fn new<T: crate::scalar::Real>() -> Self {
         let tolerance = if T::EPSILON < 1e-10 { 1e-8 } else { 1e-4 };
-        Self { tolerance, max_iterations: 50, start_mu: 10.0, warm_distance: 0.01, locate: true }
+        Self { tolerance, max_iterations: 50, start_mu: 1.0, warm_distance: 0.01, locate: true }
     }
 }

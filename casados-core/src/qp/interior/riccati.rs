@@ -51,6 +51,8 @@ pub struct Riccati<'a, T> {
     pub minus: &'a mut [T],
     /// Pivots that were made larger.
     pub regularised: usize,
+    /// The largest element of the diagonals so far: what elimination has subtracted was as large as that.
+    largest: T,
 }
 
 /// The largest dimensions.
@@ -107,6 +109,7 @@ impl<'a, T: Real> Riccati<'a, T> {
             g: take_mut(memory, ld),
             minus: take_mut(memory, pad(next_and_ng, size_of::<T>())),
             regularised: 0,
+            largest: T::ZERO,
         }
     }
 }
@@ -168,6 +171,7 @@ impl<T: Real> Riccati<'_, T> {
         let Equations { qp, first, weights, gradient, dynamics } = *equations;
         if factor {
             self.regularised = 0;
+            self.largest = T::ZERO;
         }
         for place in Places::new::<T>(qp.dims).rev() {
             let Place { nx, nu, n, ng, ld, next, ld_next, .. } = place;
@@ -238,11 +242,20 @@ impl<T: Real> Riccati<'_, T> {
             product::<T, E>(self.m, ld, hessian, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
         }
         product::<T, E>(self.m, ld, hessian, matrix, w, (n, whole..n, next + ng), Part::Full);
-        let mut largest = T::ZERO;
+        // Of the Hessian only the lower triangle is there: above are controls times states.
+        let mixed = part_mut(self.m, nx * ld, nu * ld).chunks_exact_mut(ld.max(1));
+        for (j, column) in mixed.enumerate() {
+            let row = data.get(place.matrix() + nx + j..).unwrap_or_default();
+            for (m, &s) in column.iter_mut().zip(row.iter().step_by(ld.max(1))).take(nx) {
+                *m = *m + s;
+            }
+        }
+        let mut largest = self.largest;
         for (diagonal, &weight) in self.m.iter_mut().step_by(ld + 1).zip(weights).take(n) {
             *diagonal = *diagonal + weight;
             largest = diagonal.abs().max(largest);
         }
+        self.largest = largest;
 
         let inverse = part_mut(self.inverse, place.v, ld);
         let added = part_mut(self.added, place.v, ld);

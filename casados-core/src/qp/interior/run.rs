@@ -3,12 +3,13 @@
 use super::newton::Iterate;
 use super::options::InteriorPointOptions;
 use super::riccati::First;
+use super::vector::largest_size;
 use crate::qp::error::{QpError, Side};
 use crate::qp::layout::{Places, part, part_mut};
 use crate::qp::problem::{QpView, Row};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
-use crate::qp::statistics::Statistics;
+use crate::qp::statistics::{Residuals, Statistics};
 use crate::scalar::{Packed, Real, Registers};
 
 /// One run of the method.
@@ -27,13 +28,20 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, options, start, scale, solution, result } = self;
         iterate.begin::<E>(options, start, scale, solution);
-        *result = iterate.iterations::<E>(options, solution);
+        *result = iterate.iterations::<E>(options, scale, solution);
         iterate.store(solution);
     }
 }
 
-/// Slacks and multipliers keep this part of what they have.
-const BOUNDARY: f64 = 0.995;
+/// Whether residuals are below a tolerance. With large penalties, forces are measured in their units.
+fn is_small(residuals: &Residuals, tolerance: f64, scale: f64) -> bool {
+    let Residuals { stationarity, dynamics, inequalities, complementarity } = *residuals;
+    let forces = tolerance * scale;
+    stationarity <= forces && complementarity <= forces && dynamics <= tolerance && inequalities <= tolerance
+}
+
+/// Slacks and multipliers keep at least this part of what they have, or, near the solution, `μ`.
+const BOUNDARY: f64 = 0.005;
 
 impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
@@ -54,9 +62,15 @@ impl<T: Real> Iterate<'_, T> {
             part_mut(self.v, 0, x0.len()).copy_from_slice(x0);
         }
         self.evaluate_values::<E>();
+        let cold = T::from_f64(options.start_mu * scale).sqrt();
         let distance = match start {
-            Start::Warm => T::from_f64(options.warm_distance),
-            Start::Cold => T::from_f64(options.start_mu * scale).sqrt(),
+            // The farther it is from being feasible, the less its slacks and multipliers mean.
+            Start::Warm => {
+                let gap = largest_size::<T, E>(self.dynamics).max(self.sides.violation());
+                let distance = T::from_f64(options.warm_distance).max(gap);
+                if distance < cold { distance } else { cold }
+            }
+            Start::Cold => cold,
         };
         self.sides.begin(start, distance, solution);
         // Only now are slacks what they are.
@@ -67,24 +81,28 @@ impl<T: Real> Iterate<'_, T> {
     fn iterations<E: Packed<T>>(
         &mut self,
         options: &InteriorPointOptions,
+        scale: f64,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
         let mut statistics = Statistics::default();
-        let mut short = 0;
+        let (mut short, mut refine) = (0, false);
+        // Products far below the tolerance gain nothing, and make weights that swallow the digits of everything else.
+        let floor = T::from_f64(0.01 * options.tolerance * scale);
         loop {
             statistics.residuals = self.residuals::<E>();
-            if statistics.residuals.largest() <= options.tolerance {
-                // What is known of the residuals is what rounding has left of them: now they are computed.
-                let objective = self.evaluate::<E>(solution.dynamics);
-                let before = statistics.residuals;
+            if is_small(&statistics.residuals, options.tolerance, scale) {
+                // What is known of the residuals is what steps should have left of them: now they are computed.
+                statistics.objective = self.evaluate::<E>(solution.dynamics).to_f64();
                 statistics.residuals = self.residuals::<E>();
-                statistics.objective = objective.to_f64();
-                if statistics.residuals.largest() <= options.tolerance {
+                if is_small(&statistics.residuals, options.tolerance, scale) {
                     return Ok(statistics);
                 }
                 if statistics.refinements > 3 {
-                    return Err(QpError::Stalled { iterations: statistics.iterations, residuals: before });
+                    let Statistics { iterations, residuals, .. } = statistics;
+                    return Err(QpError::Stalled { iterations, residuals });
                 }
+                // Multipliers and slacks are good: the next step is to correct the others only.
+                refine = true;
                 statistics.refinements += 1;
             }
             let (iterations, residuals) = (statistics.iterations, statistics.residuals);
@@ -92,23 +110,25 @@ impl<T: Real> Iterate<'_, T> {
                 let _ = self.evaluate::<E>(solution.dynamics);
                 return Err(QpError::MaxIterations { iterations, residuals });
             }
-            self.sides.aim_at_zero();
+            self.sides.aim(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
             let mut alpha = self.sides.longest::<E>();
-            if self.sides.counts.pairs() > 0 {
+            if !refine && self.mu > T::ZERO {
                 let after = self.sides.mu_after::<E>(alpha, self.mu);
                 let ratio = after / self.mu;
-                self.sides.aim_at(self.mu * ratio * ratio * ratio);
+                self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
                 self.newton::<E>(false)?;
                 alpha = self.sides.longest::<E>();
-                if alpha < T::ONE {
-                    alpha = alpha * T::from_f64(BOUNDARY);
-                }
+            }
+            if alpha < T::ONE {
+                let (least, most) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
+                let distance = self.mu.max(least);
+                alpha = alpha * (T::ONE - if distance < most { distance } else { most });
             }
             statistics.iterations += 1;
-            if !(alpha > T::ZERO) || !super::vector::largest_size::<T, E>(self.step).is_finite() {
+            if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) {
                 return Err(QpError::Stalled { iterations, residuals });
             }
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
@@ -117,6 +137,7 @@ impl<T: Real> Iterate<'_, T> {
                 return Err(QpError::Stalled { iterations, residuals });
             }
             self.advance::<E>(alpha);
+            refine = false;
         }
     }
 

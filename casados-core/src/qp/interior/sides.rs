@@ -14,7 +14,8 @@ use crate::scalar::Real;
 pub enum Penalties {
     /// What the problem says.
     Given,
-    /// This, linearly, where the problem says that there are none.
+    /// This, linearly, where the problem says that there are none. Bounds of controls, which are more often what nature
+    /// gives than what somebody wants, cost ten times as much.
     Elastic(f64),
 }
 
@@ -53,6 +54,7 @@ impl Counts {
 /// A row with its bounds and penalties.
 struct Constraint<T> {
     row: usize,
+    control: bool,
     lower: T,
     upper: T,
     /// Linear and quadratic.
@@ -101,6 +103,7 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
         for (i, ((bounds, lower), upper)) in bounds.zip(lower).zip(upper).enumerate().skip(skipped) {
             f(Constraint {
                 row: place.row + i,
+                control: (place.nx..place.n).contains(&i),
                 lower: *bounds.0,
                 upper: *bounds.1,
                 lower_penalty: (*lower.0, *lower.1),
@@ -113,6 +116,10 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
 impl<T: Real> Constraint<T> {
     /// Whether it is an equation, and otherwise its sides.
     fn kinds(&self, penalties: Penalties) -> (bool, Kind<T>, Kind<T>) {
+        let penalties = match penalties {
+            Penalties::Elastic(weight) if self.control => Penalties::Elastic(10.0 * weight),
+            others => others,
+        };
         let lower = kind(self.lower, self.lower_penalty, penalties);
         let upper = kind(self.upper, self.upper_penalty, penalties);
         let equation = matches!((&lower, &upper), (Kind::Hard, Kind::Hard)) && self.lower == self.upper;

@@ -58,16 +58,18 @@ pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T])
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a / b)).max(largest))
 }
 
-/// The largest `|a|`.
+/// The largest `|a|`; NaN if one of them is, or if their squares overflow.
 #[inline(always)]
-pub fn largest_size<T: Real, E: Packed<T>>(a: &[T]) -> T {
-    let (a, rest) = split!(a);
+pub fn largest_size<T: Real, E: Packed<T>>(all: &[T]) -> T {
+    let (a, rest) = split!(all);
     let mut largest = E::from_f64(0.0);
     for a in a {
         largest = E::load(a).abs().max(largest);
     }
     let whole = extreme::<T, E>(largest);
-    rest.iter().fold(whole, |largest, a| a.abs().max(largest))
+    let largest = rest.iter().fold(whole, |largest, a| a.abs().max(largest));
+    // What is compared with NaN does not show it: sums do.
+    if dot::<T, E>(all, all).is_finite() { largest } else { T::from_f64(f64::NAN) }
 }
 
 /// The largest lane.

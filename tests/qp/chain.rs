@@ -1,0 +1,195 @@
+//! The QPs of the chain of masses.
+
+use crate::Test;
+use crate::data::Record;
+use casados::Real;
+use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start, residuals};
+
+/// Elements of a list of matrices, of which the last one repeats.
+struct Repeated {
+    numbers: Vec<f64>,
+    size: usize,
+}
+
+impl Repeated {
+    fn load(record: &Record, key: &str, count: usize, size: usize) -> Result<Self, String> {
+        Ok(Self { numbers: record.numbers(key, count * size)?, size })
+    }
+    /// Row-major.
+    fn at(&self, k: usize) -> &[f64] {
+        let k = k.min(self.numbers.len() / self.size - 1);
+        &self.numbers[k * self.size..(k + 1) * self.size]
+    }
+}
+
+pub struct Chain {
+    pub record: Record,
+    pub intervals: usize,
+    pub nx: usize,
+}
+
+impl Chain {
+    pub fn load(masses: usize) -> Result<Self, String> {
+        let record = Record::load(&format!("ocp/qp_chain_{masses}.json"))?;
+        let (intervals, nx) = (record.number("N")? as usize, record.number("nx")? as usize);
+        Ok(Self { record, intervals, nx })
+    }
+
+    pub fn qp<T: Real>(&self) -> Result<HeapQp<T>, Box<dyn std::error::Error>> {
+        let (record, nx, n) = (&self.record, self.nx, self.intervals);
+        let mut dims = vec![StageDims::new(nx, 3, 0); n + 1];
+        dims[n].nu = 0;
+        let mut qp = HeapQp::new(&dims)?;
+        let load = |key, count, size| Repeated::load(record, key, count, size);
+        let (a, b, offset) = (load("A", 2, nx * nx)?, load("B", 2, nx * 3)?, load("b", 2, nx)?);
+        let (q, r, s) = (load("Q", 2, nx * nx)?, load("R", 1, 9)?, load("S", 1, 3 * nx)?);
+        let (gradient, wall) = (load("q", 2, nx)?, record.list("wall_index")?);
+        let lower = record.list("wall_lower")?;
+        let number = T::from_f64;
+        for (k, mut stage) in qp.stages_mut().enumerate() {
+            stage.q_mut().fill_with(|i, j| number(q.at(k / n)[i * nx + j]));
+            for (x, &value) in stage.gradient_x_mut().iter_mut().zip(gradient.at(k)) {
+                *x = number(value);
+            }
+            if k == n {
+                break;
+            }
+            stage.a_mut().fill_with(|i, j| number(a.at(k)[i * nx + j]));
+            stage.b_mut().fill_with(|i, j| number(b.at(k)[i * 3 + j]));
+            stage.r_mut().fill_with(|i, j| number(r.at(k)[i * 3 + j]));
+            stage.s_mut().fill_with(|i, j| number(s.at(k)[i * nx + j]));
+            for (x, &value) in stage.offset_mut().iter_mut().zip(offset.at(k)) {
+                *x = number(value);
+            }
+            for i in 0..3 {
+                stage.u_bounds_mut().set(i, number(-1.0), number(1.0));
+            }
+            if k > 0 {
+                for (&i, &lower) in wall.iter().zip(&lower) {
+                    stage.x_bounds_mut().set(i as usize, number(lower), number(f64::INFINITY));
+                }
+            }
+        }
+        let x0: Vec<T> = record.list("x0")?.into_iter().map(number).collect();
+        qp.fix_initial_state(&x0)?;
+        Ok(qp)
+    }
+
+    /// The largest distance from the reference.
+    pub fn error<T: Real>(&self, solution: &HeapSolution<T>) -> Result<f64, String> {
+        let x = self.record.numbers("x", (self.intervals + 1) * self.nx)?;
+        let u = self.record.numbers("u", self.intervals * 3)?;
+        let found_x = solution.stages().flat_map(|stage| stage.x);
+        let found_u = solution.stages().flat_map(|stage| stage.u);
+        let pairs = found_x.zip(&x).chain(found_u.zip(&u));
+        if std::env::var("DBG").is_ok() {
+            for (i, (a, b)) in solution.stages().flat_map(|stage| stage.u).zip(&u).enumerate() {
+                if (a.to_f64() - b).abs() > 1e-8 {
+                    println!("{} {} : {a:?} {b}", i / 3, i % 3);
+                }
+            }
+        }
+        Ok(pairs.map(|(found, expected)| (found.to_f64() - expected).abs()).fold(0.0, f64::max))
+    }
+}
+
+/// The references come from products of slacks and multipliers of 1e-9. With 3 masses a bound (of u₂ at stage 2) is active with a
+/// multiplier near zero: a slack of 7e-6 there satisfies the conditions as well as none.
+#[test]
+fn stored_problems_have_their_reference_solutions() -> Test {
+    let mut solver = HeapInteriorPoint::new();
+    solver.options.tolerance = 1e-12;
+    for masses in [3, 5, 7] {
+        let chain = Chain::load(masses)?;
+        let qp = chain.qp::<f64>()?;
+        let mut solution = HeapSolution::new(qp.dims())?;
+        let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        assert!(statistics.iterations <= 14, "{statistics:?}");
+        let error = chain.error(&solution)?;
+        let tolerance = if masses == 3 { 1e-5 } else { 1e-8 };
+        assert!(error < tolerance, "{masses} masses: {error:e}");
+        let expected = chain.record.number("objective")?;
+        assert!(
+            (statistics.objective - expected).abs() < 1e-8 * expected,
+            "{} {expected}",
+            statistics.objective
+        );
+        // Gradients of sizes up to 1e2, in sums of 70 terms.
+        let (residuals, _) = residuals(qp.view(), &solution);
+        assert!(residuals.largest() < 70.0 * 1e2 * f64::EPSILON * 10.0, "{residuals}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_warm_start_takes_few_iterations() -> Test {
+    let mut solver = HeapInteriorPoint::new();
+    let chain = Chain::load(5)?;
+    let mut qp = chain.qp::<f64>()?;
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let cold = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let warm = solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
+    assert!(2 * warm.iterations <= cold.iterations, "{} after {}", warm.iterations, cold.iterations);
+    // The next sampling instant: the state moves on, and the solution with it.
+    let x1 = solution.stage(1).ok_or("no stage 1")?.x.to_vec();
+    let reference = solution.clone();
+    // All stages as the second one.
+    let view = qp.view();
+    let second = view.stage(1).ok_or("no stage 1")?;
+    let elements = |block: casados::qp::Block<'_, f64>| {
+        let (rows, columns) = block.shape();
+        (0..columns * rows).filter_map(|i| block.get(i % rows, i / rows)).collect::<Vec<_>>()
+    };
+    let (a, b, gradient) = (elements(second.a()), elements(second.b()), second.gradient_x().to_vec());
+    let offset = second.offset().to_vec();
+    let mut first = qp.stage_mut(0).ok_or("no stage 0")?;
+    first.a_mut().copy_from_columns(&a)?;
+    first.b_mut().copy_from_columns(&b)?;
+    first.gradient_x_mut().copy_from_slice(&gradient);
+    first.offset_mut().copy_from_slice(&offset);
+    qp.fix_initial_state(&x1)?;
+    let mut shifted = reference.clone();
+    shifted.shift();
+    let after_shift = solver.solve(qp.view(), Start::Warm, shifted.view_mut())?;
+    let mut again = reference.clone();
+    let cold = solver.solve(qp.view(), Start::Cold, again.view_mut())?;
+    assert!(
+        after_shift.iterations < cold.iterations,
+        "{} against {}",
+        after_shift.iterations,
+        cold.iterations
+    );
+    Ok(())
+}
+
+/// Single precision: ε = 1.2e-7 times gradients of 1e2 and a strong convexity of 0.004 leave errors of 1e-2 at the worst.
+#[test]
+fn single_precision() -> Test {
+    let chain = Chain::load(3)?;
+    let qp = chain.qp::<f32>()?;
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let statistics = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut())?;
+    assert!(statistics.residuals.largest() <= 1e-4);
+    let error = chain.error(&solution)?;
+    assert!(error < 1e-2, "{error:e}");
+    Ok(())
+}
+
+/// Clarabel, which shares nothing with the other solver, and the interface to it.
+#[cfg(feature = "clarabel")]
+#[test]
+fn clarabel_agrees() -> Test {
+    let chain = Chain::load(3)?;
+    let qp = chain.qp::<f64>()?;
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let mut clarabel = casados::qp::Clarabel::new();
+    // The second time data is updated in place.
+    for _ in 0..2 {
+        let statistics = clarabel.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        let expected = chain.record.number("objective")?;
+        assert!((statistics.objective - expected).abs() < 1e-7 * expected);
+        let (residuals, _) = residuals(qp.view(), &solution);
+        assert!(residuals.largest() < 1e-7, "{residuals}");
+    }
+    Ok(())
+}

@@ -1,0 +1,141 @@
+//! Mistakes are errors that say where.
+
+use crate::Test;
+use casados::qp::{
+    Field, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, Qp, QpError, QpSolver, Solution,
+    StageDims, Start,
+};
+
+const DIMS: [StageDims; 3] = [StageDims::new(2, 1, 1), StageDims::new(2, 1, 1), StageDims::new(2, 0, 0)];
+
+fn problem() -> Result<HeapQp<f64>, QpError> {
+    let mut qp = HeapQp::<f64>::new(&DIMS)?;
+    for mut stage in qp.stages_mut() {
+        stage.a_mut().set_diagonal([1.0, 1.0]);
+        stage.b_mut().fill_with(|_, _| 1.0);
+        stage.q_mut().set_diagonal([1.0, 1.0]);
+        stage.r_mut().set(0, 0, 1.0);
+        stage.c_mut().fill_with(|_, _| 1.0);
+        stage.g_bounds_mut().set(0, -10.0, 10.0);
+    }
+    qp.fix_initial_state(&[1.0, -1.0])?;
+    Ok(qp)
+}
+
+fn error_of(qp: &HeapQp<f64>) -> Result<QpError, Box<dyn std::error::Error>> {
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    Ok(found.err().ok_or("solved")?)
+}
+
+#[test]
+fn crossed_bounds() -> Test {
+    let mut qp = problem()?;
+    qp.stage_mut(1).ok_or("no stage")?.g_bounds_mut().set(0, 2.0, 1.0);
+    let expected =
+        QpError::CrossedBounds { field: Field::GeneralBounds, stage: 1, index: 0, lower: 2.0, upper: 1.0 };
+    assert_eq!(error_of(&qp)?, expected);
+    assert_eq!(
+        expected.to_string(),
+        "stage 1: element 0 of the bounds of the general constraints is from 2 to 1"
+    );
+    Ok(())
+}
+
+/// Numbers that are not finite, wherever they are, are named.
+#[test]
+fn not_finite() -> Test {
+    type Spoil = fn(&mut casados::qp::StageMut<'_, f64>);
+    let places: [(Spoil, Field, usize); 9] = [
+        (|s| s.a_mut().set(1, 0, f64::NAN), Field::A, 1),
+        (|s| s.b_mut().set(1, 0, f64::INFINITY), Field::B, 1),
+        (|s| s.offset_mut()[1] = f64::NAN, Field::Offset, 1),
+        (|s| s.q_mut().set(1, 0, f64::NAN), Field::Q, 1),
+        (|s| s.r_mut().set(0, 0, f64::NAN), Field::R, 0),
+        (|s| s.s_mut().set(0, 1, f64::NAN), Field::S, 1),
+        (|s| s.gradient_x_mut()[0] = f64::NEG_INFINITY, Field::GradientX, 0),
+        (|s| s.gradient_u_mut()[0] = f64::NAN, Field::GradientU, 0),
+        (|s| s.u_bounds_mut().set(0, f64::NAN, 1.0), Field::ControlBounds, 0),
+    ];
+    for (spoil, expected, at) in places {
+        let mut qp = problem()?;
+        spoil(&mut qp.stage_mut(1).ok_or("no stage")?);
+        let found = error_of(&qp)?;
+        let QpError::InvalidValue { field, stage, index, value } = found else {
+            return Err(format!("{expected}: {found}").into());
+        };
+        assert_eq!((field, stage, index), (expected, 1, at));
+        assert!(!value.is_finite());
+    }
+    Ok(())
+}
+
+#[test]
+fn negative_penalty() -> Test {
+    let mut qp = problem()?;
+    qp.stage_mut(0).ok_or("no stage")?.u_bounds_mut().soften(0, -1.0, 0.0);
+    assert_eq!(
+        error_of(&qp)?,
+        QpError::InvalidValue { field: Field::Penalty, stage: 0, index: 0, value: -1.0 }
+    );
+    Ok(())
+}
+
+#[test]
+fn wrong_lengths() -> Test {
+    let mut qp = problem()?;
+    assert_eq!(
+        qp.fix_initial_state(&[0.0]),
+        Err(QpError::Dimension { field: Field::StateBounds, stage: 0, expected: 2, found: 1 })
+    );
+    let mut stage = qp.stage_mut(1).ok_or("no stage")?;
+    assert_eq!(
+        stage.b_mut().copy_from_columns(&[0.0; 3]),
+        Err(QpError::Dimension { field: Field::B, stage: 1, expected: 2, found: 3 })
+    );
+    let mut other = HeapSolution::new(&DIMS[..2])?;
+    assert_eq!(
+        HeapInteriorPoint::new().solve(qp.view(), Start::Cold, other.view_mut()),
+        Err(QpError::Dimension { field: Field::Stages, stage: 0, expected: 3, found: 2 })
+    );
+    assert!(matches!(HeapQp::<f64>::new(&[]), Err(QpError::Dimension { field: Field::Stages, .. })));
+    Ok(())
+}
+
+/// Everything in arrays, of exactly the lengths that the constant functions say, and in ones that are too short.
+#[test]
+fn memory_of_the_owner() -> Test {
+    const DATA: usize = Qp::<f64, (), ()>::memory(&DIMS);
+    const POINT: usize = Solution::<f64, (), ()>::memory(&DIMS);
+    // Bounds of two general constraints, two sides each.
+    const WORK: (usize, usize) = InteriorPoint::<f64, (), ()>::memory(&DIMS, 4, 0, 0);
+    let mut qp = Qp::in_memory(DIMS, [0.0; DATA])?;
+    for mut stage in qp.stages_mut() {
+        stage.a_mut().set_diagonal([1.0, 1.0]);
+        stage.b_mut().fill_with(|_, _| 1.0);
+        stage.q_mut().set_diagonal([1.0, 1.0]);
+        stage.r_mut().set(0, 0, 1.0);
+        stage.c_mut().fill_with(|_, _| 1.0);
+        stage.g_bounds_mut().set(0, -10.0, 10.0);
+    }
+    qp.fix_initial_state(&[1.0, -1.0])?;
+    let mut solution = Solution::in_memory(DIMS, [0.0; POINT])?;
+    let mut solver = InteriorPoint::in_memory([0.0; WORK.0], [0; WORK.1]);
+    solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let mut on_heap = HeapSolution::new(&DIMS)?;
+    HeapInteriorPoint::new().solve(problem()?.view(), Start::Cold, on_heap.view_mut())?;
+    for (a, b) in solution.stages().zip(on_heap.stages()) {
+        assert_eq!((a.x, a.u, a.dynamics), (b.x, b.u, b.dynamics));
+    }
+    let mut short = InteriorPoint::in_memory([0.0; WORK.0 - 1], [0; WORK.1]);
+    assert_eq!(
+        short.solve(qp.view(), Start::Cold, solution.view_mut()),
+        Err(QpError::Dimension { field: Field::Numbers, stage: 0, expected: WORK.0, found: WORK.0 - 1 })
+    );
+    let mut short = InteriorPoint::in_memory([0.0; WORK.0], [0; WORK.1 - 1]);
+    assert_eq!(
+        short.solve(qp.view(), Start::Cold, solution.view_mut()),
+        Err(QpError::Dimension { field: Field::Indices, stage: 0, expected: WORK.1, found: WORK.1 - 1 })
+    );
+    Ok(())
+}

@@ -1,0 +1,31 @@
+//! Quadratic programs of optimal control: stored ones against their reference solutions, hard ones, mistakes, and random
+//! ones against clarabel. Every solution is judged by `residuals`, which is written from the definition of the problem.
+
+#[path = "../data/mod.rs"]
+mod data;
+
+mod chain;
+mod errors;
+mod hard;
+#[cfg(feature = "clarabel")]
+mod random;
+
+use casados::qp::{
+    HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, Residuals, Start, Statistics, residuals,
+};
+
+type Test = Result<(), Box<dyn std::error::Error>>;
+
+/// A solution to a tolerance that is far below what is asserted, and its residuals.
+fn solve(qp: &HeapQp<f64>) -> Result<(HeapSolution<f64>, Statistics, Residuals), QpError> {
+    let mut solver = HeapInteriorPoint::new();
+    solver.options.tolerance = 1e-10;
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let (residuals, objective) = residuals(qp.view(), &solution);
+    // Sums of at most some hundred terms of sizes up to 1e2, rounded in a different order; and soft violations are
+    // complementary to 1e-10 only.
+    assert!(residuals.largest() < 1e-9, "{residuals}");
+    assert!((objective - statistics.objective).abs() <= 1e-8 * (1.0 + objective.abs()));
+    Ok((solution, statistics, residuals))
+}

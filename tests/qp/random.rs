@@ -1,0 +1,155 @@
+//! Random problems against clarabel.
+
+use crate::solve;
+use casados::qp::{Clarabel, HeapQp, HeapSolution, QpSolver, SecondOrderCone, StageDims, Start};
+use proptest::prelude::*;
+
+/// Numbers from a seed: a problem has too many for proptest to shrink.
+struct Numbers(u64);
+
+impl Numbers {
+    /// In −1 .. 1.
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+    fn chance(&mut self, probability: f64) -> bool {
+        self.next() * 0.5 + 0.5 < probability
+    }
+}
+
+/// A problem with a point inside of all hard bounds; Hessians are `G Gᵀ` of random `G`, singular in a third of the stages.
+fn problem(dims: &[StageDims], seed: u64) -> Result<HeapQp<f64>, Box<dyn std::error::Error>> {
+    let mut random = Numbers(seed);
+    let mut qp = HeapQp::<f64>::new(dims)?;
+    let mut x: Vec<f64> = (0..dims[0].nx).map(|_| random.next()).collect();
+    let x0 = x.clone();
+    for (k, mut stage) in qp.stages_mut().enumerate() {
+        let StageDims { nx, nu, ng } = dims[k];
+        let n = nx + nu;
+        let rank = if random.chance(0.33) { n.saturating_sub(1) } else { n + 1 };
+        let g: Vec<f64> = (0..n * rank).map(|_| random.next()).collect();
+        let h = |i: usize, j: usize| (0..rank).map(|c| g[c * n + i] * g[c * n + j]).sum::<f64>();
+        stage.q_mut().fill_with(h);
+        stage.r_mut().fill_with(|i, j| h(nx + i, nx + j) + if i == j { 1e-3 } else { 0.0 });
+        stage.s_mut().fill_with(|i, j| h(nx + i, j));
+        stage.gradient_x_mut().iter_mut().for_each(|q| *q = 3.0 * random.next());
+        stage.gradient_u_mut().iter_mut().for_each(|r| *r = 3.0 * random.next());
+        stage.a_mut().fill_with(|_, _| random.next());
+        stage.b_mut().fill_with(|_, _| random.next());
+        stage.offset_mut().iter_mut().for_each(|b| *b = 0.3 * random.next());
+        stage.c_mut().fill_with(|_, _| random.next());
+        stage.d_mut().fill_with(|_, _| random.next());
+        let u: Vec<f64> = (0..nu).map(|_| random.next()).collect();
+        let product = |block: casados::qp::Block<'_, f64>, v: &[f64], i: usize| {
+            v.iter().enumerate().map(|(j, v)| block.get(i, j).unwrap_or(0.0) * v).sum::<f64>()
+        };
+        let c: Vec<f64> = (0..ng)
+            .map(|i| product(stage.c_mut().as_block(), &x, i) + product(stage.d_mut().as_block(), &u, i))
+            .collect();
+        let next = dims.get(k + 1).map_or(0, |dims| dims.nx);
+        let coming: Vec<f64> = (0..next)
+            .map(|i| {
+                let sum = product(stage.a_mut().as_block(), &x, i) + product(stage.b_mut().as_block(), &u, i);
+                sum + stage.offset_mut()[i]
+            })
+            .collect();
+        for kind in 0..3 {
+            let (point, mut bounds) = match kind {
+                0 => (&x, stage.x_bounds_mut()),
+                1 => (&u, stage.u_bounds_mut()),
+                _ => (&c, stage.g_bounds_mut()),
+            };
+            for (i, &point) in point.iter().enumerate() {
+                let mut side = |sign: f64| {
+                    let distance = sign * (0.05 + 0.5 * random.next().abs());
+                    if random.chance(0.6) { point + distance } else { sign * f64::INFINITY }
+                };
+                let (lower, upper) = (side(-1.0), side(1.0));
+                if kind < 2 || lower.is_finite() || upper.is_finite() {
+                    bounds.set(i, lower, upper);
+                }
+                if random.chance(0.1) {
+                    // Out of reach, and soft.
+                    bounds.set(i, point + 5.0, f64::INFINITY);
+                    bounds.soften(i, 0.5 + random.next().abs(), if random.chance(0.5) { 0.0 } else { 1.0 });
+                } else if random.chance(0.1) {
+                    bounds.set(i, point, point);
+                }
+            }
+        }
+        x = coming;
+    }
+    if random.chance(0.7) {
+        qp.fix_initial_state(&x0)?;
+    }
+    Ok(qp)
+}
+
+fn dims() -> impl Strategy<Value = Vec<StageDims>> {
+    let stage = (1..6usize, 0..4usize, 0..3usize).prop_map(|(nx, nu, ng)| StageDims::new(nx, nu, ng));
+    proptest::collection::vec(stage, 1..7)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
+
+    /// Both find the same minimum. Tolerances of 1e-9 and 1e-10 in conditions and gaps leave 1e-7 of an objective of size 1 to 1e2.
+    #[test]
+    fn same_minimum_as_clarabel(dims in dims(), seed: u64) {
+        let qp = problem(&dims, seed).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        let mut solution = HeapSolution::new(&dims).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        let clarabel = Clarabel::new().solve(qp.view(), Start::Cold, solution.view_mut());
+        let own = solve(&qp);
+        match (clarabel, own) {
+            (Ok(clarabel), Ok((_, own, _))) => {
+                let difference = (clarabel.objective - own.objective).abs();
+                prop_assert!(difference <= 1e-7 * (1.0 + own.objective.abs()), "{clarabel:?} {own:?}");
+            }
+            // Free states at the start may make a problem unbounded.
+            (Err(_), Err(_)) => {}
+            (clarabel, own) => prop_assert!(false, "{clarabel:?} {:?}", own.map(|own| own.1)),
+        }
+    }
+}
+
+/// `min ½ |v − (3, 4)|²` in the cone `|v| ≤ 1`: the nearest point is `(0.6, 0.8)`.
+#[test]
+fn second_order_cone() -> crate::Test {
+    let mut qp = HeapQp::<f64>::new(&[StageDims::new(0, 2, 3)])?;
+    let mut stage = qp.stage_mut(0).ok_or("no stage")?;
+    stage.r_mut().set_diagonal([1.0, 1.0]);
+    stage.gradient_u_mut().copy_from_slice(&[-3.0, -4.0]);
+    // (0, u₀, u₁) − (−1, 0, 0) is in the cone.
+    stage.d_mut().set(1, 0, 1.0);
+    stage.d_mut().set(2, 1, 1.0);
+    stage.g_bounds_mut().lower.copy_from_slice(&[-1.0, 0.0, 0.0]);
+    let mut clarabel = Clarabel::new();
+    clarabel.cones = vec![SecondOrderCone { stage: 0, first: 0, count: 3 }];
+    let mut solution = HeapSolution::new(qp.dims())?;
+    clarabel.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let u = solution.stage(0).ok_or("no stage")?.u;
+    assert!((u[0] - 0.6).abs() < 1e-7 && (u[1] - 0.8).abs() < 1e-7, "{u:?}");
+    clarabel.cones[0].count = 4;
+    assert!(clarabel.solve(qp.view(), Start::Cold, solution.view_mut()).is_err());
+    Ok(())
+}
+
+/// Clarabel's certificate names a constraint, and how large a violation must be at least.
+#[test]
+fn clarabel_finds_what_is_infeasible() -> crate::Test {
+    let mut qp = HeapQp::<f64>::new(&[StageDims::new(1, 0, 1)])?;
+    let mut stage = qp.stage_mut(0).ok_or("no stage")?;
+    stage.q_mut().set(0, 0, 1.0);
+    stage.c_mut().set(0, 0, 1.0);
+    stage.x_bounds_mut().set(0, f64::NEG_INFINITY, 0.0);
+    stage.g_bounds_mut().set(0, 1.0, f64::INFINITY);
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let found = Clarabel::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    // Half of the distance, on either side.
+    assert!(
+        matches!(found, Err(casados::qp::QpError::Infeasible { stage: 0, index: 0, violation, .. }) if (violation - 0.5).abs() < 1e-6),
+        "{found:?}"
+    );
+    Ok(())
+}
