@@ -29,7 +29,7 @@ pub trait Calls {
 #[must_use]
 pub fn options(case: &Case, tolerance: f64, start: Start) -> Options {
     let newton = Newton { tolerance: tolerance / case.steps as f64, ..Default::default() };
-    Options { steps: case.steps, newton, start }
+    Options { steps: case.steps, newton, start, ..Default::default() }
 }
 
 /// The integrator of a case.

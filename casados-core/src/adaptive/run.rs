@@ -19,13 +19,13 @@ use alloc::boxed::Box;
 use bytemuck::Zeroable;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
-const EASY: f64 = 0.002;
+const EASY: f64 = 0.01;
 /// and falls where it converges at this rate or slower,
 const HARD: f64 = 0.8;
 /// but grows only if the step size hardly changes,
 const STEADY: (f64, f64) = (0.8, 1.2);
 /// and not before so many steps have been taken with it.
-const SETTLED: usize = 10;
+const SETTLED: usize = 5;
 /// A step is not made longer by less than this: the factors of its matrix are worth more.
 const WORTHWHILE: f64 = 1.2;
 /// After so many singular matrices in a row the problem is.
@@ -40,6 +40,8 @@ const TROUBLES: usize = 3;
 pub struct Base<M: Dae, T: Plain> {
     /// The variables at the time that was reached.
     pub point: ArrayV<M, T>,
+    /// Those where the Jacobian is to be evaluated.
+    middle: ArrayV<M, T>,
     pub jacobian: M::Jacobian<T>,
     pub f: ArrayK<M, T>,
     /// `(ẋ, z)` at the start.
@@ -189,10 +191,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let mut tried = 0;
         let mut pivoted = false;
         loop {
-            if need == Need::Jacobian {
-                self.evaluate_jacobian(tried)?;
-                current = true;
-            }
             let mut changed = false;
             if need >= Need::Factors {
                 settled += 1;
@@ -214,6 +212,25 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     self.tighten(stages.count());
                     controller.forget();
                 }
+            }
+            match accepted_h {
+                Some(before) => stages.continue_from_last((h / before).to_f64()),
+                None => stages.begin(&self.base.point),
+            }
+            if need == Need::Jacobian {
+                let start = Start { point: &self.base.point, scale: &self.base.scale, h };
+                // In the middle of the step, as far as that is foreseen: nearer to all stages than the start is. Where the
+                // step fails, at the start.
+                current = accepted_h.is_none() || rejected;
+                if !current {
+                    stages.predict(&start, &mut self.base.middle);
+                    current = self.evaluate_jacobian(true, tried).is_err();
+                }
+                if current {
+                    self.evaluate_jacobian(false, tried)?;
+                }
+            }
+            if need >= Need::Factors {
                 stages.set_pivoted(pivoted);
                 self.statistics.factorizations += 1;
                 match stages.factor(&self.base.jacobian, h) {
@@ -252,10 +269,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             self.check_step(t, h, refusal)?;
             tried += 1;
-            match accepted_h {
-                Some(before) => stages.continue_from_last((h / before).to_f64()),
-                None => stages.begin(&self.base.point),
-            }
             let start = Start { point: &self.base.point, scale: &self.base.scale, h };
             let residuals = &mut self.statistics.residuals;
             let outcome = stages.solve(&start, self.base.newton_tolerance, &mut convergence, residuals);
@@ -441,12 +454,14 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
     }
 
+    /// At the point that was reached, or in the middle of the step.
+    ///
     /// # Errors
     /// A value that is not finite.
-    fn evaluate_jacobian(&mut self, step: usize) -> Result<(), Error> {
-        let Base { point, f, jacobian, .. } = &mut *self.base;
+    fn evaluate_jacobian(&mut self, middle: bool, step: usize) -> Result<(), Error> {
+        let Base { point, middle: foreseen, f, jacobian, .. } = &mut *self.base;
         self.statistics.jacobians += 1;
-        M::residual_jacobian::<T>(point, f, jacobian);
+        M::residual_jacobian::<T>(if middle { foreseen } else { point }, f, jacobian);
         let at = Place { step, stage: 0, iteration: 0 };
         if let Some((equation, value)) = not_finite(f.as_ref()) {
             return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });

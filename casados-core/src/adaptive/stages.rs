@@ -90,6 +90,8 @@ pub trait Stages<M: Dae, T: Real> {
     fn begin(&mut self, point: &ArrayV<M, T>);
     /// Starts from the polynomial of the last accepted step, whose size is given relative to this one.
     fn continue_from_last(&mut self, ratio: f64);
+    /// The variables in the middle of the step from its start values.
+    fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>);
     /// Takes over the last accepted step of another method.
     fn adopt(&mut self, other: &dyn Stages<M, T>);
     /// Solves the stages.
@@ -225,7 +227,7 @@ where
     }
 
     /// The residual at all stages, and from there to the rows of the linear systems.
-    fn evaluate(&mut self) -> Result<(), Failure> {
+    fn evaluate(&mut self) {
         let Memory { points, f, rows, point, f_point, .. } = &mut *self.memory;
         for (group, (points, f)) in points.iter().zip(f.iter_mut()).enumerate() {
             if let Err(call) = T::side_by_side(Residual::<M, T> { points, f }) {
@@ -240,9 +242,6 @@ where
                     }
                 }
             }
-            if not_finite(f.as_ref().as_flattened()).is_some() {
-                return Err(Failure::NotFinite);
-            }
         }
         dispatch(Split::<M, T, S, L, G> {
             left: self.basis.left(),
@@ -250,7 +249,6 @@ where
             rows: rows.as_mut(),
             model: PhantomData,
         });
-        Ok(())
     }
 
     /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of the squares of the
@@ -328,6 +326,24 @@ where
         dispatch(Continue { weights, from: accepted.as_ref(), to: y.as_mut() });
     }
 
+    fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>) {
+        let (nx, stage) = (M::Shape::NX, S / 2);
+        *middle = *start.point;
+        let to = middle.as_mut();
+        for (index, y) in self.memory.y.as_ref().iter().enumerate() {
+            let y = y.as_flattened();
+            to[if index < nx { index } else { index + nx }] = y[stage];
+            if index < nx {
+                let terms = self.tableau.a()[stage].iter().zip(y);
+                let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);
+                to[nx + index] = to[nx + index] + start.h * sum;
+            }
+        }
+        if let Some(time) = to.last_mut() {
+            *time = *time + start.h * T::from_f64(self.tableau.c()[stage]);
+        }
+    }
+
     fn adopt(&mut self, other: &dyn Stages<M, T>) {
         let count = other.count();
         for (stage, node) in self.tableau.c().iter().enumerate() {
@@ -368,13 +384,15 @@ where
         let (mut last, mut last_rate) = (0.0, 0.0);
         for iteration in 1..=most {
             *residuals += S;
-            self.evaluate()?;
+            self.evaluate();
             let Memory { rows, factors, .. } = &mut *self.memory;
             factors.solve(rows);
             let increment = mean(self.advance(start, true), M::Shape::NK * S);
             convergence.iterations = iteration;
             if !increment.is_finite() {
-                return Err(Failure::Diverges);
+                // A value of the model that is not finite leaves no increment that is.
+                let finite = self.memory.f.iter().all(|f| not_finite(f.as_ref().as_flattened()).is_none());
+                return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
             }
             if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
                 return Ok(());

@@ -52,9 +52,10 @@ impl<T: Lanes, const L: usize> Complex<T, L> {
         let (mut re, mut im) = (self.re, self.im);
         for l in 0..L {
             let size = self.re[l].abs().max(self.im[l].abs());
-            let (r, i) = (self.re[l] / size, self.im[l] / size);
-            let square = self.re[l] * r + self.im[l] * i;
-            (re[l], im[l]) = (r / square, -i / square);
+            let scale = T::from_f64(1.0) / size;
+            let (r, i) = (self.re[l] * scale, self.im[l] * scale);
+            let square = T::from_f64(1.0) / (self.re[l] * r + self.im[l] * i);
+            (re[l], im[l]) = (r * square, -i * square);
         }
         Self { re, im }
     }

@@ -1,11 +1,13 @@
 //! Factors in the eigenbasis of the tableau that say whether they hold, with whole matrices pivoted where they do not: what
 //! steps of variable size iterate with.
 
+use super::block::Block;
 use super::complex::Complex;
 use super::dense::Dense;
 use super::factors::slot;
+use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse;
-use crate::model::{ArrayK, Assembly, Dae};
+use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::Real;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
@@ -50,23 +52,8 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
 
     /// By the plan; whether that went well.
     fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
-        let plan = &M::STRUCTURE.elimination;
-        let blocks = self.blocks.as_mut();
-        blocks.fill([[Complex::zero()]]);
-        for entry in plan.assembly {
-            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
-            if entry.state != Assembly::NONE {
-                *element = scale.scaled(jacobian[entry.state as usize]);
-            }
-            if entry.direct != Assembly::NONE {
-                let direct = jacobian[entry.direct as usize];
-                element.re = element.re.map(|re| re + direct);
-            }
-        }
-        sparse::factor(plan, blocks);
-        // A pivot that vanishes leaves infinite elements or NaN.
-        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
-        pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
+        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_mut());
+        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), scale, blocks })
     }
 
     /// By pivoting whole matrices.
@@ -111,5 +98,36 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
                 (row.re[l], row.im[l]) = (*re, *im);
             }
         }
+    }
+}
+
+/// The matrices and their factors; whether these are finite.
+struct Assemble<'a, T, const L: usize> {
+    plan: &'a Elimination,
+    jacobian: &'a [T],
+    scale: &'a Complex<T, L>,
+    blocks: &'a mut [Block<Complex<T, L>, 1>],
+}
+
+impl<T: Real, const L: usize> Kernel for Assemble<'_, T, L> {
+    type Output = bool;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> bool {
+        let Self { plan, jacobian, scale, blocks } = self;
+        blocks.fill([[Complex::zero()]]);
+        for entry in plan.assembly {
+            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
+            // An index that marks what is not there lies outside of the Jacobian.
+            if let Some(state) = jacobian.get(entry.state as usize) {
+                *element = scale.scaled(*state);
+            }
+            if let Some(direct) = jacobian.get(entry.direct as usize) {
+                element.re = element.re.map(|re| re + *direct);
+            }
+        }
+        sparse::Factor { plan, blocks }.run::<A>();
+        // A pivot that vanishes leaves infinite elements or NaN.
+        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
+        pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
     }
 }

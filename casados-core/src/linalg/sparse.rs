@@ -50,9 +50,10 @@ pub fn factor<E: Field, const S: usize>(plan: &Elimination, blocks: &mut [Block<
     dispatch(Factor { plan, blocks });
 }
 
-struct Factor<'a, E, const S: usize> {
-    plan: &'a Elimination,
-    blocks: &'a mut [Block<E, S>],
+/// See [`factor`].
+pub(super) struct Factor<'a, E, const S: usize> {
+    pub plan: &'a Elimination,
+    pub blocks: &'a mut [Block<E, S>],
 }
 
 impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
@@ -156,8 +157,15 @@ pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usiz
         }
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
-            negate(&mut packet);
-            subtract::<A, E, S, W>(&mut solution, inverse, &packet);
+            // Of one number the inverse: the packet then stays in its registers.
+            if const { S == 1 } {
+                let mut inverse = *inverse;
+                negate(&mut inverse);
+                subtract::<A, E, S, W>(&mut solution, &inverse, &packet);
+            } else {
+                negate(&mut packet);
+                subtract::<A, E, S, W>(&mut solution, inverse, &packet);
+            }
             packet = solution;
         }
         store(rows, pivot.slot as usize, column, &packet);
