@@ -226,7 +226,8 @@ fn squeezer() {
 
 /// Beside the Fortran code: E. Hairer's driver for RADAU5 at Van der Pol's equation reports 242 steps accepted and 8 refused,
 /// 280 tried, 2248 evaluations, 162 Jacobians and 253 factorisations (reproduced in the tests of russell_ode by D. Pedroso).
-/// The algorithm is the same but for the norm in which Newton's method is stopped and its start in the first step.
+/// The algorithm is the same but for the norm in which Newton's method is stopped, its start in the first step, and the Jacobian,
+/// which is that of the middle of the step: the same steps with less work.
 #[test]
 fn as_many_steps_as_radau5() {
     let options = AdaptiveOptions { rtol: 1e-4, atol: 1e-4, initial_step: Some(1e-6), ..Default::default() };
@@ -237,11 +238,15 @@ fn as_many_steps_as_radau5() {
     let near = |found: usize, published: usize| {
         assert!(found.abs_diff(published) <= published / 10, "{found} instead of {published}: {work:?}");
     };
+    let fewer = |found: usize, published: usize| {
+        let range = published * 7 / 10..=published;
+        assert!(range.contains(&found), "{found} instead of {published} or somewhat fewer: {work:?}");
+    };
     near(work.steps, 242);
-    near(work.steps + work.rejected + work.failed, 280);
-    near(work.residuals, 2248);
-    near(work.jacobians, 162);
-    near(work.factorizations, 253);
+    fewer(work.steps + work.rejected + work.failed, 280);
+    fewer(work.residuals, 2248);
+    fewer(work.jacobians, 162);
+    fewer(work.factorizations, 253);
 }
 
 /// Dense output is as good as the method between its steps: order `s + 1`, so that it follows the tolerance too. And

@@ -11,6 +11,12 @@ use std::path::Path;
 /// A JSON object.
 pub struct Record(Value);
 
+impl From<Value> for Record {
+    fn from(value: Value) -> Self {
+        Self(value)
+    }
+}
+
 impl Record {
     /// Reads a file of `tests/data`.
     pub fn load(name: &str) -> Result<Self, String> {

@@ -1,0 +1,79 @@
+//! Tables.
+
+use super::Measured;
+use super::record::{Outcome, Run, fastest};
+use std::fmt::Write;
+
+const DIGITS: [i32; 4] = [4, 6, 8, 10];
+
+/// Milliseconds with three digits.
+fn milliseconds(seconds: f64) -> String {
+    let value = 1e3 * seconds;
+    let digits = (2 - value.log10().floor() as i32).clamp(0, 5) as usize;
+    format!("{value:.digits$}")
+}
+
+fn entry(found: Option<(&Run, Outcome)>) -> String {
+    found.map_or("–".into(), |(run, outcome)| format!("{} ({})", milliseconds(outcome.time), run.solver))
+}
+
+/// Times at equal errors, and everything at four tolerances.
+pub fn markdown(all: &[Measured]) -> String {
+    let mut text = String::new();
+    for derivatives in [false, true] {
+        let of = || all.iter().filter(|measured| measured.derivatives == derivatives);
+        if of().next().is_none() {
+            continue;
+        }
+        text += if derivatives { "\nWith forward sensitivities by `(x₀, p)`:\n\n" } else { "" };
+        text += "| problem | digits | casados, ms | fastest peer, ms | ratio |\n| --- | --- | --- | --- | --- |\n";
+        for measured in of() {
+            for digits in DIGITS {
+                let error = 10f64.powi(-digits);
+                let (ours, peer) =
+                    (fastest(&measured.runs, true, error), fastest(&measured.runs, false, error));
+                let ratio = match (ours, peer) {
+                    (Some((_, ours)), Some((_, peer))) => format!("{:.1}", peer.time / ours.time),
+                    _ => "–".into(),
+                };
+                let _ = writeln!(
+                    text,
+                    "| {} | {digits} | {} | {} | {ratio} |",
+                    measured.title,
+                    entry(ours),
+                    entry(peer)
+                );
+            }
+        }
+    }
+    text += "\n| problem | solver | tolerance or steps | error | steps | factorisations | ms |\n";
+    text += "| --- | --- | --- | --- | --- | --- | --- |\n";
+    for measured in all {
+        let with = if measured.derivatives { ", with sensitivities" } else { "" };
+        for run in measured.runs.iter().filter(|run| shown(run)) {
+            let count = |count: Option<usize>| count.map_or("–".into(), |count| count.to_string());
+            let rest = match &run.outcome {
+                Ok(outcome) => format!(
+                    "{:.1e} | {} | {} | {}",
+                    outcome.error,
+                    count(outcome.steps),
+                    count(outcome.factorizations),
+                    milliseconds(outcome.time)
+                ),
+                Err(_) => "fails | – | – | –".into(),
+            };
+            let _ = writeln!(
+                text,
+                "| {}{with} | {} | {:.0e} | {rest} |",
+                measured.title, run.solver, run.accuracy
+            );
+        }
+    }
+    text
+}
+
+/// Tolerances of whole digits; a few numbers of steps.
+fn shown(run: &Run) -> bool {
+    let steps = run.accuracy > 1.0 && [40.0, 640.0].contains(&run.accuracy);
+    steps || [1e-4, 1e-6, 1e-8, 1e-10].iter().any(|tolerance| (run.accuracy / tolerance - 1.0).abs() < 1e-6)
+}
