@@ -453,6 +453,8 @@ macro_rules! explicit {
         }
 
         impl<M: Ode, T: Real> Engine<M, T> for $method {
+            const ENDS_ON_STAGE: bool = true;
+
             fn integrate(
                 state: &mut Self::State,
                 run: &mut Run<'_, M, T>,

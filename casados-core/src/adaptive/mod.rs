@@ -4,7 +4,9 @@
 //! [`Radau`], a number of stages (3, 5 or 7: orders 5, 9 and 13) that follows from how Newton's method converges. The
 //! algorithm is that of the codes RADAU5 and RADAU (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II,
 //! section IV.8; Stiff differential equations solved by Radau methods, J. Comput. Appl. Math. 111 (1999)), for fully
-//! implicit equations. Explicit pairs of orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that
+//! implicit equations. [`Gauss`] methods of orders 4 to 12, where oscillations are not to be damped, with an estimate of the
+//! same kind: how far the derivative of the polynomial, extrapolated to the end of the step, is from the solution there,
+//! through the matrix of one eigenvalue. Explicit pairs of orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that
 //! are not stiff.
 //!
 //! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
@@ -37,7 +39,7 @@ pub use statistics::AdaptiveStatistics;
 use crate::error::Error;
 use crate::model::Dae;
 use crate::scalar::Real;
-use crate::tableau::{DormandPrince5, DormandPrince8, RadauIIA};
+use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 use alloc::boxed::Box;
 use stages::Stages;
 
@@ -47,7 +49,8 @@ pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 /// A method that an adaptive integrator takes.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a method with an estimate of its error",
-    note = "`Radau`, `RadauIIA<3>`, `RadauIIA<5>` and `RadauIIA<7>` are, and for explicit models `DormandPrince5` and `DormandPrince8`"
+    note = "`Radau`, `RadauIIA<3>`, `RadauIIA<5>`, `RadauIIA<7>` and `Gauss<2>` to `Gauss<6>` are, and for explicit models \
+            `DormandPrince5` and `DormandPrince8`"
 )]
 pub trait AdaptiveMethod {
     /// Its integrator.
@@ -74,6 +77,8 @@ mod sealed {
 
     /// What integrates with steps of variable size, for the models that it can.
     pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
+        /// Whether `z` at the end of a step is that of a stage; else it is found from the equations.
+        const ENDS_ON_STAGE: bool;
         /// Integrates an interval; `after` is called after each accepted step.
         ///
         /// # Errors
@@ -110,6 +115,8 @@ mod sealed {
         const LEVELS: usize;
         /// The number of stages of the first.
         const STAGES: usize;
+        /// See [`Engine`].
+        const ENDS_ON_STAGE: bool;
         /// One of them.
         ///
         /// # Errors
@@ -122,6 +129,7 @@ use sealed::Family;
 impl Family for Radau {
     const LEVELS: usize = 3;
     const STAGES: usize = 3;
+    const ENDS_ON_STAGE: bool = true;
     fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
         match level {
             0 => RadauIIA::<3>::open(0),
@@ -132,18 +140,20 @@ impl Family for Radau {
 }
 
 macro_rules! single {
-    ($($stages:literal: $lanes:literal, $groups:literal);*) => {
-        $(impl Family for RadauIIA<$stages> {
+    ($($method:ident: $stages:literal, $groups:literal, $ends_on_stage:literal);*) => {
+        $(impl Family for $method<$stages> {
             const LEVELS: usize = 1;
             const STAGES: usize = $stages;
+            const ENDS_ON_STAGE: bool = $ends_on_stage;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-                Ok(Box::new(stages::Radau::<M, T, $stages, $lanes, $groups>::new()?))
+                // As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
+                Ok(Box::new(stages::Collocation::<M, Self, T, $stages, 4, $groups>::new()?))
             }
         })*
     };
 }
-// As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
-single!(3: 4, 1; 5: 4, 2; 7: 4, 2);
+single!(RadauIIA: 3, 1, true; RadauIIA: 5, 2, true; RadauIIA: 7, 2, true);
+single!(Gauss: 2, 1, false; Gauss: 3, 1, false; Gauss: 4, 1, false; Gauss: 5, 2, false; Gauss: 6, 2, false);
 
 macro_rules! methods {
     ($($method:ty),*) => {
@@ -153,3 +163,4 @@ macro_rules! methods {
     };
 }
 methods!(Radau, RadauIIA<3>, RadauIIA<5>, RadauIIA<7>, DormandPrince5, DormandPrince8);
+methods!(Gauss<2>, Gauss<3>, Gauss<4>, Gauss<5>, Gauss<6>);

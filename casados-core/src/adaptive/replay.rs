@@ -11,7 +11,7 @@ use crate::quadrature::Along;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
-use crate::tableau::{Method, RadauIIA};
+use crate::tableau::Method;
 
 /// Takes steps of given size.
 pub trait Replay<M: Dae, T: Real> {
@@ -69,27 +69,21 @@ pub trait Replay<M: Dae, T: Real> {
     fn stages(&mut self) -> Result<&[T], Error>;
 }
 
-/// The integrator of one step of the Radau IIA method with `S` stages.
-pub(super) type Single<M, T, const S: usize> = Integrator<M, RadauIIA<S>, S, T, Heap>;
+/// The integrator of one step of the method `B` with `S` stages.
+pub(super) type Single<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap>;
 
 /// # Errors
 /// None for methods that have a tableau.
-pub(super) fn single<M: Dae, T: Real, const S: usize>() -> Result<Single<M, T, S>, Error>
-where
-    RadauIIA<S>: Method<S>,
-{
+pub(super) fn single<M: Dae, B: Method<S>, T: Real, const S: usize>() -> Result<Single<M, B, T, S>, Error> {
     Integrator::new(Options { steps: 1, start: Start::Warm, ..Options::default() })
 }
 
 /// Goes to the start of a step.
-fn go<M: Dae, T: Real, const S: usize>(
-    single: &mut Single<M, T, S>,
+fn go<M: Dae, B: Method<S>, T: Real, const S: usize>(
+    single: &mut Single<M, B, T, S>,
     at: &At<'_, M, T>,
     y: &[T],
-) -> Result<(), Error>
-where
-    RadauIIA<S>: Method<S>,
-{
+) -> Result<(), Error> {
     if M::Shape::NP > 0 {
         single.set_parameters(at.p)?;
     }
@@ -105,10 +99,7 @@ pub(super) fn stack<M: Dae, T: Real>(adjoint: &Adjoint<M, T>, gradient: &mut [T]
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> Replay<M, T> for Single<M, T, S>
-where
-    RadauIIA<S>: Method<S>,
-{
+impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B, T, S> {
     fn solve(
         &mut self,
         at: &At<'_, M, T>,

@@ -344,10 +344,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             if accepted.stop {
                 return Ok(());
             }
-            stages.end(&mut self.base.point);
+            let on_stage = stages.end(h, &mut self.base.point);
             t = end;
             if let Some(time) = self.base.point.as_mut().last_mut() {
                 *time = t;
+            }
+            if !on_stage {
+                self.settle(t)?;
             }
             accepted_h = Some(h);
             current = false;
@@ -363,7 +366,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             rejected = false;
             let fast = convergence.rate <= FAST;
             let next_h = T::from_f64(direction * next);
-            if ((t + next_h - span.end) * T::from_f64(direction)).to_f64() >= 0.0 {
+            // What rounding leaves of the interval is no step.
+            let slack = 16.0 * T::EPSILON.to_f64() * t.abs().max(span.end.abs()).to_f64();
+            if ((t + next_h - span.end) * T::from_f64(direction)).to_f64() >= -slack {
                 (h, last) = (span.end - t, true);
             } else {
                 let ratio = next / h.to_f64().abs();
@@ -396,6 +401,28 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
         let start = *start;
         self.place(x0, &start, span.start);
+        Ok(())
+    }
+
+    /// Consistent `ẋ` and `z` at the time that was reached, from those that are there.
+    fn settle(&mut self, t: T) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let Base { point, u, parameters, .. } = &mut *self.base;
+        let mut x = VectorX::<M, T>::zeroed();
+        let mut y = ArrayK::<M, T>::zeroed();
+        for (index, y) in y.as_mut().iter_mut().enumerate() {
+            *y = point[if index < nx { index } else { index + nx }];
+        }
+        x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
+        match self.consistent.solve(&At { x: &x, u, p: parameters, t }, &mut y) {
+            Ok(points) => self.statistics.residuals += points,
+            // As at the start.
+            Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => return Ok(()),
+            Err(error) => return Err(error),
+        }
+        for (index, y) in y.as_ref().iter().enumerate() {
+            point[if index < nx { index } else { index + nx }] = *y;
+        }
         Ok(())
     }
 
@@ -556,6 +583,8 @@ impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
 }
 
 impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
+    const ENDS_ON_STAGE: bool = B::ENDS_ON_STAGE;
+
     fn integrate(
         state: &mut Self::State,
         run: &mut Run<'_, M, T>,

@@ -15,7 +15,7 @@ use super::tape::Tape;
 use crate::error::Error;
 use crate::irk::{check_result, not_finite};
 use crate::linalg::axpy;
-use crate::model::{ArrayW, ArrayX, Dae, VectorX, VectorZ};
+use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorX, VectorZ};
 use crate::quadrature::{Along, Backwards, Chained, Integrand, begin, finish};
 use crate::result::{Adjoint, Forward, Hessian, split};
 use crate::scalar::Real;
@@ -84,7 +84,27 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             result.x = x;
         }
         self.tape.commit();
+        if !B::ENDS_ON_STAGE && M::Shape::NZ > 0 {
+            let y = self.end()?;
+            self.base.result.z.as_mut_slice().copy_from_slice(&y.as_ref()[M::Shape::NX..]);
+        }
         Ok(())
+    }
+
+    /// Consistent `(ẋ, z)` at the end, from the last stage and the `z` that is there.
+    fn end(&mut self) -> Result<ArrayK<M, T>, Error> {
+        let (nx, Base { u, parameters, result, .. }) = (M::Shape::NX, &mut *self.base);
+        let mut guess = ArrayK::<M, T>::zeroed();
+        let (states, algebraic) = guess.as_mut().split_at_mut(nx);
+        let (_, y) = self.tape.numbers(self.tape.entries().len().saturating_sub(1), nx);
+        let stages = (y.len() / M::Shape::NK.max(1)).max(1);
+        for (to, k) in states.iter_mut().zip(y.chunks_exact(stages)) {
+            *to = k.last().copied().unwrap_or(T::ZERO);
+        }
+        algebraic.copy_from_slice(result.z.as_slice());
+        let x = result.x;
+        self.consistent.solve(&At { x: &x, u, p: parameters, t: self.span.end }, &mut guess)?;
+        Ok(guess)
     }
 
     /// The solution alone.
@@ -155,7 +175,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                     axpy(forward.dx_dx0[(i, j)], v.as_ref(), row.as_mut());
                 }
             }
-            if step + 1 == count {
+            if step + 1 == count && B::ENDS_ON_STAGE {
                 algebraic(forward, v, row, |row, i| {
                     split(row, i, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
                 });
@@ -165,6 +185,14 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         })?;
         for (i, row) in v.as_ref().iter().enumerate() {
             split(row.as_ref(), i, &mut result.dx_dx0, &mut result.dx_du, &mut result.dx_dp);
+        }
+        if !B::ENDS_ON_STAGE && nz > 0 {
+            let y = self.end()?;
+            let (x, Base { u, parameters, .. }) = (self.base.result.x, &mut *self.base);
+            let at = At { x: &x, u, p: parameters, t: self.span.end };
+            algebraic(self.consistent.forward(&at, &y)?, v, row, |row, i| {
+                split(row, i, &mut result.dz_dx0, &mut result.dz_du, &mut result.dz_dp);
+            });
         }
         if nz > 0 {
             let Base { u, parameters, start, .. } = &mut *self.base;

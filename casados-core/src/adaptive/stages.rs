@@ -1,4 +1,4 @@
-//! One step of a Radau IIA method with `S` stages: simplified Newton, the estimate of its error, and its polynomial.
+//! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton, the estimate of its error, and its polynomial.
 //!
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for `f(ẋ, x, z, t) = 0` with unknowns
 //! `k_i`, `z_i` instead of increments of `y`.
@@ -14,7 +14,7 @@ use crate::linalg::{Arithmetic, Complex, EigenFactors, Eigenbasis, Kernel, Rows,
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Real, Scalar, SideBySide};
 use crate::shape::{Plain, Shape};
-use crate::tableau::{Method, RadauIIA, Tableau};
+use crate::tableau::{Method, Tableau};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
@@ -111,8 +111,9 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// [`Failure::NotFinite`]
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
-    /// The variables at the end of the step.
-    fn end(&self, point: &mut ArrayV<M, T>);
+    /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a stage: else they are
+    /// extrapolated.
+    fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool;
     /// The step is accepted.
     fn accept(&mut self);
     /// The unknowns `(k, z)` of the accepted step, stages innermost.
@@ -155,11 +156,8 @@ struct Memory<M: Dae, T: Plain, const S: usize, const L: usize, const G: usize> 
     factors: EigenFactors<M, T, L>,
 }
 
-/// A step of the Radau IIA method with `S` stages in `G` groups, for whose eigenvalues there are `L ≥ ⌈S/2⌉` lanes.
-pub struct Radau<M: Dae, T: Real, const S: usize, const L: usize, const G: usize>
-where
-    RadauIIA<S>: Method<S>,
-{
+/// A step of the collocation method `B` with `S` stages in `G` groups, for whose eigenvalues there are `L ≥ ⌈S/2⌉` lanes.
+pub struct Collocation<M: Dae, B, T: Real, const S: usize, const L: usize, const G: usize> {
     tableau: Tableau<S>,
     /// Columns of `A`, and of `−h A` of this step.
     a: [Groups<T, G>; S],
@@ -173,7 +171,7 @@ where
     factors: [f64; S],
     basis: Eigenbasis<T, S, L>,
     memory: Box<Memory<M, T, S, L, G>>,
-    replay: Option<Box<Single<M, T, S>>>,
+    replay: Option<Box<Single<M, B, T, S>>>,
 }
 
 /// A value of each stage, of which the last is repeated.
@@ -181,18 +179,17 @@ fn groups<T: Real, const G: usize>(stages: usize, value: impl Fn(usize) -> T) ->
     from_fn(|group| from_fn(|lane| value((GROUP * group + lane).min(stages.saturating_sub(1)))))
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Radau<M, T, S, L, G>
-where
-    RadauIIA<S>: Method<S>,
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usize>
+    Collocation<M, B, T, S, L, G>
 {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new() -> Result<Self, Error> {
         const { assert!(G == S.div_ceil(GROUP), "as many groups as hold the stages") };
-        let tableau = <RadauIIA<S> as Method<S>>::TABLEAU;
+        let tableau = B::TABLEAU;
         let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, L, G>>() };
         let memory = try_zeroed_box().map_err(|()| out_of_memory)?;
-        // Radau IIA methods have one: tests construct all.
+        // Gauss and Radau IIA methods have one: tests construct all.
         let basis: Eigenbasis<T, S, L> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
         let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
         let a = from_fn(|j| groups(S, |i| T::from_f64(a[i][j])));
@@ -270,6 +267,38 @@ where
         sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
     }
 
+    /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
+    fn extrapolate(&self, h: T, point: &mut ArrayV<M, T>) {
+        let (nx, point) = (M::Shape::NX, point.as_mut());
+        let (b, end) = (self.tableau.b().map(T::from_f64), self.polynomials(1.0).map(T::from_f64));
+        for (index, y) in self.memory.y.as_ref().iter().enumerate() {
+            let Some(y) = y.as_flattened().first_chunk() else { continue };
+            if index < nx {
+                point[index] = dot(&end, y);
+                point[nx + index] = point[nx + index] + h * dot(&b, y);
+            } else {
+                point[nx + index] = dot(&end, y);
+            }
+        }
+    }
+
+    /// The estimated error of `x` at the end, where nothing is a stage.
+    ///
+    /// It is how far the extrapolated derivative is from the solution at the state that was reached. Of stiff components
+    /// this is their error, which no method with `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the
+    /// solve takes it out of the estimate.
+    fn error_at_end(&mut self, start: &Start<'_, M, T>, residuals: &mut usize) -> Result<f64, Failure> {
+        let mut point = *start.point;
+        self.extrapolate(start.h, &mut point);
+        if let Some(time) = point.as_mut().last_mut() {
+            *time = *time + start.h;
+        }
+        self.memory.point = point;
+        self.defect(start.h, residuals)?;
+        let states = self.memory.error.as_ref().get(..M::Shape::NX).unwrap_or_default();
+        Ok(norm(states, start.scale.as_ref()))
+    }
+
     /// The estimated error of `(x, z)` from the defect at the point that is there.
     fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
         let Memory { point, f_point, rows, error, factors, .. } = &mut *self.memory;
@@ -278,24 +307,24 @@ where
         if not_finite(f_point.as_ref()).is_some() {
             return Err(Failure::NotFinite);
         }
-        // The real system is the first.
+        // The real system is the first, if there is one.
         for (equation, f) in f_point.as_ref().iter().enumerate() {
             let [[row]] = &mut rows[slot::<M>(equation)];
             *row = Complex::zero();
             row.re[0] = -*f;
         }
         factors.solve(rows);
-        let factor = h * self.basis.values().re[0];
+        // Of methods with an even number of stages it is complex; the error is the real part.
+        let [re, im] = [self.basis.values().re[0], self.basis.values().im[0]].map(|value| h * value);
         for (index, (error, [[row]])) in error.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
-            *error = if index < M::Shape::NX { factor * row.re[0] } else { row.re[0] };
+            *error = if index < M::Shape::NX { re * row.re[0] - im * row.im[0] } else { row.re[0] };
         }
         Ok(())
     }
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Stages<M, T> for Radau<M, T, S, L, G>
-where
-    RadauIIA<S>: Method<S>,
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usize> Stages<M, T>
+    for Collocation<M, B, T, S, L, G>
 {
     fn count(&self) -> usize {
         S
@@ -427,6 +456,9 @@ where
     }
 
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
+        if !self.tableau.is_stiffly_accurate() {
+            return self.error_at_end(start, residuals);
+        }
         // What the method misses is how far the derivative of its polynomial, extrapolated to the start of the step,
         // is from the solution there.
         self.memory.point = *start.point;
@@ -453,12 +485,17 @@ where
         }
     }
 
-    fn end(&self, point: &mut ArrayV<M, T>) {
+    fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool {
+        if !self.tableau.is_stiffly_accurate() {
+            self.extrapolate(h, point);
+            return false;
+        }
         // The last lane repeats the last stage, which is the end of the step.
-        let Some(points) = self.memory.points.last() else { return };
+        let Some(points) = self.memory.points.last() else { return true };
         for (to, [.., last]) in point.as_mut().iter_mut().zip(points.as_ref()) {
             *to = *last;
         }
+        true
     }
 
     fn accepted(&self) -> &[T] {
@@ -476,7 +513,7 @@ where
     fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error> {
         Ok(match &mut self.replay {
             Some(replay) => &mut **replay,
-            none => &mut **none.insert(Box::new(single()?)),
+            none => &mut **none.insert(Box::new(single::<M, B, T, S>()?)),
         })
     }
 }
@@ -536,7 +573,7 @@ impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for
     }
 }
 
-/// See [`Radau::advance`].
+/// See [`Collocation::advance`].
 struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
     /// Columns of `−h A`.
     minus_ha: &'a [Groups<T, G>; S],
