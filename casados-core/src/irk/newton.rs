@@ -366,16 +366,16 @@ impl<E: Lanes, const S: usize> Kernel for Measure<'_, E, S> {
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
         let Self { x, y, increment, weights, h, floor } = self;
-        let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
+        let (zero, one, smallest) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(E::SMALLEST));
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
         let (mut largest, mut sum) = ([zero; S], [zero; S]);
         for (unknown, ((y, increment), weight)) in y.iter().zip(increment).zip(weights).enumerate() {
-            let mut size = x.get(unknown).map_or(zero, |x| *x).abs() * per_step;
+            let mut size = (x.get(unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
             for (y, [delta]) in y.iter().zip(increment) {
                 size = y.abs().max(delta.abs().max(size));
             }
-            *weight = E::select(Scalar::eq(size, zero), zero, one / size);
+            *weight = one / size;
             for ((largest, sum), [delta]) in largest.iter_mut().zip(&mut sum).zip(increment) {
                 let size = delta.abs() * *weight;
                 *largest = size.max(*largest);

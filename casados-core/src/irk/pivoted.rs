@@ -167,11 +167,12 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         let mut largest = (T::ZERO, 0, 0);
         for (equation, (f, magnitude)) in self.f.as_ref().iter().zip(magnitude.as_ref()).enumerate() {
             for (stage, (f, magnitude)) in f.iter().zip(magnitude).enumerate() {
-                // A residual of zero is zero even where all terms are. Terms that overflow say nothing.
+                // A residual of zero is zero even where all terms are, and none is rounded finer than normal numbers are. Terms
+                // that overflow say nothing.
                 let relative = if *f == T::ZERO {
                     T::ZERO
                 } else if magnitude.is_finite() {
-                    f.abs() / *magnitude
+                    f.abs() / magnitude.max(T::from_f64(T::SMALLEST))
                 } else {
                     T::ONE
                 };
@@ -196,7 +197,11 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 }
             }
             // No increment is none, also of zero; an unknown that became zero changed by all it was.
-            let relative = if change == T::ZERO { T::ZERO } else { change / size.max(change) };
+            let relative = if change == T::ZERO {
+                T::ZERO
+            } else {
+                change / size.max(change).max(T::from_f64(T::SMALLEST))
+            };
             if relative > largest.size || !relative.is_finite() {
                 largest = Increment { size: relative, unknown };
             }

@@ -101,7 +101,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
     fn run<A: Arithmetic>(self) -> E::Mask {
         let Self { f, points, jacobian, sizes, .. } = self;
         let (zero, bound) = (E::from_f64(0.0), E::from_f64(RESIDUAL * E::EPSILON));
-        sizes.fill([zero; S]);
+        sizes.fill([E::from_f64(E::SMALLEST); S]);
         for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
             let (Some(sizes), Some(points)) = (sizes.get_mut(r), points.get(c)) else { continue };
             for ((size, &value), &point) in sizes.iter_mut().zip(values).zip(points) {
@@ -131,7 +131,7 @@ fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
 /// `|sum| ≤ ROUNDING ε size`
 #[inline(always)]
 fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
-    E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size)
+    E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
 }
 
 struct VerifyForward<'a, M, E, const S: usize> {

@@ -226,6 +226,8 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     const EPSILON: f64;
     /// `ε^(2/3)`: what no longer shrinks below this is a rounding error.
     const STAGNATION: f64;
+    /// The smallest normal number: where numbers are smaller, rounding errors are not.
+    const SMALLEST: f64;
     /// One of them. `lane < LANES`
     fn lane(cell: &Self::Cell, lane: usize) -> f64;
     /// One of them set. `lane < LANES`

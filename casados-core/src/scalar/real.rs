@@ -130,6 +130,7 @@ macro_rules! real {
             const LANES: usize = 1;
             const EPSILON: f64 = <$t>::EPSILON as f64;
             const STAGNATION: f64 = $stagnation;
+            const SMALLEST: f64 = <$t>::MIN_POSITIVE as f64;
             #[inline(always)]
             fn lane(cell: &Self, _: usize) -> f64 {
                 *cell as f64

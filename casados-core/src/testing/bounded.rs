@@ -209,6 +209,7 @@ impl Lanes for Bounded {
     const LANES: usize = 1;
     const EPSILON: f64 = f64::EPSILON;
     const STAGNATION: f64 = <f64 as Lanes>::STAGNATION;
+    const SMALLEST: f64 = <f64 as Lanes>::SMALLEST;
     fn lane(cell: &Self, _: usize) -> f64 {
         cell.value
     }

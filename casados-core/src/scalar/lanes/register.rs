@@ -252,6 +252,7 @@ macro_rules! register {
             const LANES: usize = N;
             const EPSILON: f64 = <$element as Lanes>::EPSILON;
             const STAGNATION: f64 = <$element as Lanes>::STAGNATION;
+            const SMALLEST: f64 = <$element as Lanes>::SMALLEST;
 
             #[inline(always)]
             fn lane(cell: &Self::Cell, lane: usize) -> f64 {
