@@ -9,6 +9,9 @@ mod graph;
 mod language;
 mod structure;
 
+#[cfg(test)]
+mod fuzz;
+
 use proc_macro::TokenStream;
 
 /// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
