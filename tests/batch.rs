@@ -344,7 +344,7 @@ fn times() -> Test {
 /// However many threads there are, results are the same to the last bit.
 #[cfg(feature = "parallel")]
 #[test]
-fn threads() -> Test {
+fn t34_threads() -> Test {
     for count in COUNTS {
         let horizon = chain::<21>(count);
         let mut batch = Batch::<Chain<21>, Gauss<2>>::new(steps(2))?;

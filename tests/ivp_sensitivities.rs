@@ -87,7 +87,7 @@ macro_rules! first {
 /// `ε Σ_n |∂x(T)/∂x(t_n)| |∂x(t_n)/∂x₀|`, summed over the steps `2.0e7 ε = 4.5e-9` of the derivative itself, and 1.4e6 for the
 /// worst of them; no order of the products avoids it, forwards or backwards.
 #[test]
-fn first_order() {
+fn t14_first_order() {
     first!(Robertson, "robertson", 3, 0, 3, 1e-12, 1e-20, 1e-10);
     first!(AkzoNobel, "akzo_nobel", 5, 1, 9, 1e-12, 1e-16, 1e-10);
     first!(Oregonator, "oregonator", 3, 0, 4, 1e-14, 1e-15, 1e-10);
@@ -163,7 +163,7 @@ macro_rules! second_order {
 }
 
 #[test]
-fn second_order() {
+fn t17_second_order() {
     second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, 1e-8);
     second_order!(Oregonator, "oregonator", 3, 4, 1e-12, 1e-13, 1e-8);
     second_order!(VanDerPol, "van_der_pol_5", 2, 1, 1e-12, 1e-12, 1e-8);

@@ -62,7 +62,7 @@ macro_rules! explicit_and_implicit {
 }
 
 #[test]
-fn blow_up() {
+fn t30_blow_up() {
     macro_rules! check {
         ($method:ty) => {
             let mut adaptive = Adaptive::<Riccati, $method>::new(options(1e-8)).expect("valid");
@@ -80,7 +80,7 @@ fn blow_up() {
 }
 
 #[test]
-fn no_value_beyond_a_time() {
+fn t26_no_value_beyond_a_time() {
     macro_rules! check {
         ($method:ty) => {
             let mut adaptive = Adaptive::<Root, $method>::new(options(1e-6)).expect("valid");
@@ -107,7 +107,7 @@ fn no_value_beyond_a_time() {
 
 /// The error names what is not determined.
 #[test]
-fn index_two() {
+fn t22_index_two() {
     let mut adaptive = Adaptive::<Hidden, Radau>::new(options(1e-6)).expect("valid");
     adaptive.set_parameters(&SVector::from([0.0])).expect("finite");
     match adaptive.solve(&zero(), &zero(), 1.0).map(|result| result.x) {
@@ -120,7 +120,7 @@ fn index_two() {
 
 /// `z` at the start is found from anywhere, and decides for nothing else.
 #[test]
-fn inconsistent_start() {
+fn t24_inconsistent_start() {
     let run = |z: f64| {
         let mut adaptive = Adaptive::<Hidden, Radau>::new(options(1e-8)).expect("valid");
         adaptive.set_parameters(&SVector::from([1.0])).expect("finite");
@@ -139,7 +139,7 @@ fn inconsistent_start() {
 }
 
 #[test]
-fn the_branch_of_the_start_is_kept() {
+fn t25_the_branch_of_the_start_is_kept() {
     for sign in [1.0, -1.0] {
         let mut adaptive = Adaptive::<Branches, Radau>::new(options(1e-8)).expect("valid");
         adaptive.set_start(&zero(), &SVector::from([sign])).expect("finite");
@@ -155,7 +155,7 @@ fn the_branch_of_the_start_is_kept() {
 /// A solution that slides along a jump of the model cannot be followed: there is an end, with an error or within the
 /// tolerance of steps that chatter.
 #[test]
-fn a_jump() {
+fn t29_a_jump() {
     macro_rules! check {
         ($method:ty) => {
             let options = AdaptiveOptions { max_steps: 2000, ..options(1e-6) };
@@ -174,7 +174,7 @@ fn a_jump() {
 
 /// Powers of two, over the whole range of numbers, change no bit of a linear model.
 #[test]
-fn scaling() {
+fn t27_scaling() {
     macro_rules! check {
         ($method:ty) => {
             let run = |exponent: i32| {
@@ -196,7 +196,7 @@ fn scaling() {
 
 /// Times up to the end of the range.
 #[test]
-fn long_and_short_intervals() {
+fn t36_long_and_short_intervals() {
     for t in [1e-300, 1e-30, 1e30, 1e300] {
         let mut adaptive = Adaptive::<Decay, Radau>::new(options(1e-6)).expect("valid");
         let x0 = SVector::from([1.0, 1.0]);
@@ -211,7 +211,7 @@ fn long_and_short_intervals() {
 
 /// The same input gives the same bits, in every call.
 #[test]
-fn determinism() {
+fn t33_determinism() {
     let mut adaptive = Adaptive::<Riccati, Radau>::new(options(1e-9)).expect("valid");
     let first = adaptive.solve(&zero(), &zero(), 1.2).expect("a solution").x;
     for t in [0.3, 1.5, 0.9] {

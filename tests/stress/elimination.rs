@@ -13,7 +13,7 @@ fn vanishing(xdot: f64, x: f64, z: [f64; 2], u: [f64; 1], p: [f64; 1]) -> [f64; 
 
 /// A pivot that is small, zero or large: the algebraic states are the closed form to rounding.
 #[test]
-fn pivots_that_vanish() {
+fn t21_pivots_that_vanish() {
     let u = 0.25;
     for p in [0.0, 1e-300, 1e-20, 1e-9, 0.5, 2.0, 1e9] {
         let mut irk = Irk::<Vanishing, RadauIIA<3>>::new(Options::default()).unwrap();
@@ -41,7 +41,7 @@ fn scaled(xdot: [f64; 2], x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
 }
 
 #[test]
-fn rows_of_any_scale() {
+fn t21_rows_of_any_scale() {
     let run = |p: [f64; 2]| {
         let mut irk = Irk::<Scaled, Gauss<3>>::new(Options { steps: 4, ..Default::default() }).unwrap();
         irk.set_parameters(&SVector::from(p)).unwrap();
@@ -163,11 +163,68 @@ fn a_range_is_no_promise() {
 
 /// A matrix that is singular is an error that names the unknown, and the integrator goes on.
 #[test]
-fn singular_matrices_are_refused() {
+fn t20_singular_matrices_are_refused() {
     let mut irk = Irk::<AnyMatrix, RadauIIA<2>>::new(Options::default()).unwrap();
     irk.set_parameters(&vector![1.0, 2.0, 2.0, 4.0]).unwrap();
     let error = irk.solve(&vector![1.0], &SVector::zeros(), 0.1).map(|step| step.x).unwrap_err();
     assert!(matches!(error, casados::Error::Singular { unknown: "z[0]" | "z[1]", .. }), "{error}");
     irk.set_parameters(&vector![1.0, 0.0, 0.0, 1.0]).unwrap();
     assert!(irk.solve(&vector![1.0], &SVector::zeros(), 0.1).is_ok());
+}
+
+/// Determinants down to 1e-300, which a solution does not depend on, and matrices whose condition it does: errors are ε times it.
+#[test]
+fn t35_near_singular_matrices() {
+    let solve = |p: [f64; 4]| {
+        let mut irk = Irk::<AnyMatrix, RadauIIA<2>>::new(Options::default()).expect("valid");
+        irk.set_parameters(&SVector::from(p)).expect("finite");
+        irk.solve(&vector![1.0], &SVector::zeros(), 0.1).map(|step| (step.x[0], step.z[0], step.z[1]))
+    };
+    // Rows and columns of any scale.
+    for p in [
+        [1e-150, 0.0, 0.0, 1e-150],
+        [1e-300, 0.0, 0.0, 1.0],
+        [1e150, 0.0, 0.0, 1e-150],
+        [0.0, 1e-150, 1e150, 0.0],
+    ] {
+        let (x, z0, z1) = solve(p).expect("a solution");
+        let determinant = p[0] * p[3] - p[1] * p[2];
+        let exact = [(p[3] * x - p[1]) / determinant, (p[0] - p[2] * x) / determinant];
+        for (found, exact) in [z0, z1].into_iter().zip(exact) {
+            assert!((found - exact).abs() <= 8.0 * f64::EPSILON * exact.abs(), "{p:?}: {found:e} {exact:e}");
+        }
+    }
+    // [1 1; 1 1 + δ]: z1 = (1 − x)/δ, z0 = x − z1, of condition (2 + δ)²/δ.
+    for k in 1..=45 {
+        let delta = 2f64.powi(-k);
+        let (x, z0, z1) = solve([1.0, 1.0, 1.0, 1.0 + delta]).expect("a solution");
+        let (exact, condition) = ((1.0 - x) / delta, 4.0 / delta);
+        let size = exact.abs().max(1.0);
+        assert!((z1 - exact).abs() <= 4.0 * condition * f64::EPSILON * size, "2^-{k}: {z1} {exact}");
+        // And each equation is satisfied to rounding, whatever the condition: ten operations.
+        assert!((z0 + z1 - x).abs() <= 10.0 * f64::EPSILON * z1.abs().max(1.0), "2^-{k}");
+        assert!((z0 + (1.0 + delta) * z1 - 1.0).abs() <= 10.0 * f64::EPSILON * z1.abs().max(1.0), "2^-{k}");
+    }
+    // What is singular to the last bit is refused.
+    assert!(matches!(solve([1.0, 1.0, 1.0, 1.0]), Err(casados::Error::Singular { .. })));
+}
+
+/// A matrix of `ẋ` of rank five for eight states, in equal steps: the same solution as in the form with algebraic states.
+#[test]
+fn t23_rank_deficient_mass() {
+    use super::circuits::{TransistorAmplifier, TransistorCapacitors};
+    use super::data::Record;
+    let set = Record::load("ivp/ends.json").expect("the reference is there");
+    let y: SVector<f64, 8> = set.record("transistor_amplifier").expect("a problem").vector("x0").expect("x0");
+    let options = Options { steps: 40, ..Default::default() };
+    let mut nodes = Irk::<TransistorAmplifier, RadauIIA<3>>::new(options).expect("valid");
+    let x = nodes.solve(&y, &SVector::zeros(), 0.002).expect("a solution").x;
+    let capacitors = |y: &SVector<f64, 8>| vector![y[1] - y[0], y[2], y[4] - y[3], y[5], y[7] - y[6]];
+    let mut reduced = Irk::<TransistorCapacitors, RadauIIA<3>>::new(options).expect("valid");
+    let step = *reduced.solve(&capacitors(&y), &SVector::zeros(), 0.002).expect("a solution");
+    // Voltages up to 6, forty steps; the derivatives of algebraic voltages are differences of them.
+    let bound = 40.0 * 8.0 * 6.0 * f64::EPSILON;
+    let error = (capacitors(&x) - step.x).amax().max((vector![x[0], x[3], x[6]] - step.z).amax());
+    println!("{error:e}");
+    assert!(error <= bound, "{error:e} {bound:e}");
 }

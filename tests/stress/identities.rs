@@ -9,7 +9,7 @@ use nalgebra::SVector;
 /// A fully implicit model with every kind of variable: `z` and parameters that enter nonlinearly, time, a state-dependent
 /// mass matrix.
 #[dae]
-fn everything(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 2], t: f64) -> [f64; 3] {
+pub fn everything(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 2], t: f64) -> [f64; 3] {
     let [stiffness, mass] = p;
     [
         (mass + x[0] * x[0]) * xdot[0] + 0.1 * xdot[1].sin() - x[1] * z[0],

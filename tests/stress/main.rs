@@ -1,18 +1,77 @@
-//! Stress: what breaks integrators, and what must not break here.
+//! Stress: forty things that break integrators, and must not break here. The name of a test begins with its number:
+//! `cargo test t07`. What was measured is in `docs/accuracy.md`.
+//!
+//! | number | what | where |
+//! | --- | --- | --- |
+//! | 1, 2 | constants of tableaux, order conditions | `tableaux` |
+//! | 3 | stability functions to `\|z\| = 1e12` | `stability` |
+//! | 4 | order of convergence, and the floor | `order` |
+//! | 5, 6 | order reduction, stiffness of 1e12 | `stiffness` |
+//! | 7, 8, 9 | energy, angular momentum, compensated sums | `invariants`; a million steps in `tests/long_runs.rs` |
+//! | 10, 11 | the way back, linear invariants | `invariants` |
+//! | 12 | relative accuracy over decades | `stiffness` |
+//! | 13, 15, 16, 18, 19 | derivatives: adjoint and forward, the complex step, symmetry, cancellation, iterations that stop early | `sensitivities` |
+//! | 14, 17 | derivatives against references | `tests/ivp_sensitivities.rs`; exact zeros in `sensitivities` |
+//! | 20, 21, 23, 35 | singular and nearly singular matrices, rank-deficient mass matrices | `elimination`, `failures` |
+//! | 22 | index two | `failures`, `adaptive`; at compile time `tests/ui/structurally_singular.rs` |
+//! | 24, 25, 33 | inconsistent start values, branches, warm starts | `starts`, `adaptive` |
+//! | 26, 29, 30, 31, 32 | models without a value, jumps, blow-up, divergence, quality of Newton's method | `failures`, `adaptive` |
+//! | 27, 28, 36 | powers of two, denormal numbers, lengths of steps | `scaling`, `adaptive`; run time in `tests/long_runs.rs` |
+//! | 34 | threads | `tests/batch.rs` |
+//! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `endpoints` |
+//! | 39 | rounding of the data | `stiffness` |
+//!
+//! Besides: random equations with known solutions (`properties`), anything into every entry (`fuzz`; into the macro in
+//! `casados-macros/src/fuzz.rs`), single precision (`precision`).
 
+#[allow(dead_code)]
 #[path = "../../examples/models/ivp/chemistry.rs"]
 mod chemistry;
+#[allow(dead_code)]
+#[path = "../../examples/models/ivp/circuits.rs"]
+mod circuits;
+#[path = "../data/mod.rs"]
+mod data;
 #[path = "../interval/mod.rs"]
 mod interval;
+#[path = "../../examples/models/ivp/oscillators.rs"]
+mod oscillators;
 #[path = "../systems/mod.rs"]
 mod systems;
 
 mod adaptive;
 mod elimination;
+mod endpoints;
+mod failures;
+mod fuzz;
 mod identities;
 mod invariants;
 mod orbit;
 mod order;
+mod pollution;
+mod precision;
+mod properties;
 mod scaling;
+mod sensitivities;
 mod stability;
+mod starts;
+mod stiffness;
 mod tableaux;
+
+#[test]
+fn every_number_has_a_test() {
+    let mut sources = String::new();
+    for directory in ["tests", "tests/stress"] {
+        let directory = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(directory);
+        for file in std::fs::read_dir(directory).expect("a directory") {
+            let path = file.expect("a file").path();
+            if path.extension().is_some_and(|extension| extension == "rs") {
+                sources += &std::fs::read_to_string(path).expect("a text");
+            }
+        }
+    }
+    for number in 1..=40 {
+        let name = format!("t{number:02}_");
+        assert!(sources.contains(&format!("fn {name}")) || sources.contains(&format!("({name}")), "{name}");
+    }
+}

@@ -102,10 +102,10 @@ macro_rules! explicit_orders {
     };
 }
 
-explicit_orders!(explicit_on_logistic, Logistic, vector![0.2], LOGISTIC_TIME, [logistic(0.2)], 4,
+explicit_orders!(t04_explicit_on_logistic, Logistic, vector![0.2], LOGISTIC_TIME, [logistic(0.2)], 4,
     Euler 100.0 2.0 8, Midpoint 100.0 2.0 8, Heun 100.0 2.0 8, Rk4 32.0 2.0 8, DormandPrince8 4.0 1.3 12,
 );
-explicit_orders!(explicit_on_kepler, Kepler, kepler_start(), KEPLER_TIME, kepler(KEPLER_TIME), 6,
+explicit_orders!(t04_explicit_on_kepler, Kepler, kepler_start(), KEPLER_TIME, kepler(KEPLER_TIME), 6,
     Euler 400.0 1.6 9, Midpoint 100.0 2.0 8, Heun 100.0 2.0 8, Rk4 32.0 2.0 8, Butcher6 16.0 1.5 10,
     DormandPrince8 8.0 1.3 14,
 );
@@ -178,27 +178,27 @@ macro_rules! implicit_orders {
     };
 }
 
-implicit_orders!(gauss_on_logistic, Gauss, 2, Logistic, vector![0.2], LOGISTIC_TIME, [logistic(0.2)], 8,
+implicit_orders!(t04_gauss_on_logistic, Gauss, 2, Logistic, vector![0.2], LOGISTIC_TIME, [logistic(0.2)], 8,
     1 64.0 2.0 8, 2 16.0 1.5 12, 3 4.0 1.4 12, 4 3.0 1.3 10, 5 2.0 1.3 9, 6 2.0 1.3 8, 7 1.0 1.4 8, 8 1.0 1.3 8,
     9 1.0 1.3 8,
 );
-implicit_orders!(radau_on_logistic, RadauIIA, 1, Logistic, vector![0.2], LOGISTIC_TIME, [logistic(0.2)], 7,
+implicit_orders!(t04_radau_on_logistic, RadauIIA, 1, Logistic, vector![0.2], LOGISTIC_TIME, [logistic(0.2)], 7,
     1 64.0 2.0 8, 2 16.0 1.5 12, 3 4.0 1.4 12, 4 3.0 1.3 10, 5 2.0 1.3 9, 6 2.0 1.3 8, 7 1.0 1.4 8, 8 1.0 1.3 8,
     9 1.0 1.3 8,
 );
-implicit_orders!(gauss_on_kepler, Gauss, 2, Kepler, kepler_start(), KEPLER_TIME, kepler(KEPLER_TIME), 6,
+implicit_orders!(t04_gauss_on_kepler, Gauss, 2, Kepler, kepler_start(), KEPLER_TIME, kepler(KEPLER_TIME), 6,
     1 64.0 2.0 8, 2 16.0 1.5 14, 3 6.0 1.4 14, 4 4.0 1.3 14, 5 3.0 1.3 12, 6 3.0 1.3 12, 7 2.0 1.3 12,
     8 2.0 1.3 12, 9 2.0 1.3 10,
 );
-implicit_orders!(radau_on_kepler, RadauIIA, 1, Kepler, kepler_start(), KEPLER_TIME, kepler(KEPLER_TIME), 7,
+implicit_orders!(t04_radau_on_kepler, RadauIIA, 1, Kepler, kepler_start(), KEPLER_TIME, kepler(KEPLER_TIME), 7,
     2 16.0 1.5 14, 3 6.0 1.4 14, 4 4.0 1.3 14, 5 3.0 1.3 14, 6 3.0 1.3 12, 7 2.0 1.3 12, 8 2.0 1.3 12,
     9 2.0 1.3 10,
 );
-implicit_orders!(gauss_on_pendulum, Gauss, 2, Pendulum, pendulum_start(), PENDULUM_TIME, pendulum(), 8,
+implicit_orders!(t04_gauss_on_pendulum, Gauss, 2, Pendulum, pendulum_start(), PENDULUM_TIME, pendulum(), 8,
     1 64.0 2.0 8, 2 16.0 1.5 14, 3 6.0 1.4 14, 4 4.0 1.3 14, 5 3.0 1.3 12, 6 3.0 1.3 12, 7 2.0 1.3 12,
     8 2.0 1.3 12, 9 2.0 1.3 10,
 );
-implicit_orders!(radau_on_pendulum, RadauIIA, 1, Pendulum, pendulum_start(), PENDULUM_TIME, pendulum(), 7,
+implicit_orders!(t04_radau_on_pendulum, RadauIIA, 1, Pendulum, pendulum_start(), PENDULUM_TIME, pendulum(), 7,
     2 16.0 1.5 14, 3 6.0 1.4 14, 4 4.0 1.3 14, 5 3.0 1.3 12, 6 3.0 1.3 12, 7 2.0 1.3 12, 8 2.0 1.3 12,
     9 2.0 1.3 10,
 );
@@ -219,14 +219,14 @@ fn oscillator() -> [f64; 2] {
 }
 
 // The solution is entire: the asymptote is visible for every order, errors of 1e-12 are reached with long steps.
-implicit_orders!(gauss_on_oscillator, Gauss, 2, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 18,
+implicit_orders!(t04_gauss_on_oscillator, Gauss, 2, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 18,
     1 4096.0 1.2 8, 2 512.0 1.3 12, 3 128.0 1.3 12, 4 40.0 1.2 15, 5 24.0 1.15 16, 6 16.0 1.15 16, 7 12.0 1.12 16,
     8 10.0 1.1 16, 9 8.0 1.1 16,
 );
-implicit_orders!(radau_on_oscillator, RadauIIA, 1, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 17,
+implicit_orders!(t04_radau_on_oscillator, RadauIIA, 1, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 17,
     2 512.0 1.3 9, 3 128.0 1.3 14, 4 40.0 1.2 17, 5 24.0 1.2 14, 6 16.0 1.15 16, 7 12.0 1.12 16, 8 10.0 1.1 18,
     9 8.0 1.1 18,
 );
-explicit_orders!(explicit_on_oscillator, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 8,
+explicit_orders!(t04_explicit_on_oscillator, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 8,
     Rk4 256.0 1.4 12, DormandPrince5 64.0 1.4 16, Butcher6 64.0 1.4 14, DormandPrince8 30.0 1.2 18,
 );

@@ -67,7 +67,7 @@ macro_rules! for_stages {
 }
 
 #[test]
-fn gauss_is_the_diagonal_pade_approximant() {
+fn t03_gauss_is_the_diagonal_pade_approximant() {
     macro_rules! check {
         ($method:ident, $s:literal) => {
             for (z, exact) in reference("gauss", $s) {
@@ -86,7 +86,7 @@ fn gauss_is_the_diagonal_pade_approximant() {
 }
 
 #[test]
-fn radau_is_the_subdiagonal_pade_approximant() {
+fn t03_radau_is_the_subdiagonal_pade_approximant() {
     macro_rules! check {
         ($method:ident, $s:literal) => {
             for (z, exact) in reference("radauIIA", $s) {

@@ -51,7 +51,7 @@ fn from_hex(value: &Value) -> f64 {
 }
 
 #[test]
-fn constants_are_correct_to_the_last_bit() {
+fn t01_constants_are_correct_to_the_last_bit() {
     let reference = reference();
     let mut compared = 0;
     for_collocation!(|tableau, family| {
@@ -99,7 +99,7 @@ fn simplifying_assumptions<const S: usize>(t: &Tableau<S>, [p, q, r]: [usize; 3]
 }
 
 #[test]
-fn simplifying_assumptions_hold_to_rounding() {
+fn t02_simplifying_assumptions_hold_to_rounding() {
     for_collocation!(|t, family| {
         let s = t.c().len();
         let orders = if family == "gauss" { [2 * s, s, s] } else { [2 * s - 1, s, s - 1] };

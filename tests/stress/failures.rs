@@ -1,0 +1,311 @@
+//! What has no answer is an error that says why; what was asked before and after it is not touched.
+
+use super::oscillators::VanDerPol;
+use casados::error::Quantity;
+use casados::options::{Newton, Start};
+use casados::testing::Integrator;
+use casados::{
+    Adaptive, AdaptiveOptions, Dae, DormandPrince5, DormandPrince8, Erk, Error, Gauss, Irk, Options, Radau,
+    RadauIIA, Rk4, Shape, dae, ode,
+};
+use nalgebra::{SVector, vector};
+
+#[ode]
+fn growth(x: f64, p: f64) -> f64 {
+    p * x
+}
+
+/// The second equation vanishes with `p`.
+#[dae]
+fn empty_row(xdot: f64, x: f64, z: f64, p: f64) -> [f64; 2] {
+    [xdot + x - z, p * (z - x)]
+}
+
+/// Index two where `p` is zero: `x = sin t`, `z = ẋ`.
+#[dae]
+fn hidden(xdot: f64, x: f64, z: f64, p: f64, t: f64) -> [f64; 2] {
+    [xdot - z, x - t.sin() + p * z]
+}
+
+/// No value beyond `t = 1/2`.
+#[ode]
+fn square_root(x: f64, t: f64) -> f64 {
+    (0.5 - t).sqrt() - 0.1 * x
+}
+
+/// Beyond the largest number soon after `t = 1/2`.
+#[ode]
+fn overflow(x: f64, t: f64) -> f64 {
+    (1e4 * (t - 0.45)).exp() - 0.1 * x
+}
+
+/// The level falls below zero, where there is no logarithm.
+#[ode]
+fn logarithm(x: f64) -> f64 {
+    1e-3 * x.ln() - 1.0
+}
+
+/// `e^1000`
+#[ode]
+fn exponential(x: f64) -> f64 {
+    -x.exp()
+}
+
+fn none() -> SVector<f64, 0> {
+    SVector::zeros()
+}
+
+fn options(steps: usize) -> Options {
+    Options { steps, ..Default::default() }
+}
+
+/// `1 − hλ = 0` of implicit Euler, a row of zeros: an error, and the bits of a fresh integrator afterwards.
+#[test]
+fn t20_singular_matrices() {
+    let mut irk = Irk::<Growth, RadauIIA<1>>::new(options(1)).expect("valid");
+    irk.set_parameters(&vector![1.0]).expect("finite");
+    let before = irk.solve(&vector![1.0], &none(), 0.5).expect("a solution").x;
+    let error = irk.solve(&vector![1.0], &none(), 1.0).map(|step| step.x);
+    assert!(matches!(error, Err(Error::Singular { unknown: "x", .. })), "{error:?}");
+    let error = irk.hessian(&vector![1.0], &none(), 1.0, &vector![1.0]).map(|step| step.x);
+    assert!(matches!(error, Err(Error::Singular { .. })), "{error:?}");
+    assert_eq!(irk.solve(&vector![1.0], &none(), 0.5).expect("a solution").x, before);
+
+    macro_rules! check {
+        ($integrator:expr) => {
+            let mut integrator = $integrator.expect("valid");
+            integrator.set_parameters(&vector![0.0]).expect("finite");
+            match integrator.solve(&vector![1.0], &none(), 0.1).map(|step| step.x) {
+                Err(
+                    Error::Singular { unknown, .. }
+                    | Error::InconsistentStart { unknown, singular: true, .. },
+                ) => {
+                    assert_eq!(unknown, "z");
+                }
+                other => panic!("{other:?}"),
+            }
+            integrator.set_parameters(&vector![1e-200]).expect("finite");
+            let x = integrator.solve(&vector![1.0], &none(), 0.1).expect("a solution").x[0];
+            // ẋ = 0
+            assert!((x - 1.0).abs() <= 4.0 * f64::EPSILON, "{x}");
+        };
+    }
+    check!(Irk::<EmptyRow, Gauss<1>>::new(options(1)));
+    check!(Irk::<EmptyRow, Gauss<3>>::new(options(2)));
+    check!(Irk::<EmptyRow, RadauIIA<2>>::new(options(1)));
+    check!(Irk::<EmptyRow, RadauIIA<5>>::new(options(1)));
+    check!(Adaptive::<EmptyRow, Radau>::new(AdaptiveOptions::default()));
+}
+
+/// The index is one by construction: what a model shows to be more is no program (`tests/ui/structurally_singular.rs`: the
+/// pendulum of index two is). What shows at run time alone is an error at the start of adaptive integration. One step of a
+/// given size has a solution all the same, which is right: that of the method for index two.
+#[test]
+fn t22_index_two() {
+    let mut adaptive = Adaptive::<Hidden, Radau>::new(AdaptiveOptions::default()).expect("valid");
+    adaptive.set_parameters(&vector![0.0]).expect("finite");
+    let error = adaptive.solve(&vector![0.0], &none(), 1.0).map(|result| result.x);
+    assert!(matches!(error, Err(Error::InconsistentStart { unknown: "z", singular: true, .. })), "{error:?}");
+    let mut irk = Irk::<Hidden, RadauIIA<3>>::new(options(4)).expect("valid");
+    irk.set_parameters(&vector![0.0]).expect("finite");
+    match irk.solve(&vector![0.0], &none(), 1.0).map(|step| (step.x[0], step.z[0])) {
+        Ok((x, z)) => {
+            println!("{x} {z} {:?}", irk.statistics());
+            // x is exact at the nodes; z = ẋ of a polynomial of degree 3: h³ x⁗/24 of order 1e-3.
+            assert!((x - 1.0f64.sin()).abs() <= 1e-14 && (z - 1.0f64.cos()).abs() <= 1e-3);
+        }
+        other => assert!(matches!(other, Err(Error::Singular { .. })), "{other:?}"),
+    }
+}
+
+/// An integrator that fails, and then gives the bits of a fresh one.
+fn fails<M: Dae, I: Integrator<M>>(
+    make: impl Fn() -> I,
+    x0: f64,
+    [h, good]: [f64; 2],
+    expected: impl Fn(&Error) -> bool,
+) where
+    M::Shape: Shape<VectorX<f64> = SVector<f64, 1>, VectorU<f64> = SVector<f64, 0>>,
+{
+    let (mut integrator, one, lambda) = (make(), vector![1.0], vector![1.0]);
+    for mode in 0..4 {
+        let x0 = vector![x0];
+        let error = match mode {
+            0 => integrator.solve(&x0, &none(), h).map(|step| step.x),
+            1 => integrator.forward(&x0, &none(), h).map(|step| step.x),
+            2 => integrator.adjoint(&x0, &none(), h, &lambda).map(|step| step.x),
+            _ => integrator.hessian(&x0, &none(), h, &lambda).map(|step| step.x),
+        };
+        match &error {
+            Err(error) => assert!(expected(error), "{error:?}"),
+            Ok(x) => panic!("{x}"),
+        }
+        let after = *integrator.hessian(&one, &none(), good, &lambda).expect("a solution");
+        let mut fresh = make();
+        assert_eq!(&after, fresh.hessian(&one, &none(), good, &lambda).expect("a solution"));
+        assert!(after.x[0].is_finite() && after.h_xx[(0, 0)].is_finite());
+    }
+}
+
+#[test]
+fn t26_models_without_a_value() {
+    let residual = |stage: Option<usize>| {
+        move |error: &Error| match error {
+            Error::NonFiniteModel { quantity: Quantity::Residual, equation: 0, value, at } => {
+                !value.is_finite() && stage.is_none_or(|stage| at.stage == stage) && at.step == 0
+            }
+            _ => false,
+        }
+    };
+    macro_rules! check {
+        ($($integrator:ident $method:ty;)*) => {$(
+            // NaN at the second stage, or where there is one beyond the middle: in the first step of one.
+            fails::<SquareRoot, _>(|| $integrator::<SquareRoot, $method>::new(options(1)).expect("valid"), 1.0, [1.0, 0.4], residual(None));
+            fails::<Overflow, _>(|| $integrator::<Overflow, $method>::new(options(1)).expect("valid"), 1.0, [1.0, 0.4], residual(None));
+            fails::<Exponential, _>(|| $integrator::<Exponential, $method>::new(options(1)).expect("valid"), 1000.0, [0.1, 0.1], residual(Some(0)));
+            fails::<Logarithm, _>(|| $integrator::<Logarithm, $method>::new(options(1)).expect("valid"), -1.0, [0.1, 0.1], residual(Some(0)));
+        )*};
+    }
+    check! { Irk Gauss<2>; Irk Gauss<4>; Irk RadauIIA<3>; Irk RadauIIA<5>; Erk Rk4; Erk DormandPrince8; }
+    // The nodes of Gauss with two stages are 0.21 and 0.79: the second is beyond the middle.
+    let second = |error: &Error| residual(Some(1))(error);
+    fails::<SquareRoot, _>(
+        || Irk::<SquareRoot, Gauss<2>>::new(options(1)).expect("valid"),
+        1.0,
+        [1.0, 0.4],
+        second,
+    );
+    fails::<Overflow, _>(
+        || Irk::<Overflow, Gauss<2>>::new(options(1)).expect("valid"),
+        1.0,
+        [1.0, 0.4],
+        second,
+    );
+    // The level crosses zero in a later step: the error says in which.
+    let mut irk = Irk::<Logarithm, RadauIIA<2>>::new(options(10)).expect("valid");
+    match irk.solve(&vector![0.1], &none(), 0.2).map(|step| step.x) {
+        Err(Error::NonFiniteModel { at, .. }) => assert!((4..=5).contains(&at.step), "{at}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A force that ends at `t = 5`, by the model's own clock or by a control.
+#[ode]
+fn switched(x: f64, u: f64, t: f64) -> f64 {
+    if t < 5.0 { 2.0 - x } else { u - x }
+}
+
+#[test]
+fn t29_discontinuity() {
+    // x = 2 − e^{−t} until 5, and decays from there.
+    let exact = (2.0 - f64::exp(-5.0)) * f64::exp(-3.0);
+    let (x0, u) = (vector![1.0], vector![0.0]);
+    // With a stop at the jump the order is full: Gauss methods have no node there.
+    let mut errors = [0.0; 2];
+    for (error, steps) in errors.iter_mut().zip([4, 8]) {
+        let mut irk = Irk::<Switched, Gauss<2>>::new(options(steps)).expect("valid");
+        let x = irk.solve(&x0, &u, 5.0).expect("a solution").x;
+        irk.set_time(5.0).expect("finite");
+        *error = (irk.solve(&x, &u, 3.0).expect("a solution").x[0] - exact).abs();
+    }
+    let slope = (errors[0] / errors[1]).log2();
+    assert!((slope - 4.0).abs() <= 0.5, "{slope} of {errors:?}");
+    // Without it steps are refused until the one that contains the jump is short, and the error is that of the tolerance.
+    macro_rules! check {
+        ($method:ty) => {
+            for rtol in [1e-4, 1e-6, 1e-8] {
+                let options = AdaptiveOptions { rtol, atol: rtol, max_steps: 2000, ..Default::default() };
+                let mut adaptive = Adaptive::<Switched, $method>::new(options).expect("valid");
+                let x = adaptive.solve(&x0, &u, 8.0).expect("a solution").x[0];
+                let error = (x - exact).abs();
+                println!("{} {rtol:e}: {error:e} {:?}", stringify!($method), adaptive.statistics());
+                assert!(error <= 100.0 * rtol, "{rtol:e}: {error:e}");
+                // A stop, and integration of the rest: at the jump the model has the value of the other side, which
+                // is the control's until there.
+                let x = adaptive.solve(&x0, &vector![2.0], 5.0).expect("a solution").x;
+                adaptive.set_time(5.0).expect("finite");
+                let x = adaptive.solve(&x, &u, 8.0).expect("a solution").x[0];
+                assert!((x - exact).abs() <= 10.0 * rtol, "{rtol:e}: {:e}", x - exact);
+            }
+        };
+    }
+    check!(Radau);
+    check!(RadauIIA<3>);
+    check!(DormandPrince5);
+    check!(DormandPrince8);
+}
+
+/// Steps that no iteration solves, and iterations that are not allowed to: with how far they came.
+#[test]
+fn t31_newton_divergence() {
+    let mut irk = Irk::<VanDerPol, RadauIIA<3>>::new(options(1)).expect("valid");
+    irk.set_parameters(&vector![1e6]).expect("finite");
+    // In the jump between the slow branches.
+    let fast = vector![0.5, -1e6];
+    match irk.solve(&fast, &none(), 1e5).map(|step| step.x) {
+        Err(Error::NotConverged { residual, increment, at, .. }) => {
+            assert!(residual.is_finite() && residual > 0.0 && increment.is_finite());
+            assert_eq!((at.step, at.iteration), (0, 50));
+            assert!(irk.statistics().iterations >= 50);
+        }
+        // Or it finds the slow branch far away.
+        Ok(x) => assert!(x[0].abs() <= 2.5 && x.iter().all(|x| x.is_finite()), "{x}"),
+        Err(Error::Overflow { .. }) => {}
+        Err(other) => panic!("{other}"),
+    }
+    let newton = Newton { max_iterations: 1, ..Default::default() };
+    let mut irk = Irk::<VanDerPol, RadauIIA<3>>::new(Options { newton, ..options(1) }).expect("valid");
+    irk.set_parameters(&vector![5.0]).expect("finite");
+    let x0 = vector![2.0, -0.5];
+    match irk.solve(&x0, &none(), 0.5).map(|step| step.x) {
+        Err(Error::NotConverged { residual, increment, at, .. }) => {
+            assert!(residual > 1e-6 && increment > 0.0 && at.iteration == 1, "{residual} {increment} {at}");
+        }
+        other => panic!("{other:?}"),
+    }
+    // One iteration is enough for who asks for no more.
+    let newton = Newton { fixed_iterations: Some(1), ..Default::default() };
+    let mut irk = Irk::<VanDerPol, RadauIIA<3>>::new(Options { newton, ..options(1) }).expect("valid");
+    irk.set_parameters(&vector![5.0]).expect("finite");
+    assert!(irk.solve(&x0, &none(), 0.5).is_ok());
+    assert_eq!(irk.statistics().iterations, 1);
+}
+
+/// With one stage the stage is known from outside: `k = (x₊ − x)/h`. Its residual is rounding, at a thousand points; and no
+/// iteration went round in circles.
+#[test]
+fn t32_newton_reaches_rounding() {
+    let mut seed = 3u64;
+    let mut next = || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let start = Start::Zero;
+    let mut gauss = Irk::<VanDerPol, Gauss<1>>::new(Options { start, ..options(1) }).expect("valid");
+    let mut radau = Irk::<VanDerPol, RadauIIA<1>>::new(Options { start, ..options(1) }).expect("valid");
+    let mut most = 0;
+    for _ in 0..1000 {
+        let (x, mu, h) = (vector![2.0 * next(), 2.0 * next()], 2.0 + next(), 0.05 * (1.5 + next()));
+        for method in 0..2 {
+            let (end, iterations) = if method == 0 {
+                gauss.set_parameters(&vector![mu]).expect("finite");
+                (gauss.solve(&x, &none(), h).expect("a step").x, gauss.statistics().iterations)
+            } else {
+                radau.set_parameters(&vector![mu]).expect("finite");
+                (radau.solve(&x, &none(), h).expect("a step").x, radau.statistics().iterations)
+            };
+            most = most.max(iterations);
+            let stage = if method == 0 { (x + end) / 2.0 } else { end };
+            let [y1, y2] = [stage[0], stage[1]];
+            let terms = [[y2, 0.0, 0.0], [mu * y2, -mu * y1 * y1 * y2, -y1]];
+            for c in 0..2 {
+                let residual = (end[c] - x[c]) / h - terms[c].iter().sum::<f64>();
+                let size =
+                    terms[c].iter().map(|term| term.abs()).sum::<f64>() + (x[c].abs() + end[c].abs()) / h;
+                assert!(residual.abs() <= 10.0 * f64::EPSILON * size, "{residual:e} of {size}");
+            }
+        }
+    }
+    println!("{most} iterations");
+    assert!(most <= 15, "{most}");
+}
