@@ -88,9 +88,9 @@ macro_rules! first {
 /// worst of them; no order of the products avoids it, forwards or backwards.
 #[test]
 fn t14_first_order() {
-    first!(Robertson, "robertson", 3, 0, 3, 1e-12, 1e-20, 1e-10);
-    first!(AkzoNobel, "akzo_nobel", 5, 1, 9, 1e-12, 1e-16, 1e-10);
-    first!(Oregonator, "oregonator", 3, 0, 4, 1e-14, 1e-15, 1e-10);
+    first!(Robertson, "robertson", 3, 0, 3, 1e-12, 1e-20, 1e-12);
+    first!(AkzoNobel, "akzo_nobel", 5, 1, 9, 1e-12, 1e-16, 1e-12);
+    first!(Oregonator, "oregonator", 3, 0, 4, 1e-14, 1e-15, 1e-11);
     first!(VanDerPol, "van_der_pol_1e3", 2, 0, 1, 1e-13, 1e-16, 4e-9);
     first!(VanDerPolScaled, "van_der_pol_scaled_1e-6", 2, 0, 1, 1e-13, 1e-13, 4e-9);
 }
@@ -164,9 +164,9 @@ macro_rules! second_order {
 
 #[test]
 fn t17_second_order() {
-    second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, 1e-8);
-    second_order!(Oregonator, "oregonator", 3, 4, 1e-12, 1e-13, 1e-8);
-    second_order!(VanDerPol, "van_der_pol_5", 2, 1, 1e-12, 1e-12, 1e-8);
+    second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, 1e-10);
+    second_order!(Oregonator, "oregonator", 3, 4, 1e-13, 1e-14, 1e-10);
+    second_order!(VanDerPol, "van_der_pol_5", 2, 1, 1e-13, 1e-13, 1e-10);
 }
 
 /// The reference has the algebraic state in its sum: `y6 = Ks y1 y4`, whose derivatives follow by the product rule.
@@ -198,7 +198,7 @@ fn second_order_of_a_product() {
     for (found, expected) in gradient.iter().zip(&expected_gradient) {
         assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{found} {expected}");
     }
-    close(&hessian, &expected_hessian, 1e-8);
+    close(&hessian, &expected_hessian, 1e-10);
 }
 
 /// All derivatives at a coarse tolerance are those of one discrete map, exactly: the adjoint is the product with the
