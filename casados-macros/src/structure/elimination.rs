@@ -68,6 +68,8 @@ struct Active {
     done_columns: Vec<bool>,
     /// 1 / largest entry of each row at each sample, at the beginning.
     scales: Vec<Vec<f64>>,
+    /// How many pivots, one after the other, each row has had to wait for.
+    depths: Vec<u32>,
 }
 
 impl Active {
@@ -79,6 +81,7 @@ impl Active {
             done_rows: vec![false; size],
             done_columns: vec![false; size],
             scales: vec![vec![0.0; samples]; size],
+            depths: vec![0; size],
         };
         for entry in entries {
             active.rows[entry.row as usize].insert(entry.column, (entry.values.clone(), entry.trivial));
@@ -113,13 +116,14 @@ impl Active {
         worst
     }
 
-    /// Cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the first in order.
+    /// Cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the one that waits for the fewest
+    /// others (pivots that do not depend on each other overlap in the processor), then the first in order.
     fn choose(&self) -> Option<(u32, u32)> {
-        let mut candidates: Vec<(u64, bool, u32, u32)> = Vec::new();
+        let mut candidates: Vec<(u64, bool, u32, u32, u32)> = Vec::new();
         for (row, entries) in self.rows.iter().enumerate().filter(|(row, _)| !self.done_rows[*row]) {
             for (&column, (_, trivial)) in entries {
                 let cost = (entries.len() as u64 - 1) * (self.columns[column as usize].len() as u64 - 1);
-                candidates.push((cost, !trivial, row as u32, column));
+                candidates.push((cost, !trivial, self.depths[row], row as u32, column));
             }
         }
         candidates.sort_unstable();
@@ -128,12 +132,12 @@ impl Active {
             if threshold == 0.0 {
                 return candidates
                     .iter()
-                    .map(|&(_, _, r, c)| (self.quality(r as usize, c), r, c))
+                    .map(|&(.., r, c)| (self.quality(r as usize, c), r, c))
                     .max_by(|a, b| a.0.total_cmp(&b.0))
                     .map(|(_, r, c)| (r, c));
             }
-            let good = candidates.iter().find(|&&(_, _, r, c)| self.quality(r as usize, c) >= threshold);
-            if let Some(&(_, _, row, column)) = good {
+            let good = candidates.iter().find(|&&(.., r, c)| self.quality(r as usize, c) >= threshold);
+            if let Some(&(.., row, column)) = good {
                 return Some((row, column));
             }
         }
@@ -148,7 +152,9 @@ impl Active {
             self.columns[column as usize].iter().copied().filter(|&r| r != row).collect();
         lower.sort_unstable();
         let upper: Vec<u32> = pivot_row.keys().copied().filter(|&c| c != column).collect();
+        let depth = self.depths[row as usize] + 1;
         for &r in &lower {
+            self.depths[r as usize] = self.depths[r as usize].max(depth);
             let Some((factor, _)) = self.rows[r as usize].remove(&column) else { continue };
             for &c in &upper {
                 let samples = pivot.len();
