@@ -108,10 +108,13 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let mut from: [&[T]; MOST_LANES] = [&[]; MOST_LANES];
         macro_rules! pack {
             ($to:expr, |$interval:ident| $slice:expr) => {
-                for (from, $interval) in from.iter_mut().zip(intervals) {
-                    *from = $slice;
+                let to: &mut [E] = $to;
+                if !to.is_empty() {
+                    for (from, $interval) in from.iter_mut().zip(intervals) {
+                        *from = $slice;
+                    }
+                    dispatch(Pack { from: &from, to });
                 }
-                dispatch(Pack { from: &from, to: $to });
             };
         }
         pack!(work.x.as_mut(), |interval| interval.x0.as_slice());
@@ -126,7 +129,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let time = &mut work.inputs.time;
         time.step = time.interval / E::from_f64(count as f64);
         let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
-        for (given, to) in given.unwrap_or_default().iter().zip([xdot, z]) {
+        for (given, to) in given.iter().flatten().zip([xdot, z]) {
             dispatch(Pack { from: &[*given; MOST_LANES], to });
         }
         pack!(Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);

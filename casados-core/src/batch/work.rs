@@ -220,21 +220,28 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         let first = intervals.iter().position(Option::is_some);
         let (Some(group), Some(first)) = (group, first) else { return Ok(done) };
         let Some(Some(copy)) = intervals.get(first) else { return Ok(done) };
-        let lanes = intervals.map(|interval| interval.unwrap_or(*copy));
+        let mut lanes = [*copy; MOST_LANES];
+        for (lane, interval) in lanes.iter_mut().zip(intervals).take(E::LANES) {
+            if let Some(interval) = interval {
+                *lane = *interval;
+            }
+        }
         let index = |lane: usize| if matches!(intervals.get(lane), Some(Some(_))) { lane } else { first };
 
         let steps = work.options.steps;
         let mut records: [&[ArrayK<M, [T; S]>]; MOST_LANES] = [&[]; MOST_LANES];
         let mut warm = work.options.start == Start::Warm;
-        for (lane, record) in records.iter_mut().enumerate() {
-            let from = share.records.chunks_exact(steps).nth(index(lane));
-            *record = from.unwrap_or_default();
-            warm &= share.warm.get(index(lane)).copied().unwrap_or(false);
+        if warm {
+            for (lane, record) in records.iter_mut().enumerate().take(E::LANES) {
+                let from = share.records.chunks_exact(steps).nth(index(lane));
+                *record = from.unwrap_or_default();
+                warm &= share.warm.get(index(lane)).copied().unwrap_or(false);
+            }
         }
         group.place(lanes.get(..E::LANES).unwrap_or_default(), work.given, warm.then_some(&records))?;
 
         let (mut good, wide) = R::together(group, warm)?;
-        for slice in wide.slices() {
+        for slice in wide.slices().filter(|slice| !slice.is_empty()) {
             good = E::and(good, dispatch(Finite(slice)));
         }
         let mut verdict: E::Cell = bytemuck::Zeroable::zeroed();
@@ -242,12 +249,20 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         for (lane, (done, interval)) in done.iter_mut().zip(intervals).enumerate().take(E::LANES) {
             *done = interval.is_some() && E::lane(&verdict, lane) != 0.0;
         }
-        let mut results = share.results.iter_mut();
-        let mut places = done.map(|done| results.next().filter(|_| done).map(Slices::slices_mut));
+        let mut places = [const { None }; MOST_LANES];
+        for ((place, result), _) in
+            places.iter_mut().zip(share.results.iter_mut()).zip(done).filter(|(_, done)| *done)
+        {
+            *place = Some(result.slices_mut());
+        }
         for from in wide.slices() {
-            let place = |lane: usize| places.get_mut(lane)?.as_mut()?.next();
-            let to = core::array::from_fn(place).map(Option::unwrap_or_default);
-            dispatch(Unpack { from, to });
+            let mut to: [&mut [T]; MOST_LANES] = Default::default();
+            for (to, place) in to.iter_mut().zip(&mut places).take(E::LANES) {
+                *to = place.as_mut().and_then(Iterator::next).unwrap_or_default();
+            }
+            if !from.is_empty() {
+                dispatch(Unpack { from, to });
+            }
         }
         let places = share.records.chunks_exact_mut(steps).zip(share.warm.iter_mut());
         for (lane, ((record, warm), done)) in places.zip(done).enumerate() {

@@ -8,7 +8,7 @@ use crate::scalar::{Field, Lanes};
 use core::marker::PhantomData;
 
 /// Evaluates an expression for each panel: from `$column` on, `$W` columns, eight, four, two or one; of numbers that
-/// are registers themselves two at most, or the stages of an unknown would not fit them.
+/// are registers themselves four at most.
 macro_rules! panels {
     ($count:expr, $E:ty, $column:ident, $W:ident => $panel:expr) => {{
         let mut $column = 0;
@@ -19,17 +19,17 @@ macro_rules! panels {
                 $column += 8;
             }
         }
-        if const { size_of::<$E>() <= 8 && $count % 8 >= 4 } {
-            const $W: usize = 4;
-            $panel;
-            $column += 4;
-        }
-        if const { size_of::<$E>() > 8 || $count % 4 >= 2 } {
-            while $column + 2 <= const { $count } {
-                const $W: usize = 2;
+        if const { $count >= 4 && (size_of::<$E>() > 8 || $count % 8 >= 4) } {
+            while $column + 4 <= const { $count } {
+                const $W: usize = 4;
                 $panel;
-                $column += 2;
+                $column += 4;
             }
+        }
+        if const { $count % 4 >= 2 } {
+            const $W: usize = 2;
+            $panel;
+            $column += 2;
         }
         if const { $count % 2 == 1 } {
             const $W: usize = 1;

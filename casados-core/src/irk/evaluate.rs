@@ -3,7 +3,7 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
 //! has registers of that many numbers, one call of the model computes them all.
 
-use super::record::{Coefficients, Stage, Work};
+use super::record::{Coefficients, Stage, Times, Work};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide};
@@ -28,13 +28,9 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        let time = self.inputs.time;
-        if let Some(t) = self.points.as_mut().last_mut() {
-            let start = E::from_f64(step as f64);
-            *t = coefficients.c.map(|c| time.start + time.step * (start + c));
-        }
         let (points, x, y) = (self.points.as_mut(), x.as_ref(), y.as_ref());
-        dispatch(Place { points, x, y, a: &coefficients.a, h: time.step });
+        let Coefficients { a, c, .. } = coefficients;
+        dispatch(Place { points, x, y, a, c, time: self.inputs.time, step });
     }
 
     /// The residual at all stages.
@@ -139,15 +135,23 @@ struct Place<'a, E, const S: usize> {
     x: &'a [E],
     y: &'a [[E; S]],
     a: &'a [[E; S]; S],
-    h: E,
+    c: &'a [E; S],
+    time: Times<E>,
+    step: usize,
 }
 
 impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { points, x, y, a, h } = self;
-        let nx = x.len();
+        let Self { points, x, y, a, c, time, step } = self;
+        let (h, nx) = (time.step, x.len());
+        if let Some(t) = points.last_mut() {
+            let start = E::from_f64(step as f64);
+            for (t, &c) in t.iter_mut().zip(c) {
+                *t = time.start + h * (start + c);
+            }
+        }
         if y.len() < nx || points.len() < nx + y.len() {
             return;
         }

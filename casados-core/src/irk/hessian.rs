@@ -277,22 +277,12 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         let (d, _) = panel::<E, W>(self.d, column, rows).as_chunks::<S>();
         let g = self.g.as_flattened_mut().as_flattened_mut();
         let (g, _) = panel_mut::<E, W>(g, 0, rows).as_chunks_mut::<S>();
-        // G = H D, row by row, each in registers.
-        let mut packet = [[E::from_f64(0.0); W]; S];
-        let mut terms = M::STRUCTURE.symmetric.iter().peekable();
-        while let Some(term) = terms.next() {
-            if let (Some(values), Some(d)) =
-                (self.entries.get(term.entry as usize), d.get(term.column as usize))
-            {
-                for ((packet, &value), d) in packet.iter_mut().zip(values).zip(d) {
-                    A::subtract_row(packet, -value, d);
-                }
-            }
-            if terms.peek().is_none_or(|next| next.row != term.row) {
-                if let Some(to) = g.get_mut(term.row as usize) {
-                    *to = packet;
-                }
-                packet = [[E::from_f64(0.0); W]; S];
+        // G = H D, row by row; all stages in registers, or two of them where numbers are registers themselves.
+        if const { size_of::<E>() <= 8 || S <= 2 } {
+            multiply::<A, M, E, S, S, W>(self.entries, d, g, 0);
+        } else {
+            for stage in (0..S).step_by(2) {
+                multiply::<A, M, E, S, 2, W>(self.entries, d, g, stage);
             }
         }
         let g = g.as_flattened();
@@ -301,11 +291,39 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
                 let d = panel::<E, V>(self.d, row, rows);
                 if const { V > 4 } {
                     tiles::<A, E, R, V, 4, W>(d, g, self.sum, row, column);
+                } else if const { size_of::<E>() > 8 && V > 2 } {
+                    tiles::<A, E, R, V, 2, W>(d, g, self.sum, row, column);
                 } else {
                     tiles::<A, E, R, V, V, W>(d, g, self.sum, row, column);
                 }
             }
         });
+    }
+}
+
+/// `G = H D` at `N` stages, from a stage on.
+#[inline(always)]
+fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, const W: usize>(
+    entries: &[[E; S]],
+    d: &[[[E; W]; S]],
+    g: &mut [[[E; W]; S]],
+    stage: usize,
+) {
+    let mut packet = [[E::from_f64(0.0); W]; N];
+    let mut terms = M::STRUCTURE.symmetric.iter().peekable();
+    while let Some(term) = terms.next() {
+        if let (Some(values), Some(d)) = (entries.get(term.entry as usize), d.get(term.column as usize)) {
+            for ((packet, &value), d) in packet.iter_mut().zip(&values[stage..]).zip(&d[stage..]) {
+                A::subtract_row(packet, -value, d);
+            }
+        }
+        if terms.peek().is_none_or(|next| next.row != term.row) {
+            if let Some(to) = g.get_mut(term.row as usize) {
+                for (to, packet) in to[stage..].iter_mut().zip(&mut packet) {
+                    *to = core::mem::replace(packet, [E::from_f64(0.0); W]);
+                }
+            }
+        }
     }
 }
 

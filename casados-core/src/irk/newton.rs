@@ -170,6 +170,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             rule.full || rule.exact || !(adaptive && self.validity.factors)
         };
         let mut iteration = 0;
+        let mut active = mask::<E>(lanes, State::Active);
         loop {
             self.place(coefficients, step, x, y);
             if renew {
@@ -203,7 +204,6 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 Some(basis) if mean => self.mean.solve(basis, &mut self.increment),
                 _ => self.linear.factors.solve(&mut self.increment),
             }
-            let active = mask::<E>(lanes, State::Active);
             let floor = E::from_f64(rounding / rule.tolerance);
             let sizes = dispatch(Update {
                 x: x.as_ref(),
@@ -225,12 +225,15 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 }
                 continue;
             }
+            let mut some = false;
             for (lane, progress) in lanes.iter_mut().enumerate() {
                 if progress.state == State::Active {
-                    progress.judge(&rule, [0, 1].map(|i| E::lane(&sizes[i], lane)), renew, iteration == 1);
+                    let [size, next] = &sizes;
+                    progress.judge(&rule, [E::lane(size, lane), E::lane(next, lane)], renew, iteration == 1);
+                    some |= progress.state != State::Active;
                 }
             }
-            if !rule.exact && iteration > 1 && lanes.iter().any(|lane| lane.state == State::Converged) {
+            if some && !rule.exact && iteration > 1 {
                 // Once more, with the sizes that the unknowns have now.
                 let (x, y) = (x.as_ref(), y.as_ref());
                 let (increment, weights) = (self.increment.as_ref(), self.weights.as_mut());
@@ -241,6 +244,9 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                         (progress.state, progress.last) = (State::Active, again);
                     }
                 }
+            }
+            if some {
+                active = mask::<E>(lanes, State::Active);
             }
             let slowest = lanes.iter().filter(|lane| lane.state == State::Active);
             let slowest = slowest.fold(None, |slowest: Option<f64>, lane| {

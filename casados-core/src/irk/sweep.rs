@@ -328,7 +328,14 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             right.panel::<A, W>(v, dy, column);
         }
         if self.phase == Phase::Whole {
-            solve_packets::<A, E, [E; W], S, W>(&M::STRUCTURE.elimination, self.blocks, dy, 0);
+            let plan = &M::STRUCTURE.elimination;
+            if const { size_of::<E>() > 8 && S > 2 && W == 4 } {
+                // Four columns of all stages would not fit the registers.
+                solve_packets::<A, E, [E; W], S, 2>(plan, self.blocks, dy, 0);
+                solve_packets::<A, E, [E; W], S, 2>(plan, self.blocks, dy, 2);
+            } else {
+                solve_packets::<A, E, [E; W], S, W>(plan, self.blocks, dy, 0);
+            }
         }
         if self.phase == Phase::Before {
             return;
