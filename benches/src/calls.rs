@@ -6,7 +6,7 @@ use casados::model::{VectorU, VectorX};
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, Hessian, Nominal};
 use casados::shape::{Matrix, Shape};
-use casados::{Error, Statistics};
+use casados::{Batch, BatchError, Error, Intervals, Statistics, batch};
 use std::hint::black_box;
 
 /// An integrator with its inputs in place.
@@ -30,6 +30,54 @@ pub trait Calls {
 pub fn options(case: &Case, tolerance: f64, start: Start) -> Options {
     let newton = Newton { tolerance: tolerance / case.steps as f64, ..Default::default() };
     Options { steps: case.steps, newton, start, ..Default::default() }
+}
+
+/// All intervals of a case in one call of a batch, from zero.
+pub trait Together {
+    /// The call.
+    ///
+    /// # Errors
+    /// Those of the batch.
+    fn call(&mut self, mode: Mode) -> Result<(), BatchError>;
+    /// What it gives for the first interval.
+    ///
+    /// # Errors
+    /// Those of the batch.
+    fn values(&mut self, mode: Mode) -> Result<Values, BatchError>;
+}
+
+/// The batch of a case, if its method has one.
+///
+/// # Errors
+/// The error of the batch.
+pub fn open_batch(case: &Case, options: Options) -> Result<Option<Box<dyn Together>>, String> {
+    use Family::{Gauss as G, Radau};
+    macro_rules! choose {
+        ($($model:literal, $nx:literal, $family:pat, $stages:pat => $type:ty, $method:ty;)*) => {
+            match (case.model, case.nx, case.family, case.stages) {
+                $(($model, $nx, $family, $stages) => {
+                    let batch = Batch::<$type, $method>::new(options).map_err(|e| e.to_string())?;
+                    Ok(Some(Box::new(Side::new(case, batch))))
+                })*
+                _ => Ok(None),
+            }
+        };
+    }
+    choose! {
+        "pendulum", 4, G, 2 => Pendulum, Gauss<2>;
+        "pendulum", 4, G, 4 => Pendulum, Gauss<4>;
+        "awe", 23, Radau, 4 => Awe, RadauIIA<4>;
+        "chain", 9, G, 2 => Chain<9>, Gauss<2>;
+        "chain", 9, G, 4 => Chain<9>, Gauss<4>;
+        "chain", 21, G, 2 => Chain<21>, Gauss<2>;
+        "chain", 21, G, 4 => Chain<21>, Gauss<4>;
+        "chain", 33, G, 2 => Chain<33>, Gauss<2>;
+        "chain", 33, G, 4 => Chain<33>, Gauss<4>;
+        "chain", 45, G, 2 => Chain<45>, Gauss<2>;
+        "chain", 45, G, 4 => Chain<45>, Gauss<4>;
+        "chain", 189, G, 2 => Chain<189>, Gauss<2>;
+        "chain", 189, G, 4 => Chain<189>, Gauss<4>;
+    }
 }
 
 /// The integrator of a case.
@@ -187,6 +235,103 @@ fn triangle<M: Dae>(result: &Hessian<M>) -> Vec<f64> {
     (0..nw).flat_map(|i| (0..=i).map(move |j| lower(i, j))).collect()
 }
 
+/// A batch with its intervals and its results in place.
+struct Side<M: Dae, B, const S: usize> {
+    batch: batch::Integrator<M, B, S, f64>,
+    x0: Vec<VectorX<M, f64>>,
+    u: Vec<VectorU<M, f64>>,
+    lambda: Vec<VectorX<M, f64>>,
+    h: f64,
+    nominal: Vec<Nominal<M>>,
+    forward: Vec<Forward<M>>,
+    adjoint: Vec<Adjoint<M>>,
+    hessian: Vec<Hessian<M>>,
+}
+
+impl<M: Dae, B, const S: usize> Side<M, B, S> {
+    fn new(case: &Case, batch: batch::Integrator<M, B, S, f64>) -> Self {
+        Self {
+            batch,
+            x0: case.inputs.iter().map(|(x0, _)| vector(x0)).collect(),
+            u: case.inputs.iter().map(|(_, u)| vector(u)).collect(),
+            lambda: vec![vector(&case.lambda); case.inputs.len()],
+            h: case.t,
+            nominal: Vec::new(),
+            forward: Vec::new(),
+            adjoint: Vec::new(),
+            hessian: Vec::new(),
+        }
+    }
+}
+
+impl<M: Dae, B: Send + Sync, const S: usize> Together for Side<M, B, S> {
+    fn call(&mut self, mode: Mode) -> Result<(), BatchError> {
+        let Self { batch, x0, u, lambda, h, nominal, forward, adjoint, hessian } = self;
+        let count = x0.len();
+        let intervals = Intervals {
+            x0: black_box(x0),
+            u: black_box(u),
+            h: core::slice::from_ref(h),
+            ..Default::default()
+        };
+        match mode {
+            Mode::Simulation => {
+                nominal.resize_with(count, Default::default);
+                batch.solve(&intervals, nominal)?;
+                black_box(nominal);
+            }
+            Mode::Forward => {
+                forward.resize_with(count, Default::default);
+                batch.forward(&intervals, forward)?;
+                black_box(forward);
+            }
+            Mode::Adjoint => {
+                adjoint.resize_with(count, Default::default);
+                batch.adjoint(&intervals, lambda, adjoint)?;
+                black_box(adjoint);
+            }
+            Mode::Hessian => {
+                hessian.resize_with(count, Default::default);
+                batch.hessian(&intervals, lambda, hessian)?;
+                black_box(hessian);
+            }
+        }
+        Ok(())
+    }
+
+    fn values(&mut self, mode: Mode) -> Result<Values, BatchError> {
+        self.call(mode)?;
+        let mut values = Values::default();
+        match mode {
+            Mode::Simulation => of_nominal(&self.nominal[0], &mut values),
+            Mode::Forward => of_forward(&self.forward[0], &mut values),
+            Mode::Adjoint => of_adjoint(&self.adjoint[0], &mut values),
+            Mode::Hessian => of_hessian(&self.hessian[0], &mut values),
+        }
+        Ok(values)
+    }
+}
+
+fn of_nominal<M: Dae>(result: &Nominal<M>, values: &mut Values) {
+    values.x = result.x.as_slice().to_vec();
+}
+
+fn of_forward<M: Dae>(result: &Forward<M>, values: &mut Values) {
+    of_nominal(result, values);
+    values.forward = jacobian(result);
+}
+
+fn of_adjoint<M: Dae>(result: &Adjoint<M>, values: &mut Values) {
+    of_nominal(result, values);
+    values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
+}
+
+fn of_hessian<M: Dae>(result: &Hessian<M>, values: &mut Values) {
+    of_forward(result, values);
+    values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
+    values.hessian = triangle(result);
+}
+
 impl<M: Dae, I: Integrator<M>> Calls for Typed<M, I> {
     fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error> {
         let (x0, u) = black_box(&self.inputs[input]);
@@ -204,24 +349,10 @@ impl<M: Dae, I: Integrator<M>> Calls for Typed<M, I> {
         let (x0, u) = &self.inputs[input];
         let mut values = Values::default();
         match mode {
-            Mode::Simulation => values.x = self.integrator.solve(x0, u, self.h)?.x.as_slice().to_vec(),
-            Mode::Forward => {
-                let result = self.integrator.forward(x0, u, self.h)?;
-                values.x = result.x.as_slice().to_vec();
-                values.forward = jacobian(result);
-            }
-            Mode::Adjoint => {
-                let result = self.integrator.adjoint(x0, u, self.h, &self.lambda)?;
-                values.x = result.x.as_slice().to_vec();
-                values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
-            }
-            Mode::Hessian => {
-                let result = self.integrator.hessian(x0, u, self.h, &self.lambda)?;
-                values.x = result.x.as_slice().to_vec();
-                values.forward = jacobian(result);
-                values.adjoint = [result.grad_x0.as_slice(), result.grad_u.as_slice()].concat();
-                values.hessian = triangle(result);
-            }
+            Mode::Simulation => of_nominal(self.integrator.solve(x0, u, self.h)?, &mut values),
+            Mode::Forward => of_forward(self.integrator.forward(x0, u, self.h)?, &mut values),
+            Mode::Adjoint => of_adjoint(self.integrator.adjoint(x0, u, self.h, &self.lambda)?, &mut values),
+            Mode::Hessian => of_hessian(self.integrator.hessian(x0, u, self.h, &self.lambda)?, &mut values),
         }
         Ok(values)
     }

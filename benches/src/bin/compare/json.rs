@@ -19,6 +19,7 @@ pub fn of(results: &Results) -> Value {
                 "case": row.case, "nx": row.nx, "mode": row.mode.name(), "reference": row.reference,
                 "cold": measured(&row.cold), "rounding": measured(&row.rounding),
                 "warm": row.warm.as_ref().map(measured), "forty": measured(&row.forty),
+                "batch": row.batch.as_ref().map(measured),
                 "casadi": row.casadi.as_ref().map(measured),
                 "acados_irk": row.acados[0], "acados_gnsf": row.acados[1],
             })

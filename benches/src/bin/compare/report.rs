@@ -158,18 +158,29 @@ fn peers_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
 
 fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### Forty intervals\n")?;
-    writeln!(text, "Microseconds of one of 40 different intervals; cold, tolerance 1e-8 / steps.\n")?;
-    writeln!(text, "| case | mode | one call after the other | than acados IRK |")?;
-    writeln!(text, "| --- | --- | --- | --- |")?;
+    writeln!(
+        text,
+        "Microseconds of one of 40 different intervals; cold, tolerance 1e-8 / steps; on one thread.\n"
+    )?;
+    writeln!(
+        text,
+        "| case | mode | one call after the other | than acados IRK | in a batch | error | than one by one | than acados IRK |"
+    )?;
+    writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- |")?;
     for row in rows {
-        let ratio = row.acados[0].map(|t| t / row.forty.time.median);
+        let than = |measured: &Measured| row.acados[0].map(|t| t / measured.time.median);
+        let batch = row.batch.as_ref();
         writeln!(
             text,
-            "| {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} |",
             row.case,
             row.mode.name(),
             spread(&row.forty),
-            optional(ratio, times)
+            optional(than(&row.forty), times),
+            batch.map_or("–".into(), spread),
+            batch.map_or("–".into(), error),
+            optional(batch.map(|batch| row.forty.time.median / batch.time.median), times),
+            optional(batch.and_then(than), times)
         )?;
     }
     Ok(())

@@ -4,7 +4,7 @@ use super::anchors::Anchors;
 use super::casadi::Casadi;
 use super::{Effort, Failure};
 use casados::prelude::*;
-use casados_benches::calls::{Calls, open, options};
+use casados_benches::calls::{Calls, Together, open, open_batch, options};
 use casados_benches::case::{Case, Family, Mode};
 use casados_benches::time::{Summary, measure};
 use std::ops::Range;
@@ -41,6 +41,8 @@ pub struct Row {
     pub warm: Option<Measured>,
     /// Forty calls for the intervals of a horizon; one of them.
     pub forty: Measured,
+    /// The same in one call of a batch; one of them.
+    pub batch: Option<Measured>,
     /// CasADi, in the same rounds.
     pub casadi: Option<Measured>,
     /// acados' IRK and GNSF, carried over; seconds.
@@ -86,6 +88,7 @@ fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Eff
     if warm {
         timers.push(Timer::new(case, 1e-8, Start::Warm, mode, 0..2)?);
     }
+    let mut batch = BatchTimer::new(case, mode)?;
     let mut ask = casadi
         .filter(|_| affordable(case, mode))
         .map(|casadi| move |seconds| casadi.time(case, solver, mode, seconds, reference));
@@ -97,6 +100,7 @@ fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Eff
             peer.push(ask(effort.seconds / ROUNDS as f64)?.time);
         }
         timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
+        batch.iter_mut().try_for_each(|timer| timer.round(effort))?;
     }
     let measured: Vec<_> = timers.into_iter().map(Timer::finish).collect();
     Ok(Row {
@@ -110,6 +114,7 @@ fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Eff
         cold: measured[0],
         rounding: measured[1],
         forty: measured[2],
+        batch: batch.map(BatchTimer::finish),
         warm: measured.get(3).copied(),
         casadi: first.map(|first| Measured { time: of_rounds(&peer), ..first }),
         acados: [None; 2],
@@ -166,6 +171,34 @@ impl Timer {
             iterations: statistics.iterations,
             dense: statistics.dense,
         }
+    }
+}
+
+/// Passes over all inputs of a case side by side.
+struct BatchTimer {
+    calls: Box<dyn Together>,
+    mode: Mode,
+    count: usize,
+    error: Option<f64>,
+    rounds: Vec<Summary>,
+}
+
+impl BatchTimer {
+    fn new(case: &Case, mode: Mode) -> Result<Option<Self>, Failure> {
+        let Some(mut calls) = open_batch(case, options(case, 1e-8, Start::Zero))? else { return Ok(None) };
+        let values = calls.values(mode).map_err(|e| format!("{}, batch: {e}", case.name))?;
+        let error = case.reference.as_ref().and_then(|(_, reference)| values.error(reference, mode));
+        Ok(Some(Self { calls, mode, count: case.inputs.len(), error, rounds: Vec::new() }))
+    }
+
+    fn round(&mut self, effort: Effort) -> Result<(), Failure> {
+        let time = measure(effort.budget() / ROUNDS as u32, || self.calls.call(self.mode));
+        self.rounds.push(time.map_err(|e| e.to_string())?.divided(self.count as f64));
+        Ok(())
+    }
+
+    fn finish(self) -> Measured {
+        Measured { time: of_rounds(&self.rounds), error: self.error, ..Default::default() }
     }
 }
 
