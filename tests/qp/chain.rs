@@ -3,7 +3,9 @@
 use crate::Test;
 use crate::data::Record;
 use casados::Real;
-use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start, residuals};
+use casados::qp::{
+    Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start, residuals,
+};
 
 /// Elements of a list of matrices, of which the last one repeats.
 struct Repeated {
@@ -93,9 +95,9 @@ impl Chain {
     }
 }
 
-/// The references come from products of slacks and multipliers of 1e-9, which leave slacks of 1e-9 over the multipliers (the smallest
-/// are 4e-3). With 3 masses a bound (of u₂ at stage 2) is active with a multiplier near zero: a slack of 7e-6 there satisfies
-/// the conditions as well as none. The residuals say that the solution here is the better one.
+/// The references come from products of slacks and multipliers of 1e-9, which leave slacks of 1e-9 over the multiplier at active
+/// bounds. With 3 masses one of them (of u₂ at stage 2) has a multiplier near zero: a slack of 7e-6 there satisfies the
+/// conditions as well as none. The residuals, which are asserted to rounding, say that the solution here is the better one.
 #[test]
 fn stored_problems_have_their_reference_solutions() -> Test {
     let mut solver = HeapInteriorPoint::new();
@@ -191,6 +193,29 @@ fn clarabel_agrees() -> Test {
         assert!((statistics.objective - expected).abs() < 1e-7 * expected);
         let (residuals, _) = residuals(qp.view(), &solution);
         assert!(residuals.largest() < 1e-7, "{residuals}");
+    }
+    Ok(())
+}
+
+/// Blocks of intervals condensed to one: the same solution, states and multipliers expanded.
+#[test]
+fn condensed() -> Test {
+    for (masses, block) in [(3, 4), (3, 3), (5, 4), (7, 5)] {
+        let chain = Chain::load(masses)?;
+        let qp = chain.qp::<f64>()?;
+        let mut plain = HeapInteriorPoint::new();
+        plain.options.tolerance = 1e-11;
+        let mut solver = Condensing::new(block, plain.clone());
+        let mut expected = HeapSolution::new(qp.dims())?;
+        plain.solve(qp.view(), Start::Cold, expected.view_mut())?;
+        let mut solution = HeapSolution::new(qp.dims())?;
+        solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        let (residuals, _) = residuals(qp.view(), &solution);
+        assert!(residuals.largest() < 1e-10, "{residuals}");
+        let pairs = solution.stages().zip(expected.stages());
+        let pairs = pairs.flat_map(|(a, b)| a.u.iter().zip(b.u).chain(a.x.iter().zip(b.x)));
+        let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 1e-6, "{masses} masses in blocks of {block}: {error:e}");
     }
     Ok(())
 }

@@ -1,7 +1,10 @@
 //! Random problems against clarabel.
 
 use crate::solve;
-use casados::qp::{Clarabel, HeapQp, HeapSolution, QpSolver, SecondOrderCone, StageDims, Start};
+use casados::qp::{
+    Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, SecondOrderCone, StageDims,
+    Start, residuals,
+};
 use proptest::prelude::*;
 
 /// Numbers from a seed: a problem has too many for proptest to shrink.
@@ -87,7 +90,7 @@ fn problem(dims: &[StageDims], seed: u64) -> Result<HeapQp<f64>, Box<dyn std::er
 }
 
 fn dims() -> impl Strategy<Value = Vec<StageDims>> {
-    let stage = (1..6usize, 0..4usize, 0..3usize).prop_map(|(nx, nu, ng)| StageDims::new(nx, nu, ng));
+    let stage = (1..10usize, 0..5usize, 0..3usize).prop_map(|(nx, nu, ng)| StageDims::new(nx, nu, ng));
     proptest::collection::vec(stage, 1..7)
 }
 
@@ -109,6 +112,27 @@ proptest! {
             // Free states at the start may make a problem unbounded.
             (Err(_), Err(_)) => {}
             (clarabel, own) => prop_assert!(false, "{clarabel:?} {:?}", own.map(|own| own.1)),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
+
+    /// The problem with eliminated states has the same minimum, and what is expanded satisfies the conditions of optimality.
+    #[test]
+    fn condensed_is_uncondensed(dims in dims(), seed: u64, block in 1..5usize) {
+        let fail = |e: &dyn std::fmt::Display| TestCaseError::fail(e.to_string());
+        let qp = problem(&dims, seed).map_err(|e| fail(&e))?;
+        let Ok((_, expected, _)) = solve(&qp) else { return Ok(()) };
+        let mut solver = Condensing::new(block, HeapInteriorPoint::new());
+        solver.solver.options.tolerance = 1e-10;
+        let mut solution = HeapSolution::new(&dims).map_err(|e| fail(&e))?;
+        for start in [Start::Cold, Start::Warm] {
+            let found = solver.solve(qp.view(), start, solution.view_mut()).map_err(|e| fail(&e))?;
+            let (residuals, objective) = residuals(qp.view(), &solution);
+            prop_assert!(residuals.largest() < 1e-8, "{residuals} {found:?}");
+            prop_assert!((objective - expected.objective).abs() <= 1e-7 * (1.0 + objective.abs()));
         }
     }
 }

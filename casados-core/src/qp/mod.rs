@@ -37,6 +37,8 @@ mod block;
 mod check;
 #[cfg(feature = "clarabel")]
 mod clarabel;
+#[cfg(feature = "alloc")]
+mod condense;
 mod error;
 mod interior;
 mod layout;
@@ -53,6 +55,8 @@ pub use block::{Block, BlockMut};
 pub use check::{check, residuals};
 #[cfg(feature = "clarabel")]
 pub use clarabel::{Clarabel, SecondOrderCone};
+#[cfg(feature = "alloc")]
+pub use condense::Condensing;
 pub use error::{Field, QpError, Side};
 #[cfg(feature = "alloc")]
 pub use interior::HeapInteriorPoint;

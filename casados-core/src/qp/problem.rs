@@ -382,6 +382,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     pub fn stages_mut(&mut self) -> impl Iterator<Item = StageMut<'_, T>> {
         stages_mut(self.dims.as_ref(), self.memory.as_mut())
     }
+    /// All numbers.
+    #[cfg(feature = "alloc")]
+    pub(super) fn data_mut(&mut self) -> &mut [T] {
+        self.memory.as_mut()
+    }
     /// `x₀`, by two equal bounds of every component.
     ///
     /// # Errors

@@ -10,12 +10,13 @@ use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 use core::ops::Range;
 
-/// Columns of a wide tile.
+/// Columns of tiles, which are even: what begins at an even column and is no longer than columns, whose length is even,
+/// does not end behind them.
 const WIDE: usize = 6;
-/// Columns of a narrow tile: of what is left.
 const NARROW: usize = 4;
-/// A product writes up to so many columns more than it is asked for.
-pub const MORE: usize = WIDE - 1;
+const PAIR: usize = 2;
+/// A product writes up to one column more than it is asked for.
+pub const MORE: usize = 1;
 
 /// A matrix to be read, and the distance of its columns.
 #[derive(Clone, Copy)]
@@ -166,8 +167,8 @@ pub enum Part {
 
 /// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
 ///
-/// Columns are taken in tiles from the first one on: up to [`MORE`] than asked for are written if the target has
-/// them, and rows up to whole registers. In `Y` the first column of the target is row 0.
+/// Columns are taken in tiles from the first one on, which is even, and so is where `Y` begins in its columns. [`MORE`] columns
+/// than asked for are written if the target has them, and rows up to whole registers.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -231,13 +232,20 @@ fn tiles<T: Real, E: Packed<T>>(
         let source = source.skip(column).below(first);
         let rows = rows.saturating_sub(first);
         let (x, y) = (x.below(first), y.below(column));
-        if columns.end - column > NARROW && column + WIDE <= y.ld {
-            strip::<T, E, WIDE>(target, target_ld, source, x, y, rows, depth);
-            column += WIDE;
-        } else {
-            strip::<T, E, NARROW>(target, target_ld, source, x, y, rows, depth);
-            column += NARROW;
-        }
+        column += match columns.end - column {
+            0..=PAIR => {
+                strip::<T, E, PAIR>(target, target_ld, source, x, y, rows, depth);
+                PAIR
+            }
+            0..=NARROW => {
+                strip::<T, E, NARROW>(target, target_ld, source, x, y, rows, depth);
+                NARROW
+            }
+            _ => {
+                strip::<T, E, WIDE>(target, target_ld, source, x, y, rows, depth);
+                WIDE
+            }
+        };
     }
 }
 
@@ -380,6 +388,84 @@ pub fn mirror<T: Real>(matrix: &mut [T], ld: usize, n: usize) {
             let below = part(matrix, column * ld + row, 1).first().copied().unwrap_or(T::ZERO);
             if let Some(above) = matrix.get_mut(row * ld + column) {
                 *above = below;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::qp::layout::pad;
+    use crate::scalar::Registers;
+    use alloc::vec::Vec;
+
+    struct Case<'a> {
+        target: &'a mut [f64],
+        x: Columns<'a, f64>,
+        y: Columns<'a, f64>,
+        size: (usize, usize, usize),
+        part: Part,
+    }
+
+    impl Registers<f64> for Case<'_> {
+        fn run<E: Packed<f64>>(self) {
+            let (rows, columns, depth) = self.size;
+            let source = if depth % 2 == 0 { Source::Zero } else { Source::Target };
+            product::<f64, E>(
+                self.target,
+                self.x.ld,
+                source,
+                self.x,
+                self.y,
+                (rows, 0..columns, depth),
+                self.part,
+            );
+        }
+    }
+
+    /// Small integers, of which sums are exact, in columns of `rows`.
+    fn integers(rows: usize, columns: usize, seed: usize) -> Vec<f64> {
+        let ld = pad(rows, 8);
+        (0..ld * columns)
+            .map(|i| if i % ld < rows { ((i * 7 + seed * 13) % 11) as f64 - 5.0 } else { 0.0 })
+            .collect()
+    }
+
+    /// Every size around the edges of tiles, with memory that ends with the last column.
+    #[test]
+    fn products_of_all_sizes() {
+        for rows in 1..14 {
+            for columns in 1..14 {
+                for depth in 0..5 {
+                    for part in [Part::Full, Part::Lower] {
+                        let (ld, ld_y) = (pad(rows, 8), pad(columns, 8));
+                        let (x, y) = (integers(rows, depth, 1), integers(columns, depth, 2));
+                        let before = integers(rows, columns + MORE, 3);
+                        let mut target = before.clone();
+                        let matrices = (Columns { data: &x[..], ld }, Columns { data: &y[..], ld: ld_y });
+                        let size = (rows, columns, depth);
+                        f64::registers(Case {
+                            target: &mut target,
+                            x: matrices.0,
+                            y: matrices.1,
+                            size,
+                            part,
+                        });
+                        for column in 0..columns {
+                            for row in if part == Part::Lower { column } else { 0 }..rows {
+                                let sum =
+                                    (0..depth).map(|k| x[k * ld + row] * y[k * ld_y + column]).sum::<f64>();
+                                let source = if depth % 2 == 0 { 0.0 } else { before[column * ld + row] };
+                                assert_eq!(
+                                    target[column * ld + row],
+                                    source - sum,
+                                    "{size:?} {row} {column}"
+                                );
+                            }
+                        }
+                    }
+                }
             }
         }
     }

@@ -470,7 +470,7 @@ fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl F
 
 /// `target + H v`, of which the lower triangle is there.
 #[inline(always)]
-fn symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
+pub fn symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
     for (j, column) in h.chunks_exact(ld.max(1)).take(n).enumerate() {
         let Some(&here) = v.get(j) else { return };
         let (Some(below), Some(v_below)) = (column.get(j + 1..n), v.get(j + 1..n)) else { return };
