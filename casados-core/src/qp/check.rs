@@ -133,7 +133,7 @@ pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
 
 fn largest(of: &mut f64, value: f64) {
     // NaN stays.
-    if !(value.abs() <= *of) && !of.is_nan() {
+    if value.is_nan() || value.abs() > *of {
         *of = value.abs();
     }
 }

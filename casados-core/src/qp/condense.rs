@@ -257,13 +257,13 @@ impl<T: Real> Condense<'_, T> {
                 subtract::<T, E>(g, Columns { data: v, ld: ld_next }, offset, next, next);
                 subtract::<T, E>(constant, Columns { data: z, ld: ld_z }, offset, old, next);
                 subtract::<T, E>(g_next, negative, g, n, next);
-                let y = Columns { data: &**v, ld: ld_next };
+                let y = Columns { data: v, ld: ld_next };
                 product::<T, E>(w, ld, Source::Zero, matrix, y, (n, 0..next, next), Part::Full);
                 let hessian =
                     Source::Matrix(Columns { data: part(data, place.matrix(), place.hessian()), ld });
-                let y = Columns { data: &**w, ld };
+                let y = Columns { data: w, ld };
                 product::<T, E>(m, ld, hessian, matrix, y, (n, 0..n, next), Part::Lower);
-                let x = Columns { data: &**z, ld: ld_z };
+                let x = Columns { data: z, ld: ld_z };
                 product::<T, E>(z_next, ld_z, Source::Zero, x, negative, (old, 0..n, next), Part::Full);
             }
             first = false;
@@ -437,7 +437,7 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { qp, block, solution: SolutionView { v, dynamics, lower, upper, .. }, minus, g } = self;
-        let inside = |stage: usize| stage % block != 0 && stage + 1 < qp.dims.len();
+        let inside = |stage: usize| !stage.is_multiple_of(block) && stage + 1 < qp.dims.len();
         for place in Places::new::<T>(qp.dims).filter(|place| inside(place.stage + 1)) {
             let Place { n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());

@@ -233,11 +233,11 @@ fn tiles<T: Real, E: Packed<T>>(
         let rows = rows.saturating_sub(first);
         let (x, y) = (x.below(first), y.below(column));
         column += match columns.end - column {
-            0..=PAIR => {
+            0..=2 => {
                 strip::<T, E, PAIR>(target, target_ld, source, x, y, rows, depth);
                 PAIR
             }
-            0..=NARROW => {
+            3..=4 => {
                 strip::<T, E, NARROW>(target, target_ld, source, x, y, rows, depth);
                 NARROW
             }

@@ -407,8 +407,10 @@ fn cholesky<T: Real, E: Packed<T>>(
             let mut pivot = found;
             *added = T::ZERO;
             // `inverse` is still what the diagonal was before elimination.
-            if !(pivot > noise * *inverse) {
-                if !(pivot >= -epsilon.sqrt() * largest) {
+            let is_positive = pivot > noise * *inverse;
+            if !is_positive {
+                let is_noise = pivot >= -epsilon.sqrt() * largest;
+                if !is_noise {
                     return Err((index, pivot));
                 }
                 pivot = if largest > T::ZERO { largest } else { T::ONE };
