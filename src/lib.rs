@@ -1,5 +1,86 @@
 #![doc = include_str!("../README.md")]
 //!
+//! ## Integrals along the solution
+//!
+//! `#[function]` writes a function of a model's variables with its derivatives. An integrator takes its integral along:
+//!
+//! ```
+//! use casados::prelude::*;
+//! use nalgebra::{Vector1, matrix, vector};
+//!
+//! #[ode]
+//! fn oscillator(x: [f64; 2], u: f64) -> [f64; 2] {
+//!     [x[1], u - x[0]]
+//! }
+//!
+//! /// How far the oscillator is from rest, and the effort.
+//! #[function]
+//! fn distance(x: [f64; 2], u: f64) -> [f64; 2] {
+//!     [x[0], 0.1 * u]
+//! }
+//!
+//! let mut irk = Irk::<Oscillator, Gauss<3>>::new(Options { steps: 4, ..Default::default() })?;
+//! let (x0, u) = (vector![1.0, 0.0], Vector1::new(0.5));
+//!
+//! // ½ ∫ rᵀ W r dt, its gradient, and the matrix of Gauss and Newton over (x₀, u).
+//! let mut cost = LeastSquares::<Distance>::new(&matrix![1.0, 0.0; 0.0, 1.0]);
+//! irk.with(&mut cost).forward(&x0, &u, 1.0)?;
+//! println!("{} {} {}", cost.value, cost.grad_u, cost.h_uu);
+//!
+//! // ∫ r dt; with multipliers ν the gradient and the exact Hessian of λᵀx + νᵀ∫ r dt.
+//! let mut integral = Quadrature::<Distance>::new();
+//! integral.nu = vector![1.0, 2.0];
+//! let step = irk.with(&mut integral).hessian(&x0, &u, 1.0, &vector![0.0, 1.0])?;
+//! println!("{} {} {}", integral.q, integral.dq_dx0, step.h_uu);
+//!
+//! // x₀ = 1 + (u − 1)(1 − cos t): the integral over [0, 1] is 1 − (1 − sin 1)/2.
+//! assert!((integral.q[0] - (1.0 - 0.5 * (1.0 - 1.0_f64.sin()))).abs() < 1e-6);
+//! # Ok::<(), casados::Error>(())
+//! ```
+//!
+//! ## Steps of variable size, events, and controls that change
+//!
+//! ```
+//! use casados::prelude::*;
+//! use nalgebra::{Vector1, vector};
+//!
+//! /// A ball: height and velocity; gravity and what is left of the speed after a bounce.
+//! #[ode]
+//! fn ball(x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
+//!     [x[1], -p[0]]
+//! }
+//! #[function]
+//! fn height(x: [f64; 2], _p: [f64; 2]) -> f64 {
+//!     x[0]
+//! }
+//! #[function]
+//! fn bounce(x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
+//!     [x[0], -p[1] * x[1]]
+//! }
+//!
+//! let radau = Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?;
+//! let mut hybrid = Hybrid::new(radau, &[Event::jump::<Height, Bounce>(Crossing::Falling)])?;
+//! hybrid.integrator().set_parameters(&vector![9.81, 0.8])?;
+//! let end = hybrid.forward(&vector![1.0, 0.0], &vector![], 1.0)?;
+//! // The first bounce is at √(2h/g), and half of that relative change for one of h.
+//! let t = end.solution.occurrences[0].t;
+//! assert!((t - (2.0_f64 / 9.81).sqrt()).abs() < 1e-9);
+//! assert!((end.times[0].x0[0] - 0.5 * t).abs() < 1e-8);
+//!
+//! /// Decay with a source that is switched.
+//! #[ode]
+//! fn decay(x: f64, u: f64) -> f64 {
+//!     u - x
+//! }
+//! let mut horizon = Piecewise::new(Adaptive::<Decay, Gauss<3>>::new(AdaptiveOptions::default())?);
+//! let controls = [Vector1::new(1.0), Vector1::new(0.0)];
+//! let end = horizon.forward(&Vector1::new(0.0), &controls, &[1.0, 3.0])?;
+//! let expected = (1.0 - (-1.0_f64).exp()) * (-2.0_f64).exp();
+//! assert!((end.nominal.x[0] - expected).abs() < 1e-5);
+//! assert!((end.dx_du[0][0] - expected).abs() < 1e-5);
+//! # Ok::<(), casados::Error>(())
+//! ```
+//!
 //! ## Testing a model of your own
 //!
 //! With the feature `testing`, among the `dev-dependencies`:

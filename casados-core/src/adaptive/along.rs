@@ -13,22 +13,20 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// [`quadrature`](crate::quadrature).
     ///
     /// The steps are chosen for the states, then taken again to rounding: value and derivatives belong to each other.
-    pub fn with<'a, Q: Integrand<M, T> + ?Sized>(&'a mut self, integrand: &'a mut Q) -> With<'a, Self, Q> {
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
         With { integrator: self, integrand }
     }
 }
 
-impl<M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'_, Integrator<M, B, T>, Q> {
+impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Integrator<M, B, T>, Q> {
     /// See [`Integrator::solve`]; the integral.
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn solve(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<&Nominal<M, T>, Error> {
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<&'a Nominal<M, T>, Error> {
         self.integrator.solve_along(x0, u, t_end, Some(self.integrand))
     }
 
@@ -37,11 +35,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'_, Integrator<M
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
     pub fn forward(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         t_end: T,
-    ) -> Result<&Forward<M, T>, Error> {
+    ) -> Result<&'a Forward<M, T>, Error> {
         self.integrator.forward_along(x0, u, t_end, Some(self.integrand))
     }
 
@@ -50,12 +48,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'_, Integrator<M
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
     pub fn adjoint(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         t_end: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Adjoint<M, T>, Error> {
+    ) -> Result<&'a Adjoint<M, T>, Error> {
         self.integrator.adjoint_along(x0, u, t_end, lambda, Some(self.integrand))
     }
 
@@ -64,12 +62,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'_, Integrator<M
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
     pub fn hessian(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         t_end: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Hessian<M, T>, Error> {
+    ) -> Result<&'a Hessian<M, T>, Error> {
         self.integrator.hessian_along(x0, u, t_end, lambda, Some(self.integrand))
     }
 }

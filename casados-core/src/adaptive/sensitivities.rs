@@ -339,10 +339,9 @@ fn chain<'a, M: Dae, T: Real>(
     along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
 }
 
-fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T>>(integrand: &'a mut Option<Q>) -> Along<'a, 'a, M, T>
-where
-    Q: 'a,
-{
+fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
+    integrand: &'a mut Option<Q>,
+) -> Along<'a, 'a, M, T> {
     match integrand {
         Some(integrand) => Some(integrand),
         None => None,

@@ -42,19 +42,22 @@ pub(super) fn forward<M: Ode, T: Real>(
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those of the solution; see
     /// [`quadrature`](crate::quadrature).
-    pub fn with<'a, Q: Integrand<M, T> + ?Sized>(&'a mut self, integrand: &'a mut Q) -> With<'a, Self, Q> {
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
         With { integrator: self, integrand }
     }
 }
 
-impl<M: Ode, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
-    With<'_, Integrator<M, B, S, T, W>, Q>
+impl<'a, M: Ode, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
+    With<'a, '_, Integrator<M, B, S, T, W>, Q>
 {
     /// See [`Integrator::solve`]; the integral.
     ///
     /// # Errors
     /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
-    pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
         self.integrator.solve_along(x0, u, h, Some(self.integrand))
     }
 
@@ -62,7 +65,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     ///
     /// # Errors
     /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
-    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error>
+    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error>
     where
         W: WithForward,
     {
@@ -74,12 +77,12 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     /// # Errors
     /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
     pub fn adjoint(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Adjoint<M, T>, Error> {
+    ) -> Result<&'a Adjoint<M, T>, Error> {
         self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
     }
 
@@ -88,12 +91,12 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     /// # Errors
     /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
     pub fn hessian(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Hessian<M, T>, Error>
+    ) -> Result<&'a Hessian<M, T>, Error>
     where
         W: WithHessian,
     {

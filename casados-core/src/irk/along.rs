@@ -121,19 +121,22 @@ impl<M: Dae, T: Real, const S: usize> Parts<'_, M, T, S> {
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with those of the solution; see
     /// [`quadrature`](crate::quadrature).
-    pub fn with<'a, Q: Integrand<M, T> + ?Sized>(&'a mut self, integrand: &'a mut Q) -> With<'a, Self, Q> {
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
         With { integrator: self, integrand }
     }
 }
 
-impl<M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
-    With<'_, Integrator<M, B, S, T, W>, Q>
+impl<'a, M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
+    With<'a, '_, Integrator<M, B, S, T, W>, Q>
 {
     /// See [`Integrator::solve`]; the integral.
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
         self.integrator.solve_along(x0, u, h, Some(self.integrand))
     }
 
@@ -141,7 +144,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error>
+    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error>
     where
         W: WithForward,
     {
@@ -153,12 +156,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
     pub fn adjoint(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Adjoint<M, T>, Error>
+    ) -> Result<&'a Adjoint<M, T>, Error>
     where
         W: WithAdjoint<1>,
     {
@@ -170,12 +173,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
     pub fn hessian(
-        &mut self,
+        self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
-    ) -> Result<&Hessian<M, T>, Error>
+    ) -> Result<&'a Hessian<M, T>, Error>
     where
         W: WithHessian,
     {

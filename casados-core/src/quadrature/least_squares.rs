@@ -30,7 +30,7 @@ use bytemuck::Zeroable;
 ///
 /// What a call does not compute is zero after it. After an error the values mean nothing.
 #[derive(Zeroable)]
-#[zeroable(bound = "")]
+#[zeroable(bound = "T: Zeroable")]
 pub struct LeastSquares<F: Function, T: Plain = f64> {
     /// `φ`
     pub value: T,

@@ -89,9 +89,9 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
 
 /// An integrator with an integrand: its calls are those of the integrator, and gradients and Hessians those of
 /// `λᵀx + νᵀq`; see [`Integrand`].
-pub struct With<'a, I, Q: ?Sized> {
+pub struct With<'a, 'b, I, Q: ?Sized> {
     pub(crate) integrator: &'a mut I,
-    pub(crate) integrand: &'a mut Q,
+    pub(crate) integrand: &'b mut Q,
 }
 
 /// An integrand, or none.

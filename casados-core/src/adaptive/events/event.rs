@@ -73,11 +73,14 @@ impl<M: Dae, T: Real> core::fmt::Debug for Event<M, T> {
     }
 }
 
+/// Variables and multipliers to the gradient.
+type Adjoint<M, T> = fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>);
+
 /// A function with at most as many outputs as there are states.
 pub(super) struct Map<M: Dae, T: Real> {
     pub name: &'static str,
     value: fn(&ArrayV<M, T>, &mut [T]),
-    adjoint: fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>),
+    adjoint: Adjoint<M, T>,
     rate: fn(&ArrayV<M, T>, &mut [T]),
 }
 
