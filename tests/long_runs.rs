@@ -35,7 +35,8 @@ fn decay(x: [f64; 2], p: f64) -> [f64; 2] {
 #[cfg_attr(debug_assertions, ignore = "times of unoptimised code say nothing")]
 fn t28_denormal_numbers_are_not_slow() {
     let time = |start: f64| {
-        let mut irk = Irk::<Decay, Gauss<3>>::new(Options { steps: 20, ..Default::default() }).expect("valid");
+        let mut irk =
+            Irk::<Decay, Gauss<3>>::new(Options { steps: 20, ..Default::default() }).expect("valid");
         irk.set_parameters(&vector![-1e-3]).expect("finite");
         let runs = (0..200).map(|_| {
             let begin = std::time::Instant::now();

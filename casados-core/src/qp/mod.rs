@@ -9,12 +9,14 @@
 //! Dimensions may differ from stage to stage. The state at the start is fixed (two equal bounds), bounded or free.
 //!
 //! - [`Qp`] is the data, [`Solution`] a point with multipliers; both in memory of their owner, on the heap or not.
-//! - [`QpSolver`] is what every solver does.
+//! - [`QpSolver`] is what every solver does: [`InteriorPoint`], which is the library's own and needs neither heap nor `std`; the same
+//!   over a problem that is partially condensed first (`Condensing`); and clarabel (feature `clarabel`).
+//! - [`residuals`] says how well a point satisfies the conditions of optimality, whoever found it.
 #![cfg_attr(
     feature = "alloc",
     doc = "
 ```
-use casados_core::qp::{HeapQp, StageDims};
+use casados_core::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start};
 
 // x₊ = x + u, from x₀ = 1, with |u| ≤ 0.4, three intervals.
 let mut dims = [StageDims::new(1, 1, 0); 4];
@@ -28,6 +30,17 @@ for mut stage in qp.stages_mut() {
     stage.u_bounds_mut().set(0, -0.4, 0.4);
 }
 qp.fix_initial_state(&[1.0])?;
+
+let mut solver = HeapInteriorPoint::new();
+let mut solution = HeapSolution::new(&dims)?;
+let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+let u0 = solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]);
+assert!((u0 + 0.4).abs() < 1e-7 && statistics.iterations < 15);
+
+// The next sampling instant begins where this one would have gone.
+qp.fix_initial_state(&[0.6])?;
+solution.shift();
+solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
 # Ok::<(), casados_core::qp::QpError>(())
 ```
 "
