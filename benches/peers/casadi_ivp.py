@@ -251,10 +251,12 @@ class Call:
 
 def one(request, solver, tolerance):
     call = Call(function(request, solver, tolerance), request["x0"] + request["p"])
+    start = time.thread_time_ns()
     call.run()
+    least, count, begin = time.thread_time_ns() - start, 0, time.perf_counter()
     y, *derivatives = call.outputs()
-    least, count, begin = float("inf"), 0, time.perf_counter()
-    while count < 2 or time.perf_counter() - begin < request["seconds"]:
+    # What takes long is not repeated.
+    while least < 3e8 and (count < 2 or time.perf_counter() - begin < request["seconds"]):
         start = time.thread_time_ns()
         call.run()
         least = min(least, time.thread_time_ns() - start)
@@ -271,13 +273,13 @@ def serve(request):
     runs = []
     for solver in ["idas"] if algebraic else ["cvodes", "idas"]:
         for tolerance in request["tolerances"]:
-            begin, run = time.perf_counter(), {"solver": solver.upper(), "tolerance": tolerance}
+            run = {"solver": solver.upper(), "tolerance": tolerance}
             try:
                 run.update(one(request, solver, tolerance))
             except Exception as error:  # A solver that fails is a line of the table, not the end of the run.
                 run["error"] = str(error).strip().splitlines()[-1]
             runs.append(run)
-            if time.perf_counter() - begin > PATIENCE:
+            if run.get("time", 0) > PATIENCE:
                 break
     return {"runs": runs}
 
