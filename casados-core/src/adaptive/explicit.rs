@@ -3,41 +3,26 @@
 
 use super::consistent::At;
 use super::control::{Proportional, power};
+use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
 use super::replay::Replay;
 use super::run::{Accepted, After, Run, Span};
 use super::sealed::{Engine, Kind};
 use super::tape::Entry;
-use crate::erk::{Grid, Integrator as Erk, Point, Record, Scheme};
-use crate::error::{Error, Place, Refusal};
+use crate::erk::Integrator as Erk;
+use crate::error::{Error, Refusal};
 use crate::memory::Heap;
-use crate::model::{ArrayK, ArrayX, Dae, Ode, VectorX};
+use crate::model::{ArrayK, Dae, Ode, VectorX};
 use crate::options::Options;
 use crate::quadrature::Along;
 use crate::result::{Dense, Forward, Hessian, Nominal};
-use crate::scalar::{Real, Scalar};
-use crate::shape::{Array, Matrix, Shape};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
 use crate::tableau::{DormandPrince5, DormandPrince8};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
-use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
-
-/// Memory of a step.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-struct Memory<M: Ode, T: Real, const S: usize> {
-    point: Point<M, T>,
-    record: Record<M, T, S>,
-    /// The state at the end of the step, and its derivative there.
-    end: ArrayX<M, T>,
-    end_slope: ArrayX<M, T>,
-    difference: ArrayX<M, T>,
-    scale: ArrayX<M, T>,
-    /// Stages for dense output.
-    more: [ArrayX<M, T>; 3],
-}
 
 /// The method of an explicit pair with `S` stages.
 pub struct Steps<M: Dae, B, T: Real, const S: usize> {
@@ -49,179 +34,6 @@ pub struct Steps<M: Dae, B, T: Real, const S: usize> {
 impl<M: Dae, B, T: Real, const S: usize> Default for Steps<M, B, T, S> {
     fn default() -> Self {
         Self { engine: None, replay: None, method: PhantomData }
-    }
-}
-
-/// A step of an explicit pair.
-trait Take<M: Dae, T: Real> {
-    /// Goes to the start of a step.
-    fn go(&mut self, inputs: &[T], x: &[T]);
-    /// The derivative at the start.
-    ///
-    /// # Errors
-    /// A value that is not finite.
-    fn slope(&mut self, t: T) -> Result<&[T], Error>;
-    /// All stages of a step whose first is there.
-    ///
-    /// # Errors
-    /// A value that is not finite.
-    fn take(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The estimated error relative to what is tolerated.
-    fn error(&mut self, h: T, rtol: &[T], atol: &[T]) -> f64;
-    /// The state at the end.
-    fn end(&self) -> &[T];
-    /// The end is the next start.
-    fn advance(&mut self);
-    /// The polynomial of the step that was taken.
-    ///
-    /// # Errors
-    /// A value that is not finite.
-    fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error>;
-    /// How often the model was evaluated since this was asked for last.
-    fn count(&mut self) -> usize;
-}
-
-struct Stepper<M: Ode, B, T: Real, const S: usize> {
-    scheme: Scheme<M, T, S>,
-    memory: Box<Memory<M, T, S>>,
-    method: PhantomData<fn() -> B>,
-}
-
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
-    fn new() -> Result<Self, Error> {
-        let bytes = size_of::<Memory<M, T, S>>();
-        let memory = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
-        Ok(Self { scheme: Scheme::new(&B::TABLEAU), memory, method: PhantomData })
-    }
-
-    /// The derivative at a state.
-    fn evaluate(
-        scheme: &Scheme<M, T, S>,
-        point: &mut Point<M, T>,
-        x: &[T],
-        t: T,
-        slope: &mut ArrayX<M, T>,
-    ) -> Result<(), Error> {
-        let nx = M::Shape::NX;
-        let numbers = point.v.as_mut();
-        numbers[nx..2 * nx].copy_from_slice(x);
-        if let Some(time) = numbers.last_mut() {
-            *time = t;
-        }
-        point.derivative(scheme, slope, Place { step: 0, stage: 0, iteration: 0 })
-    }
-}
-
-/// `Σ_i e_i k_i`
-fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
-    for (coefficient, stage) in coefficients.iter().zip(stages) {
-        if *coefficient != 0.0 {
-            let coefficient = T::from_f64(*coefficient);
-            for (sum, k) in sum.iter_mut().zip(stage.as_ref()) {
-                *sum = *sum + coefficient * *k;
-            }
-        }
-    }
-}
-
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T, S> {
-    fn go(&mut self, inputs: &[T], x: &[T]) {
-        let Memory { point, record, .. } = &mut *self.memory;
-        point.v.as_mut().copy_from_slice(inputs);
-        // An explicit model is evaluated at `ẋ = 0`.
-        point.v.as_mut()[..M::Shape::NX].fill(T::ZERO);
-        record.x.as_mut().copy_from_slice(x);
-    }
-
-    fn slope(&mut self, t: T) -> Result<&[T], Error> {
-        let Memory { point, record, .. } = &mut *self.memory;
-        Self::evaluate(&self.scheme, point, record.x.as_ref(), t, &mut record.k[0])?;
-        Ok(record.k[0].as_ref())
-    }
-
-    fn take(&mut self, t: T, h: T) -> Result<(), Error> {
-        let Memory { point, record, end, end_slope, .. } = &mut *self.memory;
-        let grid = Grid { start: t, h, steps: 1, compensated: false };
-        for stage in 1..S {
-            let at = Place { step: 0, stage, iteration: 0 };
-            point.go(&self.scheme, grid, record, at)?;
-            point.derivative(&self.scheme, &mut record.k[stage], at)?;
-        }
-        record.end(&self.scheme, grid, 0, end, None)?;
-        Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)
-    }
-
-    fn error(&mut self, h: T, rtol: &[T], atol: &[T]) -> f64 {
-        let Memory { record, end, end_slope, difference, scale, .. } = &mut *self.memory;
-        let states = record.x.as_ref().iter().zip(end.as_ref());
-        for (((scale, (before, after)), rtol), atol) in
-            scale.as_mut().iter_mut().zip(states).zip(rtol).zip(atol)
-        {
-            *scale = h / (*atol + *rtol * before.abs().max(after.abs()));
-        }
-        let (stages, last) = B::DIFFERENCE;
-        difference.as_mut().fill(T::ZERO);
-        combine(&stages, &record.k, difference.as_mut());
-        combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
-        let fine = norm(difference.as_ref(), scale.as_ref());
-        let Some(coarse) = B::COARSE else { return fine };
-        difference.as_mut().fill(T::ZERO);
-        combine(&coarse, &record.k, difference.as_mut());
-        let coarse = norm(difference.as_ref(), scale.as_ref());
-        let both = fine * fine + 0.01 * coarse * coarse;
-        if both > 0.0 { fine * fine / Scalar::sqrt(both) } else { 0.0 }
-    }
-
-    fn end(&self) -> &[T] {
-        self.memory.end.as_ref()
-    }
-
-    fn advance(&mut self) {
-        let Memory { record, end, end_slope, .. } = &mut *self.memory;
-        record.x = *end;
-        record.k[0] = *end_slope;
-    }
-
-    fn interpolate(&mut self, t: T, h: T, theta: T, dense: &mut Dense<M, T>) -> Result<(), Error> {
-        let Memory { point, record, end, end_slope, more, difference: x, .. } = &mut *self.memory;
-        let last = core::slice::from_ref(&*end_slope);
-        for index in 0..B::MORE.len().min(more.len()) {
-            let Some(stage) = B::MORE.get(index) else { break };
-            x.as_mut().fill(T::ZERO);
-            combine(&stage.stages, &record.k, x.as_mut());
-            combine(&[stage.end], last, x.as_mut());
-            combine(&stage.more, &more[..index], x.as_mut());
-            for (x, start) in x.as_mut().iter_mut().zip(record.x.as_ref()) {
-                *x = *start + h * *x;
-            }
-            let time = t + h * T::from_f64(stage.node);
-            Self::evaluate(&self.scheme, point, x.as_ref(), time, &mut more[index])?;
-        }
-        // Nested: y + θ (Δ + θ' (b + θ (d + θ' (…)))), θ' = 1 − θ.
-        let rest = T::ONE - theta;
-        let to = dense.x.as_mut_slice();
-        to.fill(T::ZERO);
-        for (power, (stages, end, others)) in B::POLYNOMIAL.iter().enumerate().rev() {
-            x.as_mut().fill(T::ZERO);
-            combine(stages, &record.k, x.as_mut());
-            combine(&[*end], last, x.as_mut());
-            combine(others, more, x.as_mut());
-            let factor = if power % 2 == 0 { rest } else { theta };
-            for (to, x) in to.iter_mut().zip(x.as_ref()) {
-                *to = factor * (h * *x + *to);
-            }
-        }
-        for (index, to) in to.iter_mut().enumerate() {
-            let (start, change) = (record.x[index], end[index] - record.x[index]);
-            let bend = h * record.k[0][index] - change;
-            let cubic = change - h * end_slope[index] - bend;
-            *to = start + theta * (change + rest * (bend + theta * (cubic + *to)));
-        }
-        Ok(())
-    }
-
-    fn count(&mut self) -> usize {
-        core::mem::take(&mut self.memory.point.counts.residuals)
     }
 }
 

@@ -9,15 +9,23 @@
 //! through the matrix of one eigenvalue. Explicit pairs of orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that
 //! are not stiff.
 //!
-//! One file for each thing: `stages` one step, `control` the step size, `run` the steps of an interval, `tape` what is
-//! remembered of them, `consistent` the start, `pairs` and `explicit` the explicit methods, `replay` and `sensitivities` their derivatives, `along` an integrand, `piecewise` intervals with controls of their own, `events`, `integrator` what users see.
+//! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels` its loops, `levels` the
+//! methods of a family, `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run` the
+//! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the explicit methods,
+//! `replay` and `sensitivities` derivatives of runs, `along` an integrand, `segment` one of several intervals, `piecewise` those
+//! with controls of their own and `columns` their derivatives, `events`, `integrator` what users see.
 
 mod along;
+mod collocation;
+mod columns;
 mod consistent;
 mod control;
 mod events;
 mod explicit;
+mod explicit_step;
 mod integrator;
+mod kernels;
+mod levels;
 mod norm;
 mod options;
 mod pairs;
@@ -27,6 +35,7 @@ mod run;
 mod segment;
 mod sensitivities;
 mod stages;
+mod start;
 mod statistics;
 mod tape;
 
@@ -147,7 +156,7 @@ macro_rules! single {
             const ENDS_ON_STAGE: bool = $ends_on_stage;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
                 // As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
-                Ok(Box::new(stages::Collocation::<M, Self, T, $stages, 4, $groups>::new()?))
+                Ok(Box::new(collocation::Collocation::<M, Self, T, $stages, 4, $groups>::new()?))
             }
         })*
     };

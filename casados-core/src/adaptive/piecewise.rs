@@ -8,6 +8,7 @@
 //! d²(λᵀ x_N)/dW² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ Φ_k) D_k        D_k = d(x_k, u_k, p)/dW
 //! ```
 
+use super::columns::Columns;
 use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
@@ -438,80 +439,4 @@ fn collect<M: Dae, T: Real>(nominal: &mut Nominal<M, T>, interval: &Nominal<M, T
         nominal.z0 = interval.z0;
     }
     (nominal.x, nominal.z) = (interval.x, interval.z);
-}
-
-/// Where the directions `W = (x₀, u₀, …, u_{N−1}, p)` are.
-struct Columns<M> {
-    intervals: usize,
-    model: core::marker::PhantomData<M>,
-}
-
-impl<M: Dae> Columns<M> {
-    fn u(&self, k: usize) -> usize {
-        M::Shape::NX + k * M::Shape::NU
-    }
-
-    fn p(&self) -> usize {
-        self.u(self.intervals)
-    }
-
-    fn all(&self) -> usize {
-        self.p() + M::Shape::NP
-    }
-
-    /// `next = A V + (B at u_k, C at p)`, row after row.
-    fn chain<T: Real>(
-        &self,
-        k: usize,
-        a: &impl Matrix<T>,
-        b: &impl Matrix<T>,
-        c: &impl Matrix<T>,
-        v: &[T],
-        next: &mut [T],
-    ) {
-        let width = self.all();
-        for (r, row) in next.chunks_exact_mut(width).enumerate().take(rows(a)) {
-            row.fill(T::ZERO);
-            for (x, v) in v.chunks_exact(width).enumerate() {
-                axpy(a[(r, x)], v, row);
-            }
-            for (column, element) in row[self.u(k)..].iter_mut().enumerate().take(M::Shape::NU) {
-                *element = *element + b[(r, column)];
-            }
-            for (column, element) in row[self.p()..].iter_mut().enumerate() {
-                *element = *element + c[(r, column)];
-            }
-        }
-    }
-
-    /// `sum += Dᵀ H D`, the product `H D` first.
-    fn project<T: Real, R: AsRef<[T]>>(&self, k: usize, h: &[R], v: &[T], product: &mut [T], sum: &mut [T]) {
-        let (nx, nu, width) = (M::Shape::NX, M::Shape::NU, self.all());
-        // Where a local direction other than a state is.
-        let global = |w: usize| if w < nx + nu { self.u(k) + w - nx } else { self.p() + w - nx - nu };
-        for (row, h) in product.chunks_exact_mut(width).zip(h) {
-            row.fill(T::ZERO);
-            let (states, others) = h.as_ref().split_at(nx);
-            for (h, v) in states.iter().zip(v.chunks_exact(width)) {
-                axpy(*h, v, row);
-            }
-            for (w, h) in others.iter().enumerate() {
-                row[global(nx + w)] = row[global(nx + w)] + *h;
-            }
-        }
-        for (w, row) in product.chunks_exact(width).enumerate() {
-            match v.chunks_exact(width).nth(w) {
-                Some(v) => {
-                    for (v, sum) in v.iter().zip(sum.chunks_exact_mut(width)) {
-                        axpy(*v, row, sum);
-                    }
-                }
-                None => axpy(T::ONE, row, &mut sum[global(w) * width..][..width]),
-            }
-        }
-    }
-}
-
-fn rows<T, A: Matrix<T>>(_: &A) -> usize {
-    A::ROWS
 }

@@ -1,21 +1,19 @@
 //! The steps of an interval.
 
-use super::consistent::{At, Consistent, place_inputs};
+use super::consistent::Consistent;
 use super::control::{IMPLICIT, Predictive};
-use super::norm::norm;
+use super::levels::{Levels, interpolate};
 use super::options::AdaptiveOptions;
-use super::replay::Replay;
-use super::sealed::{Engine, Family, Kind};
-use super::stages::{Convergence, FAST, Failure, MOST, Stages, Start};
+use super::sealed::Family;
+use super::stages::{Convergence, FAST, Failure, Start};
 use super::statistics::AdaptiveStatistics;
-use super::tape::{Entry, Tape};
+use super::tape::Tape;
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;
 use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
-use crate::shape::{Matrix, Plain, Shape};
-use alloc::boxed::Box;
+use crate::shape::{Plain, Shape};
 use bytemuck::Zeroable;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -54,13 +52,13 @@ pub struct Base<M: Dae, T: Plain> {
     /// as the method needs them,
     tight: ArrayK<M, (T, T)>,
     /// and the reciprocals of the errors that they tolerate.
-    scale: ArrayK<M, T>,
+    pub(super) scale: ArrayK<M, T>,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
     pub u: VectorU<M, T>,
     /// Whether the constant entries of the Jacobian are there.
-    ready: bool,
+    pub(super) ready: bool,
     /// Where Newton's method may stop.
     newton_tolerance: f64,
 }
@@ -78,49 +76,6 @@ enum Need {
 pub struct Span<T> {
     pub start: T,
     pub end: T,
-}
-
-/// The levels of a family that are in use.
-pub struct Levels<M: Dae, T: Real> {
-    open: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
-}
-
-impl<M: Dae, T: Real> Default for Levels<M, T> {
-    fn default() -> Self {
-        Self { open: [None, None, None] }
-    }
-}
-
-impl<M: Dae, T: Real> Levels<M, T> {
-    pub fn get<B: Family>(&mut self, level: usize) -> Result<&mut dyn Stages<M, T>, Error> {
-        let missing = Error::OutOfMemory { bytes: 0 };
-        let place = self.open.get_mut(level).ok_or(missing)?;
-        if place.is_none() {
-            *place = Some(B::open::<M, T>(level)?);
-        }
-        match place {
-            Some(stages) => Ok(&mut **stages),
-            None => Err(missing),
-        }
-    }
-
-    /// The last accepted step of one level becomes that of another.
-    fn change<B: Family>(&mut self, from: usize, to: usize) -> Result<(), Error> {
-        self.get::<B>(from)?;
-        self.get::<B>(to)?;
-        let [first, second, third] = &mut self.open;
-        let (old, new) = match (from, to) {
-            (0, 1) => (first, second),
-            (1, 0) => (second, first),
-            (1, 2) => (second, third),
-            (2, 1) => (third, second),
-            _ => return Ok(()),
-        };
-        if let (Some(old), Some(new)) = (old, new) {
-            new.adopt(&**old);
-        }
-        Ok(())
-    }
 }
 
 /// What a run works with.
@@ -382,75 +337,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
     }
 
-    /// Everything at the start of the interval.
-    fn prepare(&mut self, x0: &VectorX<M, T>, span: Span<T>) -> Result<(), Error> {
-        let Base { start, given, u, parameters, jacobian, ready, .. } = &mut *self.base;
-        if !*ready {
-            M::jacobian_constants::<T>(jacobian);
-            *ready = true;
-        }
-        *start = *given;
-        let at = At { x: x0, u, p: parameters, t: span.start };
-        match self.consistent.solve(&at, start) {
-            Ok(points) => self.statistics.residuals += points,
-            // Without algebraic states all equations may still be solvable: the matrix of ẋ has not full rank.
-            Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => {
-                *start = Zeroable::zeroed()
-            }
-            Err(error) => return Err(error),
-        }
-        let start = *start;
-        self.place(x0, &start, span.start);
-        Ok(())
-    }
-
-    /// Consistent `ẋ` and `z` at the time that was reached, from those that are there.
-    fn settle(&mut self, t: T) -> Result<(), Error> {
-        let nx = M::Shape::NX;
-        let Base { point, u, parameters, .. } = &mut *self.base;
-        let mut x = VectorX::<M, T>::zeroed();
-        let mut y = ArrayK::<M, T>::zeroed();
-        for (index, y) in y.as_mut().iter_mut().enumerate() {
-            *y = point[if index < nx { index } else { index + nx }];
-        }
-        x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
-        match self.consistent.solve(&At { x: &x, u, p: parameters, t }, &mut y) {
-            Ok(points) => self.statistics.residuals += points,
-            // As at the start.
-            Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => return Ok(()),
-            Err(error) => return Err(error),
-        }
-        for (index, y) in y.as_ref().iter().enumerate() {
-            point[if index < nx { index } else { index + nx }] = *y;
-        }
-        Ok(())
-    }
-
-    /// The variables at the start, from `(ẋ, z)` there.
-    pub fn place(&mut self, x0: &VectorX<M, T>, start: &ArrayK<M, T>, t: T) {
-        let nx = M::Shape::NX;
-        let Base { point, u, parameters, result, .. } = &mut *self.base;
-        let numbers = point.as_mut();
-        for (index, value) in start.as_ref().iter().enumerate() {
-            numbers[if index < nx { index } else { index + nx }] = *value;
-        }
-        numbers[nx..2 * nx].copy_from_slice(x0.as_slice());
-        place_inputs::<M, T>(numbers, u, parameters);
-        if let Some(time) = numbers.last_mut() {
-            *time = t;
-        }
-        result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[nx..]);
-    }
-
-    /// The solution at the end.
-    pub fn finish(&mut self) {
-        let nx = M::Shape::NX;
-        let Base { point, result, .. } = &mut *self.base;
-        let states = &point.as_ref()[nx..];
-        result.x.as_mut_slice().copy_from_slice(&states[..nx]);
-        result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
-    }
-
     /// Tolerances of the estimate: it is of lower order than the method, `s` instead of `2s − 1`.
     fn tighten(&mut self, stages: usize) {
         let s = stages as f64;
@@ -473,7 +359,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     }
 
     /// What is tolerated at the time that was reached.
-    fn measure(&mut self) {
+    pub(super) fn measure(&mut self) {
         let Base { tight, scale, point, .. } = &mut *self.base;
         let states = &point.as_ref()[M::Shape::NX..];
         for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tight.as_ref()).zip(states) {
@@ -509,106 +395,5 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason });
         }
         Ok(())
-    }
-
-    /// The length of the first step: that in which an explicit Euler step changes the solution, and its derivative, by
-    /// a hundredth of their size (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I,
-    /// section II.4).
-    fn first_step(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
-        if let Some(step) = self.options.initial_step {
-            return Ok(step.min(longest));
-        }
-        let nx = M::Shape::NX;
-        let Base { point, rtol, atol, scale, parameters, u, start, .. } = &mut *self.base;
-        let tolerances = rtol.as_ref().iter().zip(atol.as_ref());
-        let states = &point.as_ref()[nx..2 * nx];
-        for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tolerances).zip(states) {
-            *scale = T::ONE / (*atol + *rtol * state.abs());
-        }
-        let scale = &scale.as_ref()[..nx];
-        let xdot = &start.as_ref()[..nx];
-        let (size, slope) = (norm(states, scale), norm(xdot, scale));
-        let mut step = if size < 1e-5 || slope < 1e-5 { 1e-6 } else { 0.01 * size / slope };
-        step = step.min(longest);
-        // A second point, if there is a consistent one.
-        let h = T::from_f64(if span.end < span.start { -step } else { step });
-        let mut x = VectorX::<M, T>::zeroed();
-        for ((to, x), xdot) in x.as_mut_slice().iter_mut().zip(states).zip(xdot) {
-            *to = *x + h * *xdot;
-        }
-        let mut y = *start;
-        let at = At { x: &x, u, p: parameters, t: span.start + h };
-        let solved = self.consistent.solve(&at, &mut y);
-        self.statistics.residuals += solved.as_ref().copied().unwrap_or(0);
-        let mut curvature = 0.0;
-        if solved.is_ok() {
-            for (y, xdot) in y.as_mut().iter_mut().zip(xdot) {
-                *y = *y - *xdot;
-            }
-            curvature = norm(&y.as_ref()[..nx], scale) / step;
-        }
-        let largest = slope.max(curvature);
-        let second =
-            if largest <= 1e-15 { (step * 1e-3).max(1e-6) } else { Scalar::powf(0.01 / largest, 0.25) };
-        self.measure();
-        Ok((100.0 * step).min(second).min(longest))
-    }
-}
-
-/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
-fn interpolate<M: Dae, T: Real>(
-    stages: &dyn Stages<M, T>,
-    x: &[T],
-    y: &[T],
-    passed: T,
-    h: T,
-    dense: &mut Dense<M, T>,
-) {
-    let theta = (passed / h).to_f64();
-    let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
-    let sum = |weights: &[f64; MOST], y: &[T]| {
-        weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
-    };
-    let mut unknowns = y.chunks_exact(stages.count());
-    for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
-        *to = *x + h * sum(&weights, k);
-    }
-    for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
-        *to = sum(&lagrange, z);
-    }
-}
-
-impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
-    type State = Levels<M, T>;
-}
-
-impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
-    const ENDS_ON_STAGE: bool = B::ENDS_ON_STAGE;
-
-    fn integrate(
-        state: &mut Self::State,
-        run: &mut Run<'_, M, T>,
-        x0: &VectorX<M, T>,
-        span: Span<T>,
-        after: After<'_, M, T>,
-    ) -> Result<(), Error> {
-        run.integrate::<B>(state, x0, span, after)
-    }
-
-    fn interpolate(
-        state: &mut Self::State,
-        _: &[T],
-        entry: &Entry<T>,
-        (x, y): (&[T], &[T]),
-        t: T,
-        dense: &mut Dense<M, T>,
-    ) -> Result<(), Error> {
-        let stages = state.get::<B>(entry.level)?;
-        interpolate(stages, x, y, t - entry.t, entry.h, dense);
-        Ok(())
-    }
-
-    fn replay(state: &mut Self::State, level: usize) -> Result<&mut dyn Replay<M, T>, Error> {
-        state.get::<B>(level)?.replay()
     }
 }

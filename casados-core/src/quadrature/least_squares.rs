@@ -30,7 +30,9 @@ use bytemuck::Zeroable;
 ///
 /// What a call does not compute is zero after it. After an error the values mean nothing.
 #[derive(Zeroable)]
-#[zeroable(bound = "T: Zeroable")]
+#[zeroable(bound = "")]
+// What the derive writes about the field `value`.
+#[allow(clippy::multiple_bound_locations)]
 pub struct LeastSquares<F: Function, T: Plain = f64> {
     /// `φ`
     pub value: T,

@@ -1,0 +1,419 @@
+//! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton, the estimate of its error, and its polynomial.
+//!
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for `f(ẋ, x, z, t) = 0` with unknowns
+//! `k_i`, `z_i` instead of increments of `y`.
+//!
+//! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of the last repeats the
+//! last stage.
+
+use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
+use super::norm::{mean, norm};
+use super::replay::{Replay, Single, single};
+use super::stages::{Convergence, FAST, Failure, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start};
+use crate::error::Error;
+use crate::irk::{dot, not_finite};
+use crate::linalg::{Complex, EigenFactors, Eigenbasis, Rows, dispatch, slot};
+use crate::model::{ArrayK, ArrayV, Dae};
+use crate::scalar::{Real, Scalar};
+use crate::shape::{Plain, Shape};
+use crate::tableau::{Method, Tableau};
+use alloc::boxed::Box;
+use bytemuck::Zeroable;
+use bytemuck::allocation::try_zeroed_box;
+use core::array::from_fn;
+use core::marker::PhantomData;
+
+/// Increments that shrink no more are rounding errors, if they are this small beside what is tolerated: of a state near zero that
+/// follows from large ones by an equation, they may be above the tolerance of the iteration.
+const NOISE: f64 = 0.01;
+
+/// Memory of a step.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+struct Memory<M: Dae, T: Plain, const S: usize, const L: usize, const G: usize> {
+    /// The unknowns `(k, z)` at the stages.
+    y: ArrayK<M, Groups<T, G>>,
+    /// Those of the last accepted step.
+    accepted: ArrayK<M, [T; S]>,
+    /// Variables of the model at the stages.
+    points: [ArrayV<M, [T; GROUP]>; G],
+    /// The residual at the stages.
+    f: [ArrayK<M, [T; GROUP]>; G],
+    rows: Rows<M, T, L>,
+    /// Variables at one point, and the residual there.
+    point: ArrayV<M, T>,
+    f_point: ArrayK<M, T>,
+    /// The estimated error of `(x, z)`.
+    error: ArrayK<M, T>,
+    factors: EigenFactors<M, T, L>,
+}
+
+/// A step of the collocation method `B` with `S` stages in `G` groups, for whose eigenvalues there are `L ≥ ⌈S/2⌉` lanes.
+pub struct Collocation<M: Dae, B, T: Real, const S: usize, const L: usize, const G: usize> {
+    tableau: Tableau<S>,
+    /// Columns of `A`, and of `−h A` of this step.
+    a: [Groups<T, G>; S],
+    minus_ha: [Groups<T, G>; S],
+    c: Groups<T, G>,
+    /// Columns of the matrix of right eigenvectors, real and imaginary parts.
+    right: [[Groups<T, G>; 2]; L],
+    /// Lagrange polynomials at the start of the step.
+    lagrange: [T; S],
+    /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
+    factors: [f64; S],
+    basis: Eigenbasis<T, S, L>,
+    memory: Box<Memory<M, T, S, L, G>>,
+    replay: Option<Box<Single<M, B, T, S>>>,
+}
+
+/// A value of each stage, of which the last is repeated.
+fn groups<T: Real, const G: usize>(stages: usize, value: impl Fn(usize) -> T) -> Groups<T, G> {
+    from_fn(|group| from_fn(|lane| value((GROUP * group + lane).min(stages.saturating_sub(1)))))
+}
+
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usize>
+    Collocation<M, B, T, S, L, G>
+{
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn new() -> Result<Self, Error> {
+        const { assert!(G == S.div_ceil(GROUP), "as many groups as hold the stages") };
+        let tableau = B::TABLEAU;
+        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, L, G>>() };
+        let memory = try_zeroed_box().map_err(|()| out_of_memory)?;
+        // Gauss and Radau IIA methods have one: tests construct all.
+        let basis: Eigenbasis<T, S, L> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
+        let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
+        let a = from_fn(|j| groups(S, |i| T::from_f64(a[i][j])));
+        Ok(Self {
+            a,
+            minus_ha: a,
+            c: groups(S, |i| T::from_f64(c[i])),
+            right: from_fn(|l| [groups(S, |i| right[i].re[l]), groups(S, |i| right[i].im[l])]),
+            lagrange: tableau.lagrange(0.0).map(T::from_f64),
+            factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
+            basis,
+            tableau,
+            memory,
+            replay: None,
+        })
+    }
+
+    /// The Lagrange polynomials of the nodes, without a division.
+    fn polynomials(&self, theta: f64) -> [f64; S] {
+        let c = self.tableau.c();
+        let (mut before, mut after) = (1.0, 1.0);
+        let mut values = self.factors;
+        for (value, c) in values.iter_mut().zip(c) {
+            *value *= before;
+            before *= theta - c;
+        }
+        for (value, c) in values.iter_mut().zip(c).rev() {
+            *value *= after;
+            after *= theta - c;
+        }
+        values
+    }
+
+    /// The residual at all stages, and from there to the rows of the linear systems.
+    fn evaluate(&mut self) {
+        let Memory { points, f, rows, point, f_point, .. } = &mut *self.memory;
+        for (group, (points, f)) in points.iter().zip(f.iter_mut()).enumerate() {
+            if let Err(call) = T::side_by_side(Residual::<M, T> { points, f }) {
+                let Residual { points, f } = call;
+                for lane in 0..GROUP.min(S - GROUP * group) {
+                    for (to, from) in point.as_mut().iter_mut().zip(points.as_ref()) {
+                        *to = from[lane];
+                    }
+                    M::residual::<T>(point, f_point);
+                    for (to, from) in f.as_mut().iter_mut().zip(f_point.as_ref()) {
+                        to[lane..].fill(*from);
+                    }
+                }
+            }
+        }
+        dispatch(Split::<M, T, S, L, G> {
+            left: self.basis.left(),
+            f: from_fn(|group| f[group].as_ref()),
+            rows: rows.as_mut(),
+            model: PhantomData,
+        });
+    }
+
+    /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of the squares of the
+    /// changes of `(ξ, z)` relative to what is tolerated.
+    fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
+        let Memory { y, points, rows, .. } = &mut *self.memory;
+        let mut points = points.each_mut().map(|points| points.as_mut());
+        let sum = dispatch(Advance {
+            minus_ha: &self.minus_ha,
+            // Of the lanes that there are eigenvalues for.
+            right: &self.right[..S.div_ceil(2)],
+            x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
+            scale: start.scale.as_ref(),
+            rows: if increment { rows.as_ref() } else { &[] },
+            y: y.as_mut(),
+            points: &mut points,
+        });
+        // Each stage once.
+        sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
+    }
+
+    /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
+    fn extrapolate(&self, h: T, point: &mut ArrayV<M, T>) {
+        let (nx, point) = (M::Shape::NX, point.as_mut());
+        let (b, end) = (self.tableau.b().map(T::from_f64), self.polynomials(1.0).map(T::from_f64));
+        for (index, y) in self.memory.y.as_ref().iter().enumerate() {
+            let Some(y) = y.as_flattened().first_chunk() else { continue };
+            if index < nx {
+                point[index] = dot(&end, y);
+                point[nx + index] = point[nx + index] + h * dot(&b, y);
+            } else {
+                point[nx + index] = dot(&end, y);
+            }
+        }
+    }
+
+    /// The estimated error of `x` at the end, where nothing is a stage.
+    ///
+    /// It is how far the extrapolated derivative is from the solution at the state that was reached. Of stiff components
+    /// this is their error, which no method with `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the
+    /// solve takes it out of the estimate.
+    fn error_at_end(&mut self, start: &Start<'_, M, T>, residuals: &mut usize) -> Result<f64, Failure> {
+        let mut point = *start.point;
+        self.extrapolate(start.h, &mut point);
+        if let Some(time) = point.as_mut().last_mut() {
+            *time = *time + start.h;
+        }
+        self.memory.point = point;
+        self.defect(start.h, residuals)?;
+        let states = self.memory.error.as_ref().get(..M::Shape::NX).unwrap_or_default();
+        Ok(norm(states, start.scale.as_ref()))
+    }
+
+    /// The estimated error of `(x, z)` from the defect at the point that is there.
+    fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
+        let Memory { point, f_point, rows, error, factors, .. } = &mut *self.memory;
+        *residuals += 1;
+        M::residual::<T>(point, f_point);
+        if not_finite(f_point.as_ref()).is_some() {
+            return Err(Failure::NotFinite);
+        }
+        // The real system is the first, if there is one.
+        for (equation, f) in f_point.as_ref().iter().enumerate() {
+            let [[row]] = &mut rows[slot::<M>(equation)];
+            *row = Complex::zero();
+            row.re[0] = -*f;
+        }
+        factors.solve(rows);
+        // Of methods with an even number of stages it is complex; the error is the real part.
+        let [re, im] = [self.basis.values().re[0], self.basis.values().im[0]].map(|value| h * value);
+        for (index, (error, [[row]])) in error.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
+            *error = if index < M::Shape::NX { re * row.re[0] - im * row.im[0] } else { row.re[0] };
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usize> Stages<M, T>
+    for Collocation<M, B, T, S, L, G>
+{
+    fn count(&self) -> usize {
+        S
+    }
+
+    fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize> {
+        self.memory.factors.factor(jacobian, self.basis.values(), h)
+    }
+
+    fn set_pivoted(&mut self, pivoted: bool) -> bool {
+        let planned = self.memory.factors.is_planned();
+        self.memory.factors.set_pivoted(pivoted);
+        planned != self.memory.factors.is_planned()
+    }
+
+    fn begin(&mut self, point: &ArrayV<M, T>) {
+        let nx = M::Shape::NX;
+        let (xdot, z) = (&point.as_ref()[..nx], &point.as_ref()[2 * nx..]);
+        for (y, value) in self.memory.y.as_mut().iter_mut().zip(xdot.iter().chain(z)) {
+            *y = [[*value; GROUP]; G];
+        }
+    }
+
+    fn continue_from_last(&mut self, ratio: f64) {
+        let weights: [[f64; S]; S] = from_fn(|i| self.polynomials(1.0 + self.tableau.c()[i] * ratio));
+        let weights = from_fn(|j| groups(S, |i| T::from_f64(weights[i][j])));
+        let Memory { y, accepted, .. } = &mut *self.memory;
+        dispatch(Continue { weights, from: accepted.as_ref(), to: y.as_mut() });
+    }
+
+    fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>) {
+        let (nx, stage) = (M::Shape::NX, S / 2);
+        *middle = *start.point;
+        let to = middle.as_mut();
+        for (index, y) in self.memory.y.as_ref().iter().enumerate() {
+            let y = y.as_flattened();
+            to[if index < nx { index } else { index + nx }] = y[stage];
+            if index < nx {
+                let terms = self.tableau.a()[stage].iter().zip(y);
+                let sum = terms.fold(T::ZERO, |sum, (a, y)| sum + T::from_f64(*a) * *y);
+                to[nx + index] = to[nx + index] + start.h * sum;
+            }
+        }
+        if let Some(time) = to.last_mut() {
+            *time = *time + start.h * T::from_f64(self.tableau.c()[stage]);
+        }
+    }
+
+    fn adopt(&mut self, other: &dyn Stages<M, T>) {
+        let count = other.count();
+        for (stage, node) in self.tableau.c().iter().enumerate() {
+            let weights = other.lagrange(*node);
+            let unknowns = other.accepted().chunks_exact(count);
+            for (to, from) in self.memory.accepted.as_mut().iter_mut().zip(unknowns) {
+                let terms = weights.iter().zip(from);
+                to[stage] = terms.fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y);
+            }
+        }
+    }
+
+    fn solve(
+        &mut self,
+        start: &Start<'_, M, T>,
+        tolerance: f64,
+        convergence: &mut Convergence,
+        residuals: &mut usize,
+    ) -> Result<(), Failure> {
+        for (to, from) in self.minus_ha.as_flattened_mut().iter_mut().zip(self.a.as_flattened()) {
+            *to = from.map(|a| -(start.h * a));
+        }
+        let t = start.point.as_ref().last().copied().unwrap_or(T::ZERO);
+        let inputs = 2 * M::Shape::NX + M::Shape::NZ;
+        for (points, c) in self.memory.points.iter_mut().zip(&self.c) {
+            for (to, from) in points.as_mut().iter_mut().zip(start.point.as_ref()).skip(inputs) {
+                *to = [*from; GROUP];
+            }
+            if let Some(time) = points.as_mut().last_mut() {
+                *time = c.map(|c| t + c * start.h);
+            }
+        }
+        self.advance(start, false);
+        let most = (ITERATIONS + MORE_ITERATIONS * (S as f64 - 3.0)).max(4.0) as usize;
+        convergence.most = most;
+        convergence.factor = Scalar::powf(convergence.factor.max(f64::EPSILON), 0.8);
+        convergence.rate = FAST;
+        let (mut last, mut last_rate) = (0.0, 0.0);
+        for iteration in 1..=most {
+            *residuals += S;
+            self.evaluate();
+            let Memory { rows, factors, .. } = &mut *self.memory;
+            factors.solve(rows);
+            let increment = mean(self.advance(start, true), M::Shape::NK * S);
+            convergence.iterations = iteration;
+            if !increment.is_finite() {
+                // A value of the model that is not finite leaves no increment that is.
+                let finite = self.memory.f.iter().all(|f| not_finite(f.as_ref().as_flattened()).is_none());
+                return Err(if finite { Failure::Diverges } else { Failure::NotFinite });
+            }
+            if iteration > 1 && increment <= NOISE && 2.0 * increment >= last {
+                return Ok(());
+            }
+            if iteration > 1 && iteration < most {
+                let rate: f64 = increment / last;
+                convergence.rate = if iteration == 2 { rate } else { Scalar::sqrt(rate * last_rate) };
+                last_rate = rate;
+                // Written so that NaN, after an increment of zero, is no divergence.
+                if convergence.rate >= 0.99 {
+                    return Err(Failure::Diverges);
+                }
+                if convergence.rate.is_finite() {
+                    convergence.factor = convergence.rate / (1.0 - convergence.rate);
+                    let left = (most - 1 - iteration) as i32;
+                    let expected =
+                        convergence.factor * increment * Scalar::powi(convergence.rate, left) / tolerance;
+                    if expected >= 1.0 {
+                        let excess = expected.clamp(1e-4, 20.0);
+                        return Err(Failure::Slow(
+                            0.8 * Scalar::powf(excess, -1.0 / (4.0 + f64::from(left))),
+                        ));
+                    }
+                }
+            }
+            if convergence.factor * increment <= tolerance {
+                return Ok(());
+            }
+            last = increment.max(f64::EPSILON);
+        }
+        Err(Failure::Diverges)
+    }
+
+    fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
+        if !self.tableau.is_stiffly_accurate() {
+            return self.error_at_end(start, residuals);
+        }
+        // What the method misses is how far the derivative of its polynomial, extrapolated to the start of the step,
+        // is from the solution there.
+        self.memory.point = *start.point;
+        for (xdot, k) in self.memory.point.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
+            *xdot = dot(&self.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
+        }
+        self.defect(start.h, residuals)?;
+        let error = norm(self.memory.error.as_ref(), start.scale.as_ref());
+        if !(again && error >= 1.0) {
+            return Ok(error);
+        }
+        let states = &mut self.memory.point.as_mut()[M::Shape::NX..];
+        for (state, error) in states.iter_mut().zip(self.memory.error.as_ref()) {
+            *state = *state + *error;
+        }
+        self.defect(start.h, residuals)?;
+        Ok(norm(self.memory.error.as_ref(), start.scale.as_ref()))
+    }
+
+    fn accept(&mut self) {
+        let Memory { y, accepted, .. } = &mut *self.memory;
+        for (accepted, y) in accepted.as_mut().iter_mut().zip(y.as_ref()) {
+            accepted.copy_from_slice(&y.as_flattened()[..S]);
+        }
+    }
+
+    fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool {
+        if !self.tableau.is_stiffly_accurate() {
+            self.extrapolate(h, point);
+            return false;
+        }
+        // The last lane repeats the last stage, which is the end of the step.
+        let Some(points) = self.memory.points.last() else { return true };
+        for (to, [.., last]) in point.as_mut().iter_mut().zip(points.as_ref()) {
+            *to = *last;
+        }
+        true
+    }
+
+    fn accepted(&self) -> &[T] {
+        self.memory.accepted.as_ref().as_flattened()
+    }
+
+    fn lagrange(&self, theta: f64) -> [f64; MOST] {
+        padded(self.polynomials(theta))
+    }
+
+    fn weights(&self, theta: f64) -> [f64; MOST] {
+        padded(self.tableau.weights(theta))
+    }
+
+    fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error> {
+        Ok(match &mut self.replay {
+            Some(replay) => &mut **replay,
+            none => &mut **none.insert(Box::new(single::<M, B, T, S>()?)),
+        })
+    }
+}
+
+fn padded<const S: usize>(weights: [f64; S]) -> [f64; MOST] {
+    let mut all = [0.0; MOST];
+    for (to, from) in all.iter_mut().zip(weights) {
+        *to = from;
+    }
+    all
+}

@@ -1,0 +1,89 @@
+//! Derivatives of intervals that follow each other, in the directions of all of their controls.
+
+use crate::linalg::axpy;
+use crate::model::Dae;
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+
+/// Where the directions `W = (x₀, u₀, …, u_{N−1}, p)` are.
+pub struct Columns<M> {
+    pub intervals: usize,
+    pub model: core::marker::PhantomData<M>,
+}
+
+impl<M: Dae> Columns<M> {
+    pub fn u(&self, k: usize) -> usize {
+        M::Shape::NX + k * M::Shape::NU
+    }
+
+    pub fn p(&self) -> usize {
+        self.u(self.intervals)
+    }
+
+    pub fn all(&self) -> usize {
+        self.p() + M::Shape::NP
+    }
+
+    /// `next = A V + (B at u_k, C at p)`, row after row.
+    pub fn chain<T: Real>(
+        &self,
+        k: usize,
+        a: &impl Matrix<T>,
+        b: &impl Matrix<T>,
+        c: &impl Matrix<T>,
+        v: &[T],
+        next: &mut [T],
+    ) {
+        let width = self.all();
+        for (r, row) in next.chunks_exact_mut(width).enumerate().take(rows(a)) {
+            row.fill(T::ZERO);
+            for (x, v) in v.chunks_exact(width).enumerate() {
+                axpy(a[(r, x)], v, row);
+            }
+            for (column, element) in row[self.u(k)..].iter_mut().enumerate().take(M::Shape::NU) {
+                *element = *element + b[(r, column)];
+            }
+            for (column, element) in row[self.p()..].iter_mut().enumerate() {
+                *element = *element + c[(r, column)];
+            }
+        }
+    }
+
+    /// `sum += Dᵀ H D`, the product `H D` first.
+    pub fn project<T: Real, R: AsRef<[T]>>(
+        &self,
+        k: usize,
+        h: &[R],
+        v: &[T],
+        product: &mut [T],
+        sum: &mut [T],
+    ) {
+        let (nx, nu, width) = (M::Shape::NX, M::Shape::NU, self.all());
+        // Where a local direction other than a state is.
+        let global = |w: usize| if w < nx + nu { self.u(k) + w - nx } else { self.p() + w - nx - nu };
+        for (row, h) in product.chunks_exact_mut(width).zip(h) {
+            row.fill(T::ZERO);
+            let (states, others) = h.as_ref().split_at(nx);
+            for (h, v) in states.iter().zip(v.chunks_exact(width)) {
+                axpy(*h, v, row);
+            }
+            for (w, h) in others.iter().enumerate() {
+                row[global(nx + w)] = row[global(nx + w)] + *h;
+            }
+        }
+        for (w, row) in product.chunks_exact(width).enumerate() {
+            match v.chunks_exact(width).nth(w) {
+                Some(v) => {
+                    for (v, sum) in v.iter().zip(sum.chunks_exact_mut(width)) {
+                        axpy(*v, row, sum);
+                    }
+                }
+                None => axpy(T::ONE, row, &mut sum[global(w) * width..][..width]),
+            }
+        }
+    }
+}
+
+fn rows<T, A: Matrix<T>>(_: &A) -> usize {
+    A::ROWS
+}

@@ -1,0 +1,156 @@
+//! The loops of a collocation step, compiled for each machine: stages lie side by side in groups of four.
+
+use crate::linalg::{Arithmetic, Complex, Kernel, slot};
+use crate::model::{ArrayK, ArrayV, Dae};
+use crate::scalar::{Lanes, Real, SideBySide};
+use core::marker::PhantomData;
+
+/// How many stages lie side by side.
+pub const GROUP: usize = 4;
+
+/// The stages of an unknown.
+pub type Groups<T, const G: usize> = [[T; GROUP]; G];
+
+/// The residual at four stages in one call.
+pub struct Residual<'a, M: Dae, T: Real> {
+    pub points: &'a ArrayV<M, [T; GROUP]>,
+    pub f: &'a mut ArrayK<M, [T; GROUP]>,
+}
+
+impl<M: Dae, T: Real> SideBySide<T, GROUP> for Residual<'_, M, T> {
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [T; GROUP]>>(self) {
+        M::residual::<R>(self.points, self.f);
+    }
+}
+
+/// `V⁻¹ f` in the slots of the equations.
+pub struct Split<'a, M: Dae, T, const S: usize, const L: usize, const G: usize> {
+    pub left: &'a [Complex<T, L>; S],
+    pub f: [&'a [[T; GROUP]]; G],
+    pub rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+    pub model: PhantomData<M>,
+}
+
+impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for Split<'_, M, T, S, L, G> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { left, f, rows, .. } = self;
+        for equation in 0..rows.len() {
+            let mut values = [[T::ZERO; GROUP]; G];
+            for (values, f) in values.iter_mut().zip(&f) {
+                if let Some(f) = f.get(equation) {
+                    *values = *f;
+                }
+            }
+            let mut sum = Complex::zero();
+            for (left, value) in left.iter().zip(values.as_flattened()) {
+                for l in 0..L {
+                    sum.re[l] = A::subtract(sum.re[l], -left.re[l], *value);
+                    sum.im[l] = A::subtract(sum.im[l], -left.im[l], *value);
+                }
+            }
+            if let Some([[row]]) = rows.get_mut(slot::<M>(equation)) {
+                *row = sum;
+            }
+        }
+    }
+}
+
+/// See [`Collocation::advance`].
+pub struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
+    /// Columns of `−h A`.
+    pub minus_ha: &'a [Groups<T, G>; S],
+    pub right: &'a [[Groups<T, G>; 2]],
+    /// The states at the start of the step.
+    pub x: &'a [T],
+    pub scale: &'a [T],
+    pub rows: &'a [[[Complex<T, L>; 1]; 1]],
+    pub y: &'a mut [Groups<T, G>],
+    pub points: &'a mut [&'b mut [[T; GROUP]]; G],
+}
+
+impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance<'_, '_, T, S, L, G> {
+    type Output = Groups<T, G>;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> Groups<T, G> {
+        let Self { minus_ha, right, x, scale, rows, y, points } = self;
+        let nx = x.len();
+        let mut sums = [[T::ZERO; GROUP]; G];
+        for (index, (unknown, &scale)) in y.iter_mut().zip(scale).enumerate() {
+            // In registers until it is finished.
+            let before = *unknown;
+            let mut y = before;
+            if let Some([[row]]) = rows.get(index) {
+                for (l, [re, im]) in right.iter().enumerate() {
+                    let (real, imaginary) = (row.re[l], -row.im[l]);
+                    for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
+                        for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
+                            *y = A::subtract(A::subtract(*y, *re, real), *im, imaginary);
+                        }
+                    }
+                }
+                *unknown = y;
+            }
+            if let Some(&x) = x.get(index) {
+                let mut xi = [[x; GROUP]; G];
+                for (a, &k) in minus_ha.iter().zip(y.as_flattened()) {
+                    for (xi, a) in xi.iter_mut().zip(a) {
+                        for (xi, a) in xi.iter_mut().zip(a) {
+                            *xi = A::subtract(*xi, *a, k);
+                        }
+                    }
+                }
+                for g in 0..G {
+                    if let Some(k) = points[g].get_mut(index) {
+                        *k = y[g];
+                    }
+                    let Some(state) = points[g].get_mut(nx + index) else { continue };
+                    for i in 0..GROUP {
+                        let relative = (xi[g][i] - state[i]) * scale;
+                        sums[g][i] = A::subtract(sums[g][i], -relative, relative);
+                    }
+                    *state = xi[g];
+                }
+            } else {
+                for g in 0..G {
+                    for i in 0..GROUP {
+                        let relative = (y[g][i] - before[g][i]) * scale;
+                        sums[g][i] = A::subtract(sums[g][i], -relative, relative);
+                    }
+                    if let Some(z) = points[g].get_mut(nx + index) {
+                        *z = y[g];
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
+
+/// The polynomial of the last step at the stages of this one.
+pub struct Continue<'a, T, const S: usize, const G: usize> {
+    /// Columns of its weights.
+    pub weights: [Groups<T, G>; S],
+    pub from: &'a [[T; S]],
+    pub to: &'a mut [Groups<T, G>],
+}
+
+impl<T: Real, const S: usize, const G: usize> Kernel for Continue<'_, T, S, G> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            let mut sum = [[T::ZERO; GROUP]; G];
+            for (weights, &value) in self.weights.iter().zip(from) {
+                for g in 0..G {
+                    for i in 0..GROUP {
+                        sum[g][i] = A::subtract(sum[g][i], -weights[g][i], value);
+                    }
+                }
+            }
+            *to = sum;
+        }
+    }
+}

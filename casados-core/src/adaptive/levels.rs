@@ -1,0 +1,114 @@
+//! The methods of a family, opened when they are needed.
+
+use super::replay::Replay;
+use super::run::{After, Run, Span};
+use super::sealed::{Engine, Family, Kind};
+use super::stages::{MOST, Stages};
+use super::tape::Entry;
+use crate::error::Error;
+use crate::model::{Dae, VectorX};
+use crate::result::Dense;
+use crate::scalar::Real;
+use crate::shape::Matrix;
+use alloc::boxed::Box;
+
+/// The levels of a family that are in use.
+pub struct Levels<M: Dae, T: Real> {
+    open: [Option<Box<dyn Stages<M, T> + Send + Sync>>; 3],
+}
+
+impl<M: Dae, T: Real> Default for Levels<M, T> {
+    fn default() -> Self {
+        Self { open: [None, None, None] }
+    }
+}
+
+impl<M: Dae, T: Real> Levels<M, T> {
+    pub fn get<B: Family>(&mut self, level: usize) -> Result<&mut dyn Stages<M, T>, Error> {
+        let missing = Error::OutOfMemory { bytes: 0 };
+        let place = self.open.get_mut(level).ok_or(missing)?;
+        if place.is_none() {
+            *place = Some(B::open::<M, T>(level)?);
+        }
+        match place {
+            Some(stages) => Ok(&mut **stages),
+            None => Err(missing),
+        }
+    }
+
+    /// The last accepted step of one level becomes that of another.
+    pub fn change<B: Family>(&mut self, from: usize, to: usize) -> Result<(), Error> {
+        self.get::<B>(from)?;
+        self.get::<B>(to)?;
+        let [first, second, third] = &mut self.open;
+        let (old, new) = match (from, to) {
+            (0, 1) => (first, second),
+            (1, 0) => (second, first),
+            (1, 2) => (second, third),
+            (2, 1) => (third, second),
+            _ => return Ok(()),
+        };
+        if let (Some(old), Some(new)) = (old, new) {
+            new.adopt(&**old);
+        }
+        Ok(())
+    }
+}
+
+/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
+pub(super) fn interpolate<M: Dae, T: Real>(
+    stages: &dyn Stages<M, T>,
+    x: &[T],
+    y: &[T],
+    passed: T,
+    h: T,
+    dense: &mut Dense<M, T>,
+) {
+    let theta = (passed / h).to_f64();
+    let (weights, lagrange) = (stages.weights(theta), stages.lagrange(theta));
+    let sum = |weights: &[f64; MOST], y: &[T]| {
+        weights.iter().zip(y).fold(T::ZERO, |sum, (weight, y)| sum + T::from_f64(*weight) * *y)
+    };
+    let mut unknowns = y.chunks_exact(stages.count());
+    for ((to, x), k) in dense.x.as_mut_slice().iter_mut().zip(x).zip(&mut unknowns) {
+        *to = *x + h * sum(&weights, k);
+    }
+    for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
+        *to = sum(&lagrange, z);
+    }
+}
+
+impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
+    type State = Levels<M, T>;
+}
+
+impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
+    const ENDS_ON_STAGE: bool = B::ENDS_ON_STAGE;
+
+    fn integrate(
+        state: &mut Self::State,
+        run: &mut Run<'_, M, T>,
+        x0: &VectorX<M, T>,
+        span: Span<T>,
+        after: After<'_, M, T>,
+    ) -> Result<(), Error> {
+        run.integrate::<B>(state, x0, span, after)
+    }
+
+    fn interpolate(
+        state: &mut Self::State,
+        _: &[T],
+        entry: &Entry<T>,
+        (x, y): (&[T], &[T]),
+        t: T,
+        dense: &mut Dense<M, T>,
+    ) -> Result<(), Error> {
+        let stages = state.get::<B>(entry.level)?;
+        interpolate(stages, x, y, t - entry.t, entry.h, dense);
+        Ok(())
+    }
+
+    fn replay(state: &mut Self::State, level: usize) -> Result<&mut dyn Replay<M, T>, Error> {
+        state.get::<B>(level)?.replay()
+    }
+}
