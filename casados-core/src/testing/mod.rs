@@ -25,6 +25,7 @@ mod points;
 mod report;
 mod sensitivities;
 
+pub use crate::scalar::lanes::{Level, limit};
 pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};

@@ -258,7 +258,8 @@ pub(crate) use blocks;
 static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);
 const UNKNOWN: u8 = u8::MAX;
 
-/// For tests: from now on no calculation of the process uses wider registers than these.
+/// For tests: from now on no calculation of the process uses wider registers than these, nor such as the machine does
+/// not have.
 pub fn limit(limit: Level) {
     LEVEL.store(widest(limit) as u8, Ordering::Relaxed);
 }
