@@ -62,11 +62,12 @@ pub fn markdown(all: &[Measured]) -> String {
                 ),
                 Err(_) => "fails | – | – | –".into(),
             };
-            let _ = writeln!(
-                text,
-                "| {}{with} | {} | {:.0e} | {rest} |",
-                measured.title, run.solver, run.accuracy
-            );
+            let accuracy = if run.accuracy > 1.0 {
+                format!("{} steps", run.accuracy)
+            } else {
+                format!("{:.0e}", run.accuracy)
+            };
+            let _ = writeln!(text, "| {}{with} | {} | {accuracy} | {rest} |", measured.title, run.solver);
         }
     }
     text
