@@ -313,18 +313,23 @@ fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, con
     let mut terms = M::STRUCTURE.symmetric.iter().peekable();
     while let Some(term) = terms.next() {
         if let (Some(values), Some(d)) = (entries.get(term.entry as usize), d.get(term.column as usize)) {
-            for ((packet, &value), d) in packet.iter_mut().zip(&values[stage..]).zip(&d[stage..]) {
+            for ((packet, &value), d) in packet.iter_mut().zip(from(values, stage)).zip(from(d, stage)) {
                 A::subtract_row(packet, -value, d);
             }
         }
         if terms.peek().is_none_or(|next| next.row != term.row) {
-            if let Some(to) = g.get_mut(term.row as usize) {
-                for (to, packet) in to[stage..].iter_mut().zip(&mut packet) {
-                    *to = core::mem::replace(packet, [E::from_f64(0.0); W]);
-                }
+            let rows = g.get_mut(term.row as usize).and_then(|rows| rows.get_mut(stage..));
+            for (to, packet) in rows.unwrap_or_default().iter_mut().zip(&mut packet) {
+                *to = core::mem::replace(packet, [E::from_f64(0.0); W]);
             }
         }
     }
+}
+
+/// The stages from one of them on.
+#[inline(always)]
+fn from<V>(stages: &[V], first: usize) -> &[V] {
+    stages.get(first..).unwrap_or_default()
 }
 
 /// `sum −= Dᵀ G` for the panels of `D` and `G` that begin with a row and a column; each tile is in registers while it goes

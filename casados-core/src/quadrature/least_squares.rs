@@ -1,5 +1,8 @@
 //! Half of the integral of a weighted square, and the matrix of Gauss and Newton.
 
+// What the derive of `Zeroable` writes about the field `value`.
+#![allow(clippy::multiple_bound_locations)]
+
 use super::memory::{ArrayW, Memory};
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
@@ -31,8 +34,6 @@ use bytemuck::Zeroable;
 /// What a call does not compute is zero after it. After an error the values mean nothing.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-// What the derive writes about the field `value`.
-#[allow(clippy::multiple_bound_locations)]
 pub struct LeastSquares<F: Function, T: Plain = f64> {
     /// `φ`
     pub value: T,
