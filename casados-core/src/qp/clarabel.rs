@@ -155,7 +155,7 @@ impl QpSolver<f64> for Clarabel {
         solver.solve();
         let found = &solver.solution;
         let SolutionView { v, dynamics, lower, upper, .. } = solution;
-        for (place, &column) in Places::new::<f64>(qp.dims()).zip(&sparse.columns) {
+        for (place, &column) in Places::<f64>::new(qp.dims()).zip(&sparse.columns) {
             let from = found.x.get(column..column + place.n).unwrap_or_default();
             for (v, &x) in v.get_mut(place.v..).unwrap_or_default().iter_mut().zip(from) {
                 *v = x;
@@ -221,7 +221,7 @@ fn infeasible(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
     }
     let (_, row, side) = largest;
     let place =
-        Places::new::<f64>(qp.dims()).find(|p| (p.row..p.row + p.rows).contains(&row)).unwrap_or_default();
+        Places::<f64>::new(qp.dims()).find(|p| (p.row..p.row + p.rows).contains(&row)).unwrap_or_default();
     let (field, index) = place.name(row - place.row);
     QpError::Infeasible { field, stage: place.stage, index, side, violation }
 }

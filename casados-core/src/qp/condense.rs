@@ -13,7 +13,7 @@
 
 use super::error::{Field, QpError};
 use super::interior::{Columns, MORE, Part, Source, add_transposed, product, subtract};
-use super::layout::{Place, Places, StageDims, pad, part, part_mut};
+use super::layout::{Place, Places, StageDims, assign, pad, part, part_mut};
 use super::memory::reserve;
 use super::problem::{HeapQp, QpView, Row};
 use super::solution::{HeapSolution, SolutionView};
@@ -106,7 +106,7 @@ impl<T: Real, S> Condensing<T, S> {
         let stages = self.dims.try_reserve(qp.dims.len());
         let most = qp.dims.iter().map(|d| d.nx + d.ng).sum();
         stages.and(self.rows.try_reserve(most)).map_err(|_| QpError::OutOfMemory { bytes: most })?;
-        let mut places = Places::new::<T>(qp.dims);
+        let mut places = Places::<T>::new(qp.dims);
         for block in blocks(qp.dims.len(), self.block) {
             let mut condensed = StageDims::default();
             for stage in block.clone() {
@@ -163,8 +163,7 @@ struct Largest {
 
 impl<'a, T: Real> Work<'a, T> {
     fn lengths(largest: &Largest) -> [usize; 10] {
-        let bytes = size_of::<T>();
-        let (ld, ld_x, ld_z) = (pad(largest.n, bytes), pad(largest.nx, bytes), pad(largest.rows, bytes));
+        let (ld, ld_x, ld_z) = (pad::<T>(largest.n), pad::<T>(largest.nx), pad::<T>(largest.rows));
         let n = largest.n + MORE;
         [ld_z * n, ld_z * n, ld_x * n, ld * n, ld * n, ld * n, ld_z, ld, ld, ld_x]
     }
@@ -183,7 +182,7 @@ impl<'a, T: Real> Work<'a, T> {
             g: next(),
             g_next: next(),
             offset: next(),
-            ld_z: pad(largest.rows, size_of::<T>()),
+            ld_z: pad::<T>(largest.rows),
         }
     }
 }
@@ -204,7 +203,7 @@ impl<T: Real> Registers<T> for Condense<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(mut self) {
         let mut rows = self.rows;
-        let targets = Places::new::<T>(self.dims);
+        let targets = Places::<T>::new(self.dims);
         for (block, to) in blocks(self.qp.dims.len(), self.block).zip(targets) {
             let (here, others) = rows.split_at_checked(to.ng).unwrap_or_default();
             rows = others;
@@ -224,7 +223,7 @@ impl<T: Real> Condense<'_, T> {
         origins.clear();
         let mut controls = 0;
         let mut first = true;
-        let stages = Places::new::<T>(self.qp.dims).skip(block.start).take(block.len());
+        let stages = Places::<T>::new(self.qp.dims).skip(block.start).take(block.len());
         for place in stages.rev() {
             let Place { nx, nu, n, ld, next, ld_next, stage, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
@@ -248,7 +247,7 @@ impl<T: Real> Condense<'_, T> {
                     set(constant, i, b.get(i).copied().unwrap_or(T::ZERO));
                 }
                 let hessian = part(data, place.matrix(), place.hessian());
-                part_mut(m, 0, hessian.len()).copy_from_slice(hessian);
+                assign(part_mut(m, 0, hessian.len()), hessian);
             } else {
                 // g + V b, and constants + Z b
                 for (offset, &b) in offset.iter_mut().zip(b) {
@@ -316,7 +315,7 @@ impl<T: Real> Condense<'_, T> {
             }
             // What is left is a function of this stage's state.
             core::mem::swap(z, z_next);
-            let ld_x = pad(nx, size_of::<T>());
+            let ld_x = pad::<T>(nx);
             for j in 0..nx {
                 for i in j..nx {
                     let element = get(m, j * ld + i);
@@ -324,7 +323,7 @@ impl<T: Real> Condense<'_, T> {
                     set(v, i * ld_x + j, element);
                 }
             }
-            part_mut(g, 0, nx).copy_from_slice(part(g_next, 0, nx));
+            assign(part_mut(g, 0, nx), part(g_next, 0, nx));
             part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
             if stage == block.start {
                 for j in 0..nx {
@@ -387,11 +386,11 @@ fn copy<T: Real>(
     expand: bool,
 ) {
     let mut rows = rows;
-    for (block, to) in blocks(qp.dims.len(), block).zip(Places::new::<T>(condensed.dims)) {
+    for (block, to) in blocks(qp.dims.len(), block).zip(Places::<T>::new(condensed.dims)) {
         let (here, others) = rows.split_at_checked(to.ng).unwrap_or_default();
         rows = others;
         let mut controls = to.nx + to.nu;
-        for place in Places::new::<T>(qp.dims).skip(block.start).take(block.len()) {
+        for place in Places::<T>::new(qp.dims).skip(block.start).take(block.len()) {
             controls -= place.nu.min(controls);
             let states = if place.stage == block.start { place.nx } else { 0 };
             let pairs =
@@ -438,16 +437,16 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { qp, block, solution: SolutionView { v, dynamics, lower, upper, .. }, minus, g } = self;
         let inside = |stage: usize| !stage.is_multiple_of(block) && stage + 1 < qp.dims.len();
-        for place in Places::new::<T>(qp.dims).filter(|place| inside(place.stage + 1)) {
+        for place in Places::<T>::new(qp.dims).filter(|place| inside(place.stage + 1)) {
             let Place { n, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let (here, coming) = v.split_at_mut_checked(place.v + ld).unwrap_or_default();
             let coming = part_mut(coming, 0, next);
-            coming.copy_from_slice(part(data, place.offset(), coming.len()));
+            assign(coming, part(data, place.offset(), next));
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
             add_transposed::<T, E>(coming, matrix, part(here, place.v, ld), n, next);
         }
-        for place in Places::new::<T>(qp.dims).rev().filter(|place| inside(place.stage)) {
+        for place in Places::<T>::new(qp.dims).rev().filter(|place| inside(place.stage)) {
             let Place { nx, n, ng, ld, next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -473,8 +472,8 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
                 *minus = lower - upper;
             }
             subtract::<T, E>(g, matrix, minus, n, next + ng);
-            let before = place.dynamics.saturating_sub(pad(nx, size_of::<T>()));
-            part_mut(dynamics, before, nx).copy_from_slice(part(g, 0, nx));
+            let before = place.dynamics.saturating_sub(pad::<T>(nx));
+            assign(part_mut(dynamics, before, nx), part(g, 0, nx));
         }
     }
 }
@@ -495,15 +494,14 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         else {
             return Err(QpError::OutOfMemory { bytes: 0 });
         };
-        let places = Places::new::<T>(qp.dims);
+        let places = Places::<T>::new(qp.dims);
         let largest = Largest {
             n: places.clone().map(|p| p.n).max().unwrap_or(0),
             nx: places.clone().map(|p| p.nx).max().unwrap_or(0),
-            rows: Places::new::<T>(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
+            rows: Places::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
         };
-        let most = places.map(|p| pad(p.next + p.ng, size_of::<T>())).max().unwrap_or(0);
-        let length =
-            Work::<T>::lengths(&largest).iter().sum::<usize>() + most + pad(largest.n, size_of::<T>());
+        let most = places.map(|p| pad::<T>(p.next + p.ng)).max().unwrap_or(0);
+        let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + most + pad::<T>(largest.n);
         reserve(work, length)?;
         origins.clear();
         origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes: largest.rows })?;
@@ -535,7 +533,7 @@ fn translate<T: Real>(
             Field::GeneralBounds => {
                 let before = dims.get(..stage)?.iter().map(|d| d.ng).sum::<usize>();
                 let origin = rows.get(before + index)?;
-                let place = Places::new::<T>(qp.dims).nth(origin.stage)?;
+                let place = Places::<T>::new(qp.dims).nth(origin.stage)?;
                 let (field, index) = place.name(origin.index);
                 Some((origin.stage, field, index))
             }

@@ -4,6 +4,7 @@
 //! multiple of [`pad`] numbers, so that whole registers can be read from it. What is padding is zero.
 
 use core::iter::FusedIterator;
+use core::marker::PhantomData;
 
 /// The dimensions of one stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -24,10 +25,10 @@ impl StageDims {
     }
 }
 
-/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of `bytes` bytes.
+/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of type `T`.
 #[must_use]
-pub(crate) const fn pad(n: usize, bytes: usize) -> usize {
-    let width = 64 / bytes;
+pub(crate) const fn pad<T>(n: usize) -> usize {
+    let width = 64 / size_of::<T>();
     n.div_ceil(width) * width
 }
 
@@ -67,9 +68,9 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    const fn new(stage: usize, dims: StageDims, next: usize, bytes: usize) -> Self {
+    const fn new<T>(stage: usize, dims: StageDims, next: usize) -> Self {
         let n = dims.nx + dims.nu;
-        let ld = pad(n, bytes);
+        let ld = pad::<T>(n);
         Self {
             stage,
             nx: dims.nx,
@@ -78,8 +79,8 @@ impl Place {
             next,
             n,
             ld,
-            ld_next: pad(next, bytes),
-            rows: ld + pad(dims.ng, bytes),
+            ld_next: pad::<T>(next),
+            rows: ld + pad::<T>(dims.ng),
             // The first state is eliminated like a control where it is not given.
             pivots: if stage == 0 { n } else { dims.nu },
             data: 0,
@@ -147,34 +148,34 @@ impl Place {
 
 /// The places of all stages, forwards or backwards.
 #[derive(Clone, Debug)]
-pub(crate) struct Places<'a> {
+pub(crate) struct Places<'a, T> {
     dims: &'a [StageDims],
     /// How many stages were taken from the front.
     taken: usize,
     /// States behind the last stage that is left.
     next: usize,
-    bytes: usize,
+    number: PhantomData<T>,
     front: Place,
     back: Place,
 }
 
-impl<'a> Places<'a> {
+impl<'a, T> Places<'a, T> {
     /// Those of stages with numbers of type `T`.
-    pub fn new<T>(dims: &'a [StageDims]) -> Self {
+    pub fn new(dims: &'a [StageDims]) -> Self {
         let back = end::<T>(dims);
         let front = Place::default();
-        Self { dims, taken: 0, next: 0, bytes: size_of::<T>(), front, back }
+        Self { dims, taken: 0, next: 0, number: PhantomData, front, back }
     }
 }
 
-impl Iterator for Places<'_> {
+impl<T> Iterator for Places<'_, T> {
     type Item = Place;
 
     #[inline]
     fn next(&mut self) -> Option<Place> {
         let (&first, rest) = self.dims.split_first()?;
         let next = rest.first().map_or(self.next, |dims| dims.nx);
-        let place = Place::new(self.taken, first, next, self.bytes).after(&self.front);
+        let place = Place::new::<T>(self.taken, first, next).after(&self.front);
         (self.dims, self.front, self.taken) = (rest, place, self.taken + 1);
         Some(place)
     }
@@ -183,30 +184,30 @@ impl Iterator for Places<'_> {
     }
 }
 
-impl DoubleEndedIterator for Places<'_> {
+impl<T> DoubleEndedIterator for Places<'_, T> {
     #[inline]
     fn next_back(&mut self) -> Option<Place> {
         let (&last, rest) = self.dims.split_last()?;
-        let place = Place::new(self.taken + rest.len(), last, self.next, self.bytes).before(&self.back);
+        let place = Place::new::<T>(self.taken + rest.len(), last, self.next).before(&self.back);
         (self.dims, self.back, self.next) = (rest, place, last.nx);
         Some(place)
     }
 }
 
-impl ExactSizeIterator for Places<'_> {}
-impl FusedIterator for Places<'_> {}
+impl<T> ExactSizeIterator for Places<'_, T> {}
+impl<T> FusedIterator for Places<'_, T> {}
 
 /// The place behind the last stage: its begins are the lengths of the arrays of the horizon.
 pub(crate) const fn end<T>(dims: &[StageDims]) -> Place {
     let mut rest = dims;
-    let mut place = Place::new(0, StageDims::new(0, 0, 0), 0, size_of::<T>());
+    let mut place = Place::new::<T>(0, StageDims::new(0, 0, 0), 0);
     let mut stage = 0;
     while let Some((&first, after)) = rest.split_first() {
         let next = match after.first() {
             Some(dims) => dims.nx,
             None => 0,
         };
-        place = Place::new(stage, first, next, size_of::<T>()).after(&place);
+        place = Place::new::<T>(stage, first, next).after(&place);
         stage += 1;
         rest = after;
     }
@@ -225,6 +226,24 @@ pub(crate) fn part_mut<T>(slice: &mut [T], begin: usize, length: usize) -> &mut 
     slice.get_mut(begin..).and_then(|rest| rest.get_mut(..length)).unwrap_or_default()
 }
 
+/// Copies what both have.
+#[inline(always)]
+pub(crate) fn assign<T: Copy>(target: &mut [T], source: &[T]) {
+    for (target, &source) in target.iter_mut().zip(source) {
+        *target = source;
+    }
+}
+
+/// Copies a part of a slice to an earlier place.
+pub(crate) fn move_forward<T: Copy>(slice: &mut [T], from: usize, to: usize, length: usize) {
+    for i in 0..length {
+        let value = slice.get(from + i).copied();
+        if let (Some(target), Some(value)) = (slice.get_mut(to + i), value) {
+            *target = value;
+        }
+    }
+}
+
 /// The first numbers of a slice, which loses them.
 #[inline(always)]
 pub(crate) fn take_mut<'a, T>(rest: &mut &'a mut [T], length: usize) -> &'a mut [T] {
@@ -241,8 +260,8 @@ mod tests {
     fn backwards_is_forwards_reversed() {
         let dims = [(3, 2, 0), (9, 1, 4), (2, 12, 1), (5, 0, 2)].map(|(x, u, g)| StageDims::new(x, u, g));
         let parts = |p: Place| [p.stage, p.n, p.next, p.data, p.v, p.dynamics, p.row, p.factor];
-        let forwards: alloc::vec::Vec<_> = Places::new::<f32>(&dims).map(parts).collect();
-        let mut backwards: alloc::vec::Vec<_> = Places::new::<f32>(&dims).rev().map(parts).collect();
+        let forwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).map(parts).collect();
+        let mut backwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).rev().map(parts).collect();
         backwards.reverse();
         assert_eq!(forwards, backwards);
         assert_eq!(forwards.iter().map(|p| p[2]).collect::<alloc::vec::Vec<_>>(), [9, 2, 5, 0]);

@@ -2,7 +2,7 @@
 
 use super::block::{Block, BlockMut, Shape};
 use super::error::{Field, QpError};
-use super::layout::{Place, Places, StageDims, end, part, part_mut};
+use super::layout::{Place, Places, StageDims, assign, end, part, part_mut};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -317,7 +317,7 @@ impl<'a, T: Real> QpView<'a, T> {
     /// All stages, in order.
     pub fn stages(&self) -> impl DoubleEndedIterator<Item = Stage<'a, T>> + ExactSizeIterator + use<'a, T> {
         let data = self.data;
-        Places::new::<T>(self.dims)
+        Places::<T>::new(self.dims)
             .map(move |place| Stage { place, data: part(data, place.data, place.data_len()) })
     }
 }
@@ -375,7 +375,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     }
     /// A stage, to be written.
     pub fn stage_mut(&mut self, stage: usize) -> Option<StageMut<'_, T>> {
-        let place = Places::new::<T>(self.dims.as_ref()).nth(stage)?;
+        let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(StageMut { place, data: part_mut(self.memory.as_mut(), place.data, place.data_len()) })
     }
     /// All stages, in order, to be written.
@@ -398,8 +398,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         if expected != found {
             return Err(QpError::Dimension { field: Field::StateBounds, stage: 0, expected, found });
         }
-        bounds.lower.copy_from_slice(x0);
-        bounds.upper.copy_from_slice(x0);
+        assign(bounds.lower, x0);
+        assign(bounds.upper, x0);
         Ok(())
     }
 }
@@ -409,7 +409,7 @@ pub(super) fn stages_mut<'a, T: Real>(
     dims: &'a [StageDims],
     mut data: &'a mut [T],
 ) -> impl Iterator<Item = StageMut<'a, T>> {
-    Places::new::<T>(dims)
+    Places::<T>::new(dims)
         .map(move |place| StageMut { place, data: super::layout::take_mut(&mut data, place.data_len()) })
 }
 

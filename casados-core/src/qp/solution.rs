@@ -1,7 +1,7 @@
 //! Solutions: variables and multipliers.
 
 use super::error::{Field, QpError};
-use super::layout::{Place, Places, StageDims, end, part, part_mut, take_mut};
+use super::layout::{Place, Places, StageDims, end, move_forward, part, part_mut, take_mut};
 use super::problem::QpView;
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -146,7 +146,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         let dynamics = part(memory, end.v, end.dynamics);
         let lower = part(memory, end.v + end.dynamics, end.row);
         let upper = part(memory, end.v + end.dynamics + end.row, end.row);
-        Places::new::<T>(dims).map(move |p| SolutionStage {
+        Places::<T>::new(dims).map(move |p| SolutionStage {
             x: part(v, p.v, p.nx),
             u: part(v, p.v + p.nx, p.nu),
             dynamics: part(dynamics, p.dynamics, p.next),
@@ -160,22 +160,22 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     }
     /// A stage, to be written.
     pub fn stage_mut(&mut self, stage: usize) -> Option<SolutionStageMut<'_, T>> {
-        let place = Places::new::<T>(self.dims.as_ref()).nth(stage)?;
+        let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(self.view_mut().into_stage(place))
     }
     /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last stages stay as they
     /// are. Stages of different dimensions are not shifted into each other.
     pub fn shift(&mut self) {
         let SolutionView { dims, v, dynamics, lower, upper } = self.view_mut();
-        let places = Places::new::<T>(dims);
+        let places = Places::<T>::new(dims);
         for (here, there) in places.clone().zip(places.skip(1)) {
             if (here.nx, here.nu, here.ng) == (there.nx, there.nu, there.ng) {
-                v.copy_within(there.v..there.v + there.ld, here.v);
-                lower.copy_within(there.row..there.row + there.rows, here.row);
-                upper.copy_within(there.row..there.row + there.rows, here.row);
+                move_forward(v, there.v, here.v, there.ld);
+                move_forward(lower, there.row, here.row, there.rows);
+                move_forward(upper, there.row, here.row, there.rows);
             }
             if here.next == there.next {
-                dynamics.copy_within(there.dynamics..there.dynamics + there.ld_next, here.dynamics);
+                move_forward(dynamics, there.dynamics, here.dynamics, there.ld_next);
             }
         }
     }

@@ -114,7 +114,7 @@ impl Sparse {
         for (stage, &column) in qp.stages().zip(&sparse.columns) {
             cost(&mut sparse.p, &mut sparse.q, &stage, column);
         }
-        for (k, (stage, place)) in qp.stages().zip(Places::new::<f64>(qp.dims())).enumerate() {
+        for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
             let (Some(&here), next) = (sparse.columns.get(k), sparse.columns.get(k + 1).copied()) else {
                 break;
             };
@@ -134,7 +134,7 @@ impl Sparse {
         }
         // Equations before inequalities, and these before cones.
         for pass in 0..2 {
-            for (k, (stage, place)) in qp.stages().zip(Places::new::<f64>(qp.dims())).enumerate() {
+            for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
                 let Some(&column) = sparse.columns.get(k) else { break };
                 let kinds = [stage.x_bounds(), stage.u_bounds(), stage.g_bounds()];
                 for (index, (bounds, i)) in
@@ -161,7 +161,7 @@ impl Sparse {
             let (Some(stage), Some(&column)) = (qp.stage(cone.stage), sparse.columns.get(cone.stage)) else {
                 continue;
             };
-            let Some(place) = Places::new::<f64>(qp.dims()).nth(cone.stage) else { continue };
+            let Some(place) = Places::<f64>::new(qp.dims()).nth(cone.stage) else { continue };
             for general in cone.first..cone.first + cone.count {
                 let lower = stage.g_bounds().lower.get(general).copied().unwrap_or(0.0);
                 let row = sparse.row(Origin::Cone(place.row + place.ld + general), -lower);

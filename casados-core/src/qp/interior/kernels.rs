@@ -426,7 +426,7 @@ mod tests {
 
     /// Small integers, of which sums are exact, in columns of `rows`.
     fn integers(rows: usize, columns: usize, seed: usize) -> Vec<f64> {
-        let ld = pad(rows, 8);
+        let ld = pad::<f64>(rows);
         (0..ld * columns)
             .map(|i| if i % ld < rows { ((i * 7 + seed * 13) % 11) as f64 - 5.0 } else { 0.0 })
             .collect()
@@ -439,7 +439,7 @@ mod tests {
             for columns in 1..14 {
                 for depth in 0..5 {
                     for part in [Part::Full, Part::Lower] {
-                        let (ld, ld_y) = (pad(rows, 8), pad(columns, 8));
+                        let (ld, ld_y) = (pad::<f64>(rows), pad::<f64>(columns));
                         let (x, y) = (integers(rows, depth, 1), integers(columns, depth, 2));
                         let before = integers(rows, columns + MORE, 3);
                         let mut target = before.clone();

@@ -7,7 +7,7 @@ use super::vector::{
     add_scaled, dot, largest_negative_product, largest_negative_ratio, largest_product, largest_size, shrink,
 };
 use crate::qp::error::QpError;
-use crate::qp::layout::{Place, Places, StageDims, end, pad, part, part_mut, take_mut};
+use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
@@ -94,7 +94,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
         let mut objective = T::ZERO;
-        for place in Places::new::<T>(self.qp.dims).rev() {
+        for place in Places::<T>::new(self.qp.dims).rev() {
             let Place { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -122,7 +122,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             subtract::<T, E>(g, matrix, minus, n, next + ng);
             if place.stage > 0 {
                 // π is what makes this part zero.
-                let before = place.dynamics.saturating_sub(pad(nx, size_of::<T>()));
+                let before = place.dynamics.saturating_sub(pad::<T>(nx));
                 for (pi, g) in part_mut(multipliers, before, nx).iter_mut().zip(part_mut(g, 0, nx)) {
                     *pi = *g;
                     *g = T::ZERO;
@@ -130,7 +130,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             } else if self.first == First::Fixed {
                 // What is left is the multiplier of the given state.
                 let given = part_mut(g, 0, nx);
-                part_mut(self.initial, 0, nx).copy_from_slice(given);
+                assign(part_mut(self.initial, 0, nx), given);
                 given.fill(T::ZERO);
             }
         }
@@ -141,7 +141,7 @@ impl<'a, T: Real> Iterate<'a, T> {
     #[inline(always)]
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
         let mut rest = &mut *self.v;
-        for place in Places::new::<T>(self.qp.dims) {
+        for place in Places::<T>::new(self.qp.dims) {
             let Place { n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -203,7 +203,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let weight = Self::equation_weight();
         let sides = &mut self.sides;
         sides.push(factor);
-        self.gradient.copy_from_slice(self.stationarity);
+        assign(self.gradient, self.stationarity);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
         let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
         scatter(self.gradient, lower, of_lower, |g, &push| g + push);
@@ -250,7 +250,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         }
         if self.riccati.regularised > 0 {
             // A pivot that was made larger is a force that keeps its variable where it is.
-            for place in Places::new::<T>(self.qp.dims) {
+            for place in Places::<T>::new(self.qp.dims) {
                 let added = self.riccati.added.get(place.v..).unwrap_or_default();
                 let step = part(self.step, place.row, place.n);
                 let residual = part_mut(self.stationarity, place.row, place.n);

@@ -13,7 +13,7 @@ use super::kernels::{
     Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column,
 };
 use crate::qp::error::QpError;
-use crate::qp::layout::{Place, Places, StageDims, end, pad, part, part_mut, take_mut};
+use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
@@ -77,7 +77,7 @@ impl Largest {
             largest.next_and_ng = max(largest.next_and_ng, next + first.ng);
             rest = after;
         }
-        largest.ld = pad(largest.n, size_of::<T>());
+        largest.ld = pad::<T>(largest.n);
         largest
     }
 }
@@ -91,8 +91,8 @@ impl<'a, T: Real> Riccati<'a, T> {
     pub const fn memory(dims: &[StageDims]) -> usize {
         let (largest, end) = (Largest::of::<T>(dims), end::<T>(dims));
         let Largest { n, ld, nx, next_and_ng } = largest;
-        let matrices = ld * (n + MORE) + ld * (next_and_ng + MORE) + pad(nx, size_of::<T>()) * (nx + MORE);
-        matrices + end.factor + 3 * end.v + end.dynamics + ld + pad(next_and_ng, size_of::<T>())
+        let matrices = ld * (n + MORE) + ld * (next_and_ng + MORE) + pad::<T>(nx) * (nx + MORE);
+        matrices + end.factor + 3 * end.v + end.dynamics + ld + pad::<T>(next_and_ng)
     }
     /// In memory that is zero.
     pub fn new(dims: &[StageDims], memory: &mut &'a mut [T]) -> Self {
@@ -100,14 +100,14 @@ impl<'a, T: Real> Riccati<'a, T> {
         Self {
             m: take_mut(memory, ld * (n + MORE)),
             w: take_mut(memory, ld * (next_and_ng + MORE)),
-            p: take_mut(memory, pad(nx, size_of::<T>()) * (nx + MORE)),
+            p: take_mut(memory, pad::<T>(nx) * (nx + MORE)),
             panels: take_mut(memory, end.factor),
             inverse: take_mut(memory, end.v),
             added: take_mut(memory, end.v),
             y: take_mut(memory, end.v),
             offset: take_mut(memory, end.dynamics),
             g: take_mut(memory, ld),
-            minus: take_mut(memory, pad(next_and_ng, size_of::<T>())),
+            minus: take_mut(memory, pad::<T>(next_and_ng)),
             regularised: 0,
             largest: T::ZERO,
         }
@@ -173,7 +173,7 @@ impl<T: Real> Riccati<'_, T> {
             self.regularised = 0;
             self.largest = T::ZERO;
         }
-        for place in Places::new::<T>(qp.dims).rev() {
+        for place in Places::<T>::new(qp.dims).rev() {
             let Place { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };
@@ -195,7 +195,7 @@ impl<T: Real> Riccati<'_, T> {
                 self.factor_stage::<E>(&place, first, data, part(weights, place.row, place.rows))?;
             }
             let g = part_mut(self.g, 0, ld);
-            g.copy_from_slice(part(gradient, place.row, g.len()));
+            assign(g, part(gradient, place.row, ld));
             subtract::<T, E>(g, matrix, self.minus, n, next + ng);
             let panel = part(self.panels, place.factor, ld * place.pivots);
             let inverse = part(self.inverse, place.v, ld);
@@ -251,7 +251,7 @@ impl<T: Real> Riccati<'_, T> {
             }
         }
         let mut largest = self.largest;
-        for (diagonal, &weight) in self.m.iter_mut().step_by(ld + 1).zip(weights).take(n) {
+        for (diagonal, &weight) in self.m.iter_mut().step_by((ld + 1).max(1)).zip(weights).take(n) {
             *diagonal = *diagonal + weight;
             largest = diagonal.abs().max(largest);
         }
@@ -265,12 +265,12 @@ impl<T: Real> Riccati<'_, T> {
         let not_convex = |index: usize, pivot: T| QpError::NotConvex { stage, index, pivot: pivot.to_f64() };
         self.regularised += cholesky::<T, E>(panel, ld, nx, n, pivots).map_err(|(i, p)| not_convex(i, p))?;
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
-        part_mut(kept, 0, nu * ld).copy_from_slice(panel);
+        assign(part_mut(kept, 0, nu * ld), panel);
         if stage == 0 && first == First::Fixed {
             return Ok(());
         }
         let panel = Columns { data: part(kept, 0, nu * ld), ld };
-        let ld_x = pad(nx, size_of::<T>());
+        let ld_x = pad::<T>(nx);
         let source = Source::Matrix(Columns { data: before, ld });
         product::<T, E>(self.p, ld_x, source, panel, panel, (nx, 0..nx, nu), Part::Lower);
         if stage > 0 {
@@ -293,7 +293,7 @@ impl<T: Real> Riccati<'_, T> {
     fn forward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, step: &mut [T]) {
         let Equations { qp, first, dynamics, .. } = *equations;
         let mut rest = step;
-        for place in Places::new::<T>(qp.dims) {
+        for place in Places::<T>::new(qp.dims) {
             let Place { nx, nu, n, ng, ld, next, .. } = place;
             let here = take_mut(&mut rest, place.rows);
             let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
@@ -304,19 +304,19 @@ impl<T: Real> Riccati<'_, T> {
             if place.stage == 0 {
                 v.fill(T::ZERO);
                 if first == First::Free {
-                    part_mut(v, 0, nx).copy_from_slice(part(y, 0, nx));
+                    assign(part_mut(v, 0, nx), part(y, 0, nx));
                     let panel = panel.get(nu * ld..).unwrap_or_default();
                     substitute(part_mut(v, 0, nx), panel, ld, 0, part(inverse, 0, nx));
                 }
             }
             part_mut(v, nx, nu).fill(T::ZERO);
             let u = part_mut(self.g, 0, nu);
-            u.copy_from_slice(part(y, nx, nu));
+            assign(u, part(y, nx, nu));
             add_transposed::<T, E>(u, Columns { data: panel, ld }, v, nx, nu);
             substitute(u, panel, ld, nx, part(inverse, nx, nu));
-            part_mut(v, nx, nu).copy_from_slice(u);
+            assign(part_mut(v, nx, nu), u);
             let coming = part_mut(rest, 0, next);
-            coming.copy_from_slice(part(dynamics, place.dynamics, coming.len()));
+            assign(coming, part(dynamics, place.dynamics, next));
             add_transposed::<T, E>(coming, matrix, v, n, next);
             let general = part_mut(general, 0, ng);
             general.fill(T::ZERO);
@@ -380,7 +380,8 @@ fn cholesky<T: Real, E: Packed<T>>(
     let mut regularised = 0;
     let epsilon = T::from_f64(T::EPSILON);
     let noise = T::from_f64(T::EPSILON * 4.0 * rows as f64);
-    for (diagonal, inverse) in panel.get(row..).unwrap_or_default().iter().step_by(ld + 1).zip(&mut *inverse)
+    for (diagonal, inverse) in
+        panel.get(row..).unwrap_or_default().iter().step_by((ld + 1).max(1)).zip(&mut *inverse)
     {
         *inverse = *diagonal;
     }

@@ -5,7 +5,7 @@ use super::options::InteriorPointOptions;
 use super::riccati::First;
 use super::vector::largest_size;
 use crate::qp::error::{QpError, Side};
-use crate::qp::layout::{Places, part, part_mut};
+use crate::qp::layout::{Places, assign, part, part_mut};
 use crate::qp::problem::{QpView, Row};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
@@ -33,6 +33,9 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     }
 }
 
+/// A step of the corrector below this is not taken.
+const SHORT: f64 = 0.3;
+
 /// Whether residuals are below a tolerance. With large penalties, forces are measured in their units.
 fn is_small(residuals: &Residuals, tolerance: f64, scale: f64) -> bool {
     let Residuals { stationarity, dynamics, inequalities, complementarity } = *residuals;
@@ -53,13 +56,13 @@ impl<T: Real> Iterate<'_, T> {
         solution: &mut SolutionView<'_, T>,
     ) {
         if start == Start::Warm {
-            for place in Places::new::<T>(self.qp.dims) {
-                part_mut(self.v, place.row, place.n).copy_from_slice(part(solution.v, place.v, place.n));
+            for place in Places::<T>::new(self.qp.dims) {
+                assign(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
             }
         }
         if let (First::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
             let x0 = stage.x_bounds().lower;
-            part_mut(self.v, 0, x0.len()).copy_from_slice(x0);
+            assign(part_mut(self.v, 0, x0.len()), x0);
         }
         self.evaluate_values::<E>();
         let cold = T::from_f64(options.start_mu * scale).sqrt();
@@ -121,6 +124,12 @@ impl<T: Real> Iterate<'_, T> {
                 self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
                 self.newton::<E>(false)?;
                 alpha = self.sides.longest::<E>();
+                if alpha < T::from_f64(SHORT) {
+                    // Products are too different for the corrector to be right: first they are made equal.
+                    self.sides.aim(self.mu * T::from_f64(SHORT));
+                    self.newton::<E>(false)?;
+                    alpha = self.sides.longest::<E>();
+                }
             }
             if alpha < T::ONE {
                 let (least, most) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
@@ -143,8 +152,8 @@ impl<T: Real> Iterate<'_, T> {
 
     /// The point and its multipliers.
     fn store(&mut self, solution: &mut SolutionView<'_, T>) {
-        for place in Places::new::<T>(self.qp.dims) {
-            part_mut(solution.v, place.v, place.n).copy_from_slice(part(self.v, place.row, place.n));
+        for place in Places::<T>::new(self.qp.dims) {
+            assign(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));
         }
         solution.lower.fill(T::ZERO);
         solution.upper.fill(T::ZERO);
@@ -171,7 +180,7 @@ impl<T: Real> Iterate<'_, T> {
 /// The largest violation of a hard bound, if it is larger than a tolerance relative to the bound.
 pub fn worst<T: Real>(qp: QpView<'_, T>, solution: &SolutionView<'_, T>, tolerance: f64) -> Option<QpError> {
     let mut worst = (0.0, None);
-    for place in Places::new::<T>(qp.dims) {
+    for place in Places::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let v = part(solution.v, place.v, place.ld);
         let vector = |row| part(data, place.row_data(row), place.rows);

@@ -93,7 +93,7 @@ pub fn is_first_fixed<T: Real>(qp: QpView<'_, T>) -> bool {
 
 /// Calls `f` for every constraint of the horizon that is not the given state at the start.
 fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constraint<T>)) {
-    for place in Places::new::<T>(qp.dims) {
+    for place in Places::<T>::new(qp.dims) {
         let data = part(qp.data, place.data, place.data_len());
         let vector = |row| part(data, place.row_data(row), place.rows);
         let bounds = vector(Row::Lower).iter().zip(vector(Row::Upper));
