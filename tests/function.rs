@@ -166,9 +166,9 @@ fn second_derivatives_three_ways() {
         });
         assert_close(&own, &complex);
         // Without the emitted adjoint: twice forward through the value.
-        for column in 2..NV - 1 {
+        for (column, own) in own.iter().enumerate().take(NV - 1).skip(2) {
             let inner: [Forward<f64>; NV] = seeded(&v, column);
-            for row in 2..NV - 1 {
+            for (row, own) in own.iter().enumerate().take(NV - 1).skip(2) {
                 let v: [Forward<Forward<f64>>; NV] = core::array::from_fn(|i| Forward {
                     re: inner[i],
                     d: Forward { re: if i == row { 1.0 } else { 0.0 }, d: 0.0 },
@@ -176,7 +176,7 @@ fn second_derivatives_three_ways() {
                 let mut y = [v[0]; NY];
                 Outputs::value_of(&v, &mut y);
                 let second: f64 = y.iter().zip(mu).map(|(y, mu)| mu * y.d.d).sum();
-                assert!((second - own[row][column]).abs() <= 1e-13, "{second} is not {}", own[row][column]);
+                assert!((second - own).abs() <= 1e-13, "{second} is not {own}");
             }
         }
     }

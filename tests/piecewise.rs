@@ -86,15 +86,15 @@ fn decay_has_a_closed_form() {
     assert_close(forward.dx_dp, [dp], tolerance);
     assert_close(forward.dz_dx0, [2.0 * x * dx], tolerance);
     assert_close(forward.dz_dp, [2.0 * x * dp], tolerance);
-    for k in 0..3 {
-        assert_close(forward.dx_du[k], [du[k]], tolerance);
-        assert_close(forward.dz_du[k], [2.0 * x * du[k]], tolerance);
+    for (k, du) in du.into_iter().enumerate() {
+        assert_close(forward.dx_du[k], [du], tolerance);
+        assert_close(forward.dz_du[k], [2.0 * x * du], tolerance);
     }
     let adjoint = horizon.adjoint(&Vector1::new(x0), &list, &ENDS, &vector![2.0]).unwrap();
     assert_close(adjoint.grad_x0, [2.0 * dx], tolerance);
     assert_close(adjoint.grad_p, [2.0 * dp], tolerance);
-    for k in 0..3 {
-        assert_close(adjoint.grad_u[k], [2.0 * du[k]], tolerance);
+    for (k, du) in du.into_iter().enumerate() {
+        assert_close(adjoint.grad_u[k], [2.0 * du], tolerance);
     }
     // Backwards in time from the end to the start.
     let back = [ENDS[1], ENDS[0], 0.0];

@@ -20,6 +20,8 @@
 //! integral.
 
 mod integral;
+// What the derive of `Zeroable` writes about a field of type `T`.
+#[allow(clippy::multiple_bound_locations)]
 mod least_squares;
 mod memory;
 mod product;
