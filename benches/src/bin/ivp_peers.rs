@@ -13,15 +13,14 @@
 use casados::GraphDae;
 use casados::shape::Shape;
 use cpu_time::ThreadTime;
-use diffsol::{
-    MatrixCommon, NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason,
-};
+use diffsol::{MatrixCommon, NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
 use models::chemistry::{AkzoNobel, E5Conserved, Hires, Oregonator, Robertson};
 use models::circuits::{RingModulator, TransistorCapacitors};
 use models::mechanics::{Pleiades, Squeezer};
 use models::oscillators::VanDerPol;
 use num_dual::Dual64;
 use serde_json::{Value, json};
+use std::cell::RefCell;
 use std::io::{BufRead, Write};
 use std::time::Instant;
 
@@ -48,7 +47,8 @@ struct Request {
 
 impl Request {
     fn read(value: &Value) -> Option<Self> {
-        let list = |key: &str| -> Option<Vec<f64>> { value[key].as_array()?.iter().map(Value::as_f64).collect() };
+        let list =
+            |key: &str| -> Option<Vec<f64>> { value[key].as_array()?.iter().map(Value::as_f64).collect() };
         Some(Self {
             x0: list("x0")?,
             p: list("p")?,
@@ -99,8 +99,11 @@ fn runs(model: Model, request: &Request) -> Vec<Value> {
                 }
                 Ok(result)
             };
-            let result =
-                if request.derivatives { forward(model, request, name, tolerance, &mut timed) } else { simulate(model, request, name, tolerance, &mut timed) };
+            let result = if request.derivatives {
+                forward(model, request, name, tolerance, &mut timed)
+            } else {
+                simulate(model, request, name, tolerance, &mut timed)
+            };
             let solver = format!("diffsol, {name}");
             runs.push(match result {
                 Ok((y, derivatives, steps)) => json!({
@@ -116,13 +119,37 @@ fn runs(model: Model, request: &Request) -> Vec<Value> {
     runs
 }
 
-/// The variables of the model: `ẋ` in front, then the states, parameters and time.
-fn place<T: Copy + From<f64>>(nx: usize, y: &[T], p: &[T], t: f64) -> Vec<T> {
-    let mut v = vec![T::from(0.0); nx];
-    v.extend(y);
-    v.extend(p);
-    v.push(T::from(t));
-    v
+/// The variables of the model, `ẋ = 0` in front, then the states, parameters and time, and its residual: memory of a call.
+#[derive(Clone)]
+struct Buffers<T> {
+    v: Vec<T>,
+    f: Vec<T>,
+}
+
+impl<T> Default for Buffers<T> {
+    fn default() -> Self {
+        Self { v: Vec::new(), f: Vec::new() }
+    }
+}
+
+impl<T: Copy + From<f64>> Buffers<T> {
+    fn residual(
+        &mut self,
+        nx: usize,
+        y: impl ExactSizeIterator<Item = T>,
+        p: impl Iterator<Item = T>,
+        t: f64,
+        residual: fn(&[T], &mut [T]),
+    ) -> &[T] {
+        self.f.resize(y.len(), T::from(0.0));
+        self.v.clear();
+        self.v.resize(nx, T::from(0.0));
+        self.v.extend(y);
+        self.v.extend(p);
+        self.v.push(T::from(t));
+        residual(&self.v, &mut self.f);
+        &self.f
+    }
 }
 
 /// `f(ẋ, y, p, t) = C ẋ − r(y, p, t)` as `C ẋ = r`; where `C` is one number in each row and column it is divided by.
@@ -133,6 +160,8 @@ struct Equations {
     explicit: Option<Vec<(usize, f64)>>,
     /// Rows of `C`.
     c: Vec<Vec<f64>>,
+    real: RefCell<Buffers<f64>>,
+    dual: RefCell<Buffers<Dual64>>,
 }
 
 impl Equations {
@@ -140,8 +169,9 @@ impl Equations {
         let (nx, n) = (model.nx, y.len());
         let mut c = vec![vec![0.0; nx]; n];
         for column in 0..nx {
-            let mut v = place::<Dual64>(nx, &duals(y), &duals(p), 0.0);
+            let mut v = vec![Dual64::from(0.0); nx];
             v[column] = Dual64::new(0.0, 1.0);
+            v.extend(y.iter().chain(p).chain(&[0.0]).map(|value| Dual64::from(*value)));
             let mut f = vec![Dual64::from(0.0); n];
             (model.dual)(&v, &mut f);
             for (row, f) in c.iter_mut().zip(f) {
@@ -154,25 +184,24 @@ impl Equations {
             (c[row].iter().filter(|c| **c != 0.0).count() == 1).then_some((row, c[row][column]))
         };
         let explicit = if n == nx { (0..nx).map(single).collect() } else { None };
-        Self { model, explicit, c }
+        Self { model, explicit, c, real: RefCell::default(), dual: RefCell::default() }
     }
 
     fn right_hand_side(&self, y: &[f64], p: &[f64], t: f64, to: &mut [f64]) {
-        let mut f = vec![0.0; y.len()];
-        (self.model.residual)(&place(self.model.nx, y, p, t), &mut f);
+        let mut buffers = self.real.borrow_mut();
+        let f = buffers.residual(self.model.nx, y.iter().copied(), p.iter().copied(), t, self.model.residual);
         match &self.explicit {
             Some(rows) => to.iter_mut().zip(rows).for_each(|(to, (row, c))| *to = -f[*row] / c),
             None => to.iter_mut().zip(f).for_each(|(to, f)| *to = -f),
         }
     }
 
-    /// In a direction of the states and the parameters.
+    /// In a direction of the states, or of the parameters.
     fn derivative(&self, (y, dy): (&[f64], &[f64]), (p, dp): (&[f64], &[f64]), t: f64, to: &mut [f64]) {
-        let pair = |a: &[f64], b: &[f64]| -> Vec<Dual64> {
-            a.iter().enumerate().map(|(i, a)| Dual64::new(*a, b.get(i).copied().unwrap_or(0.0))).collect()
-        };
-        let mut f = vec![Dual64::from(0.0); y.len()];
-        (self.model.dual)(&place(self.model.nx, &pair(y, dy), &pair(p, dp), t), &mut f);
+        let mut buffers = self.dual.borrow_mut();
+        let y = y.iter().enumerate().map(|(i, y)| Dual64::new(*y, dy.get(i).copied().unwrap_or(0.0)));
+        let p = p.iter().enumerate().map(|(i, p)| Dual64::new(*p, dp.get(i).copied().unwrap_or(0.0)));
+        let f = buffers.residual(self.model.nx, y, p, t, self.model.dual);
         match &self.explicit {
             Some(rows) => to.iter_mut().zip(rows).for_each(|(to, (row, c))| *to = -f[*row].eps / c),
             None => to.iter_mut().zip(f).for_each(|(to, f)| *to = -f.eps),
@@ -188,10 +217,6 @@ impl Equations {
             *to = product + beta * *to;
         }
     }
-}
-
-fn duals(values: &[f64]) -> Vec<Dual64> {
-    values.iter().map(|value| Dual64::from(*value)).collect()
 }
 
 type Timed<'a> = &'a mut dyn FnMut(&dyn Fn() -> Call) -> Call;
@@ -271,7 +296,6 @@ fn forward(model: Model, request: &Request, name: &str, tolerance: f64, timed: T
         return Err("an equation with a mass matrix".into());
     }
     let nx = equations.model.nx;
-    let still = vec![0.0; nx];
     let (a, b, c) = (equations.clone(), equations.clone(), equations);
     let problem = OdeBuilder::<Matrix>::new()
         .rtol(tolerance)
@@ -282,9 +306,13 @@ fn forward(model: Model, request: &Request, name: &str, tolerance: f64, timed: T
         .rhs_sens_implicit(
             move |y, p, t, to| a.right_hand_side(y, &p[nx..], t, to),
             move |y, p, t, v, to| b.derivative((y, v), (&p[nx..], &[]), t, to),
-            move |y, p, t, v, to| c.derivative((y, &still), (&p[nx..], &v[nx..]), t, to),
+            move |y, p, t, v, to| c.derivative((y, &[]), (&p[nx..], &v[nx..]), t, to),
         )
-        .init_sens(move |p, _, y| y.copy_from_slice(&p[..nx]), move |_, _, v, y| y.copy_from_slice(&v[..nx]), nx)
+        .init_sens(
+            move |p, _, y| y.copy_from_slice(&p[..nx]),
+            move |_, _, v, y| y.copy_from_slice(&v[..nx]),
+            nx,
+        )
         .build()
         .map_err(|e| e.to_string())?;
     let t = request.t;
