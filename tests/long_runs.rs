@@ -8,8 +8,8 @@ use orbit::{Kepler, STEP, changes};
 mod orbit;
 
 /// The changes of angular momentum and energy over 12 500 orbits are rounding errors. Plain sums round `x` in each step: a
-/// random walk of a million steps of ε/2 is 1e-13 long. Compensated ones leave what is rounded at the stages: each of them is a sum
-/// of ten terms that begins with `x`, and the energy of an orbit that comes back to the same points collects the same errors.
+/// random walk of a million steps of ε/2 is 1e-13 long. Compensated ones leave what is rounded at the stages: an
+/// orbit that comes back to the same points collects the same errors.
 #[test]
 #[cfg_attr(debug_assertions, ignore = "takes minutes without optimisation")]
 fn t07_t08_t09_a_million_steps_around_the_sun() {
