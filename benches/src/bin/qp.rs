@@ -8,7 +8,9 @@
 //! The reference column is HPIPM (mode `speed`; warm: as acados runs it, condensed to ten blocks) on another day on a machine on
 //! which clarabel took what the last column says: the ratio of the two columns of clarabel carries it here.
 
-use casados::qp::{Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, StageDims, Start};
+use casados::qp::{
+    Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, StageDims, Start,
+};
 use casados_benches::record::{load, numbers};
 use casados_benches::time::{Summary, measure, pin};
 use std::time::Duration;
@@ -16,7 +18,8 @@ use std::time::Duration;
 type Failure = Box<dyn std::error::Error>;
 
 /// Milliseconds of HPIPM cold, of acados' QP warm, and of clarabel beside them.
-const REFERENCES: [(usize, [f64; 3]); 3] = [(3, [0.45, 0.25, 2.6]), (5, [0.90, 0.54, 11.6]), (7, [2.27, 1.1, 45.0])];
+const REFERENCES: [(usize, [f64; 3]); 3] =
+    [(3, [0.45, 0.25, 2.6]), (5, [0.90, 0.54, 11.6]), (7, [2.27, 1.1, 45.0])];
 const ROUNDS: usize = 5;
 const BUDGET: Duration = Duration::from_millis(100);
 
@@ -64,7 +67,12 @@ struct Entry {
 }
 
 impl Entry {
-    fn new(name: String, solver: Box<dyn QpSolver<f64>>, start: Start, qp: &HeapQp<f64>) -> Result<Self, QpError> {
+    fn new(
+        name: String,
+        solver: Box<dyn QpSolver<f64>>,
+        start: Start,
+        qp: &HeapQp<f64>,
+    ) -> Result<Self, QpError> {
         let solution = HeapSolution::new(qp.dims())?;
         let mut entry = Self { name, solver, start, solution, best: f64::INFINITY, iterations: 0 };
         entry.solver.solve(qp.view(), Start::Cold, entry.solution.view_mut())?;
@@ -89,7 +97,12 @@ fn main() -> Result<(), Failure> {
         let qp = chain(masses)?;
         let mut entries = Vec::new();
         for start in [Start::Cold, Start::Warm] {
-            entries.push(Entry::new("interior point".into(), Box::new(HeapInteriorPoint::new()), start, &qp)?);
+            entries.push(Entry::new(
+                "interior point".into(),
+                Box::new(HeapInteriorPoint::new()),
+                start,
+                &qp,
+            )?);
             for block in [2, 4, 5] {
                 let solver = Box::new(Condensing::new(block, HeapInteriorPoint::new()));
                 entries.push(Entry::new(format!("condensed in blocks of {block}"), solver, start, &qp)?);

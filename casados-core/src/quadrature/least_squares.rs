@@ -1,8 +1,5 @@
 //! Half of the integral of a weighted square, and the matrix of Gauss and Newton.
 
-// What the derive of `Zeroable` writes about the field `value`.
-#![allow(clippy::multiple_bound_locations)]
-
 use super::memory::{ArrayW, Memory};
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
