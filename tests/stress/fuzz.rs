@@ -104,7 +104,6 @@ impl Source {
             min_step: [0.0, 0.0, self.number()][self.below(3)],
             max_steps: [60, 20, 1, 0][self.below(4)],
             keep_steps: self.below(3) > 0,
-            ..Default::default()
         }
     }
 }
