@@ -249,13 +249,16 @@ fn is_collocation(irk: &mut Irk<VanDerPol, RadauIIA<3>>, mu: f64, h: f64) {
         let above: f64 = others(i, j).map(|k| nodes[i] - nodes[k]).product();
         above / others(j, j).map(|k| nodes[j] - nodes[k]).product::<f64>()
     };
+    // States are sums that begin at the start of the step: they are rounded as the largest of them.
+    let largest = |state: usize| values.iter().fold(0.0, |most: f64, x| most.max(x[state].abs()));
+    let rates = |y1: f64, y2: f64| [vec![y2], vec![mu * y2, -mu * y1 * y1 * y2, -y1]];
+    let sizes = rates(largest(0), largest(1));
     for i in 1..4 {
-        let [y1, y2] = values[i].into();
-        let rates = [vec![y2], vec![mu * y2, -mu * y1 * y1 * y2, -y1]];
-        for (state, rate) in rates.iter().enumerate() {
-            let slopes = (0..4).map(|j| derivative(j, i) * values[j][state]);
-            let terms: Vec<f64> = slopes.chain(rate.iter().map(|rate| -h * rate)).collect();
-            let (sum, size) = terms.iter().fold((0.0, 0.0), |(sum, size), t| (sum + t, size + f64::abs(*t)));
+        for (state, rate) in rates(values[i][0], values[i][1]).iter().enumerate() {
+            let slopes: Vec<f64> = (0..4).map(|j| derivative(j, i) * values[j][state]).collect();
+            let sum = slopes.iter().sum::<f64>() - h * rate.iter().sum::<f64>();
+            let size = slopes.iter().map(|slope| slope.abs()).sum::<f64>()
+                + h * sizes[state].iter().map(|size| size.abs()).sum::<f64>();
             // Interpolation and differentiation of four values, and Newton's method to rounding: some tens of ε.
             assert!(
                 f64::abs(sum) <= 100.0 * f64::EPSILON * size,
