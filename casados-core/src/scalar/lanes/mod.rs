@@ -41,11 +41,11 @@ pub use register::*;
 pub enum Level {
     /// None: numbers one at a time.
     Single,
-    /// Those that every machine of this kind has: [`F64x2`], [`F32x4`].
+    /// Those that every machine of this kind has: `F64x2`, `F32x4`.
     Base,
-    /// [`F64x4`], [`F32x8`] as well.
+    /// `F64x4`, `F32x8` as well.
     Avx2,
-    /// [`F64x8`], [`F32x16`] as well.
+    /// `F64x8`, `F32x16` as well.
     Avx512,
 }
 
