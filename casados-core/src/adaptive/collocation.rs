@@ -8,7 +8,6 @@
 
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
-use super::replay::{Replay, Single, single};
 use super::stages::{Convergence, FAST, Failure, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
@@ -63,7 +62,7 @@ pub struct Collocation<M: Dae, B, T: Real, const S: usize, const L: usize, const
     factors: [f64; S],
     basis: Eigenbasis<T, S, L>,
     memory: Box<Memory<M, T, S, L, G>>,
-    replay: Option<Box<Single<M, B, T, S>>>,
+    method: PhantomData<fn() -> B>,
 }
 
 /// A value of each stage, of which the last is repeated.
@@ -95,7 +94,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
             basis,
             tableau,
             memory,
-            replay: None,
+            method: PhantomData,
         })
     }
 
@@ -400,13 +399,6 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
 
     fn weights(&self, theta: f64) -> [f64; MOST] {
         padded(self.tableau.weights(theta))
-    }
-
-    fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error> {
-        Ok(match &mut self.replay {
-            Some(replay) => &mut **replay,
-            none => &mut **none.insert(Box::new(single::<M, B, T, S>()?)),
-        })
     }
 }
 

@@ -1,12 +1,11 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution, the difference to the
 //! other one decides about the step.
 
-use super::consistent::At;
 use super::control::{Proportional, power};
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
-use super::replay::Replay;
+use super::replay::{Replay, Taken};
 use super::run::{Accepted, After, Run, Span};
 use super::sealed::{Engine, Kind};
 use super::tape::Entry;
@@ -16,18 +15,20 @@ use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, Ode, VectorX};
 use crate::options::Options;
 use crate::quadrature::Along;
-use crate::result::{Dense, Forward, Hessian, Nominal};
+use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use crate::tableau::{DormandPrince5, DormandPrince8};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
+use core::any::Any;
 use core::marker::PhantomData;
 
 /// The method of an explicit pair with `S` stages.
 pub struct Steps<M: Dae, B, T: Real, const S: usize> {
     engine: Option<Box<dyn Take<M, T> + Send + Sync>>,
-    replay: Option<Box<dyn Replay<M, T> + Send + Sync>>,
+    /// The integrator with steps of equal size, which exists for explicit models alone.
+    replay: Option<Box<dyn Any + Send + Sync>>,
     method: PhantomData<fn() -> B>,
 }
 
@@ -37,70 +38,58 @@ impl<M: Dae, B, T: Real, const S: usize> Default for Steps<M, B, T, S> {
     }
 }
 
-impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Erk<M, B, S, T, Heap> {
-    fn solve(
-        &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        _: &[T],
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Nominal<M, T>, Error> {
-        go(self, at)?;
-        Erk::solve_along(self, at.x, at.u, h, along)
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
+    /// At the start of a step.
+    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+        if self.replay.is_none() {
+            let erk: Box<Erk<M, B, S, T, Heap>> = Box::new(Erk::new(Options::default())?);
+            self.replay = Some(erk);
+        }
+        // It is one, whatever the type system knows.
+        let erk = self.replay.as_mut().and_then(|replay| replay.downcast_mut::<Erk<M, B, S, T, Heap>>());
+        let erk = erk.ok_or(Error::NoResult)?;
+        if M::Shape::NP > 0 {
+            erk.set_parameters(step.at.p)?;
+        }
+        erk.set_time(step.at.t)?;
+        Ok(erk)
+    }
+}
+
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T, S> {
+    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+        self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        _: &[T],
+        step: &Taken<'_, M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        go(self, at)?;
-        Erk::forward_along(self, at.x, at.u, h, along)
+        self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn hessian(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        _: &[T],
+        step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        go(self, at)?;
-        Erk::hessian_along(self, at.x, at.u, h, lambda, along)
+        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
     }
 
     fn adjoint(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        _: &[T],
+        step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        gradient: &mut [T],
         along: Along<'_, '_, M, T>,
-    ) -> Result<(), Error> {
-        go(self, at)?;
-        let adjoint = Erk::adjoint_along(self, at.x, at.u, h, lambda, along)?;
-        super::replay::stack(adjoint, gradient);
-        Ok(())
+    ) -> Result<&Adjoint<M, T>, Error> {
+        self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }
 
-    fn stages(&mut self) -> Result<&[T], Error> {
+    fn stages(&mut self, _: usize) -> Result<&[T], Error> {
         Ok(&[])
     }
-}
-
-/// Goes to the start of a step.
-fn go<M: Ode, B: Pair<S>, T: Real, const S: usize>(
-    erk: &mut Erk<M, B, S, T, Heap>,
-    at: &At<'_, M, T>,
-) -> Result<(), Error> {
-    if M::Shape::NP > 0 {
-        erk.set_parameters(at.p)?;
-    }
-    erk.set_time(at.t)
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
@@ -266,6 +255,7 @@ macro_rules! explicit {
 
         impl<M: Ode, T: Real> Engine<M, T> for $method {
             const ENDS_ON_STAGE: bool = true;
+            type Replays = Self::State;
 
             fn integrate(
                 state: &mut Self::State,
@@ -292,14 +282,8 @@ macro_rules! explicit {
                 step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
             }
 
-            fn replay(state: &mut Self::State, _: usize) -> Result<&mut dyn Replay<M, T>, Error> {
-                Ok(match &mut state.replay {
-                    Some(replay) => &mut **replay,
-                    none => {
-                        let erk = Erk::<M, $method, $stages, T, Heap>::new(Options::default())?;
-                        &mut **none.insert(Box::new(erk))
-                    }
-                })
+            fn replays(state: &mut Self::State) -> &mut Self::Replays {
+                state
             }
         })*
     };

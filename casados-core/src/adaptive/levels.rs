@@ -1,6 +1,5 @@
 //! The methods of a family, opened when they are needed.
 
-use super::replay::Replay;
 use super::run::{After, Run, Span};
 use super::sealed::{Engine, Family, Kind};
 use super::stages::{MOST, Stages};
@@ -78,12 +77,25 @@ pub(super) fn interpolate<M: Dae, T: Real>(
     }
 }
 
+/// What a family remembers: the steps that it takes, and those that it takes again.
+pub struct Implicit<M: Dae, B: Family, T: Real> {
+    levels: Levels<M, T>,
+    replays: B::Replays<M, T>,
+}
+
+impl<M: Dae, B: Family, T: Real> Default for Implicit<M, B, T> {
+    fn default() -> Self {
+        Self { levels: Levels::default(), replays: Default::default() }
+    }
+}
+
 impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
-    type State = Levels<M, T>;
+    type State = Implicit<M, B, T>;
 }
 
 impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
     const ENDS_ON_STAGE: bool = B::ENDS_ON_STAGE;
+    type Replays = B::Replays<M, T>;
 
     fn integrate(
         state: &mut Self::State,
@@ -92,7 +104,7 @@ impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
         span: Span<T>,
         after: After<'_, M, T>,
     ) -> Result<(), Error> {
-        run.integrate::<B>(state, x0, span, after)
+        run.integrate::<B>(&mut state.levels, x0, span, after)
     }
 
     fn interpolate(
@@ -103,12 +115,12 @@ impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
         t: T,
         dense: &mut Dense<M, T>,
     ) -> Result<(), Error> {
-        let stages = state.get::<B>(entry.level)?;
+        let stages = state.levels.get::<B>(entry.level)?;
         interpolate(stages, x, y, t - entry.t, entry.h, dense);
         Ok(())
     }
 
-    fn replay(state: &mut Self::State, level: usize) -> Result<&mut dyn Replay<M, T>, Error> {
-        state.get::<B>(level)?.replay()
+    fn replays(state: &mut Self::State) -> &mut Self::Replays {
+        &mut state.replays
     }
 }

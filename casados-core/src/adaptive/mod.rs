@@ -50,6 +50,7 @@ use crate::model::Dae;
 use crate::scalar::Real;
 use crate::tableau::{DormandPrince5, DormandPrince8, Gauss, RadauIIA};
 use alloc::boxed::Box;
+use replay::{Single, Three};
 use stages::Stages;
 
 /// The adaptive integrator of the method `B` for the model `M`, with numbers `T`: `Adaptive<Model, Radau>`.
@@ -88,6 +89,8 @@ mod sealed {
     pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
         /// Whether `z` at the end of a step is that of a stage; else it is found from the equations.
         const ENDS_ON_STAGE: bool;
+        /// What takes its steps again.
+        type Replays: Replay<M, T>;
         /// Integrates an interval; `after` is called after each accepted step.
         ///
         /// # Errors
@@ -112,10 +115,7 @@ mod sealed {
             dense: &mut Dense<M, T>,
         ) -> Result<(), Error>;
         /// What takes a step again.
-        ///
-        /// # Errors
-        /// [`Error::OutOfMemory`]
-        fn replay(state: &mut Self::State, level: usize) -> Result<&mut dyn Replay<M, T>, Error>;
+        fn replays(state: &mut Self::State) -> &mut Self::Replays;
     }
 
     /// The methods that an integrator may change between.
@@ -126,6 +126,8 @@ mod sealed {
         const STAGES: usize;
         /// See [`Engine`].
         const ENDS_ON_STAGE: bool;
+        /// What takes their steps again.
+        type Replays<M: Dae, T: Real>: Replay<M, T> + Default + Send + Sync;
         /// One of them.
         ///
         /// # Errors
@@ -139,6 +141,8 @@ impl Family for Radau {
     const LEVELS: usize = 3;
     const STAGES: usize = 3;
     const ENDS_ON_STAGE: bool = true;
+    type Replays<M: Dae, T: Real> =
+        Three<Single<M, RadauIIA<3>, T, 3>, Single<M, RadauIIA<5>, T, 5>, Single<M, RadauIIA<7>, T, 7>>;
     fn open<M: Dae, T: Real>(level: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
         match level {
             0 => RadauIIA::<3>::open(0),
@@ -154,6 +158,7 @@ macro_rules! single {
             const LEVELS: usize = 1;
             const STAGES: usize = $stages;
             const ENDS_ON_STAGE: bool = $ends_on_stage;
+            type Replays<M: Dae, T: Real> = Single<M, Self, T, $stages>;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
                 // As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
                 Ok(Box::new(collocation::Collocation::<M, Self, T, $stages, 4, $groups>::new()?))

@@ -1,5 +1,7 @@
 //! A step that is known is taken again, to rounding, and differentiated: it is an interval of one step for the integrator
 //! with steps of equal size.
+//!
+//! Nothing here is called through a table of functions: a program contains the derivatives that it asks for, and no others.
 
 use super::consistent::At;
 use crate::error::Error;
@@ -10,31 +12,36 @@ use crate::options::{Options, Start};
 use crate::quadrature::Along;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::Shape;
 use crate::tableau::Method;
+use alloc::boxed::Box;
+
+/// A step that was taken.
+pub struct Taken<'a, M: Dae, T: Real> {
+    /// Its start.
+    pub at: At<'a, M, T>,
+    /// Its length.
+    pub h: T,
+    /// The unknowns of its stages, or values near them.
+    pub y: &'a [T],
+    /// Which method of the family took it.
+    pub level: usize,
+}
 
 /// Takes steps of given size.
 pub trait Replay<M: Dae, T: Real> {
-    /// From the unknowns `y` of its stages, or near them.
+    /// The solution.
     ///
     /// # Errors
     /// Those of Newton's method.
-    fn solve(
-        &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Nominal<M, T>, Error>;
+    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error>;
     /// The same with derivatives.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix.
     fn forward(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
+        step: &Taken<'_, M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
     /// The same with second derivatives of `λᵀx` at its end.
@@ -43,113 +50,138 @@ pub trait Replay<M: Dae, T: Real> {
     /// Those of Newton's method; a singular matrix.
     fn hessian(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
+        step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>;
-    /// The gradient of `λᵀx` at its end with respect to `(x, u, p)`, written one after the other.
+    /// The gradient of `λᵀx` at its end.
     ///
     /// # Errors
     /// Those of Newton's method; a singular matrix.
     fn adjoint(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
+        step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        gradient: &mut [T],
         along: Along<'_, '_, M, T>,
-    ) -> Result<(), Error>;
-    /// The unknowns of the stages that were found.
+    ) -> Result<&Adjoint<M, T>, Error>;
+    /// The unknowns of the stages that a method of the family found last.
     ///
     /// # Errors
     /// [`Error::NoResult`]
-    fn stages(&mut self) -> Result<&[T], Error>;
+    fn stages(&mut self, level: usize) -> Result<&[T], Error>;
 }
 
-/// The integrator of one step of the method `B` with `S` stages.
-pub(super) type Single<M, B, T, const S: usize> = Integrator<M, B, S, T, Heap>;
+/// The integrator of one step of the method `B` with `S` stages, from its first call on.
+pub struct Single<M: Dae, B, T: Real, const S: usize>(Option<Box<Integrator<M, B, S, T, Heap>>>);
 
-/// # Errors
-/// None for methods that have a tableau.
-pub(super) fn single<M: Dae, B: Method<S>, T: Real, const S: usize>() -> Result<Single<M, B, T, S>, Error> {
-    Integrator::new(Options { steps: 1, start: Start::Warm, ..Options::default() })
-}
-
-/// Goes to the start of a step.
-fn go<M: Dae, B: Method<S>, T: Real, const S: usize>(
-    single: &mut Single<M, B, T, S>,
-    at: &At<'_, M, T>,
-    y: &[T],
-) -> Result<(), Error> {
-    if M::Shape::NP > 0 {
-        single.set_parameters(at.p)?;
+impl<M: Dae, B, T: Real, const S: usize> Default for Single<M, B, T, S> {
+    fn default() -> Self {
+        Self(None)
     }
-    single.set_time(at.t)?;
-    single.set_stages(y)
 }
 
-/// A gradient with respect to `(x, u, p)` as one array.
-pub(super) fn stack<M: Dae, T: Real>(adjoint: &Adjoint<M, T>, gradient: &mut [T]) {
-    let parts = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
-    for (to, from) in gradient.iter_mut().zip(parts.into_iter().flatten()) {
-        *to = *from;
+impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
+    /// At the start of a step.
+    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Integrator<M, B, S, T, Heap>, Error> {
+        let single = match &mut self.0 {
+            Some(single) => single,
+            none => {
+                let options = Options { steps: 1, start: Start::Warm, ..Options::default() };
+                none.insert(Box::new(Integrator::new(options)?))
+            }
+        };
+        if M::Shape::NP > 0 {
+            single.set_parameters(step.at.p)?;
+        }
+        single.set_time(step.at.t)?;
+        single.set_stages(step.y)?;
+        Ok(single)
     }
 }
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B, T, S> {
-    fn solve(
-        &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Nominal<M, T>, Error> {
-        go(self, at, y)?;
-        Integrator::solve_along(self, at.x, at.u, h, along)
+    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+        self.go(step)?.solve_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn forward(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
+        step: &Taken<'_, M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        go(self, at, y)?;
-        Integrator::forward_along(self, at.x, at.u, h, along)
+        self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
     }
 
     fn hessian(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
+        step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        go(self, at, y)?;
-        Integrator::hessian_along(self, at.x, at.u, h, lambda, along)
+        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
     }
 
     fn adjoint(
         &mut self,
-        at: &At<'_, M, T>,
-        h: T,
-        y: &[T],
+        step: &Taken<'_, M, T>,
         lambda: &VectorX<M, T>,
-        gradient: &mut [T],
         along: Along<'_, '_, M, T>,
-    ) -> Result<(), Error> {
-        go(self, at, y)?;
-        let adjoint = Integrator::adjoint_along(self, at.x, at.u, h, lambda, along)?;
-        stack(adjoint, gradient);
-        Ok(())
+    ) -> Result<&Adjoint<M, T>, Error> {
+        self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }
 
-    fn stages(&mut self) -> Result<&[T], Error> {
-        Integrator::stages(self)
+    fn stages(&mut self, _: usize) -> Result<&[T], Error> {
+        self.0.as_mut().ok_or(Error::NoResult)?.stages()
+    }
+}
+
+/// A family of three.
+#[derive(Default)]
+pub struct Three<A, B, C>(A, B, C);
+
+/// What the method of a level does.
+macro_rules! of_level {
+    ($three:ident, $level:expr, $name:ident($($argument:expr),*)) => {
+        match $level {
+            0 => $three.0.$name($($argument),*),
+            1 => $three.1.$name($($argument),*),
+            _ => $three.2.$name($($argument),*),
+        }
+    };
+}
+
+impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<M, T> for Three<A, B, C> {
+    fn solve(&mut self, step: &Taken<'_, M, T>, along: Along<'_, '_, M, T>) -> Result<&Nominal<M, T>, Error> {
+        of_level!(self, step.level, solve(step, along))
+    }
+
+    fn forward(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error> {
+        of_level!(self, step.level, forward(step, along))
+    }
+
+    fn hessian(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error> {
+        of_level!(self, step.level, hessian(step, lambda, along))
+    }
+
+    fn adjoint(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error> {
+        of_level!(self, step.level, adjoint(step, lambda, along))
+    }
+
+    fn stages(&mut self, level: usize) -> Result<&[T], Error> {
+        of_level!(self, level, stages(level))
     }
 }

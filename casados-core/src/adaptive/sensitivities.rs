@@ -8,7 +8,7 @@
 //! An integrand takes part step by step: forwards with the derivatives of its stages by `(x₀, u, p)`, backwards in `λ_n`.
 
 use super::consistent::{At, Consistent};
-use super::replay::Replay;
+use super::replay::{Replay, Taken};
 use super::run::{Base, Span};
 use super::sealed::Engine;
 use super::tape::Tape;
@@ -32,8 +32,8 @@ pub struct Memory<M: Dae, T: Plain> {
     /// `V_n`, and `V_{n+1}`.
     v: [ArrayX<M, ArrayW<M, T>>; 2],
     lambda: VectorX<M, T>,
-    /// The gradient of one step, and that of all.
-    gradient: [ArrayW<M, T>; 2],
+    /// The gradient of all steps.
+    gradient: ArrayW<M, T>,
     /// The Hessian of one step, its product with `D`, and the sum of all.
     pub(super) step: ArrayW<M, ArrayW<M, T>>,
     product: ArrayW<M, ArrayW<M, T>>,
@@ -56,10 +56,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         state: &mut B::State,
         x0: &VectorX<M, T>,
         mut each: impl FnMut(
-            &mut dyn Replay<M, T>,
-            &At<'_, M, T>,
-            T,
-            &[T],
+            &mut B::Replays,
+            &Taken<'_, M, T>,
             usize,
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
     ) -> Result<(), Error> {
@@ -75,11 +73,12 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         self.tape.rewrite();
         for step in 0..self.tape.entries().len() {
             let Some(entry) = self.tape.entries().get(step).copied() else { break };
-            let replay = B::replay(state, entry.level)?;
+            let replays = B::replays(state);
             let (_, y) = self.tape.numbers(step, M::Shape::NX);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let (end, z) = each(replay, &at, entry.h, y, step).map_err(|error| in_step(error, step))?;
-            self.tape.write(x.as_slice(), replay.stages()?)?;
+            let taken = Taken { at, h: entry.h, y, level: entry.level };
+            let (end, z) = each(replays, &taken, step).map_err(|error| in_step(error, step))?;
+            self.tape.write(x.as_slice(), replays.stages(entry.level)?)?;
             (x, result.z) = (end, z);
             result.x = x;
         }
@@ -118,9 +117,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         begin(&mut along);
-        self.steps::<B>(state, x0, |replay, at, h, y, _| {
+        self.steps::<B>(state, x0, |replays, taken, _| {
             let mut chained = chain(&mut along, None, false);
-            let nominal = replay.solve(at, h, y, dynamic(&mut chained))?;
+            let nominal = replays.solve(taken, dynamic(&mut chained))?;
             Ok((nominal.x, nominal.z))
         })?;
         finish(&mut along)
@@ -148,7 +147,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             row.as_mut()[index] = T::ONE;
         }
         let count = self.tape.entries().len();
-        self.steps::<B>(state, x0, |replay, at, h, y, step| {
+        self.steps::<B>(state, x0, |replays, taken, step| {
             if let Some(history) = &mut history {
                 let bytes = history.len().saturating_mul(size_of::<T>());
                 history.try_reserve(nx * M::Shape::NW).map_err(|_| Error::OutOfMemory { bytes })?;
@@ -157,7 +156,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                 }
             }
             let mut chained = chain(&mut along, Some(v), second);
-            let forward = replay.forward(at, h, y, dynamic(&mut chained))?;
+            let forward = replays.forward(taken, dynamic(&mut chained))?;
             let at = |i: usize, w: usize| {
                 if w < nx {
                     T::ZERO
@@ -220,7 +219,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-        let Memory { lambda: now, gradient: [step_gradient, gradient], adjoint, .. } = memory;
+        let Memory { lambda: now, gradient, adjoint, .. } = memory;
         *now = *lambda;
         gradient.as_mut().fill(T::ZERO);
         let Base { u, parameters, result, .. } = &mut *self.base;
@@ -229,14 +228,13 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let replay = B::replay(state, entry.level)?;
+            let taken = Taken { at, h: entry.h, y, level: entry.level };
             let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
-            replay
-                .adjoint(&at, entry.h, y, now, step_gradient.as_mut(), dynamic(&mut backwards))
-                .map_err(|error| in_step(error, step))?;
-            let (states, others) = step_gradient.as_ref().split_at(nx);
-            now.as_mut_slice().copy_from_slice(states);
-            for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(others) {
+            let local = B::replays(state).adjoint(&taken, now, dynamic(&mut backwards));
+            let local = local.map_err(|error| in_step(error, step))?;
+            now.as_mut_slice().copy_from_slice(local.grad_x0.as_slice());
+            let parts = local.grad_u.as_slice().iter().chain(local.grad_p.as_slice());
+            for (sum, part) in gradient.as_mut()[nx..].iter_mut().zip(parts) {
                 *sum = *sum + *part;
             }
         }
@@ -262,7 +260,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         let (nx, nu, np, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NP, M::Shape::NW);
-        let Memory { lambda: now, gradient: [_, gradient], hessian, step: local, product, sum, .. } = memory;
+        let Memory { lambda: now, gradient, hessian, step: local, product, sum, .. } = memory;
         *now = *lambda;
         gradient.as_mut().fill(T::ZERO);
         for row in sum.as_mut() {
@@ -274,9 +272,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let replay = B::replay(state, entry.level)?;
+            let taken = Taken { at, h: entry.h, y, level: entry.level };
             let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
-            let second = replay.hessian(&at, entry.h, y, now, dynamic(&mut backwards));
+            let second = B::replays(state).hessian(&taken, now, dynamic(&mut backwards));
             let second = second.map_err(|error| in_step(error, step))?;
             *now = second.first.grad_x0;
             let parts = second.first.grad_u.as_slice().iter().chain(second.first.grad_p.as_slice());

@@ -1,7 +1,5 @@
 //! What a run asks of a step with any number of stages.
 
-use super::replay::Replay;
-use crate::error::Error;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::Real;
 
@@ -102,9 +100,4 @@ pub trait Stages<M: Dae, T: Real> {
     fn lagrange(&self, theta: f64) -> [f64; MOST];
     /// Their integrals from zero to `theta`.
     fn weights(&self, theta: f64) -> [f64; MOST];
-    /// What takes a step again.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`]
-    fn replay(&mut self) -> Result<&mut dyn Replay<M, T>, Error>;
 }

@@ -1,6 +1,7 @@
 //! From event to event: the steps up to each, shortened to its time, and what happens there.
 
 use super::super::consistent::{At, place_inputs};
+use super::super::replay::{Replay, Taken};
 use super::super::run::Span;
 use super::super::sealed::Engine;
 use super::super::segment::add;
@@ -230,7 +231,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let x = self.end_of(k, step, h)?;
         let end = entry.t + h;
         if let Some(segment) = self.segments.get_mut(k) {
-            let stages = B::replay(&mut self.integrator.state, entry.level)?.stages()?;
+            let stages = B::replays(&mut self.integrator.state).stages(entry.level)?;
             segment.tape.set_last(h, nx, stages);
             segment.span.end = end;
         }
@@ -248,7 +249,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (states, y) = segment.tape.numbers(step, M::Shape::NX);
         x.as_mut_slice().copy_from_slice(states);
         let at = At { x: &x, u: &segment.u, p: &integrator.base.parameters, t: entry.t };
-        Ok(B::replay(&mut integrator.state, entry.level)?.solve(&at, h, y, None)?.x)
+        let taken = Taken { at, h, y, level: entry.level };
+        Ok(B::replays(&mut integrator.state).solve(&taken, None)?.x)
     }
 
     /// `(ẋ, z)` at a state.
