@@ -32,6 +32,7 @@ pub mod irk;
 mod linalg;
 pub mod memory;
 pub mod model;
+pub mod ocp;
 pub mod options;
 pub mod qp;
 pub mod quadrature;

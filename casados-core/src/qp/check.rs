@@ -186,7 +186,7 @@ fn gradient<T: Real>(
 }
 
 /// Adds to the residuals of bounds, and returns the penalties.
-fn bounds<T: Real>(
+pub(crate) fn bounds<T: Real>(
     bounds: &Bounds<'_, T>,
     value: impl Fn(usize) -> f64,
     lower: &[T],

@@ -83,3 +83,9 @@ pub use solution::HeapSolution;
 pub use solution::{Solution, SolutionStage, SolutionStageMut, SolutionView};
 pub use solver::{QpSolver, Start};
 pub use statistics::{Residuals, Statistics};
+
+// What the optimal control problems write and read.
+pub(crate) use check::bounds as bound_residuals;
+pub(crate) use interior::symmetric;
+pub(crate) use layout::{pad, part, part_mut};
+pub(crate) use problem::Arrays;

@@ -303,6 +303,74 @@ impl<T: Real> StageMut<'_, T> {
     }
 }
 
+/// The arrays of a stage as they lie in memory: matrices column after column, over `v = (x, u)`.
+pub(crate) struct Arrays<'a, T> {
+    /// `nx + nu`
+    pub n: usize,
+    /// The distance of columns.
+    pub ld: usize,
+    /// States of the next stage.
+    pub next: usize,
+    /// Where general constraints begin in vectors over constraints, and their length.
+    pub rows: usize,
+    /// `[A B; C D]ᵀ`: a column for each next state, then one for each general constraint.
+    pub matrix: &'a mut [T],
+    /// `[Q Sᵀ; S R]`, of which the lower triangle counts.
+    pub hessian: &'a mut [T],
+    /// `(q, r)`
+    pub gradient: &'a mut [T],
+    /// The constant part of the dynamics.
+    pub offset: &'a mut [T],
+    /// Six vectors over the constraints.
+    pub limits: &'a mut [T],
+}
+
+/// Those of them that a point is judged by.
+pub(crate) struct ArraysRef<'a, T> {
+    pub n: usize,
+    pub ld: usize,
+    pub next: usize,
+    pub matrix: &'a [T],
+    pub hessian: &'a [T],
+    pub gradient: &'a [T],
+    pub offset: &'a [T],
+}
+
+impl<'a, T: Real> Stage<'a, T> {
+    /// The arrays.
+    pub(crate) fn arrays(&self) -> ArraysRef<'a, T> {
+        let (p, data) = (self.place, self.data);
+        ArraysRef {
+            n: p.n,
+            ld: p.ld,
+            next: p.next,
+            matrix: part(data, 0, p.matrix()),
+            hessian: part(data, p.matrix(), p.hessian()),
+            gradient: part(data, p.gradient(), p.ld),
+            offset: part(data, p.offset(), p.ld_next),
+        }
+    }
+}
+
+impl<T: Real> StageMut<'_, T> {
+    /// The arrays.
+    pub(crate) fn arrays(&mut self) -> Arrays<'_, T> {
+        let p = self.place;
+        let mut rest = &mut *self.data;
+        Arrays {
+            n: p.n,
+            ld: p.ld,
+            next: p.next,
+            rows: p.rows,
+            matrix: super::layout::take_mut(&mut rest, p.matrix()),
+            hessian: super::layout::take_mut(&mut rest, p.hessian()),
+            gradient: super::layout::take_mut(&mut rest, p.ld),
+            offset: super::layout::take_mut(&mut rest, p.ld_next),
+            limits: rest,
+        }
+    }
+}
+
 impl<'a, T: Real> QpView<'a, T> {
     /// The dimensions of the stages.
     #[must_use]

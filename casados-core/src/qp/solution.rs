@@ -133,6 +133,16 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             upper: take_mut(&mut rest, end.row),
         }
     }
+    /// All `v`, and all `π`.
+    pub(crate) fn vectors(&self) -> (&[T], &[T]) {
+        let end = end::<T>(self.dims.as_ref());
+        let memory = self.memory.as_ref();
+        (part(memory, 0, end.v), part(memory, end.v, end.dynamics))
+    }
+    /// Everything of another solution of the same dimensions.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        super::layout::assign(self.memory.as_mut(), other.memory.as_ref());
+    }
     /// A stage.
     #[must_use]
     pub fn stage(&self, stage: usize) -> Option<SolutionStage<'_, T>> {

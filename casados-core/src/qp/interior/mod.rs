@@ -12,8 +12,7 @@ mod vector;
 
 #[cfg(feature = "alloc")]
 pub(super) use kernels::{Columns, MORE, Part, Source, add_transposed, product, subtract};
-#[cfg(feature = "alloc")]
-pub(super) use newton::symmetric;
+pub(crate) use newton::symmetric;
 pub use options::InteriorPointOptions;
 pub use store::Store;
 

@@ -1,0 +1,225 @@
+//! Constraints at the nodes.
+
+use super::error::{OcpError, Part};
+use super::point::{Terms, check, position};
+use crate::function::{ArrayV, ArrayY, Function};
+use crate::scalar::Real;
+use crate::shape::{Array, Outputs, Plain, Shape};
+use bytemuck::Zeroable;
+
+/// Constraints at a node, as functions of `(x, u, p, t)` with bounds: `()` is none, a pair is both.
+pub trait Constraints<S: Shape, T: Real> {
+    /// How many rows.
+    const ROWS: usize;
+
+    /// Whether they depend on what is there only.
+    ///
+    /// # Errors
+    /// [`OcpError::NotThere`]
+    #[doc(hidden)]
+    fn check(&self, terminal: bool) -> Result<(), OcpError>;
+    /// The bounds that hold where nothing else is said: lower ones, upper ones, linear and quadratic penalties.
+    #[doc(hidden)]
+    fn bounds(&self, limits: [&mut [T]; 4]);
+    /// The values.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], stage: usize) -> Result<(), OcpError>;
+    /// The values, and their derivatives: a column for each, `ld` apart.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn linearise(
+        &mut self,
+        v: &S::ArrayV<T>,
+        values: &mut [T],
+        columns: &mut [T],
+        ld: usize,
+        stage: usize,
+    ) -> Result<(), OcpError>;
+    /// Adds the Hessian of `μᵀg`.
+    #[doc(hidden)]
+    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>);
+    /// The function of a row, and which of its outputs it is.
+    #[doc(hidden)]
+    fn name(row: usize) -> (&'static str, usize);
+}
+
+impl<S: Shape, T: Real> Constraints<S, T> for () {
+    const ROWS: usize = 0;
+    fn check(&self, _: bool) -> Result<(), OcpError> {
+        Ok(())
+    }
+    fn bounds(&self, _: [&mut [T]; 4]) {}
+    fn value(&mut self, _: &S::ArrayV<T>, _: &mut [T], _: usize) -> Result<(), OcpError> {
+        Ok(())
+    }
+    fn linearise(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: &mut [T],
+        _: &mut [T],
+        _: usize,
+        _: usize,
+    ) -> Result<(), OcpError> {
+        Ok(())
+    }
+    fn curve(&mut self, _: &S::ArrayV<T>, _: &[T], _: &mut Terms<'_, T>) {}
+    fn name(row: usize) -> (&'static str, usize) {
+        ("", row)
+    }
+}
+
+impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<S, T> for (A, B) {
+    const ROWS: usize = A::ROWS + B::ROWS;
+    fn check(&self, terminal: bool) -> Result<(), OcpError> {
+        self.0.check(terminal)?;
+        self.1.check(terminal)
+    }
+    fn bounds(&self, limits: [&mut [T]; 4]) {
+        let [(l, lower), (u, upper), (i, linear), (q, quadratic)] =
+            limits.map(|rows| rows.split_at_mut_checked(A::ROWS).unwrap_or_default());
+        self.0.bounds([l, u, i, q]);
+        self.1.bounds([lower, upper, linear, quadratic]);
+    }
+    fn value(&mut self, v: &S::ArrayV<T>, values: &mut [T], stage: usize) -> Result<(), OcpError> {
+        let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
+        self.0.value(v, first, stage)?;
+        self.1.value(v, second, stage)
+    }
+    fn linearise(
+        &mut self,
+        v: &S::ArrayV<T>,
+        values: &mut [T],
+        columns: &mut [T],
+        ld: usize,
+        stage: usize,
+    ) -> Result<(), OcpError> {
+        let (first, second) = values.split_at_mut_checked(A::ROWS).unwrap_or_default();
+        let (mine, others) = columns.split_at_mut_checked(A::ROWS * ld).unwrap_or_default();
+        self.0.linearise(v, first, mine, ld, stage)?;
+        self.1.linearise(v, second, others, ld, stage)
+    }
+    fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>) {
+        let (first, second) = mu.split_at_checked(A::ROWS).unwrap_or_default();
+        self.0.curve(v, first, terms);
+        self.1.curve(v, second, terms);
+    }
+    fn name(row: usize) -> (&'static str, usize) {
+        match row.checked_sub(A::ROWS) {
+            None => A::name(row),
+            Some(row) => B::name(row),
+        }
+    }
+}
+
+/// `lower ≤ g(x, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal bounds are an equation.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Constraint<F: Function, T: Plain = f64> {
+    lower: ArrayY<F, T>,
+    upper: ArrayY<F, T>,
+    /// Penalties.
+    linear: ArrayY<F, T>,
+    quadratic: ArrayY<F, T>,
+    g: ArrayY<F, T>,
+    jacobian: F::Jacobian<T>,
+    hessian: F::Hessian<T>,
+}
+
+impl<F: Function, T: Real> Constraint<F, T> {
+    /// With these bounds at every node.
+    #[must_use]
+    pub fn new(lower: ArrayY<F, T>, upper: ArrayY<F, T>) -> Self {
+        let linear = Array::from_fn(|_| T::from_f64(f64::INFINITY));
+        let mut constraint = Self { lower, upper, linear, ..Zeroable::zeroed() };
+        F::jacobian_constants::<T>(&mut constraint.jacobian);
+        constraint
+    }
+
+    /// Makes the bounds soft: a violation `e` costs `linear · e + ½ quadratic · e²`.
+    #[must_use]
+    pub fn soft(mut self, linear: T, quadratic: T) -> Self {
+        self.linear = Array::from_fn(|_| linear);
+        self.quadratic = Array::from_fn(|_| quadratic);
+        self
+    }
+
+    fn check_values(&self, stage: usize) -> Result<(), OcpError> {
+        match crate::irk::not_finite(self.g.as_ref()) {
+            None => Ok(()),
+            Some((output, value)) => {
+                Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+            }
+        }
+    }
+}
+
+impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
+    const ROWS: usize = F::Outputs::NY;
+
+    fn check(&self, terminal: bool) -> Result<(), OcpError> {
+        let part = if terminal { Part::TerminalBounds } else { Part::PathBounds };
+        for (index, (&lower, &upper)) in self.lower.as_ref().iter().zip(self.upper.as_ref()).enumerate() {
+            super::bounds::check(part, 0, index, lower, upper)?;
+        }
+        for (index, (&linear, &quadratic)) in
+            self.linear.as_ref().iter().zip(self.quadratic.as_ref()).enumerate()
+        {
+            super::bounds::check_penalty(0, index, linear, quadratic)?;
+        }
+        check::<F>(terminal)
+    }
+    fn bounds(&self, limits: [&mut [T]; 4]) {
+        let given = [&self.lower, &self.upper, &self.linear, &self.quadratic];
+        for (to, from) in limits.into_iter().zip(given) {
+            for (to, &from) in to.iter_mut().zip(from.as_ref()) {
+                *to = from;
+            }
+        }
+    }
+    fn value(&mut self, v: &ArrayV<F, T>, values: &mut [T], stage: usize) -> Result<(), OcpError> {
+        F::value::<T>(v, &mut self.g);
+        self.check_values(stage)?;
+        for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
+            *value = g;
+        }
+        Ok(())
+    }
+    fn linearise(
+        &mut self,
+        v: &ArrayV<F, T>,
+        values: &mut [T],
+        columns: &mut [T],
+        ld: usize,
+        stage: usize,
+    ) -> Result<(), OcpError> {
+        F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
+        self.check_values(stage)?;
+        for (value, &g) in values.iter_mut().zip(self.g.as_ref()) {
+            *value = g;
+        }
+        for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
+            let (row, variable) = F::STRUCTURE.jacobian.at(entry);
+            let Some(position) = position::<F::Shape>(variable) else { continue };
+            if let Some(element) = columns.get_mut(row * ld + position) {
+                *element = value;
+            }
+        }
+        Ok(())
+    }
+    fn curve(&mut self, v: &ArrayV<F, T>, mu: &[T], terms: &mut Terms<'_, T>) {
+        if F::STRUCTURE.hessian.is_empty() {
+            return;
+        }
+        let mu = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
+        F::hessian::<T>(v, &mu, &mut self.hessian);
+        terms.curvature::<F>(&self.hessian, T::ONE);
+    }
+    fn name(row: usize) -> (&'static str, usize) {
+        (F::STRUCTURE.name, row)
+    }
+}

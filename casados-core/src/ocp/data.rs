@@ -1,0 +1,62 @@
+//! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
+
+use super::constraint::Constraints;
+use super::cost::Cost;
+use super::problem::Formulation;
+use crate::qp::{StageDims, pad};
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+/// The parts of the memory.
+pub(super) struct Data<'a, T> {
+    /// Times of the nodes.
+    pub times: &'a mut [T],
+    /// Parameters of every node.
+    pub p: &'a mut [T],
+    /// References of every stage, and of the last one.
+    pub references: &'a mut [T],
+    /// Lower bounds of the constraints of every stage, and of the last one.
+    pub lower: &'a mut [T],
+    /// Upper ones.
+    pub upper: &'a mut [T],
+    /// Room for two matrices and a vector over `(x, u)`.
+    pub scratch: &'a mut [T],
+}
+
+/// `NX + NU`
+pub(super) const fn inputs<S: Shape>() -> usize {
+    S::NX + S::NU
+}
+
+const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 6] {
+    let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
+    let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+    let n = inputs::<P::Shape>();
+    [intervals + 1, (intervals + 1) * P::Shape::NP, references, rows, rows, (2 * n + 1) * pad::<T>(n)]
+}
+
+/// How many numbers it takes.
+pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
+    let [a, b, c, d, e, f] = lengths::<P, T>(intervals);
+    a + b + c + d + e + f
+}
+
+/// The parts.
+pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
+    let mut rest = memory;
+    let [times, p, references, lower, upper, scratch] = lengths::<P, T>(intervals).map(|length| {
+        let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
+        rest = behind;
+        part
+    });
+    Data { times, p, references, lower, upper, scratch }
+}
+
+/// The dimensions of a stage.
+pub(super) const fn stage<P: Formulation<T>, T: Real>(last: bool) -> StageDims {
+    if last {
+        StageDims::new(P::Shape::NX, 0, P::Terminal::ROWS)
+    } else {
+        StageDims::new(P::Shape::NX, P::Shape::NU, P::Path::ROWS)
+    }
+}

@@ -1,0 +1,172 @@
+//! What happens between two nodes of a horizon.
+
+use super::error::OcpError;
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain, Shape};
+
+/// Names of the variables of a model.
+#[derive(Clone, Copy, Debug)]
+pub struct Names {
+    /// Of the model.
+    pub model: &'static str,
+    /// States.
+    pub x: &'static [&'static str],
+    /// Controls.
+    pub u: &'static [&'static str],
+    /// Parameters.
+    pub p: &'static [&'static str],
+}
+
+/// What is given of one interval.
+#[derive(Clone, Copy, Debug)]
+pub struct Interval<'a, T> {
+    /// The state at its start.
+    pub x: &'a [T],
+    /// The control, constant over the interval.
+    pub u: &'a [T],
+    /// The parameters.
+    pub p: &'a [T],
+    /// The multipliers `π` of its end.
+    pub multipliers: &'a [T],
+    /// The time at its start.
+    pub t: T,
+    /// Its length.
+    pub h: T,
+}
+
+/// The intervals of a horizon at the current iterate.
+#[derive(Clone, Copy, Debug)]
+pub struct Nodes<'a, T> {
+    pub(super) v: &'a [T],
+    pub(super) multipliers: &'a [T],
+    pub(super) p: &'a [T],
+    pub(super) times: &'a [T],
+    /// `NX`, `NU`, `NP`
+    pub(super) dims: [usize; 3],
+    /// Distances of stages in `v`, and in `multipliers`.
+    pub(super) ld: [usize; 2],
+}
+
+impl<'a, T: Real> Nodes<'a, T> {
+    /// How many intervals.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.times.len().saturating_sub(1)
+    }
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// All intervals, in order.
+    pub fn iter(&self) -> impl Iterator<Item = Interval<'a, T>> + use<'a, T> {
+        let Self { v, multipliers, p, times, dims: [nx, nu, np], ld: [ld, ld_next] } = *self;
+        let part = crate::qp::part::<T>;
+        times.windows(2).enumerate().map(move |(k, times)| {
+            let [t, end] = [0, 1].map(|i| times.get(i).copied().unwrap_or(T::ZERO));
+            Interval {
+                x: part(v, k * ld, nx),
+                u: part(v, k * ld + nx, nu),
+                p: part(p, k * np, np),
+                multipliers: part(multipliers, k * ld_next, nx),
+                t,
+                h: end - t,
+            }
+        })
+    }
+}
+
+/// What comes out of an interval: matrices as slices, column after column. What was not asked for is empty.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a, T> {
+    /// The state at the end, `φ(x, u, p)`.
+    pub x: &'a [T],
+    /// `∂φ/∂x`
+    pub dx: &'a [T],
+    /// `∂φ/∂u`
+    pub du: &'a [T],
+    /// `∂φ/∂p`
+    pub dp: &'a [T],
+    /// `∇²(πᵀφ + integral)`: blocks `xx`, `xu`, `uu`.
+    pub hessian: [&'a [T]; 3],
+    /// The integral cost.
+    pub cost: IntegralTerms<'a, T>,
+}
+
+impl<T: Real> Default for Step<'_, T> {
+    fn default() -> Self {
+        Self { x: &[], dx: &[], du: &[], dp: &[], hessian: [&[]; 3], cost: IntegralTerms::default() }
+    }
+}
+
+/// An integral cost of an interval and its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct IntegralTerms<'a, T> {
+    /// The value.
+    pub value: T,
+    /// Its gradient with respect to `x`.
+    pub x: &'a [T],
+    /// Its gradient with respect to `u`.
+    pub u: &'a [T],
+    /// The matrix of Gauss and Newton: blocks `xx`, `xu`, `uu`.
+    pub hessian: [&'a [T]; 3],
+}
+
+impl<T: Real> Default for IntegralTerms<'_, T> {
+    fn default() -> Self {
+        Self { value: T::ZERO, x: &[], u: &[], hessian: [&[]; 3] }
+    }
+}
+
+/// What takes the results of the intervals, in order.
+pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
+
+/// What happens between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.
+///
+/// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or on the heap;
+/// [`Along`](super::Along) is one with an integral cost, [`Map`](super::Map) a function that is `φ` itself, and
+/// [`Shooting`](super::Shooting) a batch that takes all intervals at once.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not say what happens between two nodes of a horizon",
+    note = "`Irk`, `Erk`, `Shooting` (over a `Batch`), `Along` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
+)]
+pub trait Dynamics<T: Real> {
+    /// Dimensions.
+    type Shape: Shape;
+    /// Names of the variables.
+    const NAMES: Names;
+
+    /// The ends of all intervals, and integral costs.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+
+    /// The ends of all intervals and their first derivatives.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+}
+
+/// Dynamics with second derivatives.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` has no second derivatives",
+    note = "integrators with `Heap` or `Inline<mode::Hessian>` memory have them"
+)]
+pub trait SecondOrder<T: Real>: Dynamics<T> {
+    /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + integral)`.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+}
+
+/// A vector of these elements.
+pub(super) fn vector<T: Plain, V: Matrix<T>>(elements: &[T]) -> V {
+    let mut vector = V::zeroed();
+    for (to, from) in vector.as_mut_slice().iter_mut().zip(elements) {
+        *to = *from;
+    }
+    vector
+}

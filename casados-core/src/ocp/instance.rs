@@ -1,0 +1,302 @@
+//! A problem on a horizon, with its data, its iterate and its QP.
+
+use super::bounds::{check_finite, check_vector};
+use super::constraint::Constraints;
+use super::cost::Cost;
+use super::data::{self, Data, split};
+use super::dynamics::Nodes;
+use super::error::{OcpError, Part};
+use super::horizon::Horizon;
+use super::problem::{Formulation, Problem};
+use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, pad, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// What is known of the state at the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Initial {
+    /// Nothing was said.
+    Unknown,
+    Fixed,
+    Free,
+}
+
+/// A problem of optimal control on a horizon, discretised by multiple shooting.
+///
+/// ```text
+/// min  Σ_k l(x_k, u_k) + e(x_N)     x_{k+1} = φ(x_k, u_k)     lb ≤ (x_k, u_k) ≤ ub     lg ≤ g(x_k, u_k) ≤ ug
+/// ```
+///
+/// It holds the data of every stage, an iterate with multipliers, and the QP that [`Ocp::linearise`] writes at the iterate.
+/// The variables of this QP are states and controls themselves, not their changes: bounds are written into it once, its
+/// solution is the next iterate, and its conditions of optimality at the iterate are those of the problem.
+///
+/// With the feature `alloc`, [`Problem::on`] allocates the memory; elsewhere [`Problem::on_horizon`] takes it.
+pub struct Ocp<P, T, D, M> {
+    pub(super) problem: P,
+    pub(super) initial: Initial,
+    pub(super) qp: Qp<T, D, M>,
+    pub(super) iterate: Solution<T, D, M>,
+    pub(super) data: M,
+    /// Of the last linearisation, without penalties.
+    pub(super) objective: T,
+}
+
+/// A problem with its memory on the heap.
+#[cfg(feature = "alloc")]
+pub type HeapOcp<P, T = f64> = Ocp<P, T, Vec<StageDims>, Vec<T>>;
+
+impl<D, L, E, G, H> Problem<D, L, E, G, H> {
+    /// The problem on a horizon, with memory on the heap.
+    ///
+    /// # Errors
+    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
+    /// [`OcpError::OutOfMemory`]
+    #[cfg(feature = "alloc")]
+    pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
+    where
+        Self: Formulation<T>,
+    {
+        let intervals = horizon.intervals();
+        let mut dims = Vec::new();
+        let bytes = intervals.saturating_mul(size_of::<StageDims>());
+        dims.try_reserve_exact(intervals.saturating_add(1)).map_err(|_| OcpError::OutOfMemory { bytes })?;
+        dims.resize(intervals, data::stage::<Self, T>(false));
+        dims.push(data::stage::<Self, T>(true));
+        let qp = Qp::new(&dims)?;
+        let iterate = Solution::new(&dims)?;
+        let length = data::length::<Self, T>(intervals);
+        let mut memory = Vec::new();
+        let bytes = length.saturating_mul(size_of::<T>());
+        memory.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
+        memory.resize(length, T::ZERO);
+        Ocp::build(self, horizon, qp, iterate, memory)
+    }
+
+    /// The dimensions of the stages, of which there is one more than there are intervals.
+    #[must_use]
+    pub const fn dims<T: Real, const STAGES: usize>() -> [StageDims; STAGES]
+    where
+        Self: Formulation<T>,
+    {
+        let mut dims = [data::stage::<Self, T>(false); STAGES];
+        if let Some(last) = dims.last_mut() {
+            *last = data::stage::<Self, T>(true);
+        }
+        dims
+    }
+
+    /// How many numbers a problem takes.
+    #[must_use]
+    pub const fn memory<T: Real>(dims: &[StageDims]) -> usize
+    where
+        Self: Formulation<T>,
+    {
+        Qp::<T, (), ()>::memory(dims)
+            + Solution::<T, (), ()>::memory(dims)
+            + data::length::<Self, T>(dims.len().saturating_sub(1))
+    }
+
+    /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims` are
+    /// [`Problem::dims`].
+    ///
+    /// # Errors
+    /// As [`Problem::on`]; [`OcpError::Length`] if memory or dimensions do not fit.
+    #[allow(clippy::type_complexity)]
+    pub fn on_horizon<'a, T: Real>(
+        self,
+        horizon: Horizon<'_, T>,
+        dims: &'a [StageDims],
+        memory: &'a mut [T],
+    ) -> Result<Ocp<Self, T, &'a [StageDims], &'a mut [T]>, OcpError>
+    where
+        Self: Formulation<T>,
+    {
+        let intervals = horizon.intervals();
+        if dims.len() != intervals + 1 {
+            let (part, expected) = (Part::Dimensions, intervals + 1);
+            return Err(OcpError::Length { part, stage: 0, expected, found: dims.len() });
+        }
+        for (stage, &dims) in dims.iter().enumerate() {
+            let given = data::stage::<Self, T>(stage == intervals);
+            for (expected, found) in [(given.nx, dims.nx), (given.nu, dims.nu), (given.ng, dims.ng)] {
+                if expected != found {
+                    return Err(OcpError::Length { part: Part::Dimensions, stage, expected, found });
+                }
+            }
+        }
+        let (expected, found) = (Self::memory::<T>(dims), memory.len());
+        if found < expected {
+            return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
+        }
+        let (qp, rest) = memory.split_at_mut_checked(Qp::<T, (), ()>::memory(dims)).unwrap_or_default();
+        let (iterate, rest) =
+            rest.split_at_mut_checked(Solution::<T, (), ()>::memory(dims)).unwrap_or_default();
+        Ocp::build(self, horizon, Qp::in_memory(dims, qp)?, Solution::in_memory(dims, iterate)?, rest)
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    fn build(
+        mut problem: P,
+        horizon: Horizon<'_, T>,
+        mut qp: Qp<T, D, M>,
+        iterate: Solution<T, D, M>,
+        mut data: M,
+    ) -> Result<Self, OcpError> {
+        let intervals = horizon.intervals();
+        if intervals == 0 {
+            return Err(OcpError::Missing { part: Part::Times, stage: 0 });
+        }
+        let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
+        stage_cost.check(false)?;
+        terminal_cost.check(true)?;
+        path.check(false)?;
+        terminal.check(true)?;
+        let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), intervals);
+        horizon.write(times)?;
+        // Parameters that nobody sets are found in this way.
+        p.fill(T::from_f64(f64::NAN));
+        references.fill(T::ZERO);
+        for (k, mut stage) in qp.stages_mut().enumerate() {
+            let begin = k * P::Path::ROWS;
+            let rows = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let bounds = stage.g_bounds_mut();
+            let limits = [
+                part_mut(lower, begin, rows),
+                part_mut(upper, begin, rows),
+                &mut *bounds.lower_linear,
+                &mut *bounds.lower_quadratic,
+            ];
+            if k < intervals {
+                path.bounds(limits)
+            } else {
+                terminal.bounds(limits)
+            }
+            bounds.upper_linear.copy_from_slice(bounds.lower_linear);
+            bounds.upper_quadratic.copy_from_slice(bounds.lower_quadratic);
+        }
+        Ok(Self { problem, initial: Initial::Unknown, qp, iterate, data, objective: T::ZERO })
+    }
+
+    /// How many intervals the horizon has.
+    #[must_use]
+    pub fn intervals(&self) -> usize {
+        self.qp.dims().len().saturating_sub(1)
+    }
+
+    /// The functions of the problem: weights of costs and options of integrators may be changed there.
+    pub fn problem(&mut self) -> &mut P {
+        &mut self.problem
+    }
+
+    /// The QP at the iterate of the last [`Ocp::linearise`].
+    #[must_use]
+    pub fn qp(&self) -> QpView<'_, T> {
+        self.qp.view()
+    }
+
+    /// The QP, and the iterate as the place of its solution.
+    pub fn qp_and_iterate(&mut self) -> (QpView<'_, T>, &mut Solution<T, D, M>) {
+        (self.qp.view(), &mut self.iterate)
+    }
+
+    /// States, controls and multipliers.
+    #[must_use]
+    pub fn iterate(&self) -> &Solution<T, D, M> {
+        &self.iterate
+    }
+
+    /// States, controls and multipliers, to be changed.
+    pub fn iterate_mut(&mut self) -> &mut Solution<T, D, M> {
+        &mut self.iterate
+    }
+
+    /// A stage of the iterate.
+    ///
+    /// # Errors
+    /// [`OcpError::NoSuchStage`]
+    pub fn stage(&self, stage: usize) -> Result<SolutionStage<'_, T>, OcpError> {
+        let stages = self.intervals() + 1;
+        self.iterate.stage(stage).ok_or(OcpError::NoSuchStage { part: Part::States, stage, stages })
+    }
+
+    /// A state and a control as the iterate at every stage, and no multipliers: a start that is always there.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`]
+    pub fn guess(&mut self, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
+        check_vector(Part::States, 0, x, P::Shape::NX)?;
+        check_vector(Part::Controls, 0, u, P::Shape::NU)?;
+        for k in 0..=self.intervals() {
+            self.guess_stage(k, x, if k < self.intervals() { u } else { &[] })?;
+        }
+        Ok(self)
+    }
+
+    /// A state and a control as the iterate at one stage, and no multipliers there. The last stage has no control.
+    ///
+    /// # Errors
+    /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
+    pub fn guess_stage(&mut self, stage: usize, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
+        let last = self.intervals();
+        let Some(place) = self.iterate.stage_mut(stage) else {
+            return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
+        };
+        check_vector(Part::States, stage, x, place.x.len())?;
+        check_vector(Part::Controls, stage, u, place.u.len())?;
+        place.x.copy_from_slice(x);
+        place.u.copy_from_slice(u);
+        for multipliers in [
+            place.dynamics,
+            place.x_lower,
+            place.x_upper,
+            place.u_lower,
+            place.u_upper,
+            place.g_lower,
+            place.g_upper,
+        ] {
+            multipliers.fill(T::ZERO);
+        }
+        Ok(self)
+    }
+
+    /// Finds what was never set, and an iterate that is not finite.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::InvalidValue`]
+    pub fn check(&self) -> Result<(), OcpError> {
+        if self.initial == Initial::Unknown {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        let np = P::Shape::NP;
+        let p = part(self.data.as_ref(), self.intervals() + 1, (self.intervals() + 1) * np);
+        if let Some((index, _)) = crate::irk::not_finite(p) {
+            let stage = index.checked_div(np).unwrap_or(0);
+            return Err(OcpError::Missing { part: Part::Parameters, stage });
+        }
+        for (stage, point) in self.iterate.stages().enumerate() {
+            check_finite(Part::States, stage, point.x)?;
+            check_finite(Part::Controls, stage, point.u)?;
+        }
+        Ok(())
+    }
+
+    /// Everything of the iterate one interval earlier, as the start of the problem of the next sampling instant.
+    pub fn shift(&mut self) {
+        self.iterate.shift();
+    }
+}
+
+/// The intervals at a point.
+pub(super) fn nodes<'a, S: Shape, T: Real>(
+    v: &'a [T],
+    multipliers: &'a [T],
+    p: &'a [T],
+    times: &'a [T],
+) -> Nodes<'a, T> {
+    let dims = [S::NX, S::NU, S::NP];
+    Nodes { v, multipliers, p, times, dims, ld: [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)] }
+}

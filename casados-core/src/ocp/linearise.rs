@@ -1,0 +1,322 @@
+//! The QP at an iterate.
+
+use super::constraint::Constraints;
+use super::convexify::{Convexification, convexify};
+use super::cost::{At, Cost};
+use super::data::{inputs, split};
+use super::dynamics::{Dynamics, IntegralTerms, Nodes, SecondOrder, Sink, Step};
+use super::error::OcpError;
+use super::instance::{Ocp, nodes};
+use super::point::{Terms, read};
+use super::problem::{Formulation, Problem};
+use crate::qp::{Arrays, Residuals, Solution, StageDims, pad, part, part_mut, symmetric};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use bytemuck::Zeroable;
+
+/// What the Hessian of the QP is: [`GaussNewton`] or [`Exact`].
+pub trait Curvature<D, T: Real>: Copy {
+    /// Whether second derivatives of everything are in it.
+    const EXACT: bool;
+    /// How a stage is made convex.
+    fn convexification(&self) -> Convexification;
+    /// Linearises the dynamics.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    #[doc(hidden)]
+    fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+}
+
+/// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GaussNewton {
+    /// What is done where a general cost is not convex.
+    pub convexification: Convexification,
+}
+
+/// The Hessian of the Lagrangian, made convex stage by stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exact {
+    /// What is done where a stage is not convex.
+    pub convexification: Convexification,
+}
+
+impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
+    const EXACT: bool = false;
+    fn convexification(&self) -> Convexification {
+        self.convexification
+    }
+    fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        dynamics.linearise(nodes, sink)
+    }
+}
+
+impl<D: SecondOrder<T>, T: Real> Curvature<D, T> for Exact {
+    const EXACT: bool = true;
+    fn convexification(&self) -> Convexification {
+        self.convexification
+    }
+    fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        dynamics.second_order(nodes, sink)
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic programming.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
+        self.check()?;
+        let intervals = self.intervals();
+        let (nx, np) = (P::Shape::NX, P::Shape::NP);
+        let n = inputs::<P::Shape>();
+        let ld = pad::<T>(n);
+        let Self { problem, qp, iterate, data, .. } = self;
+        let data = split::<P, T>(data.as_mut(), intervals);
+        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = problem.parts();
+        let (v, multipliers) = iterate.vectors();
+
+        // Costs and constraints, stage by stage.
+        let mut objective = T::ZERO;
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
+            let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
+            hessian.fill(T::ZERO);
+            gradient.fill(T::ZERO);
+            let time = data.times.get(k).copied().unwrap_or(T::ZERO);
+            read::<P::Shape, T>(&mut point, at.x, at.u, part(data.p, k * np, np), time);
+            let mut terms = Terms { gradient, hessian, ld };
+            let columns = matrix.get_mut(next * ld..).unwrap_or_default();
+            // Values lie where the lower bounds are written afterwards.
+            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
+            let values = lower.get_mut(ld..).unwrap_or_default();
+            let first = k * P::Path::ROWS;
+            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let values = part_mut(values, 0, count);
+            if k < intervals {
+                let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
+                let factor = if *running { end - time } else { T::ONE };
+                let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
+                let place = At { stage: k, factor, exact: C::EXACT };
+                objective = objective + stage_cost.add(&point, reference, place, &mut terms)?;
+                path.linearise(&point, values, columns, ld, k)?;
+            } else {
+                let begin = intervals * P::StageCost::REFERENCES;
+                let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
+                let place = At { stage: k, factor: T::ONE, exact: C::EXACT };
+                objective = objective + terminal_cost.add(&point, reference, place, &mut terms)?;
+                terminal.linearise(&point, values, columns, ld, k)?;
+            }
+            if C::EXACT && count > 0 {
+                // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
+                let mu = part_mut(rest, ld, count);
+                for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
+                    *mu = upper - lower;
+                }
+                if k < intervals {
+                    path.curve(&point, mu, &mut terms);
+                } else {
+                    terminal.curve(&point, mu, &mut terms);
+                }
+            }
+            // Bounds of what is linear: `lg − g + [C D] v`.
+            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let upper = part_mut(rest, ld, count);
+            for (row, (value, upper)) in values.iter_mut().zip(upper).enumerate() {
+                let column = part(columns, row * ld, n);
+                let shift = dot(column, here) - *value;
+                *value = data.lower.get(first + row).copied().unwrap_or(T::ZERO) + shift;
+                *upper = data.upper.get(first + row).copied().unwrap_or(T::ZERO) + shift;
+            }
+        }
+
+        // Dynamics, all intervals in one call.
+        let mut stages = qp.stages_mut();
+        let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
+        C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
+            let Some(mut stage) = stages.next() else { return };
+            let Arrays { n, ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
+            write_dynamics(matrix, ld, nx, step);
+            let here = part(v, k * ld, n);
+            for ((offset, &x), column) in offset.iter_mut().zip(step.x).zip(matrix.chunks_exact(ld.max(1))) {
+                *offset = x - dot(column, here);
+            }
+            let IntegralTerms { value, x, u, hessian: blocks } = step.cost;
+            objective = objective + value;
+            let mut terms = Terms { gradient, hessian, ld };
+            for (i, &slope) in x.iter().chain(u).enumerate() {
+                terms.slope(i, slope);
+            }
+            add_blocks(&mut terms, nx, blocks);
+            add_blocks(&mut terms, nx, step.hessian);
+        })?;
+        drop(stages);
+
+        // Gradients of what is quadratic: `∇f − H v`.
+        for (k, mut stage) in qp.stages_mut().enumerate() {
+            let Arrays { n, ld: stage_ld, hessian, gradient, .. } = stage.arrays();
+            let convex =
+                if k < intervals { P::StageCost::CONVEX } else { P::TerminalCost::CONVEX } && !C::EXACT;
+            if !convex {
+                convexify(curvature.convexification(), hessian, stage_ld, n, data.scratch);
+            }
+            let product = part_mut(data.scratch, 0, n);
+            product.fill(T::ZERO);
+            symmetric(product, hessian, stage_ld, part(v, k * ld, n), n);
+            for (gradient, &product) in gradient.iter_mut().zip(&*product) {
+                *gradient = *gradient - product;
+            }
+        }
+        self.objective = objective;
+        Ok(())
+    }
+
+    /// How well the iterate satisfies the conditions of optimality of the problem, and the objective with penalties of soft
+    /// bounds; after [`Ocp::linearise`].
+    #[must_use]
+    pub fn residuals(&mut self) -> (Residuals, f64) {
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        let (residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
+        (residuals, self.objective.to_f64() + penalties)
+    }
+
+    /// The objective at some point, without penalties; and what is left of its dynamics and constraints in `ends`: `φ` of every
+    /// interval, then `g` of every stage, in the layout of [`Ocp::ends`].
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub(super) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
+        let intervals = self.intervals();
+        let (nx, np) = (P::Shape::NX, P::Shape::NP);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
+        let (v, multipliers) = at.vectors();
+        let mut objective = T::ZERO;
+        let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
+        dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
+            objective = objective + step.cost.value;
+            part_mut(ends, k * nx, nx).copy_from_slice(step.x);
+        })?;
+        let values = ends.get_mut(intervals * nx..).unwrap_or_default();
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, at) in at.stages().enumerate() {
+            let time = data.times.get(k).copied().unwrap_or(T::ZERO);
+            read::<P::Shape, T>(&mut point, at.x, at.u, part(data.p, k * np, np), time);
+            let (begin, length) = (k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
+            if k < intervals {
+                let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
+                let factor = if *running { end - time } else { T::ONE };
+                let reference = part(data.references, begin, length);
+                objective = objective + factor * stage_cost.value(&point, reference, k)?;
+                path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
+            } else {
+                let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
+                objective = objective + terminal_cost.value(&point, reference, k)?;
+                terminal.value(&point, part_mut(values, k * P::Path::ROWS, P::Terminal::ROWS), k)?;
+            }
+        }
+        Ok(objective)
+    }
+
+    /// How many numbers `φ` of every interval and `g` of every stage are.
+    pub(super) fn ends(&self) -> usize {
+        self.intervals() * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
+    }
+
+    /// Constants of the linearised dynamics and constraints such that these are exact at some point, whose `ends` are given: what a
+    /// second-order correction solves.
+    pub(super) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
+        let intervals = self.intervals();
+        let (nx, path) = (P::Shape::NX, P::Path::ROWS);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let (v, _) = at.vectors();
+        let values = ends.get(intervals * nx..).unwrap_or_default();
+        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+            let Arrays { n, ld, next, rows, matrix, offset, limits, .. } = stage.arrays();
+            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let phi = part(ends, k * nx, if k < intervals { nx } else { 0 });
+            for ((offset, &x), column) in offset.iter_mut().zip(phi).zip(matrix.chunks_exact(ld.max(1))) {
+                *offset = x - dot(column, here);
+            }
+            let columns = matrix.get(next * ld..).unwrap_or_default();
+            let first = k * path;
+            let count = if k < intervals { path } else { P::Terminal::ROWS };
+            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
+            let sides = part_mut(lower, ld, count).iter_mut().zip(part_mut(rest, ld, count));
+            for (row, (lower, upper)) in sides.enumerate() {
+                let value = values.get(first + row).copied().unwrap_or(T::ZERO);
+                let shift = dot(part(columns, row * ld, n), here) - value;
+                *lower = data.lower.get(first + row).copied().unwrap_or(T::ZERO) + shift;
+                *upper = data.upper.get(first + row).copied().unwrap_or(T::ZERO) + shift;
+            }
+        }
+    }
+
+    /// Bounds of a general constraint of a stage, as they were given.
+    pub(super) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
+        let intervals = self.intervals();
+        let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
+        let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
+        let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
+        [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
+    }
+}
+
+/// The distance of stages in vectors `v`.
+const fn ld_of<S: Shape, T>() -> usize {
+    pad::<T>(inputs::<S>())
+}
+
+#[inline(always)]
+pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    // Four sums, which the compiler may compute side by side.
+    let mut sums = [T::ZERO; 4];
+    let (a, b) = (a.get(..b.len()).unwrap_or(a), b);
+    let (chunks, rest) = a.as_chunks::<4>();
+    let (others, more) = b.as_chunks::<4>();
+    for (a, b) in chunks.iter().zip(others) {
+        for ((sum, &a), &b) in sums.iter_mut().zip(a).zip(b) {
+            *sum = *sum + a * b;
+        }
+    }
+    let [a0, a1, a2, a3] = sums;
+    let sum = (a0 + a1) + (a2 + a3);
+    rest.iter().zip(more).fold(sum, |sum, (&a, &b)| sum + a * b)
+}
+
+/// `[A B]ᵀ`: a column for each next state.
+#[inline(always)]
+fn write_dynamics<T: Real>(matrix: &mut [T], ld: usize, nx: usize, step: &Step<'_, T>) {
+    let columns = step.dx.chunks_exact(nx.max(1)).chain(step.du.chunks_exact(nx.max(1)));
+    for (j, column) in columns.enumerate() {
+        let targets = matrix.get_mut(j..).unwrap_or_default().iter_mut().step_by(ld.max(1));
+        for (target, &value) in targets.zip(column) {
+            *target = value;
+        }
+    }
+}
+
+/// Adds blocks `xx`, `xu`, `uu`, column after column, to the lower triangle.
+fn add_blocks<T: Real>(terms: &mut Terms<'_, T>, nx: usize, [xx, xu, uu]: [&[T]; 3]) {
+    if xx.is_empty() && uu.is_empty() {
+        return;
+    }
+    for (j, column) in xx.chunks_exact(nx.max(1)).enumerate() {
+        for (i, &value) in column.iter().enumerate().skip(j) {
+            terms.curve(i, j, value);
+        }
+    }
+    for (u, column) in xu.chunks_exact(nx.max(1)).enumerate() {
+        for (x, &value) in column.iter().enumerate() {
+            terms.curve(nx + u, x, value);
+        }
+    }
+    let nu = xu.len() / nx.max(1);
+    for (j, column) in uu.chunks_exact(nu.max(1)).enumerate() {
+        for (i, &value) in column.iter().enumerate().skip(j) {
+            terms.curve(nx + i, nx + j, value);
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! A function as dynamics: discrete time.
+
+use super::dynamics::{Dynamics, Names, Nodes, SecondOrder, Sink, Step, vector};
+use super::error::OcpError;
+use super::point::{position, read};
+use crate::function::{ArrayV, ArrayY, Function};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Outputs, Plain, Shape};
+use bytemuck::Zeroable;
+
+/// `x_{k+1} = y(x_k, u_k, p_k, t_k)`: a [`Function`] with as many outputs as there are states.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Map<F: Function, T: Plain> {
+    v: ArrayV<F, T>,
+    y: ArrayY<F, T>,
+    mu: ArrayY<F, T>,
+    jacobian: F::Jacobian<T>,
+    hessian: F::Hessian<T>,
+    x: <F::Shape as Shape>::VectorX<T>,
+    dx: <F::Shape as Shape>::MatrixXX<T>,
+    du: <F::Shape as Shape>::MatrixXU<T>,
+    dp: <F::Shape as Shape>::MatrixXP<T>,
+    h_xx: <F::Shape as Shape>::MatrixXX<T>,
+    h_xu: <F::Shape as Shape>::MatrixXU<T>,
+    h_uu: <F::Shape as Shape>::MatrixUU<T>,
+}
+
+impl<F: Function, T: Real> Map<F, T> {
+    /// The map of a function.
+    #[must_use]
+    pub fn new() -> Self {
+        const { assert!(F::Outputs::NY == F::Shape::NX, "a map has one output for each state") };
+        let mut map = Self::zeroed();
+        F::jacobian_constants::<T>(&mut map.jacobian);
+        map
+    }
+
+    fn check(&self, stage: usize) -> Result<(), OcpError> {
+        match crate::irk::not_finite(self.y.as_ref()) {
+            None => Ok(()),
+            Some((output, value)) => {
+                Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+            }
+        }
+    }
+
+    fn run(&mut self, nodes: &Nodes<'_, T>, second: bool, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
+        for (k, interval) in nodes.iter().enumerate() {
+            read::<F::Shape, T>(&mut self.v, interval.x, interval.u, interval.p, interval.t);
+            F::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
+            self.check(k)?;
+            self.x = vector(self.y.as_ref());
+            for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
+                let (row, variable) = F::STRUCTURE.jacobian.at(entry);
+                if (nx..2 * nx).contains(&variable) {
+                    self.dx[(row, variable - nx)] = value;
+                } else if let Some(column) = variable.checked_sub(2 * nx + nz) {
+                    match column.checked_sub(nu) {
+                        None => self.du[(row, column)] = value,
+                        Some(column) if column < F::Shape::NP => self.dp[(row, column)] = value,
+                        Some(_) => {}
+                    }
+                }
+            }
+            let mut hessian = [&[][..]; 3];
+            if second {
+                self.mu.as_mut().copy_from_slice(interval.multipliers);
+                F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
+                for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
+                    let (row, column) = F::STRUCTURE.hessian.at(entry);
+                    let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column))
+                    else {
+                        continue;
+                    };
+                    match (row.checked_sub(nx), column.checked_sub(nx)) {
+                        (None, _) => {
+                            self.h_xx[(row, column)] = value;
+                            self.h_xx[(column, row)] = value;
+                        }
+                        (Some(row), None) => self.h_xu[(column, row)] = value,
+                        (Some(row), Some(column)) => {
+                            self.h_uu[(row, column)] = value;
+                            self.h_uu[(column, row)] = value;
+                        }
+                    }
+                }
+                hessian = [self.h_xx.as_slice(), self.h_xu.as_slice(), self.h_uu.as_slice()];
+            }
+            let (x, dx, du, dp) =
+                (self.x.as_slice(), self.dx.as_slice(), self.du.as_slice(), self.dp.as_slice());
+            sink(k, &Step { x, dx, du, dp, hessian, ..Step::default() });
+        }
+        Ok(())
+    }
+}
+
+impl<F: Function, T: Real> Default for Map<F, T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
+    type Shape = F::Shape;
+    const NAMES: Names = {
+        let structure = &F::STRUCTURE;
+        Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
+    };
+
+    fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        for (k, interval) in nodes.iter().enumerate() {
+            read::<F::Shape, T>(&mut self.v, interval.x, interval.u, interval.p, interval.t);
+            F::value::<T>(&self.v, &mut self.y);
+            self.check(k)?;
+            sink(k, &Step { x: self.y.as_ref(), ..Step::default() });
+        }
+        Ok(())
+    }
+    fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.run(nodes, false, sink)
+    }
+}
+
+impl<F: Function, T: Real> SecondOrder<T> for Map<F, T> {
+    fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.run(nodes, true, sink)
+    }
+}

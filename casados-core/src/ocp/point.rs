@@ -1,0 +1,88 @@
+//! Functions at a node: what they are evaluated at, and where their derivatives go.
+
+use super::error::OcpError;
+use crate::function::{Function, FunctionStructure};
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+/// The index in `(x, u)` of a variable in `(ẋ, x, z, u, p, t)`, if it is one of these.
+#[inline(always)]
+pub(super) fn position<S: Shape>(variable: usize) -> Option<usize> {
+    let (nx, nz, nu) = (S::NX, S::NZ, S::NU);
+    if (nx..2 * nx).contains(&variable) {
+        Some(variable - nx)
+    } else if (2 * nx + nz..2 * nx + nz + nu).contains(&variable) {
+        Some(variable - nx - nz)
+    } else {
+        None
+    }
+}
+
+/// Writes the variables `(0, x, 0, u, p, t)`.
+#[inline(always)]
+pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, x: &[T], u: &[T], p: &[T], t: T) {
+    let begin = 2 * S::NX + S::NZ;
+    let parts =
+        [(S::NX, x), (begin, u), (begin + S::NU, p), (begin + S::NU + S::NP, core::slice::from_ref(&t))];
+    for (begin, part) in parts {
+        let target = v.as_mut().get_mut(begin..).unwrap_or_default();
+        for (to, &from) in target.iter_mut().zip(part) {
+            *to = from;
+        }
+    }
+}
+
+/// Whether a function depends on what is there only.
+pub(super) fn check<F: Function>(terminal: bool) -> Result<(), OcpError> {
+    let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
+    let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
+    for &variable in variables {
+        let Some(index) = (variable as usize).checked_sub(2 * nx) else { continue };
+        let missing = if index < nz {
+            z.get(index)
+        } else if terminal && index < nz + nu {
+            u.get(index - nz)
+        } else {
+            None
+        };
+        if let Some(&variable) = missing {
+            return Err(OcpError::NotThere { function, variable, terminal });
+        }
+    }
+    Ok(())
+}
+
+/// A gradient and the lower triangle of a Hessian over `(x, u)`, to be added to.
+pub struct Terms<'a, T> {
+    pub(super) gradient: &'a mut [T],
+    pub(super) hessian: &'a mut [T],
+    /// The distance of columns.
+    pub(super) ld: usize,
+}
+
+impl<T: Real> Terms<'_, T> {
+    /// Adds to the gradient.
+    #[inline(always)]
+    pub(super) fn slope(&mut self, index: usize, value: T) {
+        if let Some(element) = self.gradient.get_mut(index) {
+            *element = *element + value;
+        }
+    }
+    /// Adds to the Hessian, `row ≥ column`.
+    #[inline(always)]
+    pub(super) fn curve(&mut self, row: usize, column: usize, value: T) {
+        if let Some(element) = self.hessian.get_mut(column * self.ld + row) {
+            *element = *element + value;
+        }
+    }
+    /// Adds the entries of the Hessian of a function.
+    #[inline(always)]
+    pub(super) fn curvature<F: Function>(&mut self, hessian: &F::Hessian<T>, factor: T) {
+        for (entry, &value) in hessian.as_ref().iter().enumerate() {
+            let (row, column) = F::STRUCTURE.hessian.at(entry);
+            if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
+                self.curve(row, column, factor * value);
+            }
+        }
+    }
+}

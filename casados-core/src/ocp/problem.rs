@@ -1,0 +1,105 @@
+//! What a problem consists of.
+
+use super::constraint::Constraints;
+use super::cost::Cost;
+use super::dynamics::Dynamics;
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+/// Dynamics, costs and constraints. Each call of the builder puts a function in its place; what is not said is not there.
+///
+/// A problem on a horizon is an [`Ocp`](super::Ocp).
+#[derive(Clone, Debug)]
+pub struct Problem<D, L = (), E = (), G = (), H = ()> {
+    /// What happens between two nodes.
+    pub dynamics: D,
+    /// The cost of the stages but the last.
+    pub stage_cost: L,
+    /// The cost of the last stage.
+    pub terminal_cost: E,
+    /// The constraints of the stages but the last.
+    pub path: G,
+    /// The constraints of the last stage.
+    pub terminal: H,
+    /// Whether stage costs are multiplied by the lengths of intervals.
+    pub(super) running: bool,
+}
+
+impl<D> Problem<D> {
+    /// Dynamics without costs and constraints.
+    pub fn new(dynamics: D) -> Self {
+        Self { dynamics, stage_cost: (), terminal_cost: (), path: (), terminal: (), running: false }
+    }
+}
+
+impl<D, L, E, G, H> Problem<D, L, E, G, H> {
+    /// The cost of every stage but the last, as it is.
+    pub fn stage_cost<C>(self, stage_cost: C) -> Problem<D, C, E, G, H> {
+        let Self { dynamics, terminal_cost, path, terminal, .. } = self;
+        Problem { dynamics, stage_cost, terminal_cost, path, terminal, running: false }
+    }
+    /// The cost of every stage but the last, times the length of its interval.
+    pub fn running_cost<C>(self, cost: C) -> Problem<D, C, E, G, H> {
+        Problem { running: true, ..self.stage_cost(cost) }
+    }
+    /// The cost of the last stage.
+    pub fn terminal_cost<C>(self, terminal_cost: C) -> Problem<D, L, C, G, H> {
+        let Self { dynamics, stage_cost, path, terminal, running, .. } = self;
+        Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
+    }
+    /// Constraints of every stage but the last.
+    pub fn path_constraints<C>(self, path: C) -> Problem<D, L, E, C, H> {
+        let Self { dynamics, stage_cost, terminal_cost, terminal, running, .. } = self;
+        Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
+    }
+    /// Constraints of the last stage.
+    pub fn terminal_constraints<C>(self, terminal: C) -> Problem<D, L, E, G, C> {
+        let Self { dynamics, stage_cost, terminal_cost, path, running, .. } = self;
+        Problem { dynamics, stage_cost, terminal_cost, path, terminal, running }
+    }
+}
+
+/// The types of a [`Problem`] under one name.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a problem of optimal control with numbers `{T}`",
+    note = "costs and constraints are functions with the arguments of the model (unused ones with an underscore), and have its dimensions"
+)]
+pub trait Formulation<T: Real> {
+    /// Dimensions.
+    type Shape: Shape;
+    /// What happens between two nodes.
+    type Dynamics: Dynamics<T, Shape = Self::Shape>;
+    /// The cost of the stages but the last.
+    type StageCost: Cost<Self::Shape, T>;
+    /// The cost of the last stage.
+    type TerminalCost: Cost<Self::Shape, T>;
+    /// The constraints of the stages but the last.
+    type Path: Constraints<Self::Shape, T>;
+    /// The constraints of the last stage.
+    type Terminal: Constraints<Self::Shape, T>;
+
+    /// All of them.
+    #[allow(clippy::type_complexity)]
+    fn parts(
+        &mut self,
+    ) -> &mut Problem<Self::Dynamics, Self::StageCost, Self::TerminalCost, Self::Path, Self::Terminal>;
+}
+
+impl<T: Real, D, L, E, G, H> Formulation<T> for Problem<D, L, E, G, H>
+where
+    D: Dynamics<T>,
+    L: Cost<D::Shape, T>,
+    E: Cost<D::Shape, T>,
+    G: Constraints<D::Shape, T>,
+    H: Constraints<D::Shape, T>,
+{
+    type Shape = D::Shape;
+    type Dynamics = D;
+    type StageCost = L;
+    type TerminalCost = E;
+    type Path = G;
+    type Terminal = H;
+    fn parts(&mut self) -> &mut Self {
+        self
+    }
+}

@@ -1,0 +1,158 @@
+//! A batch as dynamics: all intervals in one call.
+
+use super::dynamics::{Dynamics, IntegralTerms, Names, Nodes, SecondOrder, Sink, Step, vector};
+use super::error::OcpError;
+use super::single::names;
+use crate::batch::{BatchError, Integrator, Intervals};
+use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::result::{Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use alloc::vec::Vec;
+
+/// All intervals of a horizon at once: lanes of registers, and threads (feature `parallel`).
+pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
+    batch: Integrator<M, B, S, T>,
+    x: Vec<VectorX<M, T>>,
+    u: Vec<VectorU<M, T>>,
+    p: Vec<VectorP<M, T>>,
+    h: Vec<T>,
+    t: Vec<T>,
+    lambda: Vec<VectorX<M, T>>,
+    nominal: Vec<Nominal<M, T>>,
+    forward: Vec<Forward<M, T>>,
+    hessian: Vec<Hessian<M, T>>,
+}
+
+impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
+    /// Memory for the intervals is allocated by the first call of its kind.
+    #[must_use]
+    pub fn new(batch: Integrator<M, B, S, T>) -> Self {
+        Self {
+            batch,
+            x: Vec::new(),
+            u: Vec::new(),
+            p: Vec::new(),
+            h: Vec::new(),
+            t: Vec::new(),
+            lambda: Vec::new(),
+            nominal: Vec::new(),
+            forward: Vec::new(),
+            hessian: Vec::new(),
+        }
+    }
+
+    /// The batch.
+    pub fn batch(&mut self) -> &mut Integrator<M, B, S, T> {
+        &mut self.batch
+    }
+
+    /// Copies the intervals to where the batch takes them from.
+    fn take(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+        let n = nodes.len();
+        reserve(&mut self.x, n)?;
+        reserve(&mut self.u, n)?;
+        reserve(&mut self.p, n)?;
+        reserve(&mut self.h, n)?;
+        reserve(&mut self.t, n)?;
+        reserve(&mut self.lambda, n)?;
+        for interval in nodes.iter() {
+            self.x.push(vector(interval.x));
+            self.u.push(vector(interval.u));
+            if <M::Shape as Shape>::NP > 0 {
+                self.p.push(vector(interval.p));
+            }
+            self.h.push(interval.h);
+            self.t.push(interval.t);
+            self.lambda.push(vector(interval.multipliers));
+        }
+        Ok(())
+    }
+}
+
+/// An empty list with room for so many.
+fn reserve<V>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
+    list.clear();
+    let bytes = length.saturating_mul(size_of::<V>());
+    list.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })
+}
+
+/// Places for so many results.
+fn places<V: Default + Clone>(list: &mut Vec<V>, length: usize) -> Result<(), OcpError> {
+    if list.len() != length {
+        reserve(list, length)?;
+        list.resize_with(length, V::default);
+    }
+    Ok(())
+}
+
+fn failed(error: BatchError) -> OcpError {
+    match error {
+        BatchError::Intervals { first, error, .. } => OcpError::Integration { interval: first, error },
+        BatchError::OutOfMemory { bytes } => OcpError::OutOfMemory { bytes },
+        // Lengths are those of one horizon.
+        BatchError::Length { length, intervals, .. } => {
+            OcpError::Length { part: super::Part::Memory, stage: 0, expected: intervals, found: length }
+        }
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
+    type Shape = M::Shape;
+    const NAMES: Names = names::<M>();
+
+    fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.take(nodes)?;
+        places(&mut self.nominal, nodes.len())?;
+        let Self { batch, x, u, p, h, t, nominal, .. } = self;
+        batch.solve(&Intervals { x0: x, u, p, h, t0: t }, nominal).map_err(failed)?;
+        for (k, result) in nominal.iter().enumerate() {
+            sink(k, &Step { x: result.x.as_slice(), ..Step::default() });
+        }
+        Ok(())
+    }
+
+    fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.take(nodes)?;
+        places(&mut self.forward, nodes.len())?;
+        let Self { batch, x, u, p, h, t, forward, .. } = self;
+        batch.forward(&Intervals { x0: x, u, p, h, t0: t }, forward).map_err(failed)?;
+        for (k, result) in forward.iter().enumerate() {
+            sink(
+                k,
+                &Step {
+                    x: result.nominal.x.as_slice(),
+                    dx: result.dx_dx0.as_slice(),
+                    du: result.dx_du.as_slice(),
+                    dp: result.dx_dp.as_slice(),
+                    ..Step::default()
+                },
+            );
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Shooting<M, B, S, T> {
+    fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.take(nodes)?;
+        places(&mut self.hessian, nodes.len())?;
+        let Self { batch, x, u, p, h, t, lambda, hessian, .. } = self;
+        batch.hessian(&Intervals { x0: x, u, p, h, t0: t }, lambda, hessian).map_err(failed)?;
+        for (k, result) in hessian.iter().enumerate() {
+            let forward = &result.first.forward;
+            sink(
+                k,
+                &Step {
+                    x: forward.nominal.x.as_slice(),
+                    dx: forward.dx_dx0.as_slice(),
+                    du: forward.dx_du.as_slice(),
+                    dp: forward.dx_dp.as_slice(),
+                    hessian: [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()],
+                    cost: IntegralTerms::default(),
+                },
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,235 @@
+//! Integrators of single intervals as dynamics: one interval after the other, without other memory than theirs.
+
+use super::dynamics::{Dynamics, IntegralTerms, Interval, Names, Nodes, SecondOrder, Sink, Step, vector};
+use super::error::OcpError;
+use crate::error::Error;
+use crate::function::Function;
+use crate::memory::{Memory, WithForward, WithHessian};
+use crate::model::{Dae, Ode, VectorU, VectorX};
+use crate::quadrature::{Integrand, LeastSquares, Quadrature};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use crate::{erk, irk};
+
+/// The names that a model gives.
+pub(super) const fn names<M: Dae>() -> Names {
+    let structure = &M::STRUCTURE;
+    Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
+}
+
+/// An integrator with an integral cost: `∫ l dt` of a [`Quadrature`] with one output, or half the integral of a square
+/// of [`LeastSquares`], which has the matrix of Gauss and Newton. Of a quadrature, which has no such matrix, the Hessian is
+/// known to exact methods only.
+///
+/// References of integrals are parameters, which every stage has for itself.
+#[derive(Clone, Debug)]
+pub struct Along<I, Q> {
+    /// The integrator.
+    pub integrator: I,
+    /// The integral.
+    pub integral: Q,
+}
+
+impl<I, Q> Along<I, Q> {
+    /// Both together.
+    pub fn new(integrator: I, integral: Q) -> Self {
+        Self { integrator, integral }
+    }
+}
+
+/// What is an integral cost.
+pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
+    /// Before every interval.
+    #[doc(hidden)]
+    fn prepare(&mut self);
+    /// The value of the last interval and its derivatives.
+    #[doc(hidden)]
+    fn terms(&self) -> IntegralTerms<'_, T>;
+}
+
+impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for LeastSquares<F, T> {
+    fn prepare(&mut self) {}
+    fn terms(&self) -> IntegralTerms<'_, T> {
+        IntegralTerms {
+            value: self.value,
+            x: self.grad_x0.as_slice(),
+            u: self.grad_u.as_slice(),
+            hessian: [self.h_xx.as_slice(), self.h_xu.as_slice(), self.h_uu.as_slice()],
+        }
+    }
+}
+
+impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T: Real> IntegralCost<M, T>
+    for Quadrature<F, T>
+{
+    fn prepare(&mut self) {
+        self.nu.as_mut_slice().fill(T::ONE);
+    }
+    fn terms(&self) -> IntegralTerms<'_, T> {
+        IntegralTerms {
+            value: self.q.as_slice().first().copied().unwrap_or(T::ZERO),
+            x: self.dq_dx0.as_slice(),
+            u: self.dq_du.as_slice(),
+            hessian: [&[]; 3],
+        }
+    }
+}
+
+fn at<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
+    result.map_err(|error| OcpError::Integration { interval, error })
+}
+
+macro_rules! single {
+    ($module:ident, $model:ident) => {
+        /// Parameters and time of an interval.
+        impl<M: $model, B, const S: usize, T: Real, W: Memory> Begin<T>
+            for $module::Integrator<M, B, S, T, W>
+        {
+            fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error> {
+                if <M::Shape as Shape>::NP > 0 {
+                    self.set_parameters(&vector(interval.p))?;
+                }
+                self.set_time(interval.t)
+            }
+        }
+
+        impl<M: $model, B, const S: usize, T: Real, W: WithForward> Dynamics<T>
+            for $module::Integrator<M, B, S, T, W>
+        {
+            type Shape = M::Shape;
+            const NAMES: Names = names::<M>();
+
+            fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+                for (k, interval) in nodes.iter().enumerate() {
+                    at(k, self.begin(&interval))?;
+                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
+                    let result = at(k, self.solve(&x, &u, interval.h))?;
+                    sink(k, &Step { x: result.x.as_slice(), ..Step::default() });
+                }
+                Ok(())
+            }
+            fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+                for (k, interval) in nodes.iter().enumerate() {
+                    at(k, self.begin(&interval))?;
+                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
+                    let result = at(k, self.forward(&x, &u, interval.h))?;
+                    sink(
+                        k,
+                        &Step {
+                            x: result.nominal.x.as_slice(),
+                            dx: result.dx_dx0.as_slice(),
+                            du: result.dx_du.as_slice(),
+                            dp: result.dx_dp.as_slice(),
+                            ..Step::default()
+                        },
+                    );
+                }
+                Ok(())
+            }
+        }
+
+        impl<M: $model, B, const S: usize, T: Real, W: WithHessian> SecondOrder<T>
+            for $module::Integrator<M, B, S, T, W>
+        {
+            fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+                for (k, interval) in nodes.iter().enumerate() {
+                    at(k, self.begin(&interval))?;
+                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
+                    let result = at(k, self.hessian(&x, &u, interval.h, &vector(interval.multipliers)))?;
+                    let forward = &result.first.forward;
+                    sink(
+                        k,
+                        &Step {
+                            x: forward.nominal.x.as_slice(),
+                            dx: forward.dx_dx0.as_slice(),
+                            du: forward.dx_du.as_slice(),
+                            dp: forward.dx_dp.as_slice(),
+                            hessian: [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()],
+                            cost: IntegralTerms::default(),
+                        },
+                    );
+                }
+                Ok(())
+            }
+        }
+
+        impl<M: $model, B, const S: usize, T: Real, W: WithForward, Q: IntegralCost<M, T>> Dynamics<T>
+            for Along<$module::Integrator<M, B, S, T, W>, Q>
+        {
+            type Shape = M::Shape;
+            const NAMES: Names = names::<M>();
+
+            fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+                let Self { integrator, integral } = self;
+                for (k, interval) in nodes.iter().enumerate() {
+                    at(k, integrator.begin(&interval))?;
+                    integral.prepare();
+                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
+                    let result = at(k, integrator.with(integral).solve(&x, &u, interval.h))?;
+                    let cost = IntegralTerms { value: integral.terms().value, ..IntegralTerms::default() };
+                    sink(k, &Step { x: result.x.as_slice(), cost, ..Step::default() });
+                }
+                Ok(())
+            }
+            fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+                let Self { integrator, integral } = self;
+                for (k, interval) in nodes.iter().enumerate() {
+                    at(k, integrator.begin(&interval))?;
+                    integral.prepare();
+                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
+                    let result = at(k, integrator.with(integral).forward(&x, &u, interval.h))?;
+                    sink(
+                        k,
+                        &Step {
+                            x: result.nominal.x.as_slice(),
+                            dx: result.dx_dx0.as_slice(),
+                            du: result.dx_du.as_slice(),
+                            dp: result.dx_dp.as_slice(),
+                            hessian: [&[]; 3],
+                            cost: integral.terms(),
+                        },
+                    );
+                }
+                Ok(())
+            }
+        }
+
+        impl<M: $model, B, const S: usize, T: Real, W: WithHessian, Q: IntegralCost<M, T>> SecondOrder<T>
+            for Along<$module::Integrator<M, B, S, T, W>, Q>
+        {
+            fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+                let Self { integrator, integral } = self;
+                for (k, interval) in nodes.iter().enumerate() {
+                    at(k, integrator.begin(&interval))?;
+                    integral.prepare();
+                    let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
+                    let lambda: VectorX<M, T> = vector(interval.multipliers);
+                    let result = at(k, integrator.with(integral).hessian(&x, &u, interval.h, &lambda))?;
+                    let forward = &result.first.forward;
+                    // The Hessian is that of both together: what the integral would add is in it.
+                    let cost = IntegralTerms { hessian: [&[]; 3], ..integral.terms() };
+                    sink(
+                        k,
+                        &Step {
+                            x: forward.nominal.x.as_slice(),
+                            dx: forward.dx_dx0.as_slice(),
+                            du: forward.dx_du.as_slice(),
+                            dp: forward.dx_dp.as_slice(),
+                            hessian: [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()],
+                            cost,
+                        },
+                    );
+                }
+                Ok(())
+            }
+        }
+    };
+}
+
+/// What an integrator is told before an interval.
+trait Begin<T> {
+    fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error>;
+}
+
+single!(irk, Dae);
+single!(erk, Ode);
