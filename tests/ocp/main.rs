@@ -1,4 +1,4 @@
-//! Problems of optimal control.
+//! Problems of optimal control: the chain of masses against references, small problems against closed forms, mistakes.
 
 #[path = "../../examples/models/chain.rs"]
 #[allow(dead_code)]
@@ -6,6 +6,11 @@ mod chain_model;
 #[path = "../data/mod.rs"]
 mod data;
 
+mod bounds;
 mod chain;
+mod closed_form;
+mod curvature;
+mod errors;
+mod infeasible;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

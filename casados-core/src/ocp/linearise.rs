@@ -222,7 +222,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// How many numbers `φ` of every interval and `g` of every stage are.
     pub(super) fn ends(&self) -> usize {
-        self.intervals() * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
+        ends::<P, T>(self.qp.dims())
+    }
+
+    /// Rows of the path constraints.
+    pub(super) fn rows(&self) -> usize {
+        P::Path::ROWS
     }
 
     /// Constants of the linearised dynamics and constraints such that these are exact at some point, whose `ends` are given: what a
@@ -262,6 +267,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
     }
+}
+
+/// How many numbers `φ` of every interval and `g` of every stage are.
+pub(super) const fn ends<P: Formulation<T>, T: Real>(dims: &[StageDims]) -> usize {
+    dims.len().saturating_sub(1) * (P::Shape::NX + P::Path::ROWS) + P::Terminal::ROWS
 }
 
 /// The distance of stages in vectors `v`.

@@ -17,6 +17,7 @@ mod problem;
 #[cfg(feature = "alloc")]
 mod shooting;
 mod single;
+mod sqp;
 
 pub use constraint::{Constraint, Constraints};
 pub use convexify::Convexification;
@@ -33,3 +34,6 @@ pub use problem::{Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use shooting::Shooting;
 pub use single::{Along, IntegralCost};
+#[cfg(feature = "alloc")]
+pub use sqp::HeapSqp;
+pub use sqp::{Globalisation, Iteration, Log, Outcome, Sqp, SqpOptions, Status, Times};

@@ -143,6 +143,13 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     pub(crate) fn copy_from(&mut self, other: &Self) {
         super::layout::assign(self.memory.as_mut(), other.memory.as_ref());
     }
+    /// Everything as a function of two solutions of the same dimensions.
+    pub(crate) fn combine(&mut self, a: &Self, b: &Self, f: impl Fn(T, T) -> T) {
+        let pairs = a.memory.as_ref().iter().zip(b.memory.as_ref());
+        for (target, (&a, &b)) in self.memory.as_mut().iter_mut().zip(pairs) {
+            *target = f(a, b);
+        }
+    }
     /// A stage.
     #[must_use]
     pub fn stage(&self, stage: usize) -> Option<SolutionStage<'_, T>> {

@@ -1,0 +1,193 @@
+//! What happened, as data.
+
+use crate::ocp::error::ConstraintName;
+use crate::qp::{QpError, Residuals};
+use core::fmt;
+
+/// Seconds that an iteration took; zero without the feature `std`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Times {
+    /// Integration and derivatives of all functions.
+    pub linearise: f64,
+    /// The QP, and those of corrections.
+    pub qp: f64,
+    /// The line search without its QPs.
+    pub search: f64,
+}
+
+impl Times {
+    /// All together.
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.linearise + self.qp + self.search
+    }
+}
+
+/// An iteration: where it began, and how it went on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Iteration {
+    /// Counted from zero.
+    pub iteration: usize,
+    /// The objective at the iterate, with penalties of soft bounds.
+    pub objective: f64,
+    /// The conditions of optimality at the iterate.
+    pub residuals: Residuals,
+    /// The part of the step that was taken; zero in the last iteration.
+    pub step: f64,
+    /// Iterations of QPs.
+    pub qp_iterations: usize,
+    /// Whether bounds had penalties because the QP was infeasible.
+    pub elastic: bool,
+    /// Whether the step has a second-order correction.
+    pub corrected: bool,
+    /// How long it took.
+    pub times: Times,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Status {
+    /// The conditions of optimality hold.
+    Converged,
+    /// The iterations were used up.
+    MaxIterations,
+    /// The observer stopped it.
+    Stopped,
+    /// Near the iterate no point satisfies all constraints. This is the one that is violated most where their weighted sum is
+    /// smallest.
+    Infeasible {
+        /// The constraint.
+        constraint: ConstraintName,
+        /// By how much it is violated.
+        violation: f64,
+    },
+    /// A QP was infeasible, and elastic mode is off.
+    InfeasibleQp {
+        /// A constraint that cannot be satisfied.
+        constraint: ConstraintName,
+        /// By how much it is violated at least.
+        violation: f64,
+    },
+    /// A QP was not solved for another reason.
+    QpFailed(QpError),
+    /// No step was short enough to make progress.
+    NoProgress,
+}
+
+/// The outcome of a run. The iterate of the problem is the best one, whatever the status.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// How it ended.
+    pub status: Status,
+    /// Steps.
+    pub iterations: usize,
+    /// The objective at the iterate.
+    pub objective: f64,
+    /// The conditions of optimality at the iterate.
+    pub residuals: Residuals,
+    /// Iterations of all QPs.
+    pub qp_iterations: usize,
+    /// How long all of it took.
+    pub times: Times,
+}
+
+impl Outcome {
+    /// Whether the conditions of optimality hold.
+    #[must_use]
+    pub fn is_converged(&self) -> bool {
+        self.status == Status::Converged
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Converged => f.write_str("converged"),
+            Self::MaxIterations => f.write_str("not converged: the iterations were used up"),
+            Self::Stopped => f.write_str("stopped by the observer"),
+            Self::Infeasible { constraint, violation } => {
+                write!(f, "infeasible: {constraint} is violated by {violation:e}")
+            }
+            Self::InfeasibleQp { constraint, violation } => {
+                write!(f, "the QP is infeasible: {constraint} is violated by {violation:e} at least")
+            }
+            Self::QpFailed(error) => write!(f, "the QP was not solved: {error}"),
+            Self::NoProgress => f.write_str("no step was short enough to make progress"),
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} after {} iterations: objective {:.8e}, {}",
+            self.status, self.iterations, self.objective, self.residuals
+        )
+    }
+}
+
+/// Iterations, to be printed as the familiar table.
+#[derive(Clone, Copy, Debug)]
+pub struct Log<'a>(pub &'a [Iteration]);
+
+impl fmt::Display for Log<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "iter       objective   stationar.  dynamics  inequal.  complem.      step  QP it.   lin ms    QP ms  search ms"
+        )?;
+        for i in self.0 {
+            let Residuals { stationarity, dynamics, inequalities, complementarity } = i.residuals;
+            let mark = match (i.elastic, i.corrected) {
+                (true, _) => "e",
+                (_, true) => "s",
+                _ => " ",
+            };
+            writeln!(
+                f,
+                "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:6} {:8.3} {:8.3} {:10.3}",
+                i.iteration,
+                i.objective,
+                stationarity,
+                dynamics,
+                inequalities,
+                complementarity,
+                i.step,
+                i.qp_iterations,
+                1e3 * i.times.linearise,
+                1e3 * i.times.qp,
+                1e3 * i.times.search,
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Time since it was last asked.
+pub(super) struct Watch {
+    #[cfg(feature = "std")]
+    last: std::time::Instant,
+}
+
+impl Watch {
+    pub fn start() -> Self {
+        Self {
+            #[cfg(feature = "std")]
+            last: std::time::Instant::now(),
+        }
+    }
+    /// Seconds.
+    pub fn lap(&mut self) -> f64 {
+        #[cfg(feature = "std")]
+        {
+            let now = std::time::Instant::now();
+            let seconds = now.duration_since(self.last).as_secs_f64();
+            self.last = now;
+            seconds
+        }
+        #[cfg(not(feature = "std"))]
+        0.0
+    }
+}

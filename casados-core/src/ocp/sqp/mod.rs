@@ -1,0 +1,177 @@
+//! Sequential quadratic programming.
+//!
+//! ```text
+//! linearise at (x̄, ū)  →  QP with the Hessian of Gauss and Newton, or the exact one made convex  →  step
+//! ```
+
+mod elastic;
+mod log;
+mod options;
+mod run;
+mod search;
+
+pub use log::{Iteration, Log, Outcome, Status, Times};
+pub use options::{Globalisation, SqpOptions};
+
+use super::error::{OcpError, Part};
+use super::instance::Ocp;
+use super::linearise::{Exact, GaussNewton};
+use super::problem::Formulation;
+#[cfg(feature = "alloc")]
+use crate::qp::HeapInteriorPoint;
+use crate::qp::{Solution, StageDims};
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`GaussNewton`] or [`Exact`].
+///
+/// Memory is made for one problem, of whose dimensions all others are to be.
+pub struct Sqp<S, C, T, D, M> {
+    /// Options, which may be changed between calls.
+    pub options: SqpOptions,
+    /// The Hessian.
+    pub curvature: C,
+    /// The solver of QPs.
+    pub qp_solver: S,
+    /// The solution of a QP.
+    solution: Solution<T, D, M>,
+    /// A point that is tried.
+    trial: Solution<T, D, M>,
+    /// The best iterate.
+    best: Solution<T, D, M>,
+    /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode exchanges.
+    work: M,
+    #[cfg(feature = "alloc")]
+    log: Vec<Iteration>,
+}
+
+/// Sequential quadratic programming with its memory on the heap.
+#[cfg(feature = "alloc")]
+pub type HeapSqp<S = HeapInteriorPoint, C = GaussNewton, T = f64> = Sqp<S, C, T, Vec<StageDims>, Vec<T>>;
+
+#[cfg(feature = "alloc")]
+impl<T: Real> HeapSqp<HeapInteriorPoint<T>, GaussNewton, T> {
+    /// For a problem, with the library's own solver of QPs and the Hessian of Gauss and Newton.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(ocp: &super::HeapOcp<P, T>) -> Result<Self, OcpError> {
+        Self::with_solver(ocp, HeapInteriorPoint::new())
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<S, T: Real> HeapSqp<S, GaussNewton, T> {
+    /// For a problem, with a solver of QPs, such as [`Condensing`](crate::qp::Condensing).
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn with_solver<P: Formulation<T>>(
+        ocp: &super::HeapOcp<P, T>,
+        qp_solver: S,
+    ) -> Result<Self, OcpError> {
+        let dims = ocp.qp().dims();
+        let length = ocp.ends() + elastic::memory::<T>(dims);
+        let mut work = Vec::new();
+        let bytes = length.saturating_mul(size_of::<T>());
+        work.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
+        work.resize(length, T::ZERO);
+        Ok(Self {
+            options: SqpOptions::new::<T>(),
+            curvature: GaussNewton::default(),
+            qp_solver,
+            solution: Solution::new(dims)?,
+            trial: Solution::new(dims)?,
+            best: Solution::new(dims)?,
+            work,
+            log: Vec::new(),
+        })
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<S, C, T: Real> HeapSqp<S, C, T> {
+    /// The iterations of the last run, to be printed.
+    #[must_use]
+    pub fn log(&self) -> Log<'_> {
+        Log(&self.log)
+    }
+}
+
+impl<S, T: Real, D, M> Sqp<S, GaussNewton, T, D, M> {
+    /// The same with the Hessian of the Lagrangian.
+    #[must_use]
+    pub fn exact(self, curvature: Exact) -> Sqp<S, Exact, T, D, M> {
+        Sqp {
+            options: self.options,
+            curvature,
+            qp_solver: self.qp_solver,
+            solution: self.solution,
+            trial: self.trial,
+            best: self.best,
+            work: self.work,
+            #[cfg(feature = "alloc")]
+            log: self.log,
+        }
+    }
+}
+
+impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
+    /// How many numbers it takes for a problem.
+    #[must_use]
+    pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
+        3 * Solution::<T, (), ()>::memory(dims)
+            + super::linearise::ends::<P, T>(dims)
+            + elastic::memory::<T>(dims)
+    }
+
+    /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`]
+    pub fn in_memory<P: Formulation<T>>(
+        qp_solver: S,
+        dims: &'a [StageDims],
+        memory: &'a mut [T],
+    ) -> Result<Self, OcpError> {
+        let (expected, found) = (Self::memory::<P>(dims), memory.len());
+        if found < expected {
+            return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
+        }
+        let length = Solution::<T, (), ()>::memory(dims);
+        let (solution, rest) = memory.split_at_mut_checked(length).unwrap_or_default();
+        let (trial, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (best, work) = rest.split_at_mut_checked(length).unwrap_or_default();
+        Ok(Self {
+            options: SqpOptions::new::<T>(),
+            curvature: GaussNewton::default(),
+            qp_solver,
+            solution: Solution::in_memory(dims, solution)?,
+            trial: Solution::in_memory(dims, trial)?,
+            best: Solution::in_memory(dims, best)?,
+            work,
+            #[cfg(feature = "alloc")]
+            log: Vec::new(),
+        })
+    }
+}
+
+/// The memory of a run has the dimensions of its problem.
+fn fits<T: Real, P: Formulation<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &Ocp<P, T, D, M>,
+    dims: &[StageDims],
+) -> Result<(), OcpError> {
+    let (expected, found) = (ocp.qp().dims().len(), dims.len());
+    if expected != found {
+        return Err(OcpError::Length { part: Part::Dimensions, stage: 0, expected, found });
+    }
+    for (stage, (a, b)) in ocp.qp().dims().iter().zip(dims).enumerate() {
+        for (expected, found) in [(a.nx, b.nx), (a.nu, b.nu), (a.ng, b.ng)] {
+            if expected != found {
+                return Err(OcpError::Length { part: Part::Dimensions, stage, expected, found });
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,109 @@
+//! Bounds and constraints of every kind, against solutions that are known.
+
+use crate::Test;
+use casados::ocp::{Constraint, Exact, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+use casados::prelude::*;
+use casados::qp::residuals;
+
+/// A point that moves in the plane as it is told.
+#[function]
+fn go(x: [f64; 2], u: [f64; 2]) -> [f64; 2] {
+    [x[0] + u[0], x[1] + u[1]]
+}
+
+#[function]
+fn place(x: [f64; 2], _u: [f64; 2]) -> [f64; 2] {
+    x
+}
+
+#[function]
+fn speed(_x: [f64; 2], u: [f64; 2]) -> [f64; 2] {
+    u
+}
+
+/// The square of the distance from the origin.
+#[function]
+fn distance(x: [f64; 2], _u: [f64; 2]) -> f64 {
+    x[0] * x[0] + x[1] * x[1]
+}
+
+/// One interval to a target at (3, 4) in a disc of radius one: the point of the disc that is nearest, (0.6, 0.8).
+#[test]
+fn a_constraint_at_the_end() -> Test {
+    let mut ocp = Problem::new(Map::<Go, f64>::new())
+        .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 2]))
+        .terminal_constraints(Constraint::<Distance>::new([f64::NEG_INFINITY], [1.0]))
+        .on(Horizon::uniform(1, 1.0))?;
+    ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[3.0, 4.0])?;
+    ocp.guess(&[0.1, 0.2], &[0.0; 2])?;
+    // The constraint bends more than the cost: without its second derivatives full steps would go back and forth.
+    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    sqp.options.tolerance = 1e-8;
+    let outcome = sqp.solve(&mut ocp)?;
+    assert!(outcome.is_converged(), "{}{outcome}", sqp.log());
+    let end = ocp.stage(1)?;
+    assert!((end.x[0] - 0.6).abs() < 1e-7 && (end.x[1] - 0.8).abs() < 1e-7);
+    // x − target + 2 λ x = 0: λ = (5 − 1) / 2.
+    assert!((end.g_upper[0] - 2.0).abs() < 1e-6);
+    // The general residuals of the QP at the iterate are those that were computed.
+    ocp.linearise(GaussNewton::default())?;
+    let (mine, objective) = ocp.residuals();
+    let (general, _) = residuals(ocp.qp(), ocp.iterate());
+    assert!((mine.largest() - general.largest()).abs() < 1e-12);
+    assert!((objective - 8.0).abs() < 1e-6);
+    Ok(())
+}
+
+/// `½ (x − 3)²` with a soft bound `x ≤ 1`: the violation `e` satisfies `e − 2 + linear + quadratic e = 0`.
+#[test]
+fn soft_bounds() -> Test {
+    for (linear, quadratic) in [(0.0, 1.0), (0.5, 0.0), (0.5, 2.0), (5.0, 1.0)] {
+        let expected = f64::max((2.0 - linear) / (1.0 + quadratic), 0.0);
+        let mut ocp = Problem::new(Map::<Go, f64>::new())
+            .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 2]))
+            .on(Horizon::uniform(1, 1.0))?;
+        ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[3.0, 0.0])?;
+        ocp.bound("x[0]", 1..=1, f64::NEG_INFINITY, 1.0)?.soften("x[0]", 1..=1, linear, quadratic)?;
+        ocp.guess(&[0.0; 2], &[0.0; 2])?;
+        let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+        assert!(outcome.is_converged());
+        let x = ocp.stage(1)?.x[0];
+        assert!((x - 1.0 - expected).abs() < 1e-6, "{x} {expected}");
+        let e = expected;
+        let objective = 0.5 * (x - 3.0) * (x - 3.0) + linear * e + 0.5 * quadratic * e * e;
+        assert!((outcome.objective - objective).abs() < 1e-6);
+    }
+    Ok(())
+}
+
+/// The same as constraints of the path, two at once, of which the second is soft: `x₀² + x₁² ≤ 4` and `u ≤ 0.5`.
+#[test]
+fn constraints_of_the_path() -> Test {
+    let n = 8;
+    let infinity = f64::INFINITY;
+    let mut ocp = Problem::new(Map::<Go, f64>::new())
+        .stage_cost(LeastSquaresCost::<Speed>::diagonal(&[1e-2; 2]))
+        .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 2]))
+        .path_constraints((
+            Constraint::<Distance>::new([-infinity], [4.0]),
+            Constraint::<Speed>::new([-0.5; 2], [0.5; 2]).soft(1e2, 0.0),
+        ))
+        .on(Horizon::uniform(n, 1.0))?;
+    ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[3.0, 0.0])?;
+    ocp.guess(&[0.0; 2], &[0.0; 2])?;
+    let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged());
+    // 7 intervals to 2, which is as far as the path may go, the last one 0.5 beyond.
+    let before = ocp.stage(n - 1)?;
+    assert!((before.x[0] - 2.0).abs() < 1e-5, "{:?}", before);
+    assert!((before.u[0] - 0.5).abs() < 1e-5 && (ocp.stage(n)?.x[0] - 2.5).abs() < 1e-5);
+    for stage in ocp.iterate().stages().take(n - 1) {
+        assert!((stage.u[0] - 2.0 / 7.0).abs() < 1e-5);
+    }
+    // Bounds of stages may be changed.
+    ocp.set_path_bounds(n - 1..n, &[-infinity, -0.5, -0.5], &[1.0, 0.5, 0.5])?;
+    let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged());
+    assert!((ocp.stage(n)?.x[0] - 1.5).abs() < 1e-5);
+    Ok(())
+}
