@@ -45,7 +45,8 @@ pub(super) fn check_penalty<T: Real>(
     quadratic: T,
 ) -> Result<(), OcpError> {
     let part = Part::Penalty;
-    if !(linear >= T::ZERO) {
+    let is_penalty = linear >= T::ZERO;
+    if !is_penalty {
         return Err(OcpError::InvalidValue { part, stage, index, value: linear.to_f64() });
     }
     if !(quadratic >= T::ZERO && quadratic.is_finite()) {

@@ -120,7 +120,8 @@ fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T
     for k in 0..n {
         let pivot = get(work, ld, k, k);
         // A pivot may be smaller than an eigenvalue, not larger than all of them: half is for rounding.
-        if !(pivot > T::from_f64(0.5) * least) {
+        let is_positive = pivot > T::from_f64(0.5) * least;
+        if !is_positive {
             return false;
         }
         let Some((left, right)) = work.split_at_mut_checked((k + 1) * ld) else { return true };
@@ -151,7 +152,8 @@ fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
                 off = get(a, ld, i, j).abs().max(off);
             }
         }
-        if !(off > small * diagonal) {
+        let is_full = off > small * diagonal;
+        if !is_full {
             return;
         }
         for q in 1..n {

@@ -250,7 +250,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
                 }
             }
         }
-        if at.exact && F::STRUCTURE.hessian.len() > 0 {
+        if at.exact && !F::STRUCTURE.hessian.is_empty() {
             F::hessian::<T>(v, mu, hessian);
             terms.curvature::<F>(hessian, at.factor);
         }

@@ -62,7 +62,7 @@ pub(super) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 #[inline(always)]
 fn grow<T: Real>(largest: &mut f64, value: T) {
     let size = value.abs().to_f64();
-    if !(size <= *largest) {
+    if size.is_nan() || size > *largest {
         *largest = size;
     }
 }

@@ -16,7 +16,7 @@ pub(super) struct Worst {
 }
 
 /// How many numbers remember the linear penalties.
-pub(super) const fn memory<T>(dims: &[StageDims]) -> usize {
+pub(super) const fn memory(dims: &[StageDims]) -> usize {
     let (mut length, mut rest) = (0, dims);
     while let Some((first, others)) = rest.split_first() {
         length += 2 * rows(*first);

@@ -72,7 +72,7 @@ impl<S, T: Real> HeapSqp<S, GaussNewton, T> {
         qp_solver: S,
     ) -> Result<Self, OcpError> {
         let dims = ocp.qp().dims();
-        let length = ocp.ends() + elastic::memory::<T>(dims);
+        let length = ocp.ends() + elastic::memory(dims);
         let mut work = Vec::new();
         let bytes = length.saturating_mul(size_of::<T>());
         work.try_reserve_exact(length).map_err(|_| OcpError::OutOfMemory { bytes })?;
@@ -121,9 +121,7 @@ impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
     /// How many numbers it takes for a problem.
     #[must_use]
     pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
-        3 * Solution::<T, (), ()>::memory(dims)
-            + super::linearise::ends::<P, T>(dims)
-            + elastic::memory::<T>(dims)
+        3 * Solution::<T, (), ()>::memory(dims) + super::linearise::ends::<P, T>(dims) + elastic::memory(dims)
     }
 
     /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.

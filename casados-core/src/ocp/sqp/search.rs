@@ -6,7 +6,7 @@ use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
 use crate::qp::{Bounds, Solution, StageDims, part, part_mut, symmetric};
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 use crate::shape::Shape;
 
 /// Objective with penalties of soft bounds, and the sum of all violations of what is hard.
@@ -70,14 +70,13 @@ impl Search {
             return false;
         }
         // Near the solution, differences are roundings.
-        let noise = 10.0 * f64::EPSILON * (1.0 + here.objective.abs());
+        let noise = 10.0 * f64::EPSILON * (1.0 + here.objective.abs() + self.penalty * here.violation);
         match options.globalisation {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let merit = |m: &Measure| m.objective + self.penalty * m.violation;
                 let slope = model.slope - self.penalty * here.violation;
-                let rounding = noise + self.penalty * options.tolerance * f64::EPSILON.sqrt();
-                merit(there) <= merit(here) + ARMIJO * length * slope.min(0.0) + rounding
+                merit(there) <= merit(here) + ARMIJO * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
                 let entries = self.entries.iter().take(self.count.min(ENTRIES));
@@ -86,8 +85,8 @@ impl Search {
                     return false;
                 }
                 // Where the objective is expected to shrink far more than there is violation, it must (Wächter and Biegler, (19)).
-                let descends =
-                    model.slope < 0.0 && length * (-model.slope).powf_23() > here.violation.powf_11();
+                let descends = model.slope < 0.0
+                    && length * Scalar::powf(-model.slope, 2.3) > Scalar::powf(here.violation, 1.1);
                 if descends {
                     return there.objective <= here.objective + ARMIJO * length * model.slope + noise;
                 }
@@ -107,21 +106,6 @@ impl Search {
 /// Whether one of both is smaller by a margin.
 fn better(a: &Measure, b: &Measure, noise: f64) -> bool {
     a.violation <= (1.0 - MARGIN) * b.violation || a.objective <= b.objective - MARGIN * b.violation + noise
-}
-
-/// Powers of positive numbers, with or without `std`.
-trait Powers {
-    fn powf_23(self) -> f64;
-    fn powf_11(self) -> f64;
-}
-
-impl Powers for f64 {
-    fn powf_23(self) -> f64 {
-        crate::Scalar::powf(self, 2.3)
-    }
-    fn powf_11(self) -> f64 {
-        crate::Scalar::powf(self, 1.1)
-    }
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
