@@ -330,18 +330,33 @@ impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { from, mut to } = self;
+        let Self { from, to } = self;
         let mut cells: [E::Cell; BLOCK] = bytemuck::Zeroable::zeroed();
-        for (block, from) in from.chunks(BLOCK).enumerate() {
-            for (&from, cell) in from.iter().zip(&mut cells) {
+        let (blocks, rest) = from.as_chunks::<BLOCK>();
+        let mut ends: [&mut [T]; MOST_LANES] = Default::default();
+        let mut chunks: [&mut [[T; BLOCK]]; MOST_LANES] = Default::default();
+        for ((to, chunks), end) in to.into_iter().zip(&mut chunks).zip(&mut ends) {
+            (*chunks, *end) = to.as_chunks_mut::<BLOCK>();
+        }
+        for (index, block) in blocks.iter().enumerate() {
+            for (&from, cell) in block.iter().zip(&mut cells) {
                 from.store(cell);
             }
-            for (lane, to) in to.iter_mut().enumerate().take(E::LANES) {
-                let Some(to) = to.get_mut(block * BLOCK..) else { continue };
+            for (lane, to) in chunks.iter_mut().enumerate().take(E::LANES) {
+                let Some(to) = to.get_mut(index) else { continue };
                 for (to, cell) in to.iter_mut().zip(&cells) {
                     if let Some(&element) = cell.as_ref().get(lane) {
                         *to = element;
                     }
+                }
+            }
+        }
+        for (index, &from) in rest.iter().enumerate() {
+            let [cell, ..] = &mut cells;
+            from.store(cell);
+            for (to, &element) in ends.iter_mut().zip(cell.as_ref()) {
+                if let Some(to) = to.get_mut(index) {
+                    *to = element;
                 }
             }
         }

@@ -124,11 +124,12 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
         let (s, blocks) = (S as f64, plan.slots.len() as f64);
-        let updates = plan.updates.len() as f64 + 4.0 * plan.pivots.len() as f64;
+        let inverses = 4.0 * plan.pivots.len() as f64;
         // What is computed for all stages side by side counts once; a complex product is four real ones.
         let iteration = operations.residual as f64 + blocks * s + 1.0;
         let jacobian = operations.residual_jacobian as f64;
-        [(jacobian + updates * s * s) / iteration, (jacobian + updates * 4.0) / iteration]
+        let (updates, means) = (plan.products(s) + inverses, plan.products(1.0) + inverses);
+        [(jacobian + updates * s * s) / iteration, (jacobian + means * 4.0) / iteration]
     };
 
     /// Solves the stages of a step from the start values in `y`.

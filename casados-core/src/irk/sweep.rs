@@ -4,7 +4,7 @@
 use super::directions::{Directions, Identity, panel, panel_mut, panels, weight};
 use super::evaluate::entries;
 use super::record::{Coefficients, Work, copy};
-use crate::linalg::{Arithmetic, Block, Kernel, Packet, dispatch, slot, solve_packets};
+use crate::linalg::{Arithmetic, Kernel, Packet, Planned, dispatch, slot, solve_packets};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
@@ -79,7 +79,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             dispatch(Step::<M, E, D, S> {
                 phase,
                 jacobian: work.linear.jacobian.as_ref(),
-                blocks: work.linear.factors.blocks(),
+                factors: work.linear.factors.planned(),
                 coefficients,
                 h: work.inputs.time.step,
                 directions,
@@ -285,7 +285,7 @@ impl<E: Lanes, D: Directions<E>> Kernel for Start<'_, E, D> {
 struct Step<'a, M, E, D, const S: usize> {
     phase: Phase,
     jacobian: &'a [[E; S]],
-    blocks: &'a [Block<E, S>],
+    factors: Planned<'a, E, S>,
     coefficients: &'a Coefficients<E, S>,
     h: E,
     directions: &'a D,
@@ -328,13 +328,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             right.panel::<A, W>(v, dy, column);
         }
         if self.phase == Phase::Whole {
-            let plan = &M::STRUCTURE.elimination;
             if const { size_of::<E>() > 8 && S > 2 && W == 4 } {
                 // Four columns of all stages would not fit the registers.
-                solve_packets::<A, E, [E; W], S, 2>(plan, self.blocks, dy, 0);
-                solve_packets::<A, E, [E; W], S, 2>(plan, self.blocks, dy, 2);
+                solve_packets::<A, E, [E; W], S, 2>(self.factors, dy, 0);
+                solve_packets::<A, E, [E; W], S, 2>(self.factors, dy, 2);
             } else {
-                solve_packets::<A, E, [E; W], S, W>(plan, self.blocks, dy, 0);
+                solve_packets::<A, E, [E; W], S, W>(self.factors, dy, 0);
             }
         }
         if self.phase == Phase::Before {

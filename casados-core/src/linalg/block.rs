@@ -57,6 +57,27 @@ pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     }
 }
 
+/// `packet − diag(first column of block) · other`
+#[inline(always)]
+pub fn subtract_scaled<A: Arithmetic, E: Field, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    block: &Block<E, S>,
+    other: &Packet<E, S, W>,
+) {
+    let Some(scale) = block.first() else { return };
+    if const { W == 1 } {
+        let (mut target, mut x) = ([E::from_f64(0.0); S], [E::from_f64(0.0); S]);
+        target.copy_from_slice(packet.as_flattened());
+        x.copy_from_slice(other.as_flattened());
+        A::subtract_products(&mut target, scale, &x);
+        packet.as_flattened_mut().copy_from_slice(&target);
+        return;
+    }
+    for ((&scale, packet), other) in scale.iter().zip(packet).zip(other) {
+        A::subtract_row(packet, scale, other);
+    }
+}
+
 /// `packet − blockᵀ · other`
 #[inline(always)]
 pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usize>(

@@ -6,7 +6,7 @@ use super::complex::Complex;
 use super::dense::Dense;
 use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::sparse;
+use super::sparse::{self, Planned};
 use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::Real;
 use crate::shape::Plain;
@@ -83,7 +83,8 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
         if self.is_dense {
             self.solve_dense(rows);
         } else {
-            sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), rows.as_mut());
+            let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_ref());
+            sparse::solve(Planned { plan, blocks, coupling: &[[Complex::zero()]] }, rows.as_mut());
         }
     }
 
@@ -125,7 +126,7 @@ impl<T: Real, const L: usize> Kernel for Assemble<'_, T, L> {
                 element.re = element.re.map(|re| re + *direct);
             }
         }
-        sparse::Factor { plan, blocks }.run::<A>();
+        sparse::Factor { plan, coupling: &[[Complex::zero()]], blocks }.run::<A>();
         // A pivot that vanishes leaves infinite elements or NaN.
         let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
         pivots.fold(true, |finite, [[element]]| finite & element.is_finite())

@@ -3,7 +3,7 @@
 use super::block::Block;
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::sparse;
+use super::sparse::{self, Planned};
 use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Array, Plain, assign};
@@ -23,6 +23,8 @@ pub fn slot<M: Dae>(equation: usize) -> usize {
 #[zeroable(bound = "")]
 pub struct Factors<M: Dae, T: Plain, const S: usize> {
     blocks: M::Factors<Block<T, S>>,
+    /// `−hA` of the blocks.
+    coupling: Block<T, S>,
     /// Memory that is touched only where the plan is not good enough.
     dense: Dense<M, T, S>,
     /// Whether the dense factors are the ones that hold.
@@ -41,9 +43,14 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
     /// that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
-        let plan = &M::STRUCTURE.elimination;
-        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), a, h, blocks: self.blocks.as_mut() });
-        sparse::factor(plan, self.blocks.as_mut());
+        let (plan, Self { coupling, blocks, .. }) = (&M::STRUCTURE.elimination, self);
+        for (i, row) in a.iter().enumerate() {
+            for (column, &a) in coupling.iter_mut().zip(row) {
+                column[i] = -(h * a);
+            }
+        }
+        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), coupling, blocks: blocks.as_mut() });
+        sparse::factor(plan, coupling, blocks.as_mut());
     }
 
     /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots.
@@ -51,7 +58,7 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
         if self.is_dense {
             self.dense.solve(b);
         } else {
-            sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), b.as_mut());
+            sparse::solve(self.planned(), b.as_mut());
         }
     }
 
@@ -60,13 +67,13 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
         if self.is_dense {
             self.dense.solve_transposed(b);
         } else {
-            sparse::solve_transposed(&M::STRUCTURE.elimination, self.blocks.as_ref(), b.as_mut());
+            sparse::solve_transposed(self.planned(), b.as_mut());
         }
     }
 
     /// The factors by the plan.
-    pub fn blocks(&self) -> &[Block<E, S>] {
-        self.blocks.as_ref()
+    pub fn planned(&self) -> Planned<'_, E, S> {
+        Planned { plan: &M::STRUCTURE.elimination, blocks: self.blocks.as_ref(), coupling: &self.coupling }
     }
 
     /// Whether the factors that are there are those of the plan.
@@ -81,6 +88,7 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
             assign(&mut self.dense, &other.dense);
         } else {
             assign(&mut self.blocks, &other.blocks);
+            self.coupling = other.coupling;
         }
     }
 }
@@ -89,8 +97,7 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
 struct Assemble<'a, E, const S: usize> {
     plan: &'a Elimination,
     jacobian: &'a [[E; S]],
-    a: &'a [[E; S]; S],
-    h: E,
+    coupling: &'a Block<E, S>,
     blocks: &'a mut [Block<E, S>],
 }
 
@@ -98,20 +105,17 @@ impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { plan, jacobian, a, h, blocks } = self;
+        let Self { plan, jacobian, coupling, blocks } = self;
         let zero = E::from_f64(0.0);
-        // Columns of −hA.
-        let mut ha = [[zero; S]; S];
-        for (i, row) in a.iter().enumerate() {
-            for (column, &a) in ha.iter_mut().zip(row) {
-                column[i] = -(h * a);
-            }
-        }
         blocks.fill([[zero; S]; S]);
         for entry in plan.assembly {
             let Some(block) = blocks.get_mut(entry.block as usize) else { continue };
             if let Some(state) = jacobian.get(entry.state as usize) {
-                for (column, ha) in block.iter_mut().zip(&ha) {
+                if (const { S > 1 }) && entry.scaled {
+                    block[0] = *state;
+                    continue;
+                }
+                for (column, ha) in block.iter_mut().zip(coupling) {
                     *column = [zero; S];
                     A::subtract_products(column, state, ha);
                 }

@@ -3,7 +3,7 @@
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::sparse;
+use super::sparse::{self, Planned};
 use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
@@ -41,13 +41,14 @@ impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
             h,
             blocks: &mut *blocks,
         });
-        sparse::factor(plan, blocks);
+        sparse::factor(plan, &[[Complex::zero()]], blocks);
     }
 
     /// Solves the Newton system of the stages in place, equations in their slots.
     pub fn solve<const S: usize>(&mut self, basis: &Eigenbasis<E, S, L>, b: &mut ArrayK<M, [[E; 1]; S]>) {
         dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
-        sparse::solve(&M::STRUCTURE.elimination, self.blocks.as_ref(), self.rows.as_mut());
+        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_ref());
+        sparse::solve(Planned { plan, blocks, coupling: &[[Complex::zero()]] }, self.rows.as_mut());
         dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
     }
 }

@@ -21,7 +21,7 @@ mod kernels;
 mod mean;
 mod sparse;
 
-pub(crate) use block::{Block, Packet};
+pub(crate) use block::Packet;
 #[cfg(feature = "alloc")]
 pub(crate) use complex::Complex;
 pub(crate) use eigen::Eigenbasis;
@@ -31,4 +31,4 @@ pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;
 pub(crate) use mean::MeanFactors;
-pub(crate) use sparse::solve_packets;
+pub(crate) use sparse::{Planned, solve_packets};

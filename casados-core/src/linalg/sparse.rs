@@ -6,53 +6,70 @@
 //! M = (I + L) (P + U)        L_ik = B_ik P_k⁻¹,   B_ij ← B_ij − L_ik B_kj
 //! ```
 //!
-//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above. Everything is
+//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above. Below a pivot that is the
+//! identity, as that of `q̇ = v`, blocks are often still `diag(f_x,i) hA`: of these only `f_x,i` is stored, and `hA` is applied
+//! once for the whole column. Everything is
 //! indexed by *slots*: a slot is an unknown, and also the equation that determines it in the plan. So right-hand side
 //! and solution share one array, and no permutation is ever applied.
 //!
 //! The compiler does not look into the tables of the plan; elements are fetched with `get`, whose
 //! never-taken exit costs nothing beside a block and leaves no panic in the program.
 
-use super::block::{Block, Packet, inverse, negate, product, subtract, subtract_transposed};
+use super::block::{Block, Packet, inverse, negate, product, subtract, subtract_scaled, subtract_transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use crate::model::Elimination;
+use crate::model::{Elimination, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
+
+/// What a matrix is eliminated by.
+#[derive(Clone, Copy)]
+pub struct Planned<'a, E, const S: usize> {
+    pub plan: &'a Elimination,
+    /// `P⁻¹`, `L`, `U`.
+    pub blocks: &'a [Block<E, S>],
+    /// `−hA`, which the columns of pivots that are `scaled` share. Nothing for one stage.
+    pub coupling: &'a Block<E, S>,
+}
 
 /// Calls a function for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at
 /// a time, or the packet of all stages would not fit them.
 macro_rules! packets {
-    ($columns:expr, $function:ident($plan:ident, $blocks:ident, $rows:ident)) => {{
+    ($columns:expr, $function:ident($factors:ident, $rows:ident)) => {{
         let mut column = 0;
         if const { size_of::<E>() <= 8 } {
             while column + 8 <= $columns {
-                $function::<A, E, R, S, 8>($plan, $blocks, $rows, column);
+                $function::<A, E, R, S, 8>($factors, $rows, column);
                 column += 8;
             }
             if column + 4 <= $columns {
-                $function::<A, E, R, S, 4>($plan, $blocks, $rows, column);
+                $function::<A, E, R, S, 4>($factors, $rows, column);
                 column += 4;
             }
         }
         while column + 2 <= $columns {
-            $function::<A, E, R, S, 2>($plan, $blocks, $rows, column);
+            $function::<A, E, R, S, 2>($factors, $rows, column);
             column += 2;
         }
         if column < $columns {
-            $function::<A, E, R, S, 1>($plan, $blocks, $rows, column);
+            $function::<A, E, R, S, 1>($factors, $rows, column);
         }
     }};
 }
 
 /// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`. A pivot block
 /// that is singular leaves elements that are not finite.
-pub fn factor<E: Field, const S: usize>(plan: &Elimination, blocks: &mut [Block<E, S>]) {
-    dispatch(Factor { plan, blocks });
+pub fn factor<E: Field, const S: usize>(
+    plan: &Elimination,
+    coupling: &Block<E, S>,
+    blocks: &mut [Block<E, S>],
+) {
+    dispatch(Factor { plan, coupling, blocks });
 }
 
 /// See [`factor`].
 pub(super) struct Factor<'a, E, const S: usize> {
     pub plan: &'a Elimination,
+    pub coupling: &'a Block<E, S>,
     pub blocks: &'a mut [Block<E, S>],
 }
 
@@ -60,9 +77,33 @@ impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { plan, blocks } = self;
-        let mut updates = plan.updates.iter();
+        let Self { plan, coupling, blocks } = self;
+        let mut updates = plan.updates;
         for pivot in plan.pivots {
+            let Some((own, rest)) = updates.split_at_checked(pivot.lower().len() * pivot.upper().len())
+            else {
+                return;
+            };
+            updates = rest;
+            if is_scaled::<S>(pivot) {
+                let width = pivot.upper().len();
+                for (index, upper) in pivot.upper().enumerate() {
+                    let Some(upper) = blocks.get(upper) else { continue };
+                    let mut product = [[E::from_f64(0.0); S]; S];
+                    A::subtract_blocks(&mut product, coupling, upper);
+                    let targets = own.get(index..).unwrap_or_default().iter().step_by(width);
+                    for (lower, &target) in pivot.lower().zip(targets) {
+                        let Some(Some(&scale)) = blocks.get(lower).map(|lower| lower.first()) else {
+                            continue;
+                        };
+                        let Some(target) = blocks.get_mut(target as usize) else { continue };
+                        for (column, product) in target.iter_mut().zip(&product) {
+                            A::subtract_products(column, &scale, product);
+                        }
+                    }
+                }
+                continue;
+            }
             if !pivot.identity {
                 let Some(block) = blocks.get_mut(pivot.block as usize) else { continue };
                 let inverse = inverse::<A, E, S>(block);
@@ -71,9 +112,10 @@ impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
                     *block = product::<A, E, S>(block, &inverse);
                 }
             }
+            let mut own = own.iter();
             for lower in pivot.lower() {
                 let Some(&lower) = blocks.get(lower) else { continue };
-                for (upper, &target) in pivot.upper().zip(&mut updates) {
+                for (upper, &target) in pivot.upper().zip(&mut own) {
                     let Some(&upper) = blocks.get(upper) else { continue };
                     let Some(target) = blocks.get_mut(target as usize) else { continue };
                     A::subtract_blocks(target, &lower, &upper);
@@ -83,21 +125,22 @@ impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
     }
 }
 
+/// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.
+#[inline(always)]
+pub fn is_scaled<const S: usize>(pivot: &Pivot) -> bool {
+    (const { S > 1 }) && pivot.scaled
+}
+
 /// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all columns.
 ///
 /// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
 /// rows stays in the nearest cache.
-pub fn solve<E: Field + Plain, R: Array<E>, const S: usize>(
-    plan: &Elimination,
-    blocks: &[Block<E, S>],
-    rows: &mut [[R; S]],
-) {
-    dispatch(Solve { plan, blocks, rows });
+pub fn solve<E: Field + Plain, R: Array<E>, const S: usize>(factors: Planned<'_, E, S>, rows: &mut [[R; S]]) {
+    dispatch(Solve { factors, rows });
 }
 
 struct Solve<'a, E, R, const S: usize> {
-    plan: &'a Elimination,
-    blocks: &'a [Block<E, S>],
+    factors: Planned<'a, E, S>,
     rows: &'a mut [[R; S]],
 }
 
@@ -105,18 +148,17 @@ impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { plan, blocks, rows } = self;
-        packets!(R::LEN, solve_packets(plan, blocks, rows));
+        let Self { factors, rows } = self;
+        packets!(R::LEN, solve_packets(factors, rows));
     }
 }
 
 /// Solves `Mᵀ X = R` in place.
 pub fn solve_transposed<E: Field + Plain, R: Array<E>, const S: usize>(
-    plan: &Elimination,
-    blocks: &[Block<E, S>],
+    factors: Planned<'_, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(SolveTransposed(Solve { plan, blocks, rows }));
+    dispatch(SolveTransposed(Solve { factors, rows }));
 }
 
 struct SolveTransposed<'a, E, R, const S: usize>(Solve<'a, E, R, S>);
@@ -125,26 +167,36 @@ impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Solve { plan, blocks, rows } = self.0;
-        packets!(R::LEN, solve_packet_transposed(plan, blocks, rows));
+        let Solve { factors, rows } = self.0;
+        packets!(R::LEN, solve_packet_transposed(factors, rows));
     }
 }
 
 /// The part of [`solve`] for `W` columns, inside of a kernel.
 #[inline(always)]
 pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    plan: &Elimination,
-    blocks: &[Block<E, S>],
+    factors: Planned<'_, E, S>,
     rows: &mut [[R; S]],
     column: usize,
 ) {
+    let Planned { plan, blocks, coupling } = factors;
     for pivot in plan.pivots {
         let packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         // Directions that have not reached this unknown, as at the start of an interval.
         if W > 1 && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0)) {
             continue;
         }
-        for (block, other) in beside(plan, blocks, pivot.lower()) {
+        if is_scaled::<S>(pivot) {
+            let mut product = [[E::from_f64(0.0); W]; S];
+            subtract::<A, E, S, W>(&mut product, coupling, &packet);
+            for (block, other) in beside(factors, pivot.lower()) {
+                let mut target = load(rows, other, column);
+                subtract_scaled::<A, E, S, W>(&mut target, block, &product);
+                store(rows, other, column, &target);
+            }
+            continue;
+        }
+        for (block, other) in beside(factors, pivot.lower()) {
             let mut target = load(rows, other, column);
             subtract::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, column, &target);
@@ -152,7 +204,7 @@ pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usiz
     }
     for pivot in plan.pivots.iter().rev() {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
-        for (block, other) in beside(plan, blocks, pivot.upper()) {
+        for (block, other) in beside(factors, pivot.upper()) {
             subtract::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
         }
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
@@ -174,11 +226,11 @@ pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usiz
 
 #[inline(always)]
 fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    plan: &Elimination,
-    blocks: &[Block<E, S>],
+    factors: Planned<'_, E, S>,
     rows: &mut [[R; S]],
     column: usize,
 ) {
+    let Planned { plan, blocks, coupling } = factors;
     for pivot in plan.pivots {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
         if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
@@ -188,7 +240,7 @@ fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S
             packet = solution;
             store(rows, pivot.slot as usize, column, &packet);
         }
-        for (block, other) in beside(plan, blocks, pivot.upper()) {
+        for (block, other) in beside(factors, pivot.upper()) {
             let mut target = load(rows, other, column);
             subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, column, &target);
@@ -196,8 +248,16 @@ fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S
     }
     for pivot in plan.pivots.iter().rev() {
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
-        for (block, other) in beside(plan, blocks, pivot.lower()) {
-            subtract_transposed::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
+        if is_scaled::<S>(pivot) {
+            let mut sum = [[E::from_f64(0.0); W]; S];
+            for (block, other) in beside(factors, pivot.lower()) {
+                subtract_scaled::<A, E, S, W>(&mut sum, block, &load(rows, other, column));
+            }
+            subtract_transposed::<A, E, S, W>(&mut packet, coupling, &sum);
+        } else {
+            for (block, other) in beside(factors, pivot.lower()) {
+                subtract_transposed::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
+            }
         }
         store(rows, pivot.slot as usize, column, &packet);
     }
@@ -206,12 +266,11 @@ fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
 fn beside<'a, E, const S: usize>(
-    plan: &'a Elimination,
-    blocks: &'a [Block<E, S>],
+    factors: Planned<'a, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
-    let slots = plan.slots.get(range.clone()).unwrap_or_default();
-    blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
+    let slots = factors.plan.slots.get(range.clone()).unwrap_or_default();
+    factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
 }
 
 #[inline(always)]

@@ -12,11 +12,13 @@ use super::Structure;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Factors of the Newton matrix: for each pivot that is no identity an inverse and a product for each block of
-    /// its `L`; a subtracted product for each update. Without a plan LU factors of the whole matrix of
+    /// its `L`; a subtracted product for each update. Of a pivot that is [`scaled`](super::Pivot::scaled) (and two stages or
+    /// more) a product for each block of its `U`, and `2s²` for each update. Without a plan LU factors of the whole matrix of
     /// `n = s nk` rows, `n (n − 1)(4n + 1)/6`.
     pub factorisation: u64,
     /// A solve with one right-hand side, transposed or not: a subtracted product for each block beside the diagonal and a product for
-    /// each pivot that is no identity. Without a plan `2n² − n`.
+    /// each pivot that is no identity; a product for each that is scaled, and then `2s` for each block of its `L`. Without a plan
+    /// `2n² − n`.
     pub solve: u64,
     /// `f` at all stages: `s` times [`Operations::residual`](super::Operations::residual).
     pub residual: u64,
@@ -97,9 +99,15 @@ impl Structure {
             return (n * n.saturating_sub(1) * (4 * n + 1) / 6, (2 * n * n).saturating_sub(n));
         }
         let (square, cube) = (s * s, s * s * s);
-        let (mut factorisation, mut solve) = (2 * cube * plan.updates.len() as u64, 0);
+        let (mut factorisation, mut solve) = (0, 0);
         for pivot in plan.pivots {
             let (lower, upper) = (pivot.lower().len() as u64, pivot.upper().len() as u64);
+            if pivot.scaled && s > 1 {
+                factorisation += upper * (2 * cube - square + 2 * square * lower);
+                solve += 2 * square * (1 + upper) - s + 2 * s * lower;
+                continue;
+            }
+            factorisation += 2 * cube * lower * upper;
             solve += 2 * square * (lower + upper);
             if !pivot.identity {
                 factorisation += 2 * cube + s - 2 * square + lower * (2 * cube - square);

@@ -22,6 +22,19 @@ impl Elimination {
     /// No plan: the matrix is eliminated as a dense one.
     pub const NONE: Self =
         Self { pivots: &[], slots: &[], updates: &[], assembly: &[], slot_of_equation: &[] };
+
+    /// How many products of `s×s` blocks the updates of a factorisation cost; a block with scaled rows is a fraction of one.
+    pub(crate) const fn products(&self, s: f64) -> f64 {
+        let (mut products, mut index) = (0.0, 0);
+        while index < self.pivots.len() {
+            let pivot = &self.pivots[index];
+            let lower = (pivot.upper - pivot.block - 1) as f64;
+            let upper = (pivot.end - pivot.upper) as f64;
+            products += if pivot.scaled && s > 1.0 { upper + lower * upper / s } else { lower * upper };
+            index += 1;
+        }
+        products
+    }
 }
 
 /// A pivot: the blocks that it owns lie one after the other, itself, its column `L`, its row `U`.
@@ -37,6 +50,9 @@ pub struct Pivot {
     pub end: u32,
     /// The pivot is the identity, whatever the step size and the point.
     pub identity: bool,
+    /// The pivot is the identity, and nothing has been added to the blocks of its column, which are `h diag(state) A`: with two stages or more
+    /// only `state` is stored, and `hA` is applied once for all of them.
+    pub scaled: bool,
 }
 
 impl Pivot {
@@ -63,6 +79,8 @@ pub struct Assembly {
     pub direct: u32,
     /// The entry of `f_x`, or [`Assembly::NONE`].
     pub state: u32,
+    /// The block belongs to the column of a pivot that is [`scaled`](Pivot::scaled).
+    pub scaled: bool,
 }
 
 impl Assembly {

@@ -5,7 +5,7 @@ use crate::language::Variables;
 use crate::structure::{Analysis, Derivatives, Elimination, Facts, FunctionAnalysis, Operations};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// The value of `Dae::STRUCTURE`.
 pub fn write(analysis: &Analysis) -> TokenStream {
@@ -101,7 +101,7 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
 /// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that is its pivot.
 fn elimination(analysis: &Analysis) -> TokenStream {
     let krate = &analysis.model.krate;
-    let Elimination { plan, positions, identity } = &analysis.elimination;
+    let Elimination { plan, positions, identity, scaled } = &analysis.elimination;
     let mut slot_of_equation = vec![0; plan.pivots.len()];
     for &(row, column) in &plan.pivots {
         slot_of_equation[row as usize] = column;
@@ -116,25 +116,37 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             if lower { slot_of_equation[row as usize] } else { column }
         })
         .collect();
-    let pivots = plan.pivots.iter().zip(&plan.ranges).zip(identity).map(|((pivot, range), identity)| {
-        let [slot, block, upper, end] = [pivot.1, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
-        quote!(pivot(#slot, #block, #upper, #end, #identity))
-    });
+    let kinds = identity.iter().zip(scaled);
+    let pivots =
+        plan.pivots.iter().zip(&plan.ranges).zip(kinds).map(|((pivot, range), (identity, scaled))| {
+            let [slot, block, upper, end] =
+                [pivot.1, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
+            quote!(pivot(#slot, #block, #upper, #end, #identity, #scaled))
+        });
+    let scaled: HashSet<u32> = plan
+        .ranges
+        .iter()
+        .zip(scaled)
+        .filter(|(_, scaled)| **scaled)
+        .flat_map(|(&[block, upper, _], _)| block + 1..upper)
+        .collect();
     let assembly = positions.iter().map(|position| {
         let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
-        let block = Literal::u32_unsuffixed(number[&(position.row, position.column)]);
-        let (direct, state) = (entry(position.direct), entry(position.state));
-        quote!(assembly(#block, #direct, #state))
+        let block = number[&(position.row, position.column)];
+        let (direct, state, scaled) =
+            (entry(position.direct), entry(position.state), scaled.contains(&block));
+        let block = Literal::u32_unsuffixed(block);
+        quote!(assembly(#block, #direct, #state, #scaled))
     });
     let [slots, updates, slot_of_equation] =
         [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
     quote! {{
         use #krate::model::{Assembly, Pivot};
-        const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool) -> Pivot {
-            Pivot { slot, block, upper, end, identity }
+        const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool, scaled: bool) -> Pivot {
+            Pivot { slot, block, upper, end, identity, scaled }
         }
-        const fn assembly(block: u32, direct: u32, state: u32) -> Assembly {
-            Assembly { block, direct, state }
+        const fn assembly(block: u32, direct: u32, state: u32, scaled: bool) -> Assembly {
+            Assembly { block, direct, state, scaled }
         }
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },

@@ -65,6 +65,8 @@ pub struct Elimination {
     pub positions: Vec<Position>,
     /// Pivots that are the identity, whatever the step size and the point.
     pub identity: Vec<bool>,
+    /// Of these the ones of whose column all blocks are `h diag(f_x) A`, with nothing added when the pivot's turn comes.
+    pub scaled: Vec<bool>,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -156,17 +158,28 @@ fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6])
     let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
     let plan = elimination::plan(model.residual.len(), &entries);
     let updated: HashSet<u32> = plan.updates.iter().copied().collect();
-    let identity = plan
-        .pivots
+    let original = |block: u32| {
+        let (row, column) = plan.blocks[block as usize];
+        let position = positions.iter().find(|p| (p.row, p.column) == (row, column));
+        position.filter(|_| !updated.contains(&block))
+    };
+    let identity: Vec<bool> = plan
+        .ranges
         .iter()
-        .zip(&plan.ranges)
-        .map(|(&(row, column), &[block, ..])| {
-            let position = positions.iter().find(|p| (p.row, p.column) == (row, column));
-            !updated.contains(&block)
-                && position.is_some_and(|p| samples::is_identity(&model.graph, jacobian, p))
+        .map(|&[block, ..]| original(block).is_some_and(|p| samples::is_identity(&model.graph, jacobian, p)))
+        .collect();
+    let scaled = plan
+        .ranges
+        .iter()
+        .zip(&identity)
+        .map(|(&[block, upper, _], identity)| {
+            let mut lower = block + 1..upper;
+            *identity
+                && !lower.is_empty()
+                && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
-    Elimination { plan, positions, identity }
+    Elimination { plan, positions, identity, scaled }
 }
 
 /// As many equations as unknowns.
