@@ -9,55 +9,78 @@ use crate::model::{ArrayK, Dae, VectorU};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape};
+use bytemuck::Zeroable;
 
-/// A result as the slices that it consists of.
-pub trait Slices<V: Plain> {
-    fn slices<'a>(&'a self) -> impl Iterator<Item = &'a [V]>
-    where
-        V: 'a;
-    fn slices_mut<'a>(&'a mut self) -> impl Iterator<Item = &'a mut [V]>
-    where
-        V: 'a;
+/// A result of several intervals, with a number for each of them in the lanes of its registers. All of it is inlined
+/// into kernels.
+pub trait Wide<E: Lanes, R> {
+    /// Whether all numbers are finite, lane by lane.
+    fn is_finite(&self) -> E::Mask;
+    /// The result in one lane.
+    fn unpack(&self, lane: usize, to: &mut R);
 }
 
-macro_rules! slices {
+macro_rules! wide {
     ($type:ident $(: $inner:ident)?; $($field:ident),*) => {
-        impl<M: Dae, V: Plain> Slices<V> for $type<M, V> {
-            fn slices<'a>(&'a self) -> impl Iterator<Item = &'a [V]>
-            where
-                V: 'a,
-            {
-                let own = [$(self.$field.as_slice()),*].into_iter();
-                $(let own = self.$inner.slices().chain(own);)?
-                own
+        impl<M: Dae, T: Plain, E: Lanes<Cell: AsRef<[T]>>> Wide<E, $type<M, T>> for $type<M, E> {
+            #[inline(always)]
+            fn is_finite(&self) -> E::Mask {
+                let finite = yes::<E>();
+                $(let finite = E::and(finite, Wide::<E, _>::is_finite(&self.$inner));)?
+                $(let finite = are_finite(self.$field.as_slice(), finite);)*
+                finite
             }
-            fn slices_mut<'a>(&'a mut self) -> impl Iterator<Item = &'a mut [V]>
-            where
-                V: 'a,
-            {
-                let own = [$(self.$field.as_mut_slice()),*].into_iter();
-                $(let own = self.$inner.slices_mut().chain(own);)?
-                own
+            #[inline(always)]
+            fn unpack(&self, lane: usize, to: &mut $type<M, T>) {
+                $(self.$inner.unpack(lane, &mut to.$inner);)?
+                $(unpack(self.$field.as_slice(), lane, to.$field.as_mut_slice());)*
             }
         }
     };
 }
-slices!(Nominal; x, z, z0);
-slices!(Forward: nominal; dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp, dz0_dx0, dz0_du, dz0_dp);
-slices!(Adjoint: nominal; grad_x0, grad_u, grad_p);
-slices!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p);
-slices!(Hessian: first; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
+wide!(Nominal; x, z, z0);
+wide!(Forward: nominal; dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp, dz0_dx0, dz0_du, dz0_dp);
+wide!(Adjoint: nominal; grad_x0, grad_u, grad_p);
+wide!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p);
+wide!(Hessian: first; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
+
+/// True in every lane.
+#[inline(always)]
+pub fn yes<E: Lanes>() -> E::Mask {
+    E::le(E::from_f64(0.0), E::from_f64(0.0))
+}
+
+/// Which lanes are finite, beside those that are not in `finite`.
+#[inline(always)]
+fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
+    for &value in values {
+        finite = E::and(finite, value.is_finite());
+    }
+    finite
+}
+
+/// The elements in one lane.
+#[inline(always)]
+pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], lane: usize, to: &mut [T]) {
+    let mut cell: E::Cell = Zeroable::zeroed();
+    for (&from, to) in from.iter().zip(to) {
+        from.store(&mut cell);
+        if let Some(&element) = cell.as_ref().get(lane) {
+            *to = element;
+        }
+    }
+}
 
 /// What a call of a batch answers for each interval.
-pub trait Answer<M: Dae, T: Real>: Copy + Send + Slices<T> {
+pub trait Answer<M: Dae, T: Real>: Copy + Send {
     /// The same with a number for each lane.
-    type Wide<E: Lanes>: Slices<E>;
+    type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
 
     /// Bytes of the right-hand sides.
     fn columns<E: Lanes, const S: usize>() -> usize;
 
     /// For several intervals at once.
-    fn together<E: Lanes, const S: usize>(
+    fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
         group: &mut Group<M, E, S>,
         warm: bool,
     ) -> Verdict<'_, E, Self::Wide<E>>;
@@ -72,12 +95,12 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send + Slices<T> {
 macro_rules! answer {
     ($type:ident, $call:ident($($lambda:ident)?), $columns:expr) => {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
-            type Wide<E: Lanes> = $type<M, E>;
+            type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
 
             fn columns<E: Lanes, const S: usize>() -> usize {
                 size_of::<ArrayK<M, [E; S]>>() * $columns
             }
-            fn together<E: Lanes, const S: usize>(
+            fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
                 group: &mut Group<M, E, S>,
                 warm: bool,
             ) -> Verdict<'_, E, Self::Wide<E>> {

@@ -3,6 +3,7 @@
 //! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy their equations;
 //! lanes never mix, so that one that fails takes nobody with it.
 
+use super::answer::{unpack, yes};
 use super::intervals::Interval;
 use crate::error::Error;
 use crate::irk::{AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Step, Work};
@@ -95,7 +96,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
     /// earlier solutions, if all lanes have them.
     pub fn place<T: Plain>(
         &mut self,
-        intervals: &[Interval<'_, M, T>],
+        intervals: &[&Interval<'_, M, T>],
         given: Option<[&[T]; 2]>,
         records: Option<&[Record<'_, M, T, S>]>,
     ) -> Result<(), Error>
@@ -150,11 +151,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         E::Cell: AsRef<[T]>,
     {
         for (y, step) in record.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
-            let mut to: [&mut [T]; MOST_LANES] = Default::default();
-            if let Some(to) = to.get_mut(lane) {
-                *to = y.as_mut().as_flattened_mut();
-            }
-            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to });
+            let (from, to) = (step.y.as_ref().as_flattened(), y.as_mut().as_flattened_mut());
+            dispatch(Unpack { from, lane, to });
         }
         Ok(())
     }
@@ -290,11 +288,6 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
     }
 }
 
-/// True in every lane.
-fn yes<E: Lanes>() -> E::Mask {
-    E::le(E::from_f64(0.0), E::from_f64(0.0))
-}
-
 /// The elements of several slices, one of each in the lanes of a register.
 struct Pack<'a, T, E> {
     from: &'a [&'a [T]; MOST_LANES],
@@ -317,63 +310,17 @@ impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
     }
 }
 
-/// The elements of registers, those of each lane in a slice of their own; lanes with an empty slice are left out.
-pub struct Unpack<'a, T, E> {
-    pub from: &'a [E],
-    pub to: [&'a mut [T]; MOST_LANES],
+/// The elements of registers that are in one lane.
+struct Unpack<'a, T, E> {
+    from: &'a [E],
+    lane: usize,
+    to: &'a mut [T],
 }
-
-/// So many elements of a lane are written at once.
-const BLOCK: usize = 4;
 
 impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { from, to } = self;
-        let mut cells: [E::Cell; BLOCK] = bytemuck::Zeroable::zeroed();
-        let (blocks, rest) = from.as_chunks::<BLOCK>();
-        let mut ends: [&mut [T]; MOST_LANES] = Default::default();
-        let mut chunks: [&mut [[T; BLOCK]]; MOST_LANES] = Default::default();
-        for ((to, chunks), end) in to.into_iter().zip(&mut chunks).zip(&mut ends) {
-            (*chunks, *end) = to.as_chunks_mut::<BLOCK>();
-        }
-        for (index, block) in blocks.iter().enumerate() {
-            for (&from, cell) in block.iter().zip(&mut cells) {
-                from.store(cell);
-            }
-            for (lane, to) in chunks.iter_mut().enumerate().take(E::LANES) {
-                let Some(to) = to.get_mut(index) else { continue };
-                for (to, cell) in to.iter_mut().zip(&cells) {
-                    if let Some(&element) = cell.as_ref().get(lane) {
-                        *to = element;
-                    }
-                }
-            }
-        }
-        for (index, &from) in rest.iter().enumerate() {
-            let [cell, ..] = &mut cells;
-            from.store(cell);
-            for (to, &element) in ends.iter_mut().zip(cell.as_ref()) {
-                if let Some(to) = to.get_mut(index) {
-                    *to = element;
-                }
-            }
-        }
-    }
-}
-
-/// Whether all numbers are finite, lane by lane.
-pub struct Finite<'a, E>(pub &'a [E]);
-
-impl<E: Lanes> Kernel for Finite<'_, E> {
-    type Output = E::Mask;
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) -> E::Mask {
-        let mut finite = E::le(E::from_f64(0.0), E::from_f64(0.0));
-        for &value in self.0 {
-            finite = E::and(finite, value.is_finite());
-        }
-        finite
+        unpack(self.from, self.lane, self.to);
     }
 }

@@ -1,14 +1,14 @@
 //! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a result for.
 
-use super::answer::{Answer, Slices};
+use super::answer::{Answer, Wide};
 #[cfg(feature = "parallel")]
 use super::error::BatchError;
-use super::group::{Finite, Group, MOST_LANES, Unpack};
+use super::group::{Group, MOST_LANES};
 use super::intervals::{Inputs, Interval, vector};
 use super::statistics::BatchStatistics;
 use crate::error::Error;
 use crate::irk;
-use crate::linalg::dispatch;
+use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae};
 use crate::options::{Options, Start};
@@ -197,6 +197,32 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
     }
 }
 
+/// Gives every interval its result, where all is well and finite.
+struct Distribute<'a, E: Lanes, W, R> {
+    good: E::Mask,
+    wide: &'a W,
+    /// On entry which lanes are asked for, on return which are good.
+    done: &'a mut [bool; MOST_LANES],
+    results: &'a mut [R],
+}
+
+impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { good, wide, done, results } = self;
+        let good = E::and(good, wide.is_finite());
+        let mut verdict: E::Cell = bytemuck::Zeroable::zeroed();
+        E::select(good, E::from_f64(1.0), E::from_f64(0.0)).store(&mut verdict);
+        for (lane, (done, result)) in done.iter_mut().zip(results).enumerate().take(E::LANES) {
+            *done &= E::lane(&verdict, lane) != 0.0;
+            if *done {
+                wide.unpack(lane, result);
+            }
+        }
+    }
+}
+
 /// The intervals of a group side by side.
 struct Together<'a, 'b, 'c, M: Dae, T: Real, R, const S: usize> {
     work: &'a Work<'b, M, T, S>,
@@ -221,11 +247,9 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         let first = intervals.iter().position(Option::is_some);
         let (Some(group), Some(first)) = (group, first) else { return Ok(done) };
         let Some(Some(copy)) = intervals.get(first) else { return Ok(done) };
-        let mut lanes = [*copy; MOST_LANES];
+        let mut lanes = [copy; MOST_LANES];
         for (lane, interval) in lanes.iter_mut().zip(intervals).take(E::LANES) {
-            if let Some(interval) = interval {
-                *lane = *interval;
-            }
+            *lane = interval.as_ref().unwrap_or(copy);
         }
         let index = |lane: usize| if matches!(intervals.get(lane), Some(Some(_))) { lane } else { first };
 
@@ -241,30 +265,11 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         }
         group.place(lanes.get(..E::LANES).unwrap_or_default(), work.given, warm.then_some(&records))?;
 
-        let (mut good, wide) = R::together(group, warm)?;
-        for slice in wide.slices().filter(|slice| !slice.is_empty()) {
-            good = E::and(good, dispatch(Finite(slice)));
+        let (good, wide) = R::together(group, warm)?;
+        for (done, interval) in done.iter_mut().zip(intervals).take(E::LANES) {
+            *done = interval.is_some();
         }
-        let mut verdict: E::Cell = bytemuck::Zeroable::zeroed();
-        E::select(good, E::from_f64(1.0), E::from_f64(0.0)).store(&mut verdict);
-        for (lane, (done, interval)) in done.iter_mut().zip(intervals).enumerate().take(E::LANES) {
-            *done = interval.is_some() && E::lane(&verdict, lane) != 0.0;
-        }
-        let mut places = [const { None }; MOST_LANES];
-        for ((place, result), _) in
-            places.iter_mut().zip(share.results.iter_mut()).zip(done).filter(|(_, done)| *done)
-        {
-            *place = Some(result.slices_mut());
-        }
-        for from in wide.slices() {
-            let mut to: [&mut [T]; MOST_LANES] = Default::default();
-            for (to, place) in to.iter_mut().zip(&mut places).take(E::LANES) {
-                *to = place.as_mut().and_then(Iterator::next).unwrap_or_default();
-            }
-            if !from.is_empty() {
-                dispatch(Unpack { from, to });
-            }
-        }
+        dispatch(Distribute { good, wide, done: &mut done, results: &mut *share.results });
         let places = share.records.chunks_exact_mut(steps).zip(share.warm.iter_mut());
         for (lane, ((record, warm), done)) in places.zip(done).enumerate() {
             if done {

@@ -44,12 +44,7 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let (plan, Self { coupling, blocks, .. }) = (&M::STRUCTURE.elimination, self);
-        for (i, row) in a.iter().enumerate() {
-            for (column, &a) in coupling.iter_mut().zip(row) {
-                column[i] = -(h * a);
-            }
-        }
-        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), coupling, blocks: blocks.as_mut() });
+        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), a, h, coupling, blocks: blocks.as_mut() });
         sparse::factor(plan, coupling, blocks.as_mut());
     }
 
@@ -97,7 +92,10 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
 struct Assemble<'a, E, const S: usize> {
     plan: &'a Elimination,
     jacobian: &'a [[E; S]],
-    coupling: &'a Block<E, S>,
+    a: &'a [[E; S]; S],
+    h: E,
+    /// Becomes `−hA`.
+    coupling: &'a mut Block<E, S>,
     blocks: &'a mut [Block<E, S>],
 }
 
@@ -105,8 +103,13 @@ impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { plan, jacobian, coupling, blocks } = self;
+        let Self { plan, jacobian, a, h, coupling, blocks } = self;
         let zero = E::from_f64(0.0);
+        for (i, row) in a.iter().enumerate() {
+            for (column, &a) in coupling.iter_mut().zip(row) {
+                column[i] = -(h * a);
+            }
+        }
         blocks.fill([[zero; S]; S]);
         for entry in plan.assembly {
             let Some(block) = blocks.get_mut(entry.block as usize) else { continue };
@@ -115,7 +118,7 @@ impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
                     block[0] = *state;
                     continue;
                 }
-                for (column, ha) in block.iter_mut().zip(coupling) {
+                for (column, ha) in block.iter_mut().zip(&*coupling) {
                     *column = [zero; S];
                     A::subtract_products(column, state, ha);
                 }
