@@ -50,8 +50,8 @@ pub struct Pivot {
     pub end: u32,
     /// The pivot is the identity, whatever the step size and the point.
     pub identity: bool,
-    /// The pivot is the identity, and nothing has been added to the blocks of its column, which are `h diag(state) A`: with two stages or more
-    /// only `state` is stored, and `hA` is applied once for all of them.
+    /// The pivot is the identity, and nothing has been added to the blocks of its column, three or more, which are
+    /// `h diag(state) A`: with two stages or more only `state` is stored, and `hA` is applied once for all of them.
     pub scaled: bool,
 }
 

@@ -149,6 +149,9 @@ fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
     Derivatives { jacobian, blocks, constant, gradient, hessian, linear, operations }
 }
 
+/// One product with `hA` for a column costs less than one for each block from so many blocks on.
+const SHARED: usize = 3;
+
 /// Plans the elimination of the Newton matrix.
 fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6]) -> Elimination {
     let Variables { x, z, u, p } = &model.variables;
@@ -175,7 +178,7 @@ fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6])
         .map(|(&[block, upper, _], identity)| {
             let mut lower = block + 1..upper;
             *identity
-                && !lower.is_empty()
+                && lower.len() >= SHARED
                 && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
