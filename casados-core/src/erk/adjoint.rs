@@ -55,7 +55,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
             lambda.as_mut()[..columns].fill(T::ZERO);
         }
         for (step, record) in records.iter().enumerate().rev() {
-            let multipliers = multipliers.as_deref_mut().map(|of_steps| &mut of_steps[step]);
+            let multipliers = multipliers.as_deref_mut().and_then(|of_steps| of_steps.get_mut(step));
             self.step(scheme, grid, point, record, step, columns, multipliers, along)?;
         }
         Ok(())
@@ -80,12 +80,14 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
             if columns == 1 {
                 let mu = ArrayK::<M, T>::from_fn(|equation| {
                     let row = scheme.rows[equation];
-                    row.factor * self.forward.dxi[row.state].as_ref()[0]
+                    let kbar =
+                        self.forward.dxi.as_ref().get(row.state).map_or(T::ZERO, |kbar| kbar.as_ref()[0]);
+                    row.factor * kbar
                 });
                 self.pull_one(point, &mu, at)?;
                 if let Some(integrand) = along {
                     // ξ̄_i += h b_i φ_x, λ_w += h b_i φ_w
-                    integrand.point().0.copy_from_slice(point.v.as_ref());
+                    point.show(&mut **integrand);
                     let gradient = integrand.adjoint(grid.h * scheme.b[stage], at)?;
                     add(T::ONE, gradient, self.gradient.as_mut());
                 }
@@ -144,17 +146,23 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// Products with the Jacobian, one evaluation for all seeds.
     fn pull_many(&mut self, scheme: &Scheme<M, T, S>, stage: usize, columns: usize) {
         let nx = M::Shape::NX;
-        let xibar = &mut self.forward.dk[stage];
+        let Variation { dk, dxi, jacobian, .. } = &mut self.forward;
+        let Some(xibar) = dk.get_mut(stage) else { return };
         for row in xibar.as_mut() {
             row.as_mut()[..columns].fill(T::ZERO);
         }
         for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
-            let row = scheme.rows[equation];
-            let coefficient = row.factor * self.forward.jacobian[entry];
             let w = variable - nx;
-            let sum = if w < nx { xibar[w].as_mut() } else { self.lambda[w].as_mut() };
-            add(coefficient, &self.forward.dxi[row.state].as_ref()[..columns], sum);
+            let sum = if w < nx { xibar.as_mut().get_mut(w) } else { self.lambda.as_mut().get_mut(w) };
+            let (Some(sum), Some(&value), Some(row)) =
+                (sum, jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
+            else {
+                continue;
+            };
+            if let Some(kbar) = dxi.as_ref().get(row.state) {
+                add(row.factor * value, &kbar.as_ref()[..columns], sum.as_mut());
+            }
         }
     }
 }

@@ -24,7 +24,9 @@ pub(super) fn forward<M: Ode, T: Real>(
     let nx = M::Shape::NX;
     let variables = integrand.variables();
     let (v, d) = integrand.point();
-    v.copy_from_slice(point.v.as_ref());
+    for (to, from) in v.iter_mut().zip(point.v.as_ref()) {
+        *to = *from;
+    }
     for &variable in variables {
         let variable = variable as usize;
         let (Some(row), Some(w)) = (d.get_mut(variable), variable.checked_sub(nx)) else { continue };
@@ -32,7 +34,9 @@ pub(super) fn forward<M: Ode, T: Real>(
             Some(dxi) => *row = *dxi,
             None => {
                 row.as_mut().fill(T::ZERO);
-                row[w] = T::ONE;
+                if let Some(own) = row.as_mut().get_mut(w) {
+                    *own = T::ONE;
+                }
             }
         }
     }

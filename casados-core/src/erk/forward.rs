@@ -42,7 +42,9 @@ impl<M: Ode, T: Real> Directions<M, T> for Unit {
     }
     #[inline(always)]
     fn add(self, i: usize, coefficient: T, row: &mut [T]) {
-        row[i] = row[i] + coefficient;
+        if let Some(element) = row.get_mut(i) {
+            *element = *element + coefficient;
+        }
     }
 }
 
@@ -70,14 +72,17 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         for (column, value) in row.iter_mut().enumerate() {
             let column = self.first + column;
+            let Seeds { x0, u, p } = self.seeds;
             let seed = if i < nx {
-                self.seeds.x0[(i, column)]
+                x0.as_slice().get(column * nx + i)
             } else if i < nx + nu {
-                self.seeds.u[(i - nx, column)]
+                u.as_slice().get(column * nu + i - nx)
             } else {
-                self.seeds.p[(i - nx - nu, column)]
+                p.as_slice().get(column * M::Shape::NP + i - nx - nu)
             };
-            *value = *value + coefficient * seed;
+            if let Some(&seed) = seed {
+                *value = *value + coefficient * seed;
+            }
         }
     }
 }
@@ -147,18 +152,22 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
         directions: impl Directions<M, T>,
     ) {
         let (nx, columns) = (M::Shape::NX, directions.columns());
-        let dk = &mut self.dk[stage];
+        let Self { dk, dxi, jacobian, .. } = self;
+        let Some(dk) = dk.get_mut(stage) else { return };
         for row in dk.as_mut() {
             row.as_mut()[..columns].fill(T::ZERO);
         }
         for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
-            let row = scheme.rows[equation];
-            let coefficient = row.factor * self.jacobian[entry];
-            let sum = &mut dk[row.state].as_mut()[..columns];
-            let w = variable - nx;
-            if w < nx {
-                add(coefficient, self.dxi[w].as_ref(), sum);
+            let (Some(&value), Some(row)) =
+                (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
+            else {
+                continue;
+            };
+            let Some(sum) = dk.as_mut().get_mut(row.state) else { continue };
+            let (coefficient, sum, w) = (row.factor * value, &mut sum.as_mut()[..columns], variable - nx);
+            if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
+                add(coefficient, dxi.as_ref(), sum);
             } else {
                 directions.add(w, coefficient, sum);
             }

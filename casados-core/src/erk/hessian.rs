@@ -32,7 +32,10 @@ impl<M: Ode, T: Real> Curvature<M, T> {
     pub fn add_lower(&mut self, lower: &[ArrayW<M, T>]) {
         for (i, row) in lower.iter().enumerate() {
             for (j, value) in row.as_ref().iter().enumerate().take(i + 1) {
-                self.sum[j][i] = self.sum[j][i] + *value;
+                let sum = self.sum.as_mut().get_mut(j).and_then(|row| row.as_mut().get_mut(i));
+                if let Some(sum) = sum {
+                    *sum = *sum + *value;
+                }
             }
         }
     }
@@ -70,11 +73,11 @@ impl<M: Ode, T: Real> Curvature<M, T> {
         }
         // Variables u and p move only in their own directions.
         let mut add_row = |row: usize, value: T, column: usize| {
-            let sum = self.product[row].as_mut();
-            if column < nx {
-                add(value, dxi[column].as_ref(), sum);
-            } else {
-                sum[column] = sum[column] + value;
+            let Some(sum) = self.product.as_mut().get_mut(row) else { return };
+            if let (true, Some(dxi)) = (column < nx, dxi.as_ref().get(column)) {
+                add(value, dxi.as_ref(), sum.as_mut());
+            } else if let Some(sum) = sum.as_mut().get_mut(column) {
+                *sum = *sum + value;
             }
         };
         for (entry, &value) in self.entries.as_ref().iter().enumerate() {

@@ -461,8 +461,10 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             base.x = start;
             base.point.counts.steps = 0;
             variation.run(scheme, grid, base, Unit, |point, dxi, at| {
-                forward(&mut along, point, dxi, grid.h * scheme.b[at.stage], true, at)?;
-                curvature.add(scheme, point, &multipliers[at.step][at.stage], dxi, at)
+                let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
+                let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
+                forward(&mut along, point, dxi, grid.h * b, true, at)?;
+                curvature.add(scheme, point, mu, dxi, at)
             })
         };
         let run = run();

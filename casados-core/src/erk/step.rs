@@ -3,6 +3,7 @@
 use super::along::Along;
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
+use crate::quadrature::Integrand;
 use crate::result::Nominal;
 use crate::scalar::{Real, two_sum};
 use crate::shape::{Array, Shape};
@@ -31,13 +32,17 @@ impl<M: Ode, T: Real, const S: usize> Scheme<M, T, S> {
     pub fn new(tableau: &Tableau<S>) -> Self {
         let mut rows = ArrayK::<M, Row<T>>::from_fn(|_| Row { state: 0, factor: T::ZERO });
         for (state, &(row, coefficient)) in M::ROWS.iter().enumerate() {
-            rows[row as usize] = Row { state, factor: T::from_f64(-1.0 / coefficient) };
+            if let Some(row) = rows.as_mut().get_mut(row as usize) {
+                *row = Row { state, factor: T::from_f64(-1.0 / coefficient) };
+            }
         }
         let mut curved = ArrayW::<M, bool>::from_fn(|_| false);
         for entry in 0..M::STRUCTURE.hessian.len() {
-            if let Some((row, column)) = directions::<M>(entry) {
-                curved[row] = true;
-                curved[column] = true;
+            let directions = directions::<M>(entry).map(|(row, column)| [row, column]);
+            for direction in directions.into_iter().flatten() {
+                if let Some(curved) = curved.as_mut().get_mut(direction) {
+                    *curved = true;
+                }
             }
         }
         Self {
@@ -103,9 +108,10 @@ impl<M: Ode, T: Real> Point<M, T> {
         at: Place,
     ) -> Result<(), Error> {
         let nx = M::Shape::NX;
+        let (Some(a), Some(&c)) = (scheme.a.get(at.stage), scheme.c.get(at.stage)) else { return Ok(()) };
         let state = &mut self.v.as_mut()[nx..2 * nx];
         state.fill(T::ZERO);
-        for (&a, k) in scheme.a[at.stage][..at.stage].iter().zip(&record.k) {
+        for (&a, k) in a.iter().take(at.stage).zip(&record.k) {
             if a != T::ZERO {
                 add(a, k.as_ref(), state);
             }
@@ -116,7 +122,7 @@ impl<M: Ode, T: Real> Point<M, T> {
                 return Err(Error::Overflow { step: at.step, index });
             }
         }
-        let time = T::from_f64(at.step as f64) + scheme.c[at.stage];
+        let time = T::from_f64(at.step as f64) + c;
         self.v[M::Shape::NV - 1] = grid.start + grid.h * time;
         Ok(())
     }
@@ -156,9 +162,18 @@ impl<M: Ode, T: Real> Point<M, T> {
         check(jacobian.as_ref(), Quantity::Jacobian, at, |entry| M::STRUCTURE.jacobian.at(entry).0)
     }
 
+    /// The variables to where an integrand takes them from.
+    pub fn show(&self, integrand: &mut dyn Integrand<M, T>) {
+        for (to, from) in integrand.point().0.iter_mut().zip(self.v.as_ref()) {
+            *to = *from;
+        }
+    }
+
     fn assign<const S: usize>(&self, scheme: &Scheme<M, T, S>, k: &mut ArrayX<M, T>) {
         for (row, &f) in scheme.rows.as_ref().iter().zip(self.f.as_ref()) {
-            k[row.state] = row.factor * f;
+            if let Some(k) = k.as_mut().get_mut(row.state) {
+                *k = row.factor * f;
+            }
         }
     }
 }
@@ -178,7 +193,7 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
             point.go(scheme, grid, self, at)?;
             point.derivative(scheme, &mut self.k[stage], at)?;
             if let Some(integrand) = along {
-                integrand.point().0.copy_from_slice(point.v.as_ref());
+                point.show(&mut **integrand);
                 integrand.value(grid.h * scheme.b[stage], at)?;
             }
         }

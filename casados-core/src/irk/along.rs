@@ -28,7 +28,9 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         integrand: &'a mut dyn Integrand<M, T>,
     ) -> &'a mut dyn Integrand<M, T> {
         for (to, from) in integrand.point().0.iter_mut().zip(self.points.as_ref()) {
-            *to = from[stage];
+            if let Some(from) = from.get(stage) {
+                *to = *from;
+            }
         }
         integrand
     }
@@ -79,7 +81,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                     *source = *source + h * *a * *g;
                 }
             }
-            let (algebraic, inputs) = gradient.split_at(2 * nx + nz);
+            let (algebraic, inputs) = gradient.split_at_checked(2 * nx + nz).unwrap_or_default();
             for (source, g) in source.iter_mut().skip(nx).zip(algebraic.iter().skip(2 * nx)) {
                 source[stage] = *g;
             }

@@ -128,7 +128,9 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     ) {
         let Self { backward, mu, entries, .. } = self;
         for (equation, to) in mu.as_mut().iter_mut().enumerate() {
-            *to = backward.mu[slot::<M>(equation)].map(|[mu]| mu);
+            if let Some(mu) = backward.mu.as_ref().get(slot::<M>(equation)) {
+                *to = mu.map(|[mu]| mu);
+            }
         }
         work.place(coefficients, n, &step.x, &step.y);
         let Work { points, stage, .. } = work;
@@ -205,6 +207,12 @@ struct Lower<'a, M: Dae, E: Plain> {
     more: Option<&'a [ArrayW<M, E>]>,
 }
 
+/// An element of a symmetric matrix of which the lower triangle is known.
+#[inline(always)]
+fn element<M: Dae, E: Lanes>(rows: &[ArrayW<M, E>], r: usize, c: usize) -> Option<E> {
+    rows.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))).copied()
+}
+
 impl<M: Dae, E: Lanes> Lower<'_, M, E> {
     /// Its part over the directions from `row` on and those from `column` on, which are not before them.
     fn write<B: Matrix<E>>(&self, to: &mut B, row: usize, column: usize) {
@@ -213,12 +221,13 @@ impl<M: Dae, E: Lanes> Lower<'_, M, E> {
             let of_c = Identity::<M>::column(c);
             for (r, to) in to.iter_mut().enumerate() {
                 let r = row + r;
-                *to = match (Identity::<M>::column(r), of_c) {
-                    (Some(r), Some(c)) => self.sum[r.max(c)][r.min(c)],
-                    _ => E::from_f64(0.0),
+                let sum = match (Identity::<M>::column(r), of_c) {
+                    (Some(r), Some(c)) => element::<M, E>(self.sum.as_ref(), r, c),
+                    _ => None,
                 };
-                if let Some(more) = self.more.and_then(|more| more.get(r.max(c))) {
-                    *to = *to + more[r.min(c)];
+                *to = sum.unwrap_or(E::from_f64(0.0));
+                if let Some(more) = self.more.and_then(|more| element::<M, E>(more, r, c)) {
+                    *to = *to + more;
                 }
             }
         }

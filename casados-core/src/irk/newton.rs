@@ -199,7 +199,9 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             iteration += 1;
             statistics.iterations += 1;
             for (equation, f) in self.f.as_ref().iter().enumerate() {
-                self.increment[slot::<M>(equation)] = f.map(|f| [f]);
+                if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
+                    *to = f.map(|f| [f]);
+                }
             }
             match basis {
                 Some(basis) if mean => self.mean.solve(basis, &mut self.increment),

@@ -81,7 +81,9 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
                 self.factor_pivoted(coefficients, step, iteration, statistics)?;
             }
             for (equation, f) in self.f.as_ref().iter().enumerate() {
-                self.increment[slot::<M>(equation)] = f.map(|f| [f]);
+                if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
+                    *to = f.map(|f| [f]);
+                }
             }
             self.linear.factors.solve(&mut self.increment);
             let increment = self.update(y);
@@ -159,8 +161,13 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         let mut magnitude: ArrayK<M, [T; S]> = Zeroable::zeroed();
         let Pattern { rows, columns } = M::STRUCTURE.jacobian;
         for ((row, column), entry) in rows.iter().zip(columns).zip(self.linear.jacobian.as_ref()) {
-            let point = &self.points[*column as usize];
-            for ((magnitude, entry), point) in magnitude[*row as usize].iter_mut().zip(entry).zip(point) {
+            let (magnitude, points) = (magnitude.as_mut(), self.points.as_ref());
+            let (Some(magnitude), Some(point)) =
+                (magnitude.get_mut(*row as usize), points.get(*column as usize))
+            else {
+                continue;
+            };
+            for ((magnitude, entry), point) in magnitude.iter_mut().zip(entry).zip(point) {
                 *magnitude = *magnitude + (*entry * *point).abs();
             }
         }

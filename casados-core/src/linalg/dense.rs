@@ -36,14 +36,25 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
     /// Adds a value that couples an equation with an unknown of the same stage.
     #[inline(always)]
     pub fn add(&mut self, equation: usize, unknown: usize, stage: usize, value: T) {
-        let element = &mut self.rows[equation][stage][unknown][stage];
-        *element = *element + value;
+        if let Some(block) = self.block(equation, unknown, stage)
+            && let Some(element) = block.get_mut(stage)
+        {
+            *element = *element + value;
+        }
     }
 
     /// Adds values that couple an equation at one stage with an unknown at all stages: `factor · row`.
     #[inline(always)]
     pub fn add_row(&mut self, equation: usize, unknown: usize, stage: usize, factor: T, row: &[T; S]) {
-        axpy(factor, row, &mut self.rows[equation][stage][unknown]);
+        if let Some(block) = self.block(equation, unknown, stage) {
+            axpy(factor, row, block);
+        }
+    }
+
+    /// What couples an equation at one stage with an unknown at all stages.
+    #[inline(always)]
+    fn block(&mut self, equation: usize, unknown: usize, stage: usize) -> Option<&mut [T; S]> {
+        self.rows.as_mut().get_mut(equation)?.get_mut(stage)?.as_mut().get_mut(unknown)
     }
 
     /// Replaces the matrix by its factors.
@@ -73,8 +84,8 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
                     (best, at) = (size, i);
                 }
             }
-            rows.swap(k, at);
-            scales.swap(k, at);
+            exchange(rows, k, at);
+            exchange(scales, k, at);
             pivots[k] = at as u32;
             let (upper, lower) = rows.split_at_mut(k + 1);
             let (above, row) = upper.split_at(k);
@@ -105,13 +116,20 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
     }
 }
 
+/// Two rows in each other's place. The compiler does not know that pivots are rows.
+fn exchange<R>(rows: &mut [R], i: usize, j: usize) {
+    if i.max(j) < rows.len() {
+        rows.swap(i, j);
+    }
+}
+
 impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
     /// Solves `A X = B` in place, all columns of `B` at once.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         let (rows, zero) = (self.rows.as_ref().as_flattened(), E::from_f64(0.0));
         let b = b.as_mut().as_flattened_mut();
         for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate() {
-            b.swap(k, *pivot as usize);
+            exchange(b, k, *pivot as usize);
         }
         self.scale(b);
         for (i, row) in rows.iter().enumerate() {
@@ -169,7 +187,7 @@ impl<M: Dae, E: Lanes, const S: usize> Dense<M, E, S> {
         }
         self.scale(b);
         for (k, pivot) in self.pivots.as_ref().as_flattened().iter().enumerate().rev() {
-            b.swap(k, *pivot as usize);
+            exchange(b, k, *pivot as usize);
         }
     }
 }

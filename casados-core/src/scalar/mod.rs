@@ -9,8 +9,14 @@
 mod complex;
 #[cfg(feature = "num-dual")]
 mod dual;
+mod float;
 pub(crate) mod lanes;
 mod real;
+#[cfg(all(feature = "libm", any(test, not(feature = "std"))))]
+mod single;
+
+#[doc(hidden)]
+pub use float::Float;
 
 use crate::shape::Plain;
 use core::fmt::Debug;

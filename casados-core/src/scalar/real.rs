@@ -1,11 +1,13 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
+#[cfg(not(feature = "std"))]
+use super::single;
 use super::{Field, Lanes, Packed, Real, Scalar, own_cell};
 
-/// The methods of one real type, from `std` where it is there and from `libm` elsewhere.
+/// The methods of one real type, from `std` where it is there, else from `libm` and `single`.
 macro_rules! real {
-    ($t:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $libm:ident),*; $powf:ident, $atan2:ident, $hypot:ident, $sincos:ident) => {
+    ($t:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
         impl Field for $t {
             type Mask = bool;
 
@@ -42,7 +44,7 @@ macro_rules! real {
                     #[cfg(feature = "std")]
                     return <$t>::$name(self);
                     #[cfg(not(feature = "std"))]
-                    return libm::$libm(self);
+                    return $from::$function(self);
                 }
             )*
             #[inline(always)]
@@ -50,28 +52,28 @@ macro_rules! real {
                 #[cfg(feature = "std")]
                 return <$t>::sin_cos(self);
                 #[cfg(not(feature = "std"))]
-                return libm::$sincos(self);
+                return $sincos(self);
             }
             #[inline(always)]
             fn atan2(self, other: Self) -> Self {
                 #[cfg(feature = "std")]
                 return <$t>::atan2(self, other);
                 #[cfg(not(feature = "std"))]
-                return libm::$atan2(self, other);
+                return $atan2(self, other);
             }
             #[inline(always)]
             fn hypot(self, other: Self) -> Self {
                 #[cfg(feature = "std")]
                 return <$t>::hypot(self, other);
                 #[cfg(not(feature = "std"))]
-                return libm::$hypot(self, other);
+                return $hypot(self, other);
             }
             #[inline(always)]
             fn powf(self, other: Self) -> Self {
                 #[cfg(feature = "std")]
                 return <$t>::powf(self, other);
                 #[cfg(not(feature = "std"))]
-                return libm::$powf(self, other);
+                return $powf(self, other);
             }
             // Square and multiply; of a negative exponent, the reciprocal of the positive power.
             #[inline(always)]
@@ -181,11 +183,14 @@ macro_rules! real {
     };
 }
 
-real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = sqrt, cbrt = cbrt, exp = exp, exp2 = exp2, exp_m1 = expm1, ln = log, ln_1p = log1p,
-    log2 = log2, log10 = log10, sin = sin, cos = cos, tan = tan, asin = asin, acos = acos, atan = atan,
-    sinh = sinh, cosh = cosh, tanh = tanh, asinh = asinh, acosh = acosh, atanh = atanh;
-    pow, atan2, hypot, sincos);
-real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = sqrtf, cbrt = cbrtf, exp = expf, exp2 = exp2f, exp_m1 = expm1f, ln = logf, ln_1p = log1pf,
-    log2 = log2f, log10 = log10f, sin = sinf, cos = cosf, tan = tanf, asin = asinf, acos = acosf, atan = atanf,
-    sinh = sinhf, cosh = coshf, tanh = tanhf, asinh = asinhf, acosh = acoshf, atanh = atanhf;
-    powf, atan2f, hypotf, sincosf);
+real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = libm::sqrt, cbrt = libm::cbrt, exp = libm::exp,
+    exp2 = libm::exp2, exp_m1 = libm::expm1, ln = libm::log, ln_1p = libm::log1p, log2 = libm::log2, log10 = libm::log10,
+    sin = libm::sin, cos = libm::cos, tan = libm::tan, asin = libm::asin, acos = libm::acos, atan = libm::atan,
+    sinh = libm::sinh, cosh = libm::cosh, tanh = libm::tanh, asinh = libm::asinh, acosh = libm::acosh,
+    atanh = libm::atanh; libm::pow, libm::atan2, libm::hypot, libm::sincos);
+real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = single::sqrt, cbrt = single::cbrt, exp = libm::expf,
+    exp2 = single::exp2, exp_m1 = libm::expm1f, ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f,
+    log10 = libm::log10f, sin = single::sin, cos = single::cos, tan = single::tan, asin = single::asin,
+    acos = libm::acosf, atan = libm::atanf, sinh = libm::sinhf, cosh = libm::coshf, tanh = libm::tanhf,
+    asinh = libm::asinhf, acosh = single::acosh, atanh = libm::atanhf;
+    libm::powf, libm::atan2f, single::hypot, single::sin_cos);

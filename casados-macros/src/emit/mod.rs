@@ -26,7 +26,8 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
     let implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
 
     let documentation = documentation::of_type(&original, models);
-    let Model { name, visibility, instance, .. } = &first.model;
+    let Model { name, visibility, instance, krate, .. } = &first.model;
+    let item = with_elementary_functions(item, krate);
     assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
 }
 
@@ -41,7 +42,8 @@ pub fn expand_functions(
     };
     let implementations = functions.iter().map(function::write).collect::<syn::Result<TokenStream>>()?;
     let documentation = documentation::of_function(functions);
-    let Model { name, visibility, instance, .. } = &first.model;
+    let Model { name, visibility, instance, krate, .. } = &first.model;
+    let item = with_elementary_functions(item, krate);
     assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
 }
 
@@ -54,6 +56,27 @@ pub fn expand_dual(source: language::dual::Source) -> syn::Result<TokenStream> {
     let documentation = models.first().map(dual::documentation).unwrap_or_default();
     let implementations = models.iter().map(dual::write).collect();
     assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+}
+
+/// The item with `sin`, `exp` and the like in scope, which `f64` has only where there is `std`.
+fn with_elementary_functions(item: TokenStream, krate: &syn::Path) -> TokenStream {
+    let import = quote! {
+        #[allow(unused_imports)]
+        use #krate::scalar::Float as _;
+    };
+    match syn::parse2(item.clone()) {
+        Ok(syn::Item::Fn(mut function)) => {
+            function.block.stmts.insert(0, syn::Stmt::Item(syn::Item::Verbatim(import)));
+            function.into_token_stream()
+        }
+        Ok(syn::Item::Mod(mut module)) => {
+            if let Some((_, items)) = &mut module.content {
+                items.insert(0, syn::Item::Verbatim(import));
+            }
+            module.into_token_stream()
+        }
+        _ => item,
+    }
 }
 
 /// The type of a model.

@@ -1,0 +1,162 @@
+//! Elementary functions of `f32` without the standard library, where `libm` computes them in `f64`: on a processor with
+//! an FPU for single precision that takes eight times as long. These take no operation of double precision at all. The
+//! other functions of `libm` are single precision themselves.
+//!
+//! Bounds of the error in units in the last place of the exact result, of these functions and of those of `libm`; tests
+//! compare with `f64` over all arguments that there are, one in ten thousand, or in thousand of an optimised build.
+//!
+//! | function | bound |
+//! | --- | --- |
+//! | `sqrt` | 0.5 |
+//! | `sin`, `cos`, `sin_cos` | 0.8 |
+//! | `tan`, `exp2`, `asin`, `cbrt`, `hypot` | 1 |
+//! | `exp`, `ln`, `ln_1p`, `log2`, `log10`, `exp_m1`, `acos`, `atan`, `powf` | 1 |
+//! | `atan2` | 1.5 |
+//! | `sinh`, `cosh`, `tanh`, `asinh`, `acosh`, `atanh` | 3 |
+
+mod circular;
+#[cfg(test)]
+mod tests;
+
+pub use circular::{asin, cos, sin, sin_cos, tan};
+
+/// `√a`, in the one instruction that processors with an FPU have for it.
+#[inline(always)]
+pub fn sqrt(a: f32) -> f32 {
+    #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+    return instruction::sqrt(a);
+    #[cfg(not(all(target_arch = "arm", target_abi = "eabihf")))]
+    libm::sqrtf(a)
+}
+
+/// `core` does not offer square roots, and the compiler does not recognise `libm`'s.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[allow(unsafe_code)]
+mod instruction {
+    #[inline(always)]
+    pub fn sqrt(a: f32) -> f32 {
+        let root;
+        // SAFETY: it reads and writes the two registers that it names and nothing else, and every target with this
+        // binary interface has it.
+        unsafe {
+            core::arch::asm!("vsqrt.f32 {0}, {1}", lateout(sreg) root, in(sreg) a, options(pure, nomem, nostack));
+        }
+        root
+    }
+}
+
+/// `a 2ⁿ`, rounded once, for `a` near 1 and `|n| ≤ 250`.
+#[inline(always)]
+fn times_power(a: f32, n: i32) -> f32 {
+    let half = n / 2;
+    let power = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
+    a * power(half) * power(n - half)
+}
+
+/// `2ᵃ = 2ⁿ 2ʳ`, `|r| ≤ ½`, with the polynomial of S. Moshier's Cephes for `(2ʳ − 1)/r`, its largest term as a sum.
+pub fn exp2(a: f32) -> f32 {
+    const P: [f32; 5] = [1.535_336_2e-4, 1.339_887_4e-3, 9.618_437e-3, 5.550_332_5e-2, 2.402_264_8e-1];
+    // What ln 2 lacks as `f32`.
+    const LN_2_LOW: f32 = -1.904_654_3e-9;
+    // Comparisons with NaN are false: it stays.
+    let a = if a > 130.0 { 130.0 } else { a };
+    let a = if a < -152.0 { -152.0 } else { a };
+    let n = (a + ROUND) - ROUND;
+    let r = a - n;
+    let (linear, rest) = product(r, core::f32::consts::LN_2);
+    let (one, low) = ordered_sum(1.0, linear);
+    times_power(one + (low + (rest + r * LN_2_LOW + r * r * polynomial(r, P))), n as i32)
+}
+
+/// `∛a`: a guess from the exponent, as in FreeBSD's `s_cbrtf.c`, and three steps of Halley's method, the last one with the
+/// error of the cube.
+pub fn cbrt(a: f32) -> f32 {
+    let magnitude = a.abs();
+    if !(magnitude > 0.0 && magnitude <= f32::MAX) {
+        return a + a;
+    }
+    let (up, back) = scale(magnitude, [1e-30, 1e30], [EIGHT_BITS * EIGHT_BITS * EIGHT_BITS, EIGHT_BITS]);
+    let scaled = magnitude * up;
+    let mut root = f32::from_bits(scaled.to_bits() / 3 + 709_958_130);
+    for _ in 0..2 {
+        let cube = root * root * root;
+        root = root * ((scaled + scaled + cube) / (scaled + cube + cube));
+    }
+    let (square, low) = product(root, root);
+    let (cube, rest) = product(square, root);
+    root -= ((cube - scaled) + (rest + low * root)) / (3.0 * square);
+    (root * back).copysign(a)
+}
+
+/// `√(a² + b²)`, the larger one scaled to where squares neither overflow nor underflow.
+pub fn hypot(a: f32, b: f32) -> f32 {
+    let (a, b) = (a.abs(), b.abs());
+    if a == f32::INFINITY || b == f32::INFINITY {
+        return f32::INFINITY;
+    }
+    let (long, short) = if a < b { (b, a) } else { (a, b) };
+    let (up, down) = scale(long, [1e-8, 1e18], [NINETY_BITS, NINETY_BITS]);
+    let (long, short) = (long * up, short * up);
+    let ((long_square, low), (short_square, lower)) = (product(long, long), product(short, short));
+    let (sum, rest) = ordered_sum(long_square, short_square);
+    let rest = rest + (low + lower);
+    let root = sqrt(sum);
+    let (back, error) = product(root, root);
+    let rest = ((sum - back) - error) + rest;
+    if root == 0.0 { long + short } else { (root + rest / (root + root)) * down }
+}
+
+const EIGHT_BITS: f32 = 256.0;
+const NINETY_BITS: f32 = (1_u128 << 90) as f32;
+
+/// What brings a number between bounds, and its result back: powers of two and their reciprocals.
+#[inline(always)]
+fn scale(a: f32, [low, high]: [f32; 2], [up, down]: [f32; 2]) -> (f32, f32) {
+    if a < low {
+        (up, 1.0 / down)
+    } else if a > high {
+        (1.0 / up, down)
+    } else {
+        (1.0, 1.0)
+    }
+}
+
+/// `arcosh a`; that of `libm` is a number for some below one.
+pub fn acosh(a: f32) -> f32 {
+    if a < 1.0 { f32::NAN } else { libm::acoshf(a) }
+}
+
+/// `1.5 · 2²³`: added and subtracted, it rounds to an integer; added, it leaves the integer in the last bits.
+const ROUND: f32 = 12_582_912.0;
+
+/// `a + b` and what rounding took, for `|a| ≥ |b|`.
+#[inline(always)]
+fn ordered_sum(a: f32, b: f32) -> (f32, f32) {
+    let sum = a + b;
+    (sum, b - (sum - a))
+}
+
+/// `a + b` and what rounding took.
+#[inline(always)]
+fn sum(a: f32, b: f32) -> (f32, f32) {
+    let [high, low] = super::two_sum(a, b);
+    (high, low)
+}
+
+/// `a b` and what rounding took (Dekker), of numbers whose product neither overflows nor underflows.
+#[inline(always)]
+fn product(a: f32, b: f32) -> (f32, f32) {
+    let halves = |a: f32| {
+        let scaled = a * 4097.0;
+        let upper = scaled - (scaled - a);
+        (upper, a - upper)
+    };
+    let (high, (a1, a2), (b1, b2)) = (a * b, halves(a), halves(b));
+    (high, a2 * b2 - (((high - a1 * b1) - a2 * b1) - a1 * b2))
+}
+
+/// A polynomial, its highest power first.
+#[inline(always)]
+fn polynomial<const K: usize>(x: f32, coefficients: [f32; K]) -> f32 {
+    coefficients.into_iter().fold(0.0, |sum, c| sum * x + c)
+}
