@@ -9,7 +9,8 @@
 use super::directions::{Identity, Seeded};
 use super::record::{Coefficients, Work, copy};
 use super::step::check;
-use super::sweep::{Sweep, Target};
+use super::sweep::Sweep;
+use super::write::Target;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::model::{ArrayW, Dae, NO_COLUMN};

@@ -32,6 +32,7 @@ mod run;
 mod step;
 mod sweep;
 mod verify;
+mod write;
 
 pub use adjoint::AdjointMemory;
 pub use forward::{DirectionalMemory, ForwardMemory};

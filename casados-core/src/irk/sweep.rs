@@ -1,11 +1,11 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to `V_{n+1}`, and to what second
 //! derivatives need of both.
 
-use super::directions::{Directions, Identity, panel, panel_mut, panels, weight};
+use super::directions::{Directions, panel, panel_mut, panels, weight};
 use super::evaluate::entries;
 use super::record::{Coefficients, Work, copy};
 use crate::linalg::{Arithmetic, Kernel, Packet, Planned, dispatch, slot, solve_packets};
-use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
+use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
 use bytemuck::Zeroable;
@@ -109,6 +109,16 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         E::or(good, work.verify_forward(self, coefficients, directions, true))
     }
 
+    /// `V` at the end of the step, or at its start.
+    pub(super) fn v(&self, end: bool) -> &[E] {
+        self.v.get(usize::from(self.end == end)).map_or(&[], |v| R::flat(v.as_ref()))
+    }
+
+    /// The derivatives of the stages.
+    pub(super) fn dy(&self) -> &[E] {
+        R::flat(self.dy.as_ref().as_flattened())
+    }
+
     /// Solves by the factors of the whole matrix, column by column.
     fn solve_columns<D: Directions<E>>(&mut self, work: &mut Work<M, E, S>) {
         let Work { increment, linear, .. } = work;
@@ -128,135 +138,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
                 }
             }
         });
-    }
-
-    /// Writes `V_{n+1}`.
-    pub(crate) fn write_end<D: Directions<E>>(&self, to: &mut impl Target<E>) {
-        let (v, rows) = (self.v.get(usize::from(self.end)).map(|v| R::flat(v.as_ref())), M::Shape::NX);
-        dispatch(Write::<E, D, _, S> {
-            v,
-            dy: &[],
-            height: 0,
-            first: 0,
-            rows,
-            weights: None,
-            to,
-            directions: PhantomData,
-        });
-    }
-
-    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`.
-    pub(crate) fn write_differential<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
-        let (v, rows) = (self.v.get(usize::from(!self.end)).map(|v| R::flat(v.as_ref())), M::Shape::NX);
-        let (dy, weights) = (R::flat(self.dy.as_ref().as_flattened()), Some(weights));
-        dispatch(Write::<E, D, _, S> {
-            v,
-            dy,
-            height: M::Shape::NK * S,
-            first: 0,
-            rows,
-            weights,
-            to,
-            directions: PhantomData,
-        });
-    }
-
-    /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
-    pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) {
-        let (first, rows) = (M::Shape::NX, M::Shape::NZ);
-        let (dy, weights) = (R::flat(self.dy.as_ref().as_flattened()), Some(lagrange));
-        dispatch(Write::<E, D, _, S> {
-            v: None,
-            dy,
-            height: M::Shape::NK * S,
-            first,
-            rows,
-            weights,
-            to,
-            directions: PhantomData,
-        });
-    }
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Sweep<M, E, ArrayW<M, E>, S> {
-    /// Rows of `D` at a stage for some variables, over all directions.
-    pub(crate) fn write_rows(
-        &self,
-        coefficients: &Coefficients<E, S>,
-        h: E,
-        stage: usize,
-        variables: &[u32],
-        d: &mut [ArrayW<M, E>],
-    ) {
-        let v = self.v.get(usize::from(!self.end)).map(|v| Array::flat(v.as_ref()));
-        let (v, dy) = (v.unwrap_or_default(), Array::flat(self.dy.as_ref().as_flattened()));
-        dispatch(WriteRows::<M, E, S> { v, dy, coefficients, h, stage, variables, d });
-    }
-}
-
-/// See [`Sweep::write_rows`].
-struct WriteRows<'a, M: Dae, E: Lanes, const S: usize> {
-    v: &'a [E],
-    dy: &'a [E],
-    coefficients: &'a Coefficients<E, S>,
-    h: E,
-    stage: usize,
-    variables: &'a [u32],
-    d: &'a mut [ArrayW<M, E>],
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { v, dy, coefficients, h, stage, variables, d } = self;
-        let (nx, nz, nk) = (M::Shape::NX, M::Shape::NZ, M::Shape::NK);
-        let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
-        for &variable in variables {
-            let variable = variable as usize;
-            let Some(row) = d.get_mut(variable) else { continue };
-            row.as_mut().fill(zero);
-            // A state or an input that the model does not feel moves with itself.
-            let own = if variable < nx {
-                None
-            } else if variable < 2 * nx {
-                Some(variable - nx)
-            } else {
-                variable.checked_sub(nx + nz).filter(|_| variable >= 2 * nx + nz)
-            };
-            let own = own.filter(|&own| own >= nx || Identity::<M>::column(own).is_none());
-            if let Some(element) = own.and_then(|own| row.as_mut().get_mut(own)) {
-                *element = one;
-            }
-            if variable >= 2 * nx + nz {
-                continue;
-            }
-            let unknown = if variable < nx { variable } else { variable - nx };
-            panels!(M::STRUCTURE.directions.len(), E, column, W => {
-                let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
-                let v = panel::<E, W>(v, column, nx);
-                let mut values = [zero; W];
-                if let Some(packet) = dy.get(unknown) {
-                    match (v.get(unknown), coefficients.a.get(stage)) {
-                        (Some(v), Some(a)) if (nx..2 * nx).contains(&variable) => {
-                            values = *v;
-                            for (&a, dk) in a.iter().zip(packet) {
-                                A::subtract_row(&mut values, -(h * a), dk);
-                            }
-                        }
-                        _ => values = packet.get(stage).copied().unwrap_or(values),
-                    }
-                }
-                for (c, &value) in values.iter().enumerate() {
-                    let direction = M::STRUCTURE.directions.get(column + c);
-                    if let Some(element) =
-                        direction.and_then(|&direction| row.as_mut().get_mut(direction as usize))
-                    {
-                        *element = value;
-                    }
-                }
-            });
-        }
     }
 }
 
@@ -379,16 +260,12 @@ fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     weights: &[E; W],
     row: &[E; W],
 ) {
-    if const { W == 8 } {
-        let (Some(weights), Some(row)) = (weights.first_chunk::<8>(), row.first_chunk::<8>()) else { return };
-        let [w0, w1, w2, w3, w4, w5, w6, w7] = *weights;
-        let [r0, r1, r2, r3, r4, r5, r6, r7] = *row;
-        A::subtract_products(strands, &[w0, w1, w2, w3], &[r0, r1, r2, r3]);
-        A::subtract_products(strands, &[w4, w5, w6, w7], &[r4, r5, r6, r7]);
-    } else {
-        for ((strand, &weight), &element) in strands.iter_mut().zip(weights).zip(row) {
-            *strand = A::subtract(*strand, weight, element);
-        }
+    let ((weights, last_weights), (row, last)) = (weights.as_chunks(), row.as_chunks());
+    for (weights, row) in weights.iter().zip(row) {
+        A::subtract_products(strands, weights, row);
+    }
+    for ((strand, &weight), &element) in strands.iter_mut().zip(last_weights).zip(last) {
+        *strand = A::subtract(*strand, weight, element);
     }
 }
 
@@ -488,50 +365,5 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Curved<'_, M, E, D, S> 
                 }
             }
         }
-    }
-}
-
-/// Where derivatives are written.
-pub(crate) trait Target<E> {
-    /// The column of a matrix that belongs to a column of the panels.
-    fn column(&mut self, column: usize) -> &mut [E];
-}
-
-/// `V + Σ_i weight_i dy_i`, panels to matrices.
-struct Write<'a, E, D, G, const S: usize> {
-    v: Option<&'a [E]>,
-    dy: &'a [E],
-    /// The elements of a column of `dy`, and the first of its unknowns that is written.
-    height: usize,
-    first: usize,
-    rows: usize,
-    weights: Option<&'a [E; S]>,
-    to: &'a mut G,
-    directions: PhantomData<D>,
-}
-
-impl<E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Write<'_, E, D, G, S> {
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { v, dy, height, first, rows, weights, to, .. } = self;
-        panels!(D::COUNT, E, column, W => {
-            let v = v.map(|v| panel::<E, W>(v, column, rows));
-            let (packets, _) = panel::<E, W>(dy, column, height).as_chunks::<S>();
-            for c in 0..W {
-                for (row, to) in to.column(column + c).iter_mut().enumerate() {
-                    let mut value = E::from_f64(0.0);
-                    if let Some(v) = v.and_then(|v| v.get(row)) {
-                        value = v[c];
-                    }
-                    if let (Some(weights), Some(packet)) = (weights, packets.get(first + row)) {
-                        for (&weight, dy) in weights.iter().zip(packet) {
-                            value = A::subtract(value, -weight, dy[c]);
-                        }
-                    }
-                    *to = value;
-                }
-            }
-        });
     }
 }

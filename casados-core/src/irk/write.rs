@@ -1,0 +1,167 @@
+//! What derivatives over a step are written to: matrices of results, and rows of `D` at a stage.
+
+use super::directions::{Directions, Identity, panel, panels};
+use super::record::Coefficients;
+use super::sweep::Sweep;
+use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::model::{ArrayW, Dae};
+use crate::scalar::Lanes;
+use crate::shape::{Array, Shape};
+use core::marker::PhantomData;
+
+/// Where derivatives are written.
+pub(crate) trait Target<E> {
+    /// The column of a matrix that belongs to a column of the panels.
+    fn column(&mut self, column: usize) -> &mut [E];
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
+    /// Writes `V_{n+1}`.
+    pub(crate) fn write_end<D: Directions<E>>(&self, to: &mut impl Target<E>) {
+        self.write::<D, _>(Some(self.v(true)), 0..M::Shape::NX, None, to);
+    }
+
+    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`.
+    pub(crate) fn write_differential<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
+        self.write::<D, _>(Some(self.v(false)), 0..M::Shape::NX, Some(weights), to);
+    }
+
+    /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
+    pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) {
+        self.write::<D, _>(None, M::Shape::NX..M::Shape::NK, Some(lagrange), to);
+    }
+
+    /// Writes `V + Σ_i weight_i dy_i` for some unknowns.
+    fn write<D: Directions<E>, G: Target<E>>(
+        &self,
+        v: Option<&[E]>,
+        unknowns: core::ops::Range<usize>,
+        weights: Option<&[E; S]>,
+        to: &mut G,
+    ) {
+        if unknowns.is_empty() {
+            return;
+        }
+        let (dy, height) = (self.dy(), M::Shape::NK * S);
+        dispatch(Write::<E, D, _, S> { v, dy, height, unknowns, weights, to, directions: PhantomData });
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Sweep<M, E, ArrayW<M, E>, S> {
+    /// Rows of `D` at a stage for some variables, over all directions.
+    pub(crate) fn write_rows(
+        &self,
+        coefficients: &Coefficients<E, S>,
+        h: E,
+        stage: usize,
+        variables: &[u32],
+        d: &mut [ArrayW<M, E>],
+    ) {
+        let (v, dy) = (self.v(false), self.dy());
+        dispatch(WriteRows::<M, E, S> { v, dy, coefficients, h, stage, variables, d });
+    }
+}
+
+/// See [`Sweep::write_rows`].
+struct WriteRows<'a, M: Dae, E: Lanes, const S: usize> {
+    v: &'a [E],
+    dy: &'a [E],
+    coefficients: &'a Coefficients<E, S>,
+    h: E,
+    stage: usize,
+    variables: &'a [u32],
+    d: &'a mut [ArrayW<M, E>],
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { v, dy, coefficients, h, stage, variables, d } = self;
+        let (nx, nz, nk) = (M::Shape::NX, M::Shape::NZ, M::Shape::NK);
+        let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
+        for &variable in variables {
+            let variable = variable as usize;
+            let Some(row) = d.get_mut(variable) else { continue };
+            row.as_mut().fill(zero);
+            // A state or an input that the model does not feel moves with itself.
+            let own = if variable < nx {
+                None
+            } else if variable < 2 * nx {
+                Some(variable - nx)
+            } else {
+                variable.checked_sub(nx + nz).filter(|_| variable >= 2 * nx + nz)
+            };
+            let own = own.filter(|&own| own >= nx || Identity::<M>::column(own).is_none());
+            if let Some(element) = own.and_then(|own| row.as_mut().get_mut(own)) {
+                *element = one;
+            }
+            if variable >= 2 * nx + nz {
+                continue;
+            }
+            let unknown = if variable < nx { variable } else { variable - nx };
+            panels!(M::STRUCTURE.directions.len(), E, column, W => {
+                let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
+                let v = panel::<E, W>(v, column, nx);
+                let mut values = [zero; W];
+                if let Some(packet) = dy.get(unknown) {
+                    match (v.get(unknown), coefficients.a.get(stage)) {
+                        (Some(v), Some(a)) if (nx..2 * nx).contains(&variable) => {
+                            values = *v;
+                            for (&a, dk) in a.iter().zip(packet) {
+                                A::subtract_row(&mut values, -(h * a), dk);
+                            }
+                        }
+                        _ => values = packet.get(stage).copied().unwrap_or(values),
+                    }
+                }
+                for (c, &value) in values.iter().enumerate() {
+                    let direction = M::STRUCTURE.directions.get(column + c);
+                    if let Some(element) =
+                        direction.and_then(|&direction| row.as_mut().get_mut(direction as usize))
+                    {
+                        *element = value;
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// `V + Σ_i weight_i dy_i`, panels to matrices.
+struct Write<'a, E, D, G, const S: usize> {
+    v: Option<&'a [E]>,
+    dy: &'a [E],
+    /// The elements of a column of `dy`.
+    height: usize,
+    unknowns: core::ops::Range<usize>,
+    weights: Option<&'a [E; S]>,
+    to: &'a mut G,
+    directions: PhantomData<D>,
+}
+
+impl<E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Write<'_, E, D, G, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { v, dy, height, unknowns, weights, to, .. } = self;
+        panels!(D::COUNT, E, column, W => {
+            let v = v.map(|v| panel::<E, W>(v, column, unknowns.len()));
+            let (packets, _) = panel::<E, W>(dy, column, height).as_chunks::<S>();
+            for c in 0..W {
+                for (row, to) in to.column(column + c).iter_mut().enumerate() {
+                    let mut value = E::from_f64(0.0);
+                    if let Some(v) = v.and_then(|v| v.get(row)) {
+                        value = v[c];
+                    }
+                    if let (Some(weights), Some(packet)) = (weights, packets.get(unknowns.start + row)) {
+                        for (&weight, dy) in weights.iter().zip(packet) {
+                            value = A::subtract(value, -weight, dy[c]);
+                        }
+                    }
+                    *to = value;
+                }
+            }
+        });
+    }
+}
