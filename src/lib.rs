@@ -124,3 +124,6 @@ pub mod prelude {
 #[cfg(doctest)]
 #[doc = include_str!("../docs/language.md")]
 mod language {}
+#[cfg(doctest)]
+#[doc = include_str!("../docs/embedded.md")]
+mod embedded {}

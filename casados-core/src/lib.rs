@@ -8,6 +8,10 @@
 //! implementation from a Rust function.
 #![no_std]
 #![deny(unsafe_code)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::todo, clippy::unimplemented)
+)]
 
 #[cfg(feature = "alloc")]
 extern crate alloc;

@@ -12,5 +12,6 @@ mod closed_form;
 mod curvature;
 mod errors;
 mod infeasible;
+mod real_time;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

@@ -207,6 +207,14 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 Some(basis) if mean => self.mean.solve(basis, &mut self.increment),
                 _ => self.linear.factors.solve(&mut self.increment),
             }
+            if !test {
+                // Nobody asks how large the increment is.
+                dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
+                if iteration == most {
+                    return Solved { converged: active, exact: false };
+                }
+                continue;
+            }
             let floor = E::from_f64(rounding / rule.tolerance);
             let sizes = dispatch(Update {
                 x: x.as_ref(),
@@ -219,15 +227,9 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 floor,
                 tolerance: E::from_f64(rule.tolerance),
                 full: rule.full,
-                measure: test && iteration == 1,
+                measure: iteration == 1,
             })
             .map(cell);
-            if !test {
-                if iteration == most {
-                    return Solved { converged: active, exact: false };
-                }
-                continue;
-            }
             let mut some = false;
             for (lane, progress) in lanes.iter_mut().enumerate() {
                 if progress.state == State::Active {
@@ -294,6 +296,24 @@ fn cell<E: Lanes>(value: E) -> E::Cell {
     let mut cell: E::Cell = Zeroable::zeroed();
     value.store(&mut cell);
     cell
+}
+
+/// `y ← y − Δ`
+struct Subtract<'a, E, const S: usize> {
+    y: &'a mut [[E; S]],
+    increment: &'a [[[E; 1]; S]],
+}
+
+impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (y, increment) in self.y.iter_mut().zip(self.increment) {
+            for (y, [delta]) in y.iter_mut().zip(increment) {
+                *y = *y - *delta;
+            }
+        }
+    }
 }
 
 /// `y ← y − Δ`; the size of the increment, and of the one that is expected next.

@@ -14,6 +14,7 @@ mod linearise;
 mod map;
 mod point;
 mod problem;
+mod real_time;
 #[cfg(feature = "alloc")]
 mod shooting;
 mod single;
@@ -31,6 +32,9 @@ pub use instance::Ocp;
 pub use linearise::{Curvature, Exact, GaussNewton};
 pub use map::Map;
 pub use problem::{Formulation, Problem};
+#[cfg(feature = "alloc")]
+pub use real_time::HeapRealTime;
+pub use real_time::{Feedback, Prepared, RealTime};
 #[cfg(feature = "alloc")]
 pub use shooting::Shooting;
 pub use single::{Along, IntegralCost};

@@ -6,6 +6,7 @@
 pub mod board;
 pub mod closed_loop;
 pub mod memory;
+pub mod mpc;
 pub mod report;
 
 // The models that run on the desk, as they stand.

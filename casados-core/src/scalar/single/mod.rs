@@ -8,7 +8,7 @@
 //! | function | bound |
 //! | --- | --- |
 //! | `sqrt` | 0.5 |
-//! | `sin`, `cos`, `sin_cos` | 0.8 |
+//! | `sin`, `cos`, `sin_cos` | 0.82 |
 //! | `tan`, `exp2`, `asin`, `cbrt`, `hypot` | 1 |
 //! | `exp`, `ln`, `ln_1p`, `log2`, `log10`, `exp_m1`, `acos`, `atan`, `powf` | 1 |
 //! | `atan2` | 1.5 |

@@ -43,7 +43,7 @@ fn errors_are_below_their_bounds() {
     }
     below!(
         0.5: sqrt = super::sqrt;
-        0.8: sin = super::sin, cos = super::cos;
+        0.82: sin = super::sin, cos = super::cos;
         1.0: tan = super::tan, exp2 = super::exp2, asin = super::asin, cbrt = super::cbrt;
         1.0: exp = libm::expf, ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f, log10 = libm::log10f,
             exp_m1 = libm::expm1f, acos = libm::acosf, atan = libm::atanf;

@@ -1,0 +1,129 @@
+//! Model predictive control: a pendulum on a cart, brought upright and kept there in spite of a kick, with force and rail
+//! bounded. One real-time iteration in each sample.
+
+use crate::pendulum::Pendulum;
+use crate::{board, report};
+use casados::ocp::{Horizon, LeastSquaresCost, OcpError, Problem, RealTime};
+use casados::qp::{InteriorPoint, StageDims};
+use casados::{Gauss, Inline, Irk, Real, function, mode};
+use nalgebra::{Vector1, Vector4};
+
+pub const INTERVALS: usize = 20;
+const SAMPLE: f64 = 0.05;
+const SAMPLES: usize = 100;
+/// When it is kicked, and how fast that makes the ball turn.
+const KICK: (usize, f64) = (50, 1.0);
+pub const FORCE: f64 = 10.0;
+pub const RAIL: f64 = 0.6;
+/// Two sides of the force at every stage but the last, of the position at every one but the first.
+pub const BOUNDS: usize = 4 * INTERVALS;
+
+#[function]
+pub fn deviation(x: [f64; 4], u: [f64; 1]) -> [f64; 5] {
+    [x[0], x[1], x[2], x[3], u[0]]
+}
+
+#[function]
+pub fn end(x: [f64; 4], _u: [f64; 1]) -> [f64; 4] {
+    x
+}
+
+/// The problem: an integrator that is its own memory, and squares of deviations.
+pub type Controlled<T> = Problem<
+    Irk<Pendulum, Gauss<2>, T, Inline<mode::Forward>>,
+    LeastSquaresCost<Deviation, T>,
+    LeastSquaresCost<End, T>,
+>;
+
+/// All memory of the controller in one static of a size that is known here.
+#[macro_export]
+macro_rules! mpc {
+    ($number:ty) => {
+        const DIMS: [casados::qp::StageDims; $crate::mpc::INTERVALS + 1] =
+            $crate::mpc::Controlled::<$number>::dims::<$number, { $crate::mpc::INTERVALS + 1 }>();
+        const PROBLEM: usize = $crate::mpc::Controlled::<$number>::memory::<$number>(&DIMS);
+        const PLAN: usize = casados::qp::Solution::<$number, (), ()>::memory(&DIMS);
+        const SOLVER: (usize, usize) =
+            casados::qp::InteriorPoint::<$number, (), ()>::memory(&DIMS, $crate::mpc::BOUNDS, 0, 0);
+        static NUMBERS: $crate::memory::Static<[$number; PROBLEM + PLAN + SOLVER.0]> =
+            $crate::memory::Static::new();
+        static INDICES: $crate::memory::Static<[u32; SOLVER.1]> = $crate::memory::Static::new();
+
+        #[cfg_attr(target_os = "none", cortex_m_rt::entry)]
+        fn main() -> ! {
+            let good = match (NUMBERS.fill(0.0), INDICES.fill(0)) {
+                (Some(numbers), Some(indices)) => {
+                    $crate::mpc::run(&DIMS, numbers, [PROBLEM, PLAN], indices).is_ok()
+                }
+                _ => false,
+            };
+            $crate::board::exit(good)
+        }
+    };
+}
+
+/// Runs the loop, and prints every tenth state, how many instructions a sample takes and how much stack.
+///
+/// # Errors
+/// Those of the controller.
+#[inline(never)]
+pub fn run<T: Real>(
+    dims: &'static [StageDims],
+    numbers: &'static mut [T],
+    [problem, plan]: [usize; 2],
+    indices: &'static mut [u32],
+) -> Result<(), OcpError> {
+    let number = T::from_f64;
+    let top = board::paint();
+    report::numbers("memory", &[(size_of_val(numbers) + size_of_val(indices)) as u32]);
+    let (problem, rest) = numbers.split_at_mut_checked(problem).unwrap_or_default();
+    let (plan, solver) = rest.split_at_mut_checked(plan).unwrap_or_default();
+
+    let integrator = Irk::<Pendulum, Gauss<2>, T, Inline<mode::Forward>>::inline(crate::options(3))
+        .map_err(|error| OcpError::Integration { interval: 0, error })?;
+    let mut ocp = Problem::new(integrator)
+        .stage_cost(LeastSquaresCost::<Deviation, T>::diagonal(&[1.0, 10.0, 0.1, 0.1, 0.01].map(number)))
+        .terminal_cost(LeastSquaresCost::<End, T>::diagonal(&[20.0, 100.0, 5.0, 5.0].map(number)))
+        .on_horizon(Horizon::uniform(INTERVALS, number(SAMPLE)), dims, problem)?;
+    let mut x = [0.0, 0.6, 0.0, 0.0].map(number);
+    ocp.bound("u", .., number(-FORCE), number(FORCE))?.bound("x[0]", .., number(-RAIL), number(RAIL))?;
+    ocp.fix_initial_state(&x)?.guess(&x, &[T::ZERO])?;
+    let mut qp_solver = InteriorPoint::in_memory(solver, indices);
+    // A sample takes so long at most.
+    (qp_solver.options.max_iterations, qp_solver.options.locate) = (20, false);
+    let mut controller = RealTime::in_memory(ocp, qp_solver, dims, plan)?;
+
+    let (mut preparation, mut feedback, mut iterations) = ([u32::MAX, 0], [u32::MAX, 0], [u32::MAX, 0]);
+    for sample in 0..SAMPLES {
+        if sample == KICK.0 {
+            x[3] = x[3] + number(KICK.1);
+        }
+        let (count, prepared) = board::count(|| controller.prepare());
+        note(&mut preparation, count);
+        let prepared = prepared?;
+        let (count, result) = board::count(|| prepared.feedback(&x));
+        note(&mut feedback, count);
+        let result = result?;
+        note(&mut iterations, result.statistics.iterations as u32);
+        let force = result.u.first().copied().unwrap_or(T::ZERO);
+        let integrator = &mut controller.ocp_mut().problem().dynamics;
+        let step = integrator
+            .solve(&Vector4::from(x), &Vector1::new(force), number(SAMPLE))
+            .map_err(|error| OcpError::Integration { interval: 0, error })?;
+        x = step.x.into();
+        controller.shift();
+        if sample % 10 == 9 {
+            report::reals("state", &x);
+        }
+    }
+    report::numbers("stack", &[board::used(top)]);
+    report::numbers("prepare", &preparation);
+    report::numbers("feedback", &feedback);
+    report::numbers("iterations", &iterations);
+    Ok(())
+}
+
+/// The least and the most.
+fn note([least, most]: &mut [u32; 2], count: u32) {
+    (*least, *most) = ((*least).min(count), (*most).max(count));
+}
