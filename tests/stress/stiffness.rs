@@ -166,7 +166,7 @@ fn t06_stiffness_of_1e12() {
 }
 
 /// Every component is right relative to its own size: concentrations from 1 to 1e-14 (Robertson), to 1e-18 (pollution of
-/// the air), to 1e-25 (E5).
+/// the air), to 1e-65 (E5). Absolute tolerances are below all of them.
 #[test]
 fn t12_relative_accuracy_over_decades() {
     for rtol in [1e-6, 1e-9] {
@@ -174,12 +174,9 @@ fn t12_relative_accuracy_over_decades() {
         println!("Robertson, {rtol:e}: {found:?}");
         assert!(found.iter().all(|error| *error <= 100.0 * rtol), "{rtol:e}: {found:?}");
         let values = |x: &[f64], z: &[f64]| vec![x[0], x[1], z[0], x[2]];
-        let found = errors::<E5Conserved>("e5", 3, [rtol, 1e-60 * rtol], values).expect("a solution");
+        let found = errors::<E5Conserved>("e5", 3, [rtol, 1e-80 * rtol], values).expect("a solution");
         println!("E5, {rtol:e}: {found:?}");
-        assert!(found[..2].iter().all(|error| *error <= 100.0 * rtol), "{rtol:e}: {found:?}");
-        // Until the last end y1 and y4 fall by a factor of e^71, in few steps. Each tolerates rtol of what they were at its
-        // start: at its end, that is e^k times as much of what they are, if the step lets them fall by e^−k.
-        assert!(found[2] <= 1e4 * rtol, "{rtol:e}: {found:?}");
+        assert!(found.iter().all(|error| *error <= 100.0 * rtol), "{rtol:e}: {found:?}");
         let options = AdaptiveOptions { rtol, atol: 1e-20 * rtol, ..Default::default() };
         let mut adaptive = Adaptive::<Pollution, Radau>::new(options).expect("valid");
         let x = adaptive.solve(&pollution::START.into(), &SVector::zeros(), 60.0).expect("a solution").x;
