@@ -239,15 +239,16 @@ fn as_many_steps_as_radau5() {
     let near = |found: usize, published: usize| {
         assert!(found.abs_diff(published) <= published / 10, "{found} instead of {published}: {work:?}");
     };
-    let fewer = |found: usize, published: usize| {
-        let range = published * 7 / 10..=published;
-        assert!(range.contains(&found), "{found} instead of {published} or somewhat fewer: {work:?}");
-    };
     near(work.steps, 242);
-    fewer(work.steps + work.rejected + work.failed, 280);
-    fewer(work.residuals, 2248);
-    fewer(work.jacobians, 162);
-    fewer(work.factorizations, 253);
+    // The Jacobian in the middle of a step leaves 4 failures of 30, and with them 38 attempts, their factors and their stages.
+    let fewer = |found: usize, published: usize, spared: usize| {
+        let range = published - spared * 5 / 4..=published - spared * 3 / 4;
+        assert!(range.contains(&found), "{found} instead of {published} − {spared}: {work:?}");
+    };
+    near(work.jacobians, 162);
+    fewer(work.steps + work.rejected + work.failed, 280, 33);
+    fewer(work.residuals, 2248, 404);
+    fewer(work.factorizations, 253, 47);
 }
 
 /// Dense output is as good as the method between its steps: order `s + 1`, so that it follows the tolerance too. And

@@ -162,12 +162,12 @@ macro_rules! second_order {
     };
 }
 
-/// What is asked of second derivatives at tight tolerances: 1e-8 of the larger of row and column. They follow the tolerance,
-/// amplified by the problem, so that the sequence of steps decides how far below they are (7e-10, 2e-12, 1e-11).
+/// Relative to the larger of row and column. Those of Van der Pol's equation do not follow the tolerance: after two jumps they are
+/// off by 6e-12 to 3e-9 at tolerances from 1e-11 to 3e-15, rounding errors of where derivatives were larger.
 #[test]
 fn t17_second_order() {
-    second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, 1e-8);
-    second_order!(Oregonator, "oregonator", 3, 4, 1e-13, 1e-14, 1e-8);
+    second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, 1e-10);
+    second_order!(Oregonator, "oregonator", 3, 4, 1e-13, 1e-14, 1e-10);
     second_order!(VanDerPol, "van_der_pol_5", 2, 1, 1e-13, 1e-13, 1e-8);
 }
 

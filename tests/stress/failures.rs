@@ -33,6 +33,12 @@ fn square_root(x: f64, t: f64) -> f64 {
     (0.5 - t).sqrt() - 0.1 * x
 }
 
+/// With a pole at `t = 1` from `x = 1`.
+#[ode]
+fn riccati(x: f64) -> f64 {
+    x * x
+}
+
 /// Beyond the largest number soon after `t = 1/2`.
 #[ode]
 fn overflow(x: f64, t: f64) -> f64 {
@@ -98,8 +104,9 @@ fn t20_singular_matrices() {
 }
 
 /// The index is one by construction: what a model shows to be more is no program (`tests/ui/structurally_singular.rs`: the
-/// pendulum of index two is). What shows at run time alone is an error at the start of adaptive integration. One step of a
-/// given size has a solution all the same, which is right: that of the method for index two.
+/// pendulum of index two is). What shows at run time alone is an error at the start of adaptive integration, and of an interval
+/// without length: there the Newton matrix is `∂f/∂(ẋ, z)`. Steps of a given size have a solution all the same, which is right:
+/// that of the method for index two.
 #[test]
 fn t22_index_two() {
     let mut adaptive = Adaptive::<Hidden, Radau>::new(AdaptiveOptions::default()).expect("valid");
@@ -108,6 +115,8 @@ fn t22_index_two() {
     assert!(matches!(error, Err(Error::InconsistentStart { unknown: "z", singular: true, .. })), "{error:?}");
     let mut irk = Irk::<Hidden, RadauIIA<3>>::new(options(4)).expect("valid");
     irk.set_parameters(&vector![0.0]).expect("finite");
+    let error = irk.solve(&vector![0.0], &none(), 0.0).map(|step| step.x);
+    assert!(matches!(error, Err(Error::Singular { unknown: "z", .. })), "{error:?}");
     match irk.solve(&vector![0.0], &none(), 1.0).map(|step| (step.x[0], step.z[0])) {
         Ok((x, z)) => {
             println!("{x} {z} {:?}", irk.statistics());
@@ -285,6 +294,18 @@ fn t31_newton_divergence() {
         Ok(_) => is_collocation(&mut irk, 1e6, 1e5),
         Err(Error::Overflow { .. }) => {}
         Err(other) => panic!("{other}"),
+    }
+    // A step of implicit Euler with `h = 1` has no solution: `k = (1 + k)²` has no real root. Relative to its terms, `|k|` and
+    // `2 (1 + k)²`, the residual is `(k² + k + 1)/(|k| + 2 (1 + k)²) ≥ 1/3`, which it is at `k = 1`.
+    let mut irk = Irk::<Riccati, RadauIIA<1>>::new(options(1)).expect("valid");
+    match irk.solve(&vector![1.0], &none(), 1.0).map(|step| step.x) {
+        Err(Error::NotConverged { residual, increment, at, .. }) => {
+            assert!(
+                residual >= 0.333 && increment > 0.0 && at.iteration == 50,
+                "{residual} {increment} {at}"
+            );
+        }
+        other => panic!("{other:?}"),
     }
     let newton = Newton { max_iterations: 1, ..Default::default() };
     let mut irk = Irk::<VanDerPol, RadauIIA<3>>::new(Options { newton, ..options(1) }).expect("valid");

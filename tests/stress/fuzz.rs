@@ -142,6 +142,8 @@ fn ignore<T>(_: T) {}
 
 /// How many integrators of each kind are made, and how many calls of each.
 const INTEGRATORS: u64 = 120;
+// Draws are the same in every run: of what they ask for, so much has an answer (the last number of each test, somewhat less than
+// what is counted, since rounding differs between machines). Less means that something has begun to fail.
 const CALLS: usize = 8;
 
 /// Calls that all integrators with equal steps have; how many succeeded.
@@ -206,7 +208,7 @@ macro_rules! common {
 }
 
 macro_rules! implicit {
-    ($($name:ident: $model:ty, $method:ty, $nz:literal, $t:ty;)*) => {$(
+    ($($name:ident: $model:ty, $method:ty, $nz:literal, $t:ty, $answers:literal;)*) => {$(
         #[test]
         fn $name() {
             let mut done = 0;
@@ -235,20 +237,20 @@ macro_rules! implicit {
                 }
             }
             println!("{done} answers");
-            assert!(done > 20, "{done}");
+            assert!(done >= $answers, "{done}");
         }
     )*};
 }
 implicit! {
-    everything_gauss: Everything, Gauss<3>, 1, f64;
-    everything_radau: Everything, RadauIIA<2>, 1, f64;
-    everything_single: Everything, Gauss<2>, 1, f32;
-    linear_radau: Linear, RadauIIA<3>, 1, f64;
-    fragile_radau: Fragile, RadauIIA<4>, 0, f64;
+    everything_gauss: Everything, Gauss<3>, 1, f64, 60;
+    everything_radau: Everything, RadauIIA<2>, 1, f64, 60;
+    everything_single: Everything, Gauss<2>, 1, f32, 60;
+    linear_radau: Linear, RadauIIA<3>, 1, f64, 90;
+    fragile_radau: Fragile, RadauIIA<4>, 0, f64, 30;
 }
 
 macro_rules! explicit {
-    ($($name:ident: $method:ty, $t:ty;)*) => {$(
+    ($($name:ident: $method:ty, $t:ty, $answers:literal;)*) => {$(
         #[test]
         fn $name() {
             let mut done = 0;
@@ -264,17 +266,17 @@ macro_rules! explicit {
                 }
             }
             println!("{done} answers");
-            assert!(done > 20, "{done}");
+            assert!(done >= $answers, "{done}");
         }
     )*};
 }
 explicit! {
-    fragile_explicit: Rk4, f64;
-    fragile_explicit_single: DormandPrince8, f32;
+    fragile_explicit: Rk4, f64, 180;
+    fragile_explicit_single: DormandPrince8, f32, 150;
 }
 
 macro_rules! adaptive {
-    ($($name:ident: $model:ty, $method:ty, $nz:literal, $t:ty;)*) => {$(
+    ($($name:ident: $model:ty, $method:ty, $nz:literal, $t:ty, $answers:literal;)*) => {$(
         #[test]
         fn $name() {
             let mut done = 0;
@@ -344,16 +346,16 @@ macro_rules! adaptive {
                 }
             }
             println!("{done} answers");
-            assert!(done > 5, "{done}");
+            assert!(done >= $answers, "{done}");
         }
     )*};
 }
 adaptive! {
-    everything_adaptive: Everything, Radau, 1, f64;
-    everything_adaptive_single: Everything, RadauIIA<3>, 1, f32;
-    linear_adaptive: Linear, RadauIIA<5>, 1, f64;
-    fragile_adaptive: Fragile, DormandPrince5, 0, f64;
-    fragile_adaptive_single: Fragile, DormandPrince8, 0, f32;
+    everything_adaptive: Everything, Radau, 1, f64, 30;
+    everything_adaptive_single: Everything, RadauIIA<3>, 1, f32, 8;
+    linear_adaptive: Linear, RadauIIA<5>, 1, f64, 36;
+    fragile_adaptive: Fragile, DormandPrince5, 0, f64, 25;
+    fragile_adaptive_single: Fragile, DormandPrince8, 0, f32, 7;
 }
 
 /// Batches: an interval that fails takes nobody with it, and those that succeed are finite.
@@ -410,5 +412,5 @@ fn batches() {
         }
     }
     println!("{done} answers");
-    assert!(done > 20, "{done}");
+    assert!(done >= 90, "{done}");
 }
