@@ -3,7 +3,9 @@
 //!
 //! Forward derivatives `D` of all variables satisfy `∂f/∂v D = 0` at every stage, adjoints `μ` satisfy `Jᵀμ = h (b ⊗ λ, 0)`.
 //! A sum over all directions (with weights that are neither equal nor alternating, so that no structure hides an
-//! error) is held against the sizes of its terms, equation by equation: however equations and unknowns are scaled.
+//! error) is held against the sizes of its terms, equation by equation: however equations and unknowns are scaled. What is solved
+//! for is `dk`, so that `dξ = V + h Σ a dk` counts with its own terms (W. Oettli, W. Prager, Compatibility of approximate
+//! solution of linear equations with given error bounds, Numer. Math. 6 (1964)): where they cancel, no elimination is to blame.
 
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
@@ -35,7 +37,8 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         second: bool,
     ) -> E::Mask {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        let probe = self.probe[0].as_mut();
+        let [probe, sizes] = &mut self.probe;
+        let (probe, sizes) = (probe.as_mut(), sizes.as_mut());
         let inputs = probe.get_mut(nx + nx + nz..).unwrap_or_default();
         for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
             *input = [directions.total(nx + w, second); S];
@@ -47,6 +50,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             h: self.inputs.time.step,
             jacobian: self.linear.jacobian.as_ref(),
             probe,
+            sizes,
             model: PhantomData,
         })
     }
@@ -140,7 +144,9 @@ struct VerifyForward<'a, M, E, const S: usize> {
     a: &'a [[E; S]; S],
     h: E,
     jacobian: &'a [[E; S]],
+    /// The sum over the directions of every variable, and what it is rounded relative to.
     probe: &'a mut [[E; S]],
+    sizes: &'a mut [[E; S]],
     model: PhantomData<M>,
 }
 
@@ -148,11 +154,16 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { start_sums, stage_sums, a, h, jacobian, probe, .. } = self;
+        let Self { start_sums, stage_sums, a, h, jacobian, probe, sizes, .. } = self;
         let (nx, zero) = (start_sums.len(), E::from_f64(0.0));
+        for (probe, stages) in probe.iter_mut().skip(nx + nx).zip(stage_sums.iter().skip(nx)) {
+            for (z, strands) in probe.iter_mut().zip(stages) {
+                *z = total(strands);
+            }
+        }
         let (xdot, rest) = probe.split_at_mut(nx.min(probe.len()));
-        let (xi, rest) = rest.split_at_mut(nx.min(rest.len()));
-        for (((stages, start), xdot), xi) in stage_sums.iter().zip(start_sums).zip(xdot).zip(xi) {
+        for ((stages, start), (xdot, xi)) in stage_sums.iter().zip(start_sums).zip(xdot.iter_mut().zip(rest))
+        {
             *xi = [total(start); S];
             for (xdot, strands) in xdot.iter_mut().zip(stages) {
                 *xdot = total(strands);
@@ -163,32 +174,39 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
                 }
             }
         }
-        for (stages, z) in stage_sums.iter().skip(nx).zip(rest) {
-            for (z, strands) in z.iter_mut().zip(stages) {
-                *z = total(strands);
+        for (sizes, values) in sizes.iter_mut().zip(probe.iter()) {
+            for (size, value) in sizes.iter_mut().zip(values) {
+                *size = value.abs();
+            }
+        }
+        for ((xi, start), xdot) in sizes.iter_mut().skip(nx).zip(start_sums).zip(probe.iter()) {
+            for (xi, a) in xi.iter_mut().zip(a) {
+                *xi = total(start).abs();
+                for (&a, &dk) in a.iter().zip(xdot) {
+                    *xi = A::subtract(*xi, -(h * a).abs(), dk.abs());
+                }
             }
         }
         // Equation by equation: the entries of a block of the Jacobian lie row by row.
         let (mut good, mut begin) = (E::le(zero, zero), M::STRUCTURE.blocks);
         for equation in 0..M::Shape::NK {
-            let (mut sums, mut sizes) = ([zero; S], [zero; S]);
+            let (mut sums, mut terms) = ([zero; S], [zero; S]);
             for (begin, &end) in begin.iter_mut().zip(&M::STRUCTURE.blocks[1..]) {
                 for (r, c, values) in entries(&M::STRUCTURE, jacobian, *begin, end) {
                     if r != equation {
                         break;
                     }
                     *begin += 1;
-                    let Some(directions) = probe.get(c) else { continue };
-                    for (((sum, size), &value), &direction) in
-                        sums.iter_mut().zip(&mut sizes).zip(values).zip(directions)
-                    {
-                        let term = value * direction;
-                        *sum = *sum + term;
-                        *size = *size + term.abs();
+                    let (Some(directions), Some(sizes)) = (probe.get(c), sizes.get(c)) else { continue };
+                    for ((sum, &value), &direction) in sums.iter_mut().zip(values).zip(directions) {
+                        *sum = *sum + value * direction;
+                    }
+                    for ((term, &value), &size) in terms.iter_mut().zip(values).zip(sizes) {
+                        *term = *term + value.abs() * size;
                     }
                 }
             }
-            for (&sum, &size) in sums.iter().zip(&sizes) {
+            for (&sum, &size) in sums.iter().zip(&terms) {
                 good = E::and(good, is_small(sum, size));
             }
         }
