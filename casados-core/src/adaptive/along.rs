@@ -1,6 +1,7 @@
 //! An integrand beside an adaptive integration; see [`quadrature`](crate::quadrature).
 
 use super::integrator::Integrator;
+use super::piecewise::{Piecewise, PiecewiseAdjoint};
 use super::sealed::Engine;
 use crate::error::Error;
 use crate::model::{Dae, VectorU, VectorX};
@@ -69,5 +70,45 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Inte
         lambda: &VectorX<M, T>,
     ) -> Result<&'a Hessian<M, T>, Error> {
         self.integrator.hessian_along(x0, u, t_end, lambda, Some(self.integrand))
+    }
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
+    /// Takes an integrand along, for its integral over all intervals and the gradient of it with that of the solution; see
+    /// [`quadrature`](crate::quadrature).
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
+        With { integrator: self, integrand }
+    }
+}
+
+impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piecewise<M, B, T>, Q> {
+    /// See [`Piecewise::solve`]; the integral over all intervals.
+    ///
+    /// # Errors
+    /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
+    pub fn solve(
+        self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+    ) -> Result<&'a Nominal<M, T>, Error> {
+        self.integrator.solve_along(x0, controls, ends, Some(self.integrand))
+    }
+
+    /// See [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end and the integral over all intervals.
+    ///
+    /// # Errors
+    /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
+    pub fn adjoint(
+        self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<PiecewiseAdjoint<M, T>, Error> {
+        self.integrator.adjoint_along(x0, controls, ends, lambda, Some(self.integrand))
     }
 }

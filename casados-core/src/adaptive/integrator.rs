@@ -165,7 +165,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             let span = self.begin(x0, u, t_end)?;
             self.check_frozen(span)?;
             let Self { base, consistent, tape, state, .. } = self;
-            Frozen { base, consistent, tape, span }.solve::<B>(state, x0, None)?;
+            let given = base.given;
+            Frozen { base, consistent, tape, span, given }.solve::<B>(state, x0, None)?;
         } else {
             let record = self.options.keep_steps;
             self.run(x0, u, t_end, record, |_, _| Ok(()))?;
@@ -431,7 +432,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let span = last.ok_or(Error::NoResult)?;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
-        Ok((Frozen { base, consistent, tape, span }, state, memory, history))
+        let given = base.given;
+        Ok((Frozen { base, consistent, tape, span, given }, state, memory, history))
     }
 
     pub(super) fn run(

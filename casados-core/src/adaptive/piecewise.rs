@@ -13,7 +13,7 @@ use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
 use super::segment::{Segment, add, dense, filled};
-use super::sensitivities::{Memory, fill, place};
+use super::sensitivities::{Memory, chain, dynamic, fill, place};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
 use crate::irk::check;
@@ -22,6 +22,7 @@ use crate::model::{
     Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX, VectorP,
     VectorU, VectorX,
 };
+use crate::quadrature::{Along, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape, listed};
@@ -137,8 +138,21 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     ) -> Result<&Nominal<M, T>, Error> {
         self.steps(x0, controls, ends)?;
         if self.frozen {
-            self.replay(x0)?;
+            self.replay(x0, None)?;
         }
+        Ok(&self.nominal)
+    }
+
+    /// As [`Piecewise::solve`], with an integrand: the steps are taken again, to rounding.
+    pub(super) fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.steps(x0, controls, ends)?;
+        self.replay(x0, along)?;
         Ok(&self.nominal)
     }
 
@@ -176,9 +190,21 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
+        self.adjoint_along(x0, controls, ends, lambda, None)
+    }
+
+    /// As [`Piecewise::adjoint`], with an integrand.
+    pub(super) fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<PiecewiseAdjoint<M, T>, Error> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
-        self.replay(x0)?;
+        self.replay(x0, reborrow(&mut along))?;
         let Self { integrator, segments, count, nominal, .. } = self;
         let mut result = PiecewiseAdjoint {
             nominal: *nominal,
@@ -188,7 +214,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         };
         for (segment, grad_u) in segments.iter_mut().zip(&mut result.grad_u).rev() {
             let (mut frozen, state, memory, _) = segment.open(integrator)?;
-            frozen.adjoint::<B>(state, &result.grad_x0, memory, None)?;
+            frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut along))?;
             result.grad_x0.as_mut_slice().copy_from_slice(memory.adjoint.grad_x0.as_slice());
             grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
             axpy(T::ONE, memory.adjoint.grad_p.as_slice(), result.grad_p.as_mut_slice());
@@ -363,17 +389,19 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     }
 
     /// All steps again, to rounding.
-    fn replay(&mut self, x0: &VectorX<M, T>) -> Result<(), Error> {
+    fn replay(&mut self, x0: &VectorX<M, T>, mut along: Along<'_, '_, M, T>) -> Result<(), Error> {
+        begin(&mut along);
         let Self { integrator, segments, count, nominal, .. } = self;
         let mut x = *x0;
         for (k, segment) in segments.iter_mut().enumerate().take(*count) {
             segment.x = x;
             let (mut frozen, state, ..) = segment.open(integrator)?;
-            frozen.solve::<B>(state, &x, None)?;
+            let mut part = chain(&mut along, None, false);
+            frozen.solve::<B>(state, &x, dynamic(&mut part))?;
             x = integrator.base.result.x;
             collect(nominal, &integrator.base.result, k);
         }
-        Ok(())
+        finish(&mut along)
     }
 
     /// The same with derivatives, and what those of second order need.

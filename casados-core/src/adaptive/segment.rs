@@ -50,10 +50,11 @@ impl<M: Dae, T: Real> Segment<M, T> {
         integrator: &'a mut Integrator<M, B, T>,
     ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
         let Integrator { base, consistent, state, memory, .. } = integrator;
-        (base.u, base.given) = (self.u, self.given);
+        base.u = self.u;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
-        Ok((Frozen { base, consistent, tape: &mut self.tape, span: self.span }, state, memory, &self.v))
+        let Self { tape, span, given, v, .. } = self;
+        Ok((Frozen { base, consistent, tape, span: *span, given: *given }, state, memory, v))
     }
 }
 

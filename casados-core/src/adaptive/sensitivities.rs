@@ -47,6 +47,8 @@ pub struct Frozen<'a, M: Dae, T: Real> {
     pub consistent: &'a mut Consistent<M, T>,
     pub tape: &'a mut Tape<T>,
     pub span: Span<T>,
+    /// Start values of `(ẋ, z)`.
+    pub given: ArrayK<M, T>,
 }
 
 impl<M: Dae, T: Real> Frozen<'_, M, T> {
@@ -62,8 +64,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         ) -> Result<(VectorX<M, T>, VectorZ<M, T>), Error>,
     ) -> Result<(), Error> {
         let mut x = *x0;
-        let Base { u, parameters, result, start, given, .. } = &mut *self.base;
-        *start = *given;
+        let Base { u, parameters, result, start, .. } = &mut *self.base;
+        *start = self.given;
         let at = At { x: x0, u, p: parameters, t: self.span.start };
         if M::Shape::NZ > 0 {
             self.consistent.solve(&at, start)?;
@@ -328,8 +330,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     }
 }
 
-/// The integrand of one step of the interval.
-fn chain<'a, M: Dae, T: Real>(
+/// The integrand of one step of an interval, or of one of several intervals.
+pub(super) fn chain<'a, M: Dae, T: Real>(
     along: &'a mut Along<'_, '_, M, T>,
     v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
     second: bool,
@@ -337,7 +339,7 @@ fn chain<'a, M: Dae, T: Real>(
     along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
 }
 
-fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
+pub(super) fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
     integrand: &'a mut Option<Q>,
 ) -> Along<'a, 'a, M, T> {
     match integrand {

@@ -17,7 +17,7 @@
 //! them, with the matrix of Gauss and Newton. An integrator takes one along: `irk.with(&mut cost).hessian(...)`.
 //!
 //! Integrands are evaluated one stage after the other. An adaptive integrator chooses its steps for the states, not for the
-//! integral.
+//! integral. Over intervals with controls of their own there are its value and the gradient by all of them.
 
 mod integral;
 // What the derive of `Zeroable` writes about a field of type `T`.
