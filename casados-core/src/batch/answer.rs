@@ -1,6 +1,6 @@
 //! The questions that a batch can be asked, each known by what it answers.
 
-use super::group::{Group, Verdict};
+use super::group::{Group, MOST_LANES, Verdict};
 use super::intervals::{Interval, vector};
 use crate::error::Error;
 use crate::irk::Integrator;
@@ -16,8 +16,8 @@ use bytemuck::Zeroable;
 pub trait Wide<E: Lanes, R> {
     /// Whether all numbers are finite, lane by lane.
     fn is_finite(&self) -> E::Mask;
-    /// The result in one lane.
-    fn unpack(&self, lane: usize, to: &mut R);
+    /// The results of the lanes that are good, each in its element of a slice that has it somewhere inside.
+    fn unpack<Q>(&self, good: &[bool], results: &mut [Q], get: impl Fn(&mut Q) -> &mut R + Copy);
 }
 
 macro_rules! wide {
@@ -31,9 +31,22 @@ macro_rules! wide {
                 finite
             }
             #[inline(always)]
-            fn unpack(&self, lane: usize, to: &mut $type<M, T>) {
-                $(self.$inner.unpack(lane, &mut to.$inner);)?
-                $(unpack(self.$field.as_slice(), lane, to.$field.as_mut_slice());)*
+            fn unpack<Q>(
+                &self,
+                good: &[bool],
+                results: &mut [Q],
+                get: impl Fn(&mut Q) -> &mut $type<M, T> + Copy,
+            ) {
+                $(self.$inner.unpack(good, results, move |result| &mut get(result).$inner);)?
+                $(
+                    let mut to: [&mut [T]; MOST_LANES] = Default::default();
+                    for ((to, result), &good) in to.iter_mut().zip(results.iter_mut()).zip(good) {
+                        if good {
+                            *to = get(result).$field.as_mut_slice();
+                        }
+                    }
+                    unpack(self.$field.as_slice(), &mut to);
+                )*
             }
         }
     };
@@ -59,14 +72,16 @@ fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
     finite
 }
 
-/// The elements in one lane.
+/// The elements of each lane in a slice of their own, which may be empty.
 #[inline(always)]
-pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], lane: usize, to: &mut [T]) {
+pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], to: &mut [&mut [T]; MOST_LANES]) {
     let mut cell: E::Cell = Zeroable::zeroed();
-    for (&from, to) in from.iter().zip(to) {
+    for (index, &from) in from.iter().enumerate() {
         from.store(&mut cell);
-        if let Some(&element) = cell.as_ref().get(lane) {
-            *to = element;
+        for (to, &element) in to.iter_mut().zip(cell.as_ref()) {
+            if let Some(to) = to.get_mut(index) {
+                *to = element;
+            }
         }
     }
 }

@@ -151,8 +151,11 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         E::Cell: AsRef<[T]>,
     {
         for (y, step) in record.iter_mut().zip(Heap::tape(&mut self.steps, self.options.steps)?) {
-            let (from, to) = (step.y.as_ref().as_flattened(), y.as_mut().as_flattened_mut());
-            dispatch(Unpack { from, lane, to });
+            let mut to: [&mut [T]; MOST_LANES] = Default::default();
+            if let Some(to) = to.get_mut(lane) {
+                *to = y.as_mut().as_flattened_mut();
+            }
+            dispatch(Unpack { from: step.y.as_ref().as_flattened(), to });
         }
         Ok(())
     }
@@ -310,17 +313,16 @@ impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
     }
 }
 
-/// The elements of registers that are in one lane.
+/// The elements of registers, those of each lane in a slice of their own.
 struct Unpack<'a, T, E> {
     from: &'a [E],
-    lane: usize,
-    to: &'a mut [T],
+    to: [&'a mut [T]; MOST_LANES],
 }
 
 impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        unpack(self.from, self.lane, self.to);
+    fn run<A: Arithmetic>(mut self) {
+        unpack(self.from, &mut self.to);
     }
 }

@@ -214,12 +214,10 @@ impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
         let good = E::and(good, wide.is_finite());
         let mut verdict: E::Cell = bytemuck::Zeroable::zeroed();
         E::select(good, E::from_f64(1.0), E::from_f64(0.0)).store(&mut verdict);
-        for (lane, (done, result)) in done.iter_mut().zip(results).enumerate().take(E::LANES) {
+        for (lane, done) in done.iter_mut().enumerate().take(E::LANES) {
             *done &= E::lane(&verdict, lane) != 0.0;
-            if *done {
-                wide.unpack(lane, result);
-            }
         }
+        wide.unpack(&*done, results, |result| result);
     }
 }
 
