@@ -10,7 +10,9 @@
 //! Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since then `θ` squares too. Both are asked unknown by
 //! unknown: a norm of all would let a linear one, corrected at once, speak for a nonlinear one. It has converged as
 //! soon as the next increment is below the tolerance. Where increments stop shrinking because the rounding errors of the model are
-//! larger than expected, it has converged too if they are small: more cannot be known.
+//! larger than expected, it has converged too if they are small, or if the residual is at the level of the rounding errors of its
+//! terms: more cannot be known. (Where a model rests, unknowns are differences of large terms that cancel: they have no digits
+//! by which an increment could be small.)
 //!
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
 //! values is kept as long as the iterations that are still expected with it cost less than a new one. A new one, with
@@ -105,6 +107,11 @@ impl Progress {
         self.state == State::Active && self.rate.is_some_and(|rate| rate > 1.0)
     }
 
+    /// Whether increments no longer shrink.
+    fn is_stuck(&self) -> bool {
+        self.state == State::Active && self.rate.is_some_and(|rate| rate >= 0.5)
+    }
+
     /// How many more increments are expected until the tolerance.
     fn remaining(&self, rule: &Rule) -> f64 {
         let (mut increment, mut count) = (self.last, 0.0);
@@ -196,6 +203,19 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                     return Solved { converged: satisfied, exact: true };
                 }
             }
+            if test && !rule.exact && iteration > 1 && lanes.iter().any(Progress::is_stuck) {
+                let satisfied = self.is_satisfied();
+                let satisfied = cell(E::select(satisfied, E::from_f64(1.0), E::from_f64(0.0)));
+                for (lane, progress) in lanes.iter_mut().enumerate() {
+                    if progress.is_stuck() && E::lane(&satisfied, lane) > 0.0 {
+                        progress.state = State::Converged;
+                    }
+                }
+                if lanes.iter().all(|lane| lane.state != State::Active) {
+                    return self.solved(lanes, mean);
+                }
+                active = mask::<E>(lanes, State::Active);
+            }
             iteration += 1;
             statistics.iterations += 1;
             for (equation, f) in self.f.as_ref().iter().enumerate() {
@@ -257,15 +277,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             let slowest = slowest.fold(None, |slowest: Option<f64>, lane| {
                 Some(slowest.unwrap_or(0.0).max(lane.remaining(&rule)))
             });
-            let Some(remaining) = slowest else {
-                let converged = mask::<E>(lanes, State::Converged);
-                // Lanes that failed have no say in what the others do next.
-                let good = lanes.iter().filter(|lane| lane.state == State::Converged);
-                self.validity.rate = good.clone().fold(0.0, |rate, lane| lane.rate.unwrap_or(0.0).max(rate));
-                let any = good.count() > 0;
-                (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
-                return Solved { converged, exact: false };
-            };
+            let Some(remaining) = slowest else { return self.solved(lanes, mean) };
             if iteration == most {
                 (self.validity.factors, self.validity.mean) = (false, false);
                 return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
@@ -279,6 +291,18 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             renew =
                 !rule.exact && (rule.full || adaptive && remaining > 2.0 + Self::RENEWAL[usize::from(cheap)]);
         }
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+    /// After the last iteration: no lane is active any more.
+    fn solved(&mut self, lanes: &[Progress], mean: bool) -> Solved<E> {
+        // Lanes that failed have no say in what the others do next.
+        let good = lanes.iter().filter(|lane| lane.state == State::Converged);
+        self.validity.rate = good.clone().fold(0.0, |rate, lane| lane.rate.unwrap_or(0.0).max(rate));
+        let any = good.count() > 0;
+        (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
+        Solved { converged: mask::<E>(lanes, State::Converged), exact: false }
     }
 }
 
