@@ -81,6 +81,44 @@
 //! # Ok::<(), casados::Error>(())
 //! ```
 //!
+//! ## Optimal control
+//!
+//! ```
+//! use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem, Shooting};
+//! use casados::prelude::*;
+//!
+//! /// A pendulum that is pushed: angle from below, rate.
+//! #[ode]
+//! fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] {
+//!     [x[1], u - 9.81 * x[0].sin()]
+//! }
+//! /// What is to be small.
+//! #[function]
+//! fn deviation(x: [f64; 2], u: f64) -> [f64; 3] {
+//!     [x[0], x[1], u]
+//! }
+//! #[function]
+//! fn end(x: [f64; 2], _u: f64) -> [f64; 2] {
+//!     x
+//! }
+//!
+//! let batch = Batch::<Pendulum, Gauss<2>>::new(Options::default())?;
+//! let mut ocp = Problem::new(Shooting::new(batch))
+//!     .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 0.1, 0.01]))
+//!     .terminal_cost(LeastSquaresCost::<End>::diagonal(&[10.0, 1.0]))
+//!     .on(Horizon::uniform(20, 0.1))?;
+//! ocp.fix_initial_state(&[1.0, 0.0])?.bound("u", .., -3.0, 3.0)?;
+//! ocp.bound("x[1]", 1.., -1.5, 1.5)?.soften("x[1]", 1.., 100.0, 0.0)?;
+//! ocp.guess(&[0.0; 2], &[0.0])?;
+//!
+//! let mut sqp = HeapSqp::new(&ocp)?;
+//! let outcome = sqp.solve(&mut ocp)?;
+//! println!("{}{outcome}", sqp.log());
+//! assert!(outcome.is_converged());
+//! assert!(ocp.stage(20)?.x[0].abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! ## Testing a model of your own
 //!
 //! With the feature `testing`, among the `dev-dependencies`:

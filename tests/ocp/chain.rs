@@ -175,6 +175,17 @@ fn single_intervals_give_the_same() -> Test {
     Ok(())
 }
 
+/// At rest, velocities and accelerations are differences that cancel: all intervals are integrated side by side nevertheless.
+#[test]
+fn rest_is_not_a_special_case() -> Test {
+    let record = Record::load("ocp/chain_5.json")?;
+    let mut ocp = problem!(21, &record, batch!(21, 2, 2));
+    ocp.linearise(casados::ocp::GaussNewton::default())?;
+    let statistics = *ocp.problem().dynamics.batch().statistics();
+    assert_eq!((statistics.redone, statistics.alone, statistics.work.dense), (0, 0, 0));
+    Ok(())
+}
+
 /// The conditions of optimality, with costs written by hand and derivatives of single integrations by differences.
 #[test]
 fn the_solution_satisfies_conditions_that_are_computed_independently() -> Test {

@@ -13,5 +13,6 @@ mod curvature;
 mod errors;
 mod infeasible;
 mod real_time;
+mod sensitivities;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

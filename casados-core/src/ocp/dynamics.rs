@@ -125,7 +125,7 @@ pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
 ///
 /// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or on the heap;
 /// [`Along`](super::Along) is one with an integral cost, [`Map`](super::Map) a function that is `φ` itself, and
-/// [`Shooting`](super::Shooting) a batch that takes all intervals at once.
+/// `Shooting` a batch that takes all intervals at once.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say what happens between two nodes of a horizon",
     note = "`Irk`, `Erk`, `Shooting` (over a `Batch`), `Along` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"

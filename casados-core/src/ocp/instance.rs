@@ -33,7 +33,7 @@ pub(super) enum Initial {
 /// The variables of this QP are states and controls themselves, not their changes: bounds are written into it once, its
 /// solution is the next iterate, and its conditions of optimality at the iterate are those of the problem.
 ///
-/// With the feature `alloc`, [`Problem::on`] allocates the memory; elsewhere [`Problem::on_horizon`] takes it.
+/// With the feature `alloc`, `Problem::on` allocates the memory; elsewhere [`Problem::on_horizon`] takes it.
 pub struct Ocp<P, T, D, M> {
     pub(super) problem: P,
     pub(super) initial: Initial,
@@ -103,7 +103,7 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// [`Problem::dims`].
     ///
     /// # Errors
-    /// As [`Problem::on`]; [`OcpError::Length`] if memory or dimensions do not fit.
+    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]; [`OcpError::Length`] if memory or dimensions do not fit.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,

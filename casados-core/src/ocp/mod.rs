@@ -1,4 +1,34 @@
-//! Problems of optimal control, discretised by multiple shooting.
+//! Problems of optimal control, discretised by direct multiple shooting.
+//!
+//! ```text
+//! min  Σ_k l(x_k, u_k, p_k, t_k) + e(x_N)        x_{k+1} = φ(x_k, u_k, p_k)
+//!      lb ≤ (x_k, u_k) ≤ ub        lg ≤ g(x_k, u_k, p_k, t_k) ≤ ug        each side optional, each side hard or soft
+//! ```
+//!
+//! | | |
+//! | --- | --- |
+//! | `φ` | [`Dynamics`]: an integrator of single intervals (`Irk`, `Erk`), `Shooting` over a `Batch`, [`Map`] |
+//! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`GeneralCost`], pairs of costs; integrals with [`Along`] |
+//! | `g` | [`Constraint`], pairs of constraints |
+//!
+//! All of these are `#[function]`s of the arguments of the model: derivatives are exact and not written by anybody. [`Problem`] puts them
+//! together, `problem.on(horizon)` gives them memory: an [`Ocp`], which knows bounds by the names of the model
+//! (`ocp.bound("u", .., -1.0, 1.0)?`), references and parameters of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves it:
+//!
+//! ```text
+//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        GaussNewton: JᵀWJ of least squares alone; Exact: all of it, made convex stage by stage
+//! QP at (x̄, ū): variables (x, u), data φ − A x̄ − B ū, …, solution the next iterate
+//! ```
+//!
+//! with full steps or line searches (merit function, filter, second-order correction), penalties where a QP is infeasible
+//! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. A real-time iteration is one
+//! [`Ocp::linearise`] and one QP. `Sensitivities` are derivatives of solutions, and feedback gains.
+//!
+//! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
+//! stage 0 given by equal bounds. So are parameters that are to be found.
+//!
+//! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose length is a constant of the types
+//! ([`Problem::memory`]), and integrators with `Inline` memory are dynamics too.
 
 mod bounds;
 mod constraint;
@@ -15,6 +45,8 @@ mod map;
 mod point;
 mod problem;
 mod real_time;
+#[cfg(feature = "alloc")]
+mod sensitivities;
 #[cfg(feature = "alloc")]
 mod shooting;
 mod single;
@@ -35,6 +67,8 @@ pub use problem::{Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use real_time::HeapRealTime;
 pub use real_time::{Feedback, Prepared, RealTime};
+#[cfg(feature = "alloc")]
+pub use sensitivities::Sensitivities;
 #[cfg(feature = "alloc")]
 pub use shooting::Shooting;
 pub use single::{Along, IntegralCost};

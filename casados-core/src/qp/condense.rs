@@ -479,6 +479,10 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
 }
 
 impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
+    fn relax(&mut self, tolerance: f64) {
+        self.solver.relax(tolerance);
+    }
+
     fn solve(
         &mut self,
         qp: QpView<'_, T>,

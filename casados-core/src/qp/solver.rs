@@ -28,4 +28,10 @@ pub trait QpSolver<T> {
         start: Start,
         solution: SolutionView<'_, T>,
     ) -> Result<Statistics, QpError>;
+
+    /// Asks for residuals below a tolerance for now, but not for less than its options say. A solver that cannot make use
+    /// of it solves as well as always.
+    fn relax(&mut self, tolerance: f64) {
+        let _ = tolerance;
+    }
 }

@@ -23,6 +23,9 @@ pub struct SqpOptions {
     pub globalisation: Globalisation,
     /// Whether QPs begin at the solution of the one before. Default true.
     pub warm_start: bool,
+    /// QPs are solved to this part of the largest residual, if that is more than the solver's own tolerance: what the
+    /// linearisation is off by is more. Default 1e-4.
+    pub qp_accuracy: f64,
     /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default true.
     pub elastic: bool,
     /// The first of these penalties, linear; they grow by factors of ten up to ten thousand times that. Default 1e3.
@@ -40,6 +43,7 @@ impl SqpOptions {
             max_iterations: 50,
             globalisation: Globalisation::default(),
             warm_start: true,
+            qp_accuracy: 1e-4,
             elastic: true,
             elastic_penalty: 1e3,
             shortest_step: 1e-6,

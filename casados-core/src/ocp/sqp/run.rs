@@ -172,6 +172,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }));
         }
         let start = if self.options.warm_start && row.iteration > 0 { Start::Warm } else { Start::Cold };
+        self.qp_solver.relax(self.options.qp_accuracy * residuals.largest());
         let solved = self.solve_qp(ocp, state, start, row);
         row.times.qp = watch.lap();
         if let Err(error) = solved {

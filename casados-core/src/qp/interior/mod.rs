@@ -43,6 +43,8 @@ use sides::{Counts, Penalties, Sides, count, is_first_fixed};
 pub struct InteriorPoint<T, N, I> {
     /// Options, which may be changed between calls.
     pub options: InteriorPointOptions,
+    /// A tolerance above that of the options is asked for.
+    relaxed: f64,
     numbers: N,
     indices: I,
     number: PhantomData<T>,
@@ -83,7 +85,13 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
 impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     /// A solver in given memory, of the lengths that [`InteriorPoint::memory`] tells.
     pub fn in_memory(numbers: N, indices: I) -> Self {
-        Self { options: InteriorPointOptions::new::<T>(), numbers, indices, number: PhantomData }
+        Self {
+            options: InteriorPointOptions::new::<T>(),
+            relaxed: 0.0,
+            numbers,
+            indices,
+            number: PhantomData,
+        }
     }
 
     /// One run of the method.
@@ -104,10 +112,12 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if fixed { First::Fixed } else { First::Free };
         let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
         let mut result = Ok(Statistics::default());
+        let options =
+            InteriorPointOptions { tolerance: self.options.tolerance.max(self.relaxed), ..self.options };
         let scale = if let Penalties::Elastic(weight) = penalties { weight } else { 1.0 };
         T::registers(Run {
             iterate: &mut iterate,
-            options: &self.options,
+            options: &options,
             start,
             scale,
             solution,
@@ -151,5 +161,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
             }
             result => result,
         }
+    }
+
+    fn relax(&mut self, tolerance: f64) {
+        self.relaxed = tolerance;
     }
 }

@@ -9,7 +9,7 @@ pub struct InteriorPointOptions {
     pub max_iterations: usize,
     /// Where the products of slacks and multipliers begin. Default 1.
     pub start_mu: f64,
-    /// Slacks and multipliers of a warm start are at least this. Default 0.01.
+    /// Slacks and multipliers of a warm start are at least this. Default 1e-3.
     pub warm_distance: f64,
     /// Whether a QP that was not solved is solved again with all bounds soft, to see which of them cannot be satisfied.
     /// Default true.
@@ -21,6 +21,6 @@ impl InteriorPointOptions {
     #[must_use]
     pub fn new<T: crate::scalar::Real>() -> Self {
         let tolerance = if T::EPSILON < 1e-10 { 1e-8 } else { 1e-4 };
-        Self { tolerance, max_iterations: 50, start_mu: 1.0, warm_distance: 0.01, locate: true }
+        Self { tolerance, max_iterations: 50, start_mu: 1.0, warm_distance: 1e-3, locate: true }
     }
 }
