@@ -238,7 +238,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for k in stages {
             for (bounds, given) in [(&mut *data.lower, lower), (&mut *data.upper, upper)] {
                 // The rows of the last stage lie behind those of all others.
-                crate::qp::part_mut(bounds, k * P::Path::ROWS, rows).copy_from_slice(given);
+                crate::qp::assign(crate::qp::part_mut(bounds, k * P::Path::ROWS, rows), given);
             }
         }
         Ok(self)
@@ -287,7 +287,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         check_vector(Part::Parameters, range.start, p, P::Shape::NP)?;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         for k in range {
-            crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP).copy_from_slice(p);
+            crate::qp::assign(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
         }
         Ok(self)
     }
@@ -306,7 +306,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         check_vector(Part::Reference, range.start, reference, length)?;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         for k in range {
-            crate::qp::part_mut(data.references, k * length, length).copy_from_slice(reference);
+            crate::qp::assign(crate::qp::part_mut(data.references, k * length, length), reference);
         }
         Ok(self)
     }
@@ -320,7 +320,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         check_vector(Part::TerminalReference, intervals, reference, length)?;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let begin = intervals * P::StageCost::REFERENCES;
-        crate::qp::part_mut(data.references, begin, length).copy_from_slice(reference);
+        crate::qp::assign(crate::qp::part_mut(data.references, begin, length), reference);
         Ok(self)
     }
 

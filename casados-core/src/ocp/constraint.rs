@@ -203,7 +203,7 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
             *value = g;
         }
         for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
-            let (row, variable) = F::STRUCTURE.jacobian.at(entry);
+            let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
             let Some(position) = position::<F::Shape>(variable) else { continue };
             if let Some(element) = columns.get_mut(row * ld + position) {
                 *element = value;

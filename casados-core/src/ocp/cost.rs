@@ -200,7 +200,7 @@ fn entries<'a, F: Function, T: Real>(
 ) -> impl Iterator<Item = (usize, T)> + Clone + 'a {
     let [x, u] = ranges;
     x.chain(u).filter_map(move |entry| {
-        let (_, variable) = F::STRUCTURE.jacobian.at(entry);
+        let (_, variable) = F::STRUCTURE.jacobian.get(entry)?;
         Some((position::<F::Shape>(variable)?, *jacobian.get(entry)?))
     })
 }

@@ -8,7 +8,7 @@ use super::dynamics::Nodes;
 use super::error::{OcpError, Part};
 use super::horizon::Horizon;
 use super::problem::{Formulation, Problem};
-use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, pad, part, part_mut};
+use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 #[cfg(feature = "alloc")]
@@ -175,8 +175,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             } else {
                 terminal.bounds(limits)
             }
-            bounds.upper_linear.copy_from_slice(bounds.lower_linear);
-            bounds.upper_quadratic.copy_from_slice(bounds.lower_quadratic);
+            assign(bounds.upper_linear, bounds.lower_linear);
+            assign(bounds.upper_quadratic, bounds.lower_quadratic);
         }
         Ok(Self { problem, initial: Initial::Unknown, qp, iterate, data, objective: T::ZERO })
     }
@@ -247,8 +247,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         };
         check_vector(Part::States, stage, x, place.x.len())?;
         check_vector(Part::Controls, stage, u, place.u.len())?;
-        place.x.copy_from_slice(x);
-        place.u.copy_from_slice(u);
+        assign(place.x, x);
+        assign(place.u, u);
         for multipliers in [
             place.dynamics,
             place.x_lower,

@@ -9,7 +9,7 @@ use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 use super::point::{Terms, read};
 use super::problem::{Formulation, Problem};
-use crate::qp::{Arrays, Residuals, Solution, StageDims, pad, part, part_mut, symmetric};
+use crate::qp::{Arrays, Residuals, Solution, StageDims, assign, pad, part, part_mut, symmetric};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -197,7 +197,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
         dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
             objective = objective + step.cost.value;
-            part_mut(ends, k * nx, nx).copy_from_slice(step.x);
+            assign(part_mut(ends, k * nx, nx), step.x);
         })?;
         let values = ends.get_mut(intervals * nx..).unwrap_or_default();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();

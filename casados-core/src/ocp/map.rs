@@ -53,7 +53,7 @@ impl<F: Function, T: Real> Map<F, T> {
             self.check(k)?;
             self.x = vector(self.y.as_ref());
             for (entry, &value) in self.jacobian.as_ref().iter().enumerate() {
-                let (row, variable) = F::STRUCTURE.jacobian.at(entry);
+                let Some((row, variable)) = F::STRUCTURE.jacobian.get(entry) else { continue };
                 if (nx..2 * nx).contains(&variable) {
                     self.dx[(row, variable - nx)] = value;
                 } else if let Some(column) = variable.checked_sub(2 * nx + nz) {
@@ -66,10 +66,10 @@ impl<F: Function, T: Real> Map<F, T> {
             }
             let mut hessian = [&[][..]; 3];
             if second {
-                self.mu.as_mut().copy_from_slice(interval.multipliers);
+                crate::qp::assign(self.mu.as_mut(), interval.multipliers);
                 F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
                 for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
-                    let (row, column) = F::STRUCTURE.hessian.at(entry);
+                    let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
                     let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column))
                     else {
                         continue;

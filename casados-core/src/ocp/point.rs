@@ -79,7 +79,7 @@ impl<T: Real> Terms<'_, T> {
     #[inline(always)]
     pub(super) fn curvature<F: Function>(&mut self, hessian: &F::Hessian<T>, factor: T) {
         for (entry, &value) in hessian.as_ref().iter().enumerate() {
-            let (row, column) = F::STRUCTURE.hessian.at(entry);
+            let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
             if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
                 self.curve(row, column, factor * value);
             }

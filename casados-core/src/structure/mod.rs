@@ -91,6 +91,13 @@ impl Pattern {
     pub const fn at(&self, entry: usize) -> (usize, usize) {
         (self.rows[entry] as usize, self.columns[entry] as usize)
     }
+
+    /// `(row, column)` of an entry, if there is one: without a panic where the compiler does not know that.
+    #[must_use]
+    #[inline(always)]
+    pub fn get(&self, entry: usize) -> Option<(usize, usize)> {
+        Some((*self.rows.get(entry)? as usize, *self.columns.get(entry)? as usize))
+    }
 }
 
 /// Numbers of arithmetic operations of one evaluation; an elementary function counts as one.

@@ -1,5 +1,5 @@
-//! Model predictive control: a pendulum on a cart, brought upright and kept there in spite of a kick, with force and rail
-//! bounded. One real-time iteration in each sample.
+//! Model predictive control: a pendulum on a cart hangs down, is swung up and kept there in spite of a kick, with force and
+//! rail bounded. One real-time iteration in each sample.
 
 use crate::pendulum::Pendulum;
 use crate::{board, report};
@@ -9,12 +9,12 @@ use casados::{Gauss, Inline, Irk, Real, function, mode};
 use nalgebra::{Vector1, Vector4};
 
 pub const INTERVALS: usize = 20;
-const SAMPLE: f64 = 0.05;
+const SAMPLE: f64 = 0.08;
 const SAMPLES: usize = 100;
 /// When it is kicked, and how fast that makes the ball turn.
 const KICK: (usize, f64) = (50, 1.0);
-pub const FORCE: f64 = 10.0;
-pub const RAIL: f64 = 0.6;
+pub const FORCE: f64 = 15.0;
+pub const RAIL: f64 = 1.0;
 /// Two sides of the force at every stage but the last, of the position at every one but the first.
 pub const BOUNDS: usize = 4 * INTERVALS;
 
@@ -53,7 +53,8 @@ macro_rules! mpc {
         fn main() -> ! {
             let good = match (NUMBERS.fill(0.0), INDICES.fill(0)) {
                 (Some(numbers), Some(indices)) => {
-                    $crate::mpc::run(&DIMS, numbers, [PROBLEM, PLAN], indices).is_ok()
+                    let result = $crate::mpc::run(&DIMS, numbers, [PROBLEM, PLAN], indices);
+                    result.map_err(|error| $crate::board::explain(&error)).is_ok()
                 }
                 _ => false,
             };
@@ -85,7 +86,7 @@ pub fn run<T: Real>(
         .stage_cost(LeastSquaresCost::<Deviation, T>::diagonal(&[1.0, 10.0, 0.1, 0.1, 0.01].map(number)))
         .terminal_cost(LeastSquaresCost::<End, T>::diagonal(&[20.0, 100.0, 5.0, 5.0].map(number)))
         .on_horizon(Horizon::uniform(INTERVALS, number(SAMPLE)), dims, problem)?;
-    let mut x = [0.0, 0.6, 0.0, 0.0].map(number);
+    let mut x = [0.0, 3.14, 0.0, 0.0].map(number);
     ocp.bound("u", .., number(-FORCE), number(FORCE))?.bound("x[0]", .., number(-RAIL), number(RAIL))?;
     ocp.fix_initial_state(&x)?.guess(&x, &[T::ZERO])?;
     let mut qp_solver = InteriorPoint::in_memory(solver, indices);

@@ -16,6 +16,9 @@ pub fn print(text: &str) {
     }
 }
 
+/// Words for errors are more than there is room for.
+pub fn explain(_: &dyn core::error::Error) {}
+
 pub fn exit(success: bool) -> ! {
     loop {
         semihost(0x18, if success { 0x20026 } else { 0x20023 });

@@ -6,6 +6,11 @@ pub fn print(text: &str) {
     std::print!("{text}");
 }
 
+/// What went wrong.
+pub fn explain(error: &dyn core::error::Error) {
+    std::eprintln!("{error}");
+}
+
 pub fn exit(success: bool) -> ! {
     std::process::exit(i32::from(!success))
 }
