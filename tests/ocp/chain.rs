@@ -2,50 +2,19 @@
 
 use crate::Test;
 use crate::chain_model::Chain;
+use crate::chain_problem;
 use crate::data::Record;
 use casados::Scalar;
-use casados::ocp::{
-    Convexification, Exact, Globalisation, HeapSqp, Horizon, LeastSquaresCost, Problem, Shooting,
-};
+use casados::ocp::{Convexification, Exact, Globalisation, HeapSqp, Shooting};
 use casados::prelude::*;
 use casados::qp::{Condensing, HeapInteriorPoint};
 use nalgebra::{SVector, Vector3};
 
-#[function(NX = [9, 15, 21, 27, 33])]
-fn state<const NX: usize>(x: [f64; NX], _u: [f64; 3]) -> [f64; NX] {
-    x
-}
-
-#[function(NX = [9, 15, 21, 27, 33])]
-fn control<const NX: usize>(_x: [f64; NX], u: [f64; 3]) -> [f64; 3] {
-    u
-}
-
-/// The problem of a size with dynamics, at the start `x_k = x_rest`, `u = 0`.
+/// The problem of a size with dynamics.
 macro_rules! problem {
-    ($nx:literal, $record:expr, $dynamics:expr) => {{
-        const FREE: usize = ($nx - 3) / 6;
-        let record: &Record = $record;
-        let (n, ts) = (record.number("N")? as usize, record.number("Ts")?);
-        let (rest, x0) = (record.list("xrest")?, record.list("x0")?);
-        let mut q = [2.0; $nx];
-        q[3 * FREE..3 * FREE + 3].fill(2.0 * (FREE + 1) as f64);
-        let mut ocp = Problem::new($dynamics)
-            .running_cost((
-                LeastSquaresCost::<State<$nx>>::diagonal(&q),
-                LeastSquaresCost::<Control<$nx>>::diagonal(&[0.02; 3]),
-            ))
-            .terminal_cost(LeastSquaresCost::<State<$nx>>::diagonal(&q))
-            .on(Horizon::uniform(n, ts))?;
-        let reference: Vec<f64> = rest.iter().copied().chain([0.0; 3]).collect();
-        ocp.set_reference(.., &reference)?.set_terminal_reference(&rest)?;
-        ocp.fix_initial_state(&x0)?.bound("u", .., -1.0, 1.0)?;
-        for mass in 0..=FREE {
-            ocp.bound(&format!("x[{}]", 3 * mass + 1), 1..n, -0.05, f64::INFINITY)?;
-        }
-        ocp.guess(&rest, &[0.0; 3])?;
-        ocp
-    }};
+    ($nx:literal, $record:expr, $dynamics:expr) => {
+        chain_problem::problem!($nx, $record.list("xrest")?, $record.list("x0")?, $dynamics)
+    };
 }
 
 /// Gauss-Legendre of `S` stages, all intervals at once.

@@ -3,6 +3,8 @@
 #[path = "../../examples/models/chain.rs"]
 #[allow(dead_code)]
 mod chain_model;
+#[path = "../../examples/models/chain_problem.rs"]
+mod chain_problem;
 #[path = "../data/mod.rs"]
 mod data;
 

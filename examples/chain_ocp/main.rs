@@ -1,0 +1,118 @@
+//! A chain of masses is brought to rest beside a wall: optimal control by multiple shooting and sequential quadratic programming,
+//! and what an iteration costs as the chain grows.
+//!
+//! ```text
+//! cargo run --release --example chain_ocp [PICTURE.svg]
+//! ```
+
+#[path = "../models/chain.rs"]
+#[allow(dead_code)]
+mod chain;
+#[path = "../models/chain_problem.rs"]
+mod chain_problem;
+#[path = "../../tests/data/mod.rs"]
+mod data;
+mod plot;
+
+use casados::ocp::{HeapSqp, Outcome, Shooting};
+use casados::prelude::*;
+use casados::qp::{Condensing, HeapInteriorPoint};
+use chain::Chain;
+use data::Record;
+use plot::{Picture, Series};
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: cargo run --release --example chain_ocp [PICTURE.svg]";
+/// Whole solutions that are timed; the fastest counts.
+const REPETITIONS: usize = 20;
+
+fn main() -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().skip(1).collect();
+    let picture = match &arguments[..] {
+        [] => PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/plots/chain_ocp.svg")),
+        [path] if path.as_encoded_bytes().ends_with(b".svg") => PathBuf::from(path),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::FAILURE;
+        }
+    };
+    match run().and_then(|drawing| drawing.draw(&picture)) {
+        Ok(()) => {
+            println!("\n{}", picture.display());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("chain_ocp: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Solves the problem of a size, again and again; the fastest outcome, the iterations of the last one, and the states.
+macro_rules! solve {
+    ($nx:literal, $stages:literal, $steps:literal) => {{
+        let record = Record::load(&format!("ocp/chain_{}.json", ($nx - 3) / 6 + 2))?;
+        let (rest, x0) = (record.list("xrest")?, record.list("x0")?);
+        let options = Options { steps: $steps, ..Default::default() };
+        let batch = Batch::<Chain<$nx>, Gauss<$stages>>::new(options)?;
+        let mut ocp = chain_problem::problem!($nx, rest.clone(), x0, Shooting::new(batch));
+        let mut sqp = HeapSqp::with_solver(&ocp, Condensing::new(5, HeapInteriorPoint::new()))?;
+        let mut best: Option<Outcome> = None;
+        for _ in 0..REPETITIONS {
+            ocp.guess(&rest, &[0.0; 3])?;
+            let outcome = sqp.solve(&mut ocp)?;
+            if !outcome.is_converged() {
+                return Err(outcome.to_string().into());
+            }
+            if best.is_none_or(|best| outcome.times.total() < best.times.total()) {
+                best = Some(outcome);
+            }
+        }
+        let states: Vec<Vec<f64>> = ocp.iterate().stages().map(|stage| stage.x.to_vec()).collect();
+        (best.ok_or("no run")?, sqp.log().to_string(), states)
+    }};
+}
+
+/// Problems of all sizes with one method.
+macro_rules! sizes {
+    ($picture:ident, $stages:literal x $steps:literal) => {{
+        let mut series = Series { name: format!("GL{}x{}", $stages, $steps), points: Vec::new() };
+        sizes!(@ $picture, series, $stages, $steps, 9, 15, 21, 27, 33);
+        $picture.series.push(series);
+    }};
+    (@ $picture:ident, $series:ident, $stages:literal, $steps:literal, $($nx:literal),*) => { $(
+        let (outcome, log, states) = solve!($nx, $stages, $steps);
+        let (masses, iterations) = (($nx - 3) / 6 + 2, outcome.iterations);
+        // The last linearisation finds that it is done, and belongs to the steps before.
+        let each = |seconds: f64| 1e3 * seconds / iterations as f64;
+        println!(
+            "{masses:>6} {:>7} {iterations:>6} {:>16.8} {:>10.2} {:>10.3} {:>10.3} {:>10.3}",
+            $series.name,
+            outcome.objective,
+            1e3 * outcome.times.total(),
+            each(outcome.times.total()),
+            each(outcome.times.linearise),
+            each(outcome.times.qp),
+        );
+        $series.points.push((masses, each(outcome.times.total())));
+        if masses == 5 && $stages == 2 && $steps == 2 {
+            $picture.log = log;
+            $picture.states = states;
+        }
+    )* };
+}
+
+fn run() -> Result<Picture, Box<dyn Error>> {
+    println!(
+        "Milliseconds, the fastest of {REPETITIONS}; Gauss-Legendre, stages x steps in each of 40 intervals\n"
+    );
+    println!("masses  method   iter        objective      whole  iteration  linearise         QP");
+    let mut picture = Picture::default();
+    sizes!(picture, 2 x 1);
+    sizes!(picture, 2 x 2);
+    sizes!(picture, 4 x 4);
+    println!("\nThe iterations with five masses, GL2x2:\n\n{}", picture.log);
+    Ok(picture)
+}
