@@ -3,5 +3,5 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 cargo build --quiet --release
-${CC:-gcc} -std=c11 -O2 -Wall -Wextra -Werror main.c target/release/libcasados_pendulum.a -lm -o target/main
+${CC:-gcc} -std=c11 -O2 -Wall -Wextra -Werror -Wl,--gc-sections main.c target/release/libcasados_pendulum.a -lm -o target/main
 target/main

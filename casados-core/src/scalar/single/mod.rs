@@ -29,19 +29,29 @@ pub fn sqrt(a: f32) -> f32 {
     libm::sqrtf(a)
 }
 
-/// `core` does not offer square roots, and the compiler does not recognise `libm`'s.
+/// `core` does not offer square roots, and the compiler does not recognise `libm`'s. It does not hand out registers of an
+/// FPU for single precision either.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[allow(unsafe_code)]
 mod instruction {
     #[inline(always)]
     pub fn sqrt(a: f32) -> f32 {
-        let root;
-        // SAFETY: it reads and writes the two registers that it names and nothing else, and every target with this
-        // binary interface has it.
+        let mut bits = a.to_bits();
+        // SAFETY: it changes the two registers that it is given, and leaves `s0` as it was; every target with this binary
+        // interface has the instruction.
         unsafe {
-            core::arch::asm!("vsqrt.f32 {0}, {1}", lateout(sreg) root, in(sreg) a, options(pure, nomem, nostack));
+            core::arch::asm!(
+                "vmov {kept}, s0",
+                "vmov s0, {bits}",
+                "vsqrt.f32 s0, s0",
+                "vmov {bits}, s0",
+                "vmov s0, {kept}",
+                kept = out(reg) _,
+                bits = inout(reg) bits,
+                options(pure, nomem, nostack),
+            );
         }
-        root
+        f32::from_bits(bits)
     }
 }
 
@@ -80,7 +90,7 @@ pub fn cbrt(a: f32) -> f32 {
     let mut root = f32::from_bits(scaled.to_bits() / 3 + 709_958_130);
     for _ in 0..2 {
         let cube = root * root * root;
-        root = root * ((scaled + scaled + cube) / (scaled + cube + cube));
+        root *= (scaled + scaled + cube) / (scaled + cube + cube);
     }
     let (square, low) = product(root, root);
     let (cube, rest) = product(square, root);
