@@ -94,8 +94,8 @@ fn check<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<P>) 
         let qp = ocp.qp().stage(k).ok_or("no stage")?;
         let nx = qp.dims().nx;
         let size = nx + qp.dims().nu;
-        let mut hessian = vec![vec![0.0; size]; size];
-        for (i, row) in hessian.iter_mut().enumerate() {
+        let mut hessian = vec![0.0; size * size];
+        for (i, row) in hessian.chunks_exact_mut(size).enumerate() {
             for (j, element) in row.iter_mut().enumerate().take(i + 1) {
                 let value = match (i.checked_sub(nx), j.checked_sub(nx)) {
                     (None, _) => qp.q().get(i, j),
@@ -123,9 +123,9 @@ fn check<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<P>) 
                 let difference = (sides[0][i] - sides[1][i]) / (2.0 * step);
                 // Third derivatives of order ten times h² / 6, and roundings of 1e-15 / h.
                 assert!(
-                    (difference - hessian[i][j]).abs() < 2e-9,
+                    (difference - hessian[i * size + j]).abs() < 2e-9,
                     "{k} {i} {j}: {difference} {}",
-                    hessian[i][j]
+                    hessian[i * size + j]
                 );
             }
         }

@@ -71,8 +71,7 @@ fn differences_of_solutions() -> Test {
                 ocp.iterate().stages().map(|stage| (stage.x.to_vec(), stage.u.to_vec())).collect();
             sides.push(all);
         }
-        for k in 0..=n {
-            let (plus, minus) = (&sides[0][k], &sides[1][k]);
+        for (k, (plus, minus)) in sides[0].iter().zip(&sides[1]).enumerate() {
             let pairs = plus.0.iter().zip(&minus.0).zip(&result.dx(k)[direction * 3..]);
             let du = result.du(k.min(n - 1)).get(direction..).unwrap_or_default();
             for ((a, b), derivative) in pairs.chain(plus.1.iter().zip(&minus.1).zip(du)) {

@@ -21,8 +21,8 @@
 //! ```
 //!
 //! with full steps or line searches (merit function, filter, second-order correction), penalties where a QP is infeasible
-//! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. A real-time iteration is one
-//! [`Ocp::linearise`] and one QP. `Sensitivities` are derivatives of solutions, and feedback gains.
+//! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. [`RealTime`] takes one step in
+//! each sample, in two phases. `Sensitivities` are derivatives of solutions, and feedback gains.
 //!
 //! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
 //! stage 0 given by equal bounds. So are parameters that are to be found.
