@@ -168,7 +168,7 @@ fn states(x: &[f64], z: &[f64]) -> Vec<f64> {
 /// Data that is not there.
 pub fn all() -> Result<Vec<Problem>, String> {
     let load = Problem::load;
-    let mut e5 = load("e5", "E5", 1e11, 1e-60)?;
+    let mut e5 = load("e5", "E5", 1e11, 1e-80)?;
     e5.x0.truncate(3);
     let rest = |x: &[f64], z: &[f64]| vec![x[0], x[1], z[0], x[2]];
     let mut pleiades = problem!(Pleiades, load("pleiades", "Pleiades", 3.0, 1.0)?, states);
