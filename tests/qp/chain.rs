@@ -4,7 +4,7 @@ use crate::Test;
 use crate::data::Record;
 use casados::Real;
 use casados::qp::{
-    Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start, residuals,
+    BlockMut, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start, residuals,
 };
 
 /// Elements of a list of matrices, of which the last one repeats.
@@ -171,11 +171,73 @@ fn single_precision() -> Test {
     let chain = Chain::load(3)?;
     let qp = chain.qp::<f32>()?;
     let mut solution = HeapSolution::new(qp.dims())?;
-    let statistics = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let mut solver = HeapInteriorPoint::new();
+    solver.options.relative_tolerance = 0.0;
+    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
     assert!(statistics.residuals.largest() <= 1e-4);
     let error = chain.error(&solution)?;
     assert!(error < 1e-2, "{error:e}");
     Ok(())
+}
+
+/// Multiplies costs: the solution is the same, forces and multipliers are so many times as large.
+fn multiply_costs<T: Real>(qp: &mut HeapQp<T>, factor: f64) {
+    let factor = T::from_f64(factor);
+    for mut stage in qp.stages_mut() {
+        let multiply = |mut block: BlockMut<'_, T>| {
+            let (rows, columns) = block.as_block().shape();
+            for (i, j) in (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+                let value = block.as_block().get(i, j).unwrap_or(T::ZERO);
+                block.set(i, j, value * factor);
+            }
+        };
+        multiply(stage.q_mut());
+        multiply(stage.r_mut());
+        multiply(stage.s_mut());
+        stage.gradient_x_mut().iter_mut().for_each(|g| *g = *g * factor);
+        stage.gradient_u_mut().iter_mut().for_each(|g| *g = *g * factor);
+    }
+}
+
+/// The largest multiplier of the dynamics: a term of the gradients that are to vanish.
+fn largest_force<T: Real>(solution: &HeapSolution<T>) -> f64 {
+    let all = solution.stages().flat_map(|stage| stage.dynamics);
+    all.map(|force| force.to_f64().abs()).fold(0.0, f64::max)
+}
+
+/// Costs in other units, 2²⁰ times as large: rounding errors of forces of 1e6 and more are far above the absolute tolerance,
+/// and a part of the forces is what can be asked for.
+fn in_other_units<T: Real>(relative: f64) -> Test {
+    const UNIT: f64 = (1 << 20) as f64;
+    let chain = Chain::load(3)?;
+    let mut qp = chain.qp::<T>()?;
+    multiply_costs(&mut qp, UNIT);
+    let mut solution = HeapSolution::new(qp.dims())?;
+    let mut solver = HeapInteriorPoint::<T>::new();
+    // Products of slacks and multipliers have these units too.
+    (solver.options.start_mu, solver.options.max_iterations, solver.options.locate) = (UNIT, 20, false);
+    // Rounding errors are a few ε of the terms.
+    (solver.options.tolerance, solver.options.relative_tolerance) = (0.1 * T::EPSILON * UNIT, 0.0);
+    let absolute = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+    assert!(absolute.is_err(), "{absolute:?}");
+    (solver.options.tolerance, solver.options.relative_tolerance) = (0.0, relative);
+    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let (found, _) = residuals(qp.view(), &solution);
+    let force = largest_force(&solution);
+    // Multipliers are among the terms of gradients, and none of the others is more than ten times as large here.
+    assert!(found.stationarity.max(found.complementarity) <= 10.0 * relative * force, "{found} of {force:e}");
+    assert!(found.dynamics.max(found.inequalities) <= 10.0 * relative, "{found}");
+    assert!(statistics.iterations <= 16, "{statistics:?}");
+    // Where slack and multiplier both vanish, either may be the root of their product; and see above for the reference.
+    let error = chain.error(&solution)?;
+    assert!(error < (10.0 * relative * force / UNIT).sqrt() + 1e-5, "{error:e}");
+    Ok(())
+}
+
+#[test]
+fn relative_tolerances() -> Test {
+    in_other_units::<f32>(1e-5)?;
+    in_other_units::<f64>(1e-12)
 }
 
 /// Clarabel, which shares nothing with the other solver, and the interface to it.

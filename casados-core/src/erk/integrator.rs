@@ -503,7 +503,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let first = 2 * M::Shape::NX;
         base.point.v.as_mut()[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
         let Options { steps, compensated, .. } = self.options;
-        Ok(Grid { start: self.start, h: h / T::from_f64(steps as f64), steps, compensated })
+        Ok(Grid { start: self.start, h: h / T::from_whole(steps), steps, compensated })
     }
 }
 

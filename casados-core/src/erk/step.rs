@@ -122,7 +122,7 @@ impl<M: Ode, T: Real> Point<M, T> {
                 return Err(Error::Overflow { step: at.step, index });
             }
         }
-        let time = T::from_f64(at.step as f64) + c;
+        let time = T::from_whole(at.step) + c;
         self.v[M::Shape::NV - 1] = grid.start + grid.h * time;
         Ok(())
     }

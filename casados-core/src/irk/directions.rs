@@ -123,5 +123,5 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
 #[inline(always)]
 pub(super) fn weight<E: Field>(direction: usize, second: bool) -> E {
     let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;
-    E::from_f64(1.0 + 0.25 * rank as f64)
+    E::from_f64(1.0) + E::from_f64(0.25) * E::from_whole(rank)
 }

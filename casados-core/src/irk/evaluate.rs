@@ -147,7 +147,7 @@ impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
         let Self { points, x, y, a, c, time, step } = self;
         let (h, nx) = (time.step, x.len());
         if let Some(t) = points.last_mut() {
-            let start = E::from_f64(step as f64);
+            let start = E::from_whole(step);
             for (t, &c) in t.iter_mut().zip(c) {
                 *t = time.start + h * (start + c);
             }

@@ -76,7 +76,7 @@ where
     /// # Errors
     /// [`Error::InvalidOption`]
     pub fn inline(options: Options) -> Result<Self, Error> {
-        Self::build(options, B::TABLEAU)
+        Self::ready(options, B::TABLEAU)
     }
 }
 
@@ -90,7 +90,7 @@ where
     /// # Errors
     /// As `with_tableau`.
     pub fn inline_with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
-        Self::build(options, tableau)
+        Self::ready(options, tableau)
     }
 }
 
@@ -109,6 +109,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             sweep: None,
             method: PhantomData,
         })
+    }
+
+    /// As `build`, and what a first call would prepare: none takes longer than the others.
+    fn ready(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        let mut integrator = Self::build(options, tableau)?;
+        integrator.reserve()?;
+        Ok(integrator)
     }
 
     /// The parameters `p` of all following calls.

@@ -154,14 +154,15 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         let most = options.fixed_iterations.unwrap_or(options.max_iterations);
         let rounding = if *compensated { LITTLE } else { ROUNDING } * E::EPSILON;
         let rule = Rule {
-            tolerance: options.tolerance.max(rounding),
+            // Without a test nothing is computed in `f64`.
+            tolerance: if test { options.tolerance.max(rounding) } else { rounding },
             stagnation: E::STAGNATION,
             full: options.jacobian == Jacobian::Full || options.jacobian == Jacobian::Auto && !test,
             // Of linear equations every step has one matrix, which may be that of all steps.
             exact: M::STRUCTURE.linear_in_state,
         };
         let h = self.inputs.time.step;
-        let rate = Some(self.validity.rate).filter(|rate| *rate > 0.0);
+        let rate = Some(self.validity.rate).filter(|rate| test && *rate > 0.0);
         let mut lanes = [Progress { state: State::Active, last: 0.0, rate }; MOST_LANES];
         let lanes = lanes.get_mut(..E::LANES).unwrap_or_default();
         let simplified = options.jacobian == Jacobian::Simplified;

@@ -134,7 +134,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         work.inputs.p = work.parameters;
         work.inputs.time.start = self.time;
         work.inputs.time.interval = arguments.h;
-        work.inputs.time.step = arguments.h / T::from_f64(options.steps as f64);
+        work.inputs.time.step = arguments.h / T::from_whole(options.steps);
         work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
         let [first, second] = tapes;
         let (kept, running) = if self.kept == 0 { (first, second) } else { (second, first) };

@@ -98,7 +98,7 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
                         .iter()
                         .zip(row)
                         .fold(T::ZERO, |sum, (above, l)| sum + (*l * above.as_ref().as_flattened()[k]).abs());
-                    pivot.abs() <= T::from_f64(n as f64) * T::from_f64(T::EPSILON) * sum
+                    pivot.abs() <= T::from_whole(n) * T::from_f64(T::EPSILON) * sum
                 };
             if singular {
                 return Err((k / S, k % S));

@@ -38,7 +38,7 @@ impl<'a, T: Real> Horizon<'a, T> {
     }
     fn time(&self, node: usize) -> T {
         match self {
-            Self::Uniform { length, .. } => T::from_f64(node as f64) * *length,
+            Self::Uniform { length, .. } => T::from_whole(node) * *length,
             Self::Nodes(times) => times.get(node).copied().unwrap_or(T::ZERO),
         }
     }

@@ -64,6 +64,12 @@ pub trait Field:
     /// A constant.
     fn from_f64(value: f64) -> Self;
 
+    /// A whole number that is known at run time only: without double precision where this has none.
+    #[inline(always)]
+    fn from_whole(value: usize) -> Self {
+        Self::from_f64(value as f64)
+    }
+
     /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
     /// machine has an instruction for it: elsewhere it is slow.
     #[inline(always)]

@@ -15,6 +15,10 @@ macro_rules! real {
             fn from_f64(value: f64) -> Self {
                 value as $t
             }
+            #[inline(always)]
+            fn from_whole(value: usize) -> Self {
+                value as $t
+            }
             #[cfg(feature = "std")]
             #[inline(always)]
             fn subtract_product(self, a: Self, b: Self) -> Self {

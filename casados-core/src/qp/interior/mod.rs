@@ -29,7 +29,7 @@ use alloc::vec::Vec;
 use core::marker::PhantomData;
 use newton::Iterate;
 use riccati::First;
-use run::Run;
+use run::{Limits, Run};
 use sides::{Counts, Penalties, Sides, count, is_first_fixed};
 
 /// An interior point that exploits the structure of optimal control.
@@ -44,7 +44,7 @@ pub struct InteriorPoint<T, N, I> {
     /// Options, which may be changed between calls.
     pub options: InteriorPointOptions,
     /// A tolerance above that of the options is asked for.
-    relaxed: f64,
+    relaxed: T,
     numbers: N,
     indices: I,
     number: PhantomData<T>,
@@ -87,7 +87,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     pub fn in_memory(numbers: N, indices: I) -> Self {
         Self {
             options: InteriorPointOptions::new::<T>(),
-            relaxed: 0.0,
+            relaxed: T::ZERO,
             numbers,
             indices,
             number: PhantomData,
@@ -112,12 +112,11 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if fixed { First::Fixed } else { First::Free };
         let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
         let mut result = Ok(Statistics::default());
-        let options =
-            InteriorPointOptions { tolerance: self.options.tolerance.max(self.relaxed), ..self.options };
-        let scale = if let Penalties::Elastic(weight) = penalties { weight } else { 1.0 };
+        let scale = if let Penalties::Elastic(weight) = penalties { T::from_f64(weight) } else { T::ONE };
         T::registers(Run {
             iterate: &mut iterate,
-            options: &options,
+            options: &self.options,
+            limits: Limits::new(&self.options, self.relaxed, scale),
             start,
             scale,
             solution,
@@ -164,6 +163,6 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
     }
 
     fn relax(&mut self, tolerance: f64) {
-        self.relaxed = tolerance;
+        self.relaxed = T::from_f64(tolerance);
     }
 }

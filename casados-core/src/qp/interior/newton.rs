@@ -39,6 +39,44 @@ pub struct Iterate<'a, T> {
     pub initial: &'a mut [T],
     /// `Σ s λ` over the number of pairs.
     pub mu: T,
+    /// The largest terms of the residuals when they were computed last.
+    pub terms: Terms<T>,
+}
+
+/// What residuals are sums of.
+#[derive(Clone, Copy)]
+pub struct Terms<T> {
+    /// In gradients: `H v`, `h`, forces of constraints, `π`.
+    pub forces: T,
+    /// In conditions: `v`, `C x + D u`, `b`.
+    pub values: T,
+}
+
+/// The residuals of the conditions of optimality, the largest element of each: see [`Residuals`].
+#[derive(Clone, Copy)]
+pub struct Largest<T> {
+    pub stationarity: T,
+    pub dynamics: T,
+    pub inequalities: T,
+    pub complementarity: T,
+}
+
+impl<T: Real> From<Largest<T>> for Residuals {
+    fn from(largest: Largest<T>) -> Self {
+        let Largest { stationarity, dynamics, inequalities, complementarity } = largest;
+        Self {
+            stationarity: stationarity.to_f64(),
+            dynamics: dynamics.to_f64(),
+            inequalities: inequalities.to_f64(),
+            complementarity: complementarity.to_f64(),
+        }
+    }
+}
+
+/// The largest size, at least that of `largest`. What is not a number does not show: residuals will.
+#[inline(always)]
+fn grow<T: Real>(largest: &mut T, vector: &[T]) {
+    *largest = vector.iter().fold(*largest, |largest, a| a.abs().max(largest));
 }
 
 const fn first_nx(dims: &[StageDims]) -> usize {
@@ -71,6 +109,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             dynamics: take_mut(numbers, end.dynamics),
             initial: take_mut(numbers, if first == First::Fixed { initial } else { 0 }),
             mu: T::ZERO,
+            terms: Terms { forces: T::ZERO, values: T::ZERO },
         }
     }
 
@@ -94,6 +133,8 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
         let mut objective = T::ZERO;
+        let mut largest = T::ZERO;
+        grow(&mut largest, forces);
         for place in Places::<T>::new(self.qp.dims).rev() {
             let Place { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
@@ -104,6 +145,8 @@ impl<'a, T: Real> Iterate<'a, T> {
             let v = part(self.v, place.row, ld);
             g.fill(T::ZERO);
             symmetric(g, hessian, ld, v, n);
+            grow(&mut largest, g);
+            grow(&mut largest, linear);
             for ((g, &linear), &v) in g.iter_mut().zip(linear).zip(v) {
                 objective = objective + v * (T::from_f64(0.5) * *g + linear);
                 *g = *g + linear;
@@ -123,10 +166,12 @@ impl<'a, T: Real> Iterate<'a, T> {
             if place.stage > 0 {
                 // π is what makes this part zero.
                 let before = place.dynamics.saturating_sub(pad::<T>(nx));
-                for (pi, g) in part_mut(multipliers, before, nx).iter_mut().zip(part_mut(g, 0, nx)) {
+                let pi = part_mut(multipliers, before, nx);
+                for (pi, g) in pi.iter_mut().zip(part_mut(g, 0, nx)) {
                     *pi = *g;
                     *g = T::ZERO;
                 }
+                grow(&mut largest, pi);
             } else if self.first == First::Fixed {
                 // What is left is the multiplier of the given state.
                 let given = part_mut(g, 0, nx);
@@ -134,12 +179,14 @@ impl<'a, T: Real> Iterate<'a, T> {
                 given.fill(T::ZERO);
             }
         }
+        self.terms.forces = largest;
         objective + self.penalties()
     }
 
     /// General constraints, dynamics, and what belongs to sides.
     #[inline(always)]
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
+        let mut largest = T::ZERO;
         let mut rest = &mut *self.v;
         for place in Places::<T>::new(self.qp.dims) {
             let Place { n, ng, ld, next, .. } = place;
@@ -149,13 +196,17 @@ impl<'a, T: Real> Iterate<'a, T> {
             let general = part_mut(general, 0, ng);
             general.fill(T::ZERO);
             add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
+            grow(&mut largest, v);
+            grow(&mut largest, general);
             let dynamics = part_mut(self.dynamics, place.dynamics, next);
             let offset = part(data, place.offset(), next);
+            grow(&mut largest, offset);
             for ((dynamics, &offset), &coming) in dynamics.iter_mut().zip(offset).zip(&*rest) {
                 *dynamics = offset - coming;
             }
             add_transposed::<T, E>(dynamics, matrix, v, n, next);
         }
+        self.terms.values = largest;
         let sides = &mut self.sides;
         sides.gather(self.v, |value, bound| value - bound, |value, bound| bound - value);
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
@@ -185,15 +236,15 @@ impl<'a, T: Real> Iterate<'a, T> {
 
     /// The residuals as they are known.
     #[inline(always)]
-    pub fn residuals<E: Packed<T>>(&self) -> Residuals {
+    pub fn residuals<E: Packed<T>>(&self) -> Largest<T> {
         let sides = &self.sides;
         let inequalities =
             largest_size::<T, E>(sides.residual).max(largest_size::<T, E>(sides.equation_residual));
-        Residuals {
-            stationarity: largest_size::<T, E>(self.stationarity).to_f64(),
-            dynamics: largest_size::<T, E>(self.dynamics).to_f64(),
-            inequalities: inequalities.to_f64(),
-            complementarity: largest_product::<T, E>(T::ZERO, sides.slack, sides.multiplier).to_f64(),
+        Largest {
+            stationarity: largest_size::<T, E>(self.stationarity),
+            dynamics: largest_size::<T, E>(self.dynamics),
+            inequalities,
+            complementarity: largest_product::<T, E>(T::ZERO, sides.slack, sides.multiplier),
         }
     }
 
@@ -270,7 +321,7 @@ impl<T: Real> Sides<'_, T> {
     #[inline(always)]
     pub fn mu<E: Packed<T>>(&self) -> T {
         let pairs = self.counts.pairs().max(1);
-        dot::<T, E>(self.slack, self.multiplier) / T::from_f64(pairs as f64)
+        dot::<T, E>(self.slack, self.multiplier) / T::from_whole(pairs)
     }
 
     /// A function of the value of the row and the bound, for every side, into `scratch`.
@@ -333,7 +384,7 @@ impl<T: Real> Sides<'_, T> {
     #[inline(always)]
     pub fn mu_after<E: Packed<T>>(&self, alpha: T, mu: T) -> T {
         let pairs = self.counts.pairs().max(1);
-        let products = dot::<T, E>(self.slack_step, self.multiplier_step) / T::from_f64(pairs as f64);
+        let products = dot::<T, E>(self.slack_step, self.multiplier_step) / T::from_whole(pairs);
         (T::ONE - alpha) * mu + alpha * alpha * products
     }
 

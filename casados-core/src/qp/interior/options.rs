@@ -3,8 +3,14 @@
 /// Options of the interior point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InteriorPointOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below. Default 1e-8; of single precision 1e-4.
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below this, or below `relative_tolerance`. Default
+    /// 1e-8; of single precision 1e-4.
     pub tolerance: f64,
+    /// Residuals may be this part of the largest of the terms whose sums they are: stationarity and complementarity of
+    /// `H v`, `h`, forces of constraints and multipliers `π`; dynamics and inequalities of `v`, values of general constraints
+    /// and `b`. What is asked for is the larger one of this and `tolerance`. Default 0, absolute; of single precision, where
+    /// terms have no more than seven digits, 1e-5.
+    pub relative_tolerance: f64,
     /// Default 50.
     pub max_iterations: usize,
     /// Where the products of slacks and multipliers begin. Default 1.
@@ -20,7 +26,14 @@ impl InteriorPointOptions {
     /// For numbers of some precision.
     #[must_use]
     pub fn new<T: crate::scalar::Real>() -> Self {
-        let tolerance = if T::EPSILON < 1e-10 { 1e-8 } else { 1e-4 };
-        Self { tolerance, max_iterations: 50, start_mu: 1.0, warm_distance: 1e-3, locate: true }
+        let (tolerance, relative_tolerance) = if T::EPSILON < 1e-10 { (1e-8, 0.0) } else { (1e-4, 1e-5) };
+        Self {
+            tolerance,
+            relative_tolerance,
+            max_iterations: 50,
+            start_mu: 1.0,
+            warm_distance: 1e-3,
+            locate: true,
+        }
     }
 }

@@ -379,7 +379,7 @@ fn cholesky<T: Real, E: Packed<T>>(
     let Pivots { inverse, added, largest } = pivots;
     let mut regularised = 0;
     let epsilon = T::from_f64(T::EPSILON);
-    let noise = T::from_f64(T::EPSILON * 4.0 * rows as f64);
+    let noise = T::from_f64(T::EPSILON * 4.0) * T::from_whole(rows);
     for (diagonal, inverse) in
         panel.get(row..).unwrap_or_default().iter().step_by((ld + 1).max(1)).zip(&mut *inverse)
     {

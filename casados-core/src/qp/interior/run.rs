@@ -1,6 +1,6 @@
 //! The iterations.
 
-use super::newton::Iterate;
+use super::newton::{Iterate, Largest, Terms};
 use super::options::InteriorPointOptions;
 use super::riccati::First;
 use super::vector::largest_size;
@@ -9,16 +9,17 @@ use crate::qp::layout::{Places, assign, part, part_mut};
 use crate::qp::problem::{QpView, Row};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
-use crate::qp::statistics::{Residuals, Statistics};
+use crate::qp::statistics::Statistics;
 use crate::scalar::{Packed, Real, Registers};
 
 /// One run of the method.
 pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
     pub options: &'r InteriorPointOptions,
+    pub limits: Limits<T>,
     pub start: Start,
     /// The size of penalties.
-    pub scale: f64,
+    pub scale: T,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<Statistics, QpError>,
 }
@@ -26,9 +27,9 @@ pub struct Run<'r, 'a, 's, T> {
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, options, start, scale, solution, result } = self;
+        let Self { iterate, options, limits, start, scale, solution, result } = self;
         iterate.begin::<E>(options, start, scale, solution);
-        *result = iterate.iterations::<E>(options, scale, solution);
+        *result = iterate.iterations::<E>(options, &limits, solution);
         iterate.store(solution);
     }
 }
@@ -36,11 +37,37 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
 /// A step of the corrector below this is not taken.
 const SHORT: f64 = 0.3;
 
-/// Whether residuals are below a tolerance. With large penalties, forces are measured in their units.
-fn is_small(residuals: &Residuals, tolerance: f64, scale: f64) -> bool {
-    let Residuals { stationarity, dynamics, inequalities, complementarity } = *residuals;
-    let forces = tolerance * scale;
-    stationarity <= forces && complementarity <= forces && dynamics <= tolerance && inequalities <= tolerance
+/// The terms of the residuals are computed again where `μ` is this part of what it was.
+const OLD: f64 = 0.01;
+
+/// What residuals are to be below.
+pub struct Limits<T> {
+    absolute: Terms<T>,
+    relative: T,
+}
+
+impl<T: Real> Limits<T> {
+    /// At least a tolerance that is asked for; with large penalties, forces are measured in their units.
+    pub fn new(options: &InteriorPointOptions, relaxed: T, scale: T) -> Self {
+        let values = T::from_f64(options.tolerance).max(relaxed);
+        let absolute = Terms { forces: values * scale, values };
+        Self { absolute, relative: T::from_f64(options.relative_tolerance) }
+    }
+
+    /// Of residuals with such terms.
+    fn of(&self, terms: Terms<T>) -> Terms<T> {
+        Terms {
+            forces: (self.relative * terms.forces).max(self.absolute.forces),
+            values: (self.relative * terms.values).max(self.absolute.values),
+        }
+    }
+
+    /// Whether residuals with such terms are small.
+    fn hold(&self, residuals: Largest<T>, terms: Terms<T>) -> bool {
+        let Largest { stationarity, dynamics, inequalities, complementarity } = residuals;
+        let Terms { forces, values } = self.of(terms);
+        stationarity <= forces && complementarity <= forces && dynamics <= values && inequalities <= values
+    }
 }
 
 /// Slacks and multipliers keep at least this part of what they have, or, near the solution, `μ`.
@@ -52,7 +79,7 @@ impl<T: Real> Iterate<'_, T> {
         &mut self,
         options: &InteriorPointOptions,
         start: Start,
-        scale: f64,
+        scale: T,
         solution: &mut SolutionView<'_, T>,
     ) {
         if start == Start::Warm {
@@ -65,7 +92,7 @@ impl<T: Real> Iterate<'_, T> {
             assign(part_mut(self.v, 0, x0.len()), x0);
         }
         self.evaluate_values::<E>();
-        let cold = T::from_f64(options.start_mu * scale).sqrt();
+        let cold = (T::from_f64(options.start_mu) * scale).sqrt();
         let distance = match start {
             // The farther it is from being feasible, the less its slacks and multipliers mean.
             Start::Warm => {
@@ -84,34 +111,39 @@ impl<T: Real> Iterate<'_, T> {
     fn iterations<E: Packed<T>>(
         &mut self,
         options: &InteriorPointOptions,
-        scale: f64,
+        limits: &Limits<T>,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
         let mut statistics = Statistics::default();
         let (mut short, mut refine) = (0, false);
-        // Products far below the tolerance gain nothing, and make weights that swallow the digits of everything else.
-        let floor = T::from_f64(0.01 * options.tolerance * scale);
+        let mut known = self.mu;
         loop {
-            statistics.residuals = self.residuals::<E>();
-            if is_small(&statistics.residuals, options.tolerance, scale) {
+            let mut residuals = self.residuals::<E>();
+            let small = limits.hold(residuals, self.terms);
+            // Terms change on the way.
+            let old = limits.relative > T::ZERO && self.mu < T::from_f64(OLD) * known;
+            if small || old {
                 // What is known of the residuals is what steps should have left of them: now they are computed.
-                statistics.objective = self.evaluate::<E>(solution.dynamics).to_f64();
-                statistics.residuals = self.residuals::<E>();
-                if is_small(&statistics.residuals, options.tolerance, scale) {
+                let objective = self.evaluate::<E>(solution.dynamics);
+                (residuals, known) = (self.residuals::<E>(), self.mu);
+                if limits.hold(residuals, self.terms) {
+                    (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                     return Ok(statistics);
                 }
-                if statistics.refinements > 3 {
-                    let Statistics { iterations, residuals, .. } = statistics;
-                    return Err(QpError::Stalled { iterations, residuals });
+                if small && statistics.refinements > 3 {
+                    let iterations = statistics.iterations;
+                    return Err(QpError::Stalled { iterations, residuals: residuals.into() });
                 }
                 // Multipliers and slacks are good: the next step is to correct the others only.
-                refine = true;
-                statistics.refinements += 1;
+                refine = small;
+                statistics.refinements += usize::from(small);
             }
-            let (iterations, residuals) = (statistics.iterations, statistics.residuals);
+            // Products far below the tolerance gain nothing, and make weights that swallow the digits of everything else.
+            let floor = T::from_f64(0.01) * limits.of(self.terms).forces;
+            let iterations = statistics.iterations;
             if iterations >= options.max_iterations {
                 let _ = self.evaluate::<E>(solution.dynamics);
-                return Err(QpError::MaxIterations { iterations, residuals });
+                return Err(QpError::MaxIterations { iterations, residuals: residuals.into() });
             }
             self.sides.aim(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
@@ -138,12 +170,12 @@ impl<T: Real> Iterate<'_, T> {
             }
             statistics.iterations += 1;
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) {
-                return Err(QpError::Stalled { iterations, residuals });
+                return Err(QpError::Stalled { iterations, residuals: residuals.into() });
             }
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
             if short > 4 {
                 let _ = self.evaluate::<E>(solution.dynamics);
-                return Err(QpError::Stalled { iterations, residuals });
+                return Err(QpError::Stalled { iterations, residuals: residuals.into() });
             }
             self.advance::<E>(alpha);
             refine = false;
