@@ -158,6 +158,70 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(config(200))]
+
+    /// From the solution of a problem nearby, with other linear terms and another state at the start, to the minimum that a
+    /// cold start finds.
+    #[test]
+    fn warm_is_cold(dims in dims(), seed: u64, distance in 0..4_i32) {
+        let fail = |e: &dyn std::fmt::Display| TestCaseError::fail(e.to_string());
+        let mut qp = problem(&dims, seed).map_err(|e| fail(&e))?;
+        let mut solver = HeapInteriorPoint::new();
+        solver.options.tolerance = 1e-9;
+        let mut solution = HeapSolution::new(&dims).map_err(|e| fail(&e))?;
+        if solver.solve(qp.view(), Start::Cold, solution.view_mut()).is_err() {
+            return Ok(());
+        }
+        disturb(&mut qp, seed, 10_f64.powi(-distance)).map_err(|e| fail(&*e))?;
+        let Ok((_, cold, _)) = solve_to(1e-9, &qp) else { return Ok(()) };
+        let warm = solver.solve(qp.view(), Start::Warm, solution.view_mut()).map_err(|e| fail(&e))?;
+        let (residuals, objective) = residuals(qp.view(), &solution);
+        prop_assert!(residuals.largest() < 1e-8, "{residuals} {warm:?}");
+        prop_assert!((objective - cold.objective).abs() <= 3e-7 * size(&solution), "{warm:?} {cold:?}");
+    }
+}
+
+/// Other gradients, offsets, and state at the start.
+fn disturb(qp: &mut HeapQp<f64>, seed: u64, scale: f64) -> Result<(), Box<dyn std::error::Error>> {
+    let mut random = Numbers(!seed);
+    for mut stage in qp.stages_mut() {
+        stage.gradient_x_mut().iter_mut().for_each(|q| *q += scale * random.next());
+        stage.gradient_u_mut().iter_mut().for_each(|r| *r += scale * random.next());
+        stage.offset_mut().iter_mut().for_each(|b| *b += 0.1 * scale * random.next());
+    }
+    let stage = qp.view().stage(0).ok_or("no stage")?;
+    let bounds = stage.x_bounds();
+    let mut x0 = bounds.lower.to_vec();
+    if bounds.lower == bounds.upper {
+        x0.iter_mut().for_each(|x| *x += 0.1 * scale * random.next());
+        qp.fix_initial_state(&x0)?;
+    }
+    Ok(())
+}
+
+/// Most problems nearby are solved by active sets alone.
+#[test]
+fn few_active_sets_lie_between_neighbours() -> crate::Test {
+    let (mut all, mut alone) = (0, 0);
+    for seed in 0..200 {
+        let dims: Vec<_> = (0..6).map(|k| StageDims::new(4, if k < 5 { 2 } else { 0 }, 1)).collect();
+        let mut qp = problem(&dims, seed)?;
+        let mut solver = HeapInteriorPoint::new();
+        let mut solution = HeapSolution::new(&dims)?;
+        if solver.solve(qp.view(), Start::Cold, solution.view_mut()).is_err() {
+            continue;
+        }
+        disturb(&mut qp, seed, 0.01)?;
+        let Ok(statistics) = solver.solve(qp.view(), Start::Warm, solution.view_mut()) else { continue };
+        all += 1;
+        alone += usize::from(statistics.active_sets == statistics.iterations);
+    }
+    println!("{alone} of {all}");
+    assert!(all > 100 && 4 * alone > 3 * all, "{alone} of {all}");
+    Ok(())
+}
+
 /// `min ½ |v − (3, 4)|²` in the cone `|v| ≤ 1`: the nearest point is `(0.6, 0.8)`.
 #[test]
 fn second_order_cone() -> crate::Test {

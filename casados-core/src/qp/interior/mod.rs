@@ -1,6 +1,7 @@
 //! The library's own solver: a primal-dual interior point with Mehrotra's predictor and corrector, whose linear systems
 //! are solved by a Riccati recursion.
 
+mod active;
 mod kernels;
 mod newton;
 mod options;
@@ -37,6 +38,11 @@ use sides::{Counts, Penalties, Sides, count, is_first_fixed};
 /// Each iteration costs one Riccati factorisation, `O(N (nx + nu)³)`, and two solves. With the feature `alloc` its memory is
 /// on the heap, and is allocated by the first call and by calls with larger problems only. Elsewhere see
 /// [`InteriorPoint::in_memory`].
+///
+/// A warm start first takes the bounds with multipliers for the active ones, and corrects this set by semismooth Newton steps
+/// (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as a semismooth Newton method", SIAM J. Optim. 13, 2002): for a
+/// problem like the last one a single factorisation is enough. Where
+/// [`active_sets`](InteriorPointOptions::active_sets) of them are not, the interior point follows.
 ///
 /// Violated bounds of an infeasible problem are found by solving it once more with all bounds soft.
 #[derive(Clone, Debug)]

@@ -4,7 +4,8 @@ use super::kernels::{Columns, add_transposed, subtract};
 use super::riccati::{Equations, First, Riccati};
 use super::sides::{Counts, Sides, set};
 use super::vector::{
-    add_scaled, dot, largest_negative_product, largest_negative_ratio, largest_product, largest_size, shrink,
+    add_scaled, dot, larger, largest_negative_product, largest_negative_ratio, largest_product, largest_size,
+    shrink,
 };
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
@@ -12,7 +13,8 @@ use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
 use crate::qp::statistics::Residuals;
-use crate::scalar::{Packed, Real};
+use crate::scalar::{Packed, Piece, Real};
+use core::marker::PhantomData;
 
 /// A point, its multipliers and residuals. Vectors over rows are `v` and the values of general constraints of each stage.
 ///
@@ -30,9 +32,9 @@ pub struct Iterate<'a, T> {
     /// Gradient of the Lagrangian.
     pub stationarity: &'a mut [T],
     /// Right-hand side of Newton's equations.
-    gradient: &'a mut [T],
+    pub gradient: &'a mut [T],
     /// Weights of rows.
-    weights: &'a mut [T],
+    pub weights: &'a mut [T],
     /// `A x + B u + b − x₊`
     pub dynamics: &'a mut [T],
     /// The multiplier of a given state at the start.
@@ -73,10 +75,21 @@ impl<T: Real> From<Largest<T>> for Residuals {
     }
 }
 
-/// The largest size, at least that of `largest`. What is not a number does not show: residuals will.
-#[inline(always)]
-fn grow<T: Real>(largest: &mut T, vector: &[T]) {
-    *largest = vector.iter().fold(*largest, |largest, a| a.abs().max(largest));
+/// The residuals as a function of its own; the gradient only where there is room for multipliers and the objective.
+struct Evaluate<'s, 'a, T, E> {
+    iterate: &'s mut Iterate<'a, T>,
+    multipliers: Option<(&'s mut [T], &'s mut T)>,
+    register: PhantomData<E>,
+}
+
+impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
+    #[inline(always)]
+    fn run(self) {
+        self.iterate.values::<E>();
+        if let Some((multipliers, objective)) = self.multipliers {
+            *objective = self.iterate.gradient::<E>(multipliers);
+        }
+    }
 }
 
 const fn first_nx(dims: &[StageDims]) -> usize {
@@ -114,15 +127,27 @@ impl<'a, T: Real> Iterate<'a, T> {
     }
 
     /// `1 / ε` of equations: they are satisfied up to `ε Δy`, and the next step takes what is left.
-    fn equation_weight() -> T {
+    pub fn equation_weight() -> T {
         T::ONE / T::from_f64(T::EPSILON).sqrt()
     }
 
     /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
     /// Lagrangian in `x` zero, and the gradient in `u`. Returns the objective.
-    #[inline(always)]
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
-        self.evaluate_values::<E>();
+        let (mut objective, register) = (T::ZERO, PhantomData);
+        let multipliers = Some((multipliers, &mut objective));
+        E::vectorize(Evaluate::<T, E> { iterate: self, multipliers, register });
+        objective
+    }
+
+    /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are in `scratch` afterwards.
+    pub fn evaluate_values<E: Packed<T>>(&mut self) {
+        E::vectorize(Evaluate::<T, E> { iterate: self, multipliers: None, register: PhantomData });
+    }
+
+    /// The multipliers `π`, the gradient in `u`, and the objective.
+    #[inline(always)]
+    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
         let sides = &mut self.sides;
         // Forces of the constraints, by rows.
         let forces = &mut *self.gradient;
@@ -134,7 +159,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
-        grow(&mut largest, forces);
+        largest = larger::<T, E>(largest, forces);
         for place in Places::<T>::new(self.qp.dims).rev() {
             let Place { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
@@ -145,8 +170,8 @@ impl<'a, T: Real> Iterate<'a, T> {
             let v = part(self.v, place.row, ld);
             g.fill(T::ZERO);
             symmetric(g, hessian, ld, v, n);
-            grow(&mut largest, g);
-            grow(&mut largest, linear);
+            largest = larger::<T, E>(largest, g);
+            largest = larger::<T, E>(largest, linear);
             for ((g, &linear), &v) in g.iter_mut().zip(linear).zip(v) {
                 objective = objective + v * (T::from_f64(0.5) * *g + linear);
                 *g = *g + linear;
@@ -171,7 +196,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                     *pi = *g;
                     *g = T::ZERO;
                 }
-                grow(&mut largest, pi);
+                largest = larger::<T, E>(largest, pi);
             } else if self.first == First::Fixed {
                 // What is left is the multiplier of the given state.
                 let given = part_mut(g, 0, nx);
@@ -183,9 +208,8 @@ impl<'a, T: Real> Iterate<'a, T> {
         objective + self.penalties()
     }
 
-    /// General constraints, dynamics, and what belongs to sides.
     #[inline(always)]
-    pub fn evaluate_values<E: Packed<T>>(&mut self) {
+    fn values<E: Packed<T>>(&mut self) {
         let mut largest = T::ZERO;
         let mut rest = &mut *self.v;
         for place in Places::<T>::new(self.qp.dims) {
@@ -196,11 +220,11 @@ impl<'a, T: Real> Iterate<'a, T> {
             let general = part_mut(general, 0, ng);
             general.fill(T::ZERO);
             add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
-            grow(&mut largest, v);
-            grow(&mut largest, general);
+            largest = larger::<T, E>(largest, v);
+            largest = larger::<T, E>(largest, general);
             let dynamics = part_mut(self.dynamics, place.dynamics, next);
             let offset = part(data, place.offset(), next);
-            grow(&mut largest, offset);
+            largest = larger::<T, E>(largest, offset);
             for ((dynamics, &offset), &coming) in dynamics.iter_mut().zip(offset).zip(&*rest) {
                 *dynamics = offset - coming;
             }
@@ -326,7 +350,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// A function of the value of the row and the bound, for every side, into `scratch`.
     #[inline(always)]
-    fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
+    pub fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
         let count = self.counts.lower;
         let (lower_rows, upper_rows) = self.rows.split_at_checked(count).unwrap_or_default();
         let (lower_bounds, upper_bounds) = self.bound.split_at_checked(count).unwrap_or_default();
@@ -339,6 +363,19 @@ impl<T: Real> Sides<'_, T> {
         }
     }
 
+    /// Multipliers of a solution.
+    pub fn take_multipliers(&mut self, solution: &SolutionView<'_, T>) {
+        let (lower, upper) = self.rows.split_at_checked(self.counts.lower).unwrap_or_default();
+        let sides = lower.iter().map(|&row| at(solution.lower, row));
+        let sides = sides.chain(upper.iter().map(|&row| at(solution.upper, row)));
+        for (multiplier, given) in self.multiplier.iter_mut().zip(sides) {
+            *multiplier = given;
+        }
+        for (free, &row) in self.free.iter_mut().zip(&*self.equations) {
+            *free = at(solution.lower, row) - at(solution.upper, row);
+        }
+    }
+
     /// Slacks at least this far from zero, with multipliers from a solution or such that all products are equal.
     /// `scratch` has the distances from the bounds.
     pub fn begin(&mut self, start: Start, distance: T, solution: &SolutionView<'_, T>) {
@@ -346,18 +383,11 @@ impl<T: Real> Sides<'_, T> {
         for (slack, &value) in self.slack.iter_mut().zip(&*self.scratch).take(sides) {
             *slack = value.max(distance);
         }
-        for (i, (multiplier, &row)) in self.multiplier.iter_mut().zip(&*self.rows).enumerate() {
-            let given = if i < self.counts.lower { &*solution.lower } else { &*solution.upper };
-            let slack = self.slack.get(i).copied().unwrap_or(T::ONE);
-            *multiplier = match start {
-                Start::Cold => distance * distance / slack,
-                Start::Warm => at(given, row).max(distance * distance / slack),
-            };
-        }
         if start == Start::Warm {
-            for (free, &row) in self.free.iter_mut().zip(&*self.equations) {
-                *free = at(solution.lower, row) - at(solution.upper, row);
-            }
+            self.take_multipliers(solution);
+        }
+        for (multiplier, &slack) in self.multiplier.iter_mut().zip(&*self.slack).take(sides) {
+            *multiplier = multiplier.max(distance * distance / slack);
         }
         for (j, &side) in self.soft.iter().enumerate() {
             let side = side as usize;
@@ -505,13 +535,13 @@ struct Soft<T> {
 
 /// An element; zero if there is none.
 #[inline(always)]
-fn at<T: Real>(slice: &[T], index: u32) -> T {
+pub fn at<T: Real>(slice: &[T], index: u32) -> T {
     slice.get(index as usize).copied().unwrap_or(T::ZERO)
 }
 
 /// Changes rows by values that belong to them.
 #[inline(always)]
-fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
+pub fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
     for (&row, value) in rows.iter().zip(values) {
         if let Some(target) = target.get_mut(row as usize) {
             *target = change(*target, value);

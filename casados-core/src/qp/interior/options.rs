@@ -15,6 +15,9 @@ pub struct InteriorPointOptions {
     pub max_iterations: usize,
     /// Where the products of slacks and multipliers begin. Default 1.
     pub start_mu: f64,
+    /// How many sets of active bounds a warm start tries before slacks and multipliers are moved away from zero and the
+    /// interior point begins. Each costs less than one of its iterations. Default 4.
+    pub active_sets: usize,
     /// Slacks and multipliers of a warm start are at least this. Default 1e-3.
     pub warm_distance: f64,
     /// Whether a QP that was not solved is solved again with all bounds soft, to see which of them cannot be satisfied.
@@ -32,6 +35,7 @@ impl InteriorPointOptions {
             relative_tolerance,
             max_iterations: 50,
             start_mu: 1.0,
+            active_sets: 4,
             warm_distance: 1e-3,
             locate: true,
         }

@@ -149,7 +149,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
 }
 
 impl<T: Real> Riccati<'_, T> {
-    /// Solves Newton's equations, for a new matrix or for that of the last time. `step` is `Δ`, with the changes of the general
+    /// Solves Newton's equations, for a new matrix or for that of the last time and its `r`. `step` is `Δ`, with the changes of the general
     /// constraints.
     ///
     /// # Errors
@@ -164,6 +164,11 @@ impl<T: Real> Riccati<'_, T> {
         let register = PhantomData::<E>;
         E::vectorize(Solve { riccati: self, equations, factor, step, result: &mut result, register });
         result
+    }
+
+    /// The next solve with the same matrix has other residuals of the dynamics: none, but for rounding.
+    pub fn no_dynamics(&mut self) {
+        self.offset.fill(T::ZERO);
     }
 
     #[inline(always)]

@@ -28,8 +28,11 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { iterate, options, limits, start, scale, solution, result } = self;
-        iterate.begin::<E>(options, start, scale, solution);
-        *result = iterate.iterations::<E>(options, &limits, solution);
+        let tries = if start == Start::Warm { options.active_sets.min(options.max_iterations) } else { 0 };
+        *result = iterate.by_active_sets::<E>(tries, &limits, solution).or_else(|statistics| {
+            iterate.begin::<E>(options, start, scale, solution);
+            iterate.iterations::<E>(statistics, options, &limits, solution)
+        });
         iterate.store(solution);
     }
 }
@@ -55,7 +58,7 @@ impl<T: Real> Limits<T> {
     }
 
     /// Of residuals with such terms.
-    fn of(&self, terms: Terms<T>) -> Terms<T> {
+    pub fn of(&self, terms: Terms<T>) -> Terms<T> {
         Terms {
             forces: (self.relative * terms.forces).max(self.absolute.forces),
             values: (self.relative * terms.values).max(self.absolute.values),
@@ -63,7 +66,7 @@ impl<T: Real> Limits<T> {
     }
 
     /// Whether residuals with such terms are small.
-    fn hold(&self, residuals: Largest<T>, terms: Terms<T>) -> bool {
+    pub fn hold(&self, residuals: Largest<T>, terms: Terms<T>) -> bool {
         let Largest { stationarity, dynamics, inequalities, complementarity } = residuals;
         let Terms { forces, values } = self.of(terms);
         stationarity <= forces && complementarity <= forces && dynamics <= values && inequalities <= values
@@ -74,6 +77,21 @@ impl<T: Real> Limits<T> {
 const BOUNDARY: f64 = 0.005;
 
 impl<T: Real> Iterate<'_, T> {
+    /// States and controls of a solution.
+    pub fn take_point(&mut self, solution: &SolutionView<'_, T>) {
+        for place in Places::<T>::new(self.qp.dims) {
+            assign(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
+        }
+    }
+
+    /// The state at the start, if it is given.
+    pub fn give_initial_state(&mut self) {
+        if let (First::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
+            let x0 = stage.x_bounds().lower;
+            assign(part_mut(self.v, 0, x0.len()), x0);
+        }
+    }
+
     #[inline(always)]
     fn begin<E: Packed<T>>(
         &mut self,
@@ -83,14 +101,9 @@ impl<T: Real> Iterate<'_, T> {
         solution: &mut SolutionView<'_, T>,
     ) {
         if start == Start::Warm {
-            for place in Places::<T>::new(self.qp.dims) {
-                assign(part_mut(self.v, place.row, place.n), part(solution.v, place.v, place.n));
-            }
+            self.take_point(solution);
         }
-        if let (First::Fixed, Some(stage)) = (self.first, self.qp.stage(0)) {
-            let x0 = stage.x_bounds().lower;
-            assign(part_mut(self.v, 0, x0.len()), x0);
-        }
+        self.give_initial_state();
         self.evaluate_values::<E>();
         let cold = (T::from_f64(options.start_mu) * scale).sqrt();
         let distance = match start {
@@ -110,11 +123,11 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     fn iterations<E: Packed<T>>(
         &mut self,
+        mut statistics: Statistics,
         options: &InteriorPointOptions,
         limits: &Limits<T>,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
-        let mut statistics = Statistics::default();
         let (mut short, mut refine) = (0, false);
         let mut known = self.mu;
         loop {

@@ -47,7 +47,7 @@ impl Counts {
     }
     /// How many indices the lists take.
     pub const fn indices(&self) -> usize {
-        self.sides() + self.equations + self.soft
+        2 * self.sides() + self.equations + self.soft
     }
 }
 
@@ -153,6 +153,8 @@ pub struct Sides<'a, T> {
     pub equations: &'a mut [u32],
     /// Sides that are soft.
     pub soft: &'a mut [u32],
+    /// What sides are to a method of active sets.
+    pub activity: &'a mut [u32],
     /// Slacks `s` of sides, then violations `e`.
     pub slack: &'a mut [T],
     /// Multipliers `λ`, then `ν`.
@@ -201,6 +203,7 @@ impl<'a, T: Real> Sides<'a, T> {
             rows: take_mut(indices, sides),
             equations: take_mut(indices, counts.equations),
             soft: take_mut(indices, counts.soft),
+            activity: take_mut(indices, sides),
             slack: take_mut(numbers, pairs),
             multiplier: take_mut(numbers, pairs),
             residual: take_mut(numbers, pairs),

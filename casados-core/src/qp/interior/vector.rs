@@ -58,16 +58,22 @@ pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T])
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a / b)).max(largest))
 }
 
-/// The largest `|a|`; NaN if one of them is, or if their squares overflow.
+/// The largest `|a|`, at least `least`. NaN is not seen.
 #[inline(always)]
-pub fn largest_size<T: Real, E: Packed<T>>(all: &[T]) -> T {
+pub fn larger<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
     let (a, rest) = split!(all);
-    let mut largest = E::from_f64(0.0);
+    let mut largest = super::kernels::splat::<T, E>(least);
     for a in a {
         largest = E::load(a).abs().max(largest);
     }
     let whole = extreme::<T, E>(largest);
-    let largest = rest.iter().fold(whole, |largest, a| a.abs().max(largest));
+    rest.iter().fold(whole, |largest, a| a.abs().max(largest))
+}
+
+/// The largest `|a|`; NaN if one of them is, or if their squares overflow.
+#[inline(always)]
+pub fn largest_size<T: Real, E: Packed<T>>(all: &[T]) -> T {
+    let largest = larger::<T, E>(T::ZERO, all);
     // What is compared with NaN does not show it: sums do.
     if dot::<T, E>(all, all).is_finite() { largest } else { T::from_f64(f64::NAN) }
 }

@@ -1,0 +1,281 @@
+//! Warm starts by active sets: Newton's method on `min(s, λ) = 0` instead of `s λ = μ` (M. Hintermüller, K. Ito, K. Kunisch,
+//! "The primal-dual active set strategy as a semismooth Newton method", SIAM J. Optim. 13, 2002).
+//!
+//! Of a QP that resembles the last one mostly the same bounds are active, and the multipliers tell which. With these as
+//! equations one factorisation solves it; then bounds that are violated become active, and those that pull cease to be.
+//! An interior point, which has to leave the boundary first, needs several times as many. Where the sets do not settle it is
+//! asked all the same, so that nothing depends on whether they do.
+//!
+//! With the distance `d = σ (c v − bound)`, a weight `W`, and penalties `l e + ½ q e²` of a violation `e`:
+//!
+//! ```text
+//! inactive   λ = 0           until d < 0
+//! active     λ₊ = λ − W d₊   until λ < 0, or, of a soft side, λ > l        (augmented Lagrangian: d₊ = (λ − λ₊) / W)
+//! violated   λ = l − q d     until d > 0
+//! ```
+
+use super::newton::{Iterate, Terms, at, scatter};
+use super::riccati::Equations;
+use super::run::Limits;
+use super::sides::{Sides, set};
+use super::vector::{largest_negative_product, largest_product};
+use crate::qp::layout::{assign, part_mut};
+use crate::qp::solution::SolutionView;
+use crate::qp::statistics::Statistics;
+use crate::scalar::{Packed, Real};
+
+/// What a side is, as an element of a list of indices.
+pub const INACTIVE: u32 = 0;
+pub const ACTIVE: u32 = 1;
+pub const VIOLATED: u32 = 2;
+
+/// Solves with the same factors, at most.
+const REFINEMENTS: usize = 3;
+
+impl<T: Real> Iterate<'_, T> {
+    /// The solution from a point and its multipliers, if not more than some active sets are between them and no pivot
+    /// vanishes; otherwise what it took to see that.
+    #[inline(always)]
+    pub fn by_active_sets<E: Packed<T>>(
+        &mut self,
+        tries: usize,
+        limits: &Limits<T>,
+        solution: &mut SolutionView<'_, T>,
+    ) -> Result<Statistics, Statistics> {
+        let mut statistics = Statistics::default();
+        if tries == 0 {
+            return Err(statistics);
+        }
+        self.take_point(solution);
+        self.give_initial_state();
+        self.evaluate_values::<E>();
+        self.sides.take_multipliers(solution);
+        self.sides.guess();
+        let _ = self.evaluate::<E>(solution.dynamics);
+        let (mut factor, mut changes) = (true, usize::MAX);
+        loop {
+            if factor {
+                statistics.iterations += 1;
+                statistics.active_sets += 1;
+                statistics.factorisations += 1;
+            } else {
+                statistics.refinements += 1;
+            }
+            if !self.active_step::<E>(factor) {
+                return Err(statistics);
+            }
+            let before = changes;
+            // Nothing changes sides because of what is below the tolerance.
+            let Terms { forces, values } = limits.of(self.terms);
+            let half = T::from_f64(0.5);
+            changes = self.sides.change(Terms { forces: half * forces, values: half * values });
+            factor = changes > 0;
+            if factor {
+                // Sets that come nearer do not change more and more.
+                if statistics.iterations >= tries || changes > before {
+                    return Err(statistics);
+                }
+                continue;
+            }
+            self.sides.settle();
+            let objective = self.evaluate::<E>(solution.dynamics);
+            let mut residuals = self.residuals::<E>();
+            // Slacks of active sides are zero: what is left of their distances counts here too.
+            let (residual, multiplier) = (&*self.sides.residual, &*self.sides.multiplier);
+            let products = largest_product::<T, E>(T::ZERO, residual, multiplier);
+            residuals.complementarity = largest_negative_product::<T, E>(products, residual, multiplier);
+            if limits.hold(residuals, self.terms) {
+                (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
+                return Ok(statistics);
+            }
+            if statistics.refinements >= REFINEMENTS {
+                return Err(Statistics { refinements: 0, ..statistics });
+            }
+            self.sides.unsettle();
+            self.riccati.no_dynamics();
+        }
+    }
+
+    /// Newton's step, with the sides as they are; whether there is one.
+    #[inline(always)]
+    fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
+        let weight = Self::equation_weight();
+        let sides = &mut self.sides;
+        sides.force(weight);
+        assign(self.gradient, self.stationarity);
+        let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
+        let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
+        scatter(self.gradient, lower, of_lower, |g, &force| g - force);
+        scatter(self.gradient, upper, of_upper, |g, &force| g + force);
+        scatter(self.gradient, sides.equations, sides.equation_residual, |g, &residual| {
+            g + weight * residual
+        });
+        if factor {
+            self.weights.fill(T::ZERO);
+            scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
+            scatter(self.weights, sides.equations, sides.free, |sum, _| sum + weight);
+        }
+        let equations = Equations {
+            qp: self.qp,
+            first: self.first,
+            weights: self.weights,
+            gradient: self.gradient,
+            dynamics: self.dynamics,
+        };
+        if self.riccati.solve::<E>(equations, factor, self.step).is_err() || self.riccati.regularised > 0 {
+            return false;
+        }
+        for (v, &step) in self.v.iter_mut().zip(&*self.step) {
+            *v = *v + step;
+        }
+        // A whole step leaves nothing of these.
+        self.stationarity.fill(T::ZERO);
+        self.dynamics.fill(T::ZERO);
+        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
+        for ((&row, free), residual) in equations {
+            *residual = *residual + at(self.step, row);
+            *free = *free - weight * *residual;
+        }
+        sides.gather(self.step, |value, _| value, |value, _| -value);
+        sides.follow(weight);
+        true
+    }
+}
+
+/// Here `slack` is the distance `d`, which may be negative, and `target` the force that the gradient knows of.
+impl<T: Real> Sides<'_, T> {
+    /// What sides are, from their distances in `scratch` and their multipliers.
+    fn guess(&mut self) {
+        let count = self.counts.sides();
+        assign(part_mut(self.slack, 0, count), self.scratch);
+        for ((activity, &distance), &multiplier) in
+            self.activity.iter_mut().zip(&*self.slack).zip(&*self.multiplier)
+        {
+            *activity = if multiplier > distance { ACTIVE } else { INACTIVE };
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
+            let force = at(self.linear, j as u32) - at(self.quadratic, j as u32) * distance;
+            // Of a violation and the force that its multiplier lacks one is zero.
+            if distance < T::ZERO && -distance > force - multiplier {
+                set(self.activity, side as usize, VIOLATED);
+                set(self.multiplier, side as usize, force);
+            }
+        }
+        for (&activity, multiplier) in self.activity.iter().zip(&mut *self.multiplier) {
+            if activity == INACTIVE {
+                *multiplier = T::ZERO;
+            }
+        }
+        assign(part_mut(self.target, 0, count), self.multiplier);
+    }
+
+    /// Weights, and into `scratch` what the sides pull with beyond what the gradient knows of.
+    #[inline(always)]
+    fn force(&mut self, weight: T) {
+        for (&activity, side_weight) in self.activity.iter().zip(&mut *self.weight) {
+            *side_weight = if activity == ACTIVE { weight } else { T::ZERO };
+        }
+        let forces = self.multiplier.iter().zip(&*self.target).zip(self.weight.iter().zip(&*self.slack));
+        for (scratch, ((&force, &known), (&weight, &distance))) in self.scratch.iter_mut().zip(forces) {
+            *scratch = force - known - weight * distance;
+        }
+        for (&side, &quadratic) in self.soft.iter().zip(&*self.quadratic) {
+            if self.activity.get(side as usize) == Some(&VIOLATED) {
+                set(self.weight, side as usize, quadratic);
+            }
+        }
+    }
+
+    /// Distances and multipliers after a step, whose changes of rows are in `scratch`.
+    #[inline(always)]
+    fn follow(&mut self, weight: T) {
+        for (distance, &change) in self.slack.iter_mut().zip(&*self.scratch).take(self.counts.sides()) {
+            *distance = *distance + change;
+        }
+        let sides = self.activity.iter().zip(&*self.slack);
+        for (multiplier, (&activity, &distance)) in self.multiplier.iter_mut().zip(sides) {
+            *multiplier = *multiplier - if activity == ACTIVE { weight * distance } else { T::ZERO };
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            if self.activity.get(side as usize) == Some(&VIOLATED) {
+                let distance = at(self.slack, side);
+                let force = at(self.linear, j as u32) - at(self.quadratic, j as u32) * distance;
+                set(self.multiplier, side as usize, force);
+            }
+        }
+        assign(part_mut(self.target, 0, self.counts.sides()), self.multiplier);
+    }
+
+    /// Sides become what their distances and multipliers say. Returns how many have changed.
+    #[inline(always)]
+    fn change(&mut self, tolerance: Terms<T>) -> usize {
+        let Terms { forces, values } = tolerance;
+        let mut changes = 0;
+        let sides = self.activity.iter_mut().zip(&*self.slack);
+        for ((activity, &distance), multiplier) in sides.zip(&mut *self.multiplier) {
+            if *activity == ACTIVE && *multiplier < -forces {
+                (*activity, *multiplier) = (INACTIVE, T::ZERO);
+                changes += 1;
+            } else if *activity == INACTIVE && distance < -values {
+                *activity = ACTIVE;
+                changes += 1;
+            }
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let Some(activity) = self.activity.get_mut(side as usize) else { break };
+            let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
+            let linear = at(self.linear, j as u32);
+            let whole = linear - at(self.quadratic, j as u32) * distance;
+            // Without a linear penalty there is nothing between inactive and violated.
+            let between = linear > T::ZERO;
+            match *activity {
+                ACTIVE if !between || multiplier > linear + forces => {
+                    *activity = VIOLATED;
+                    set(self.multiplier, side as usize, whole);
+                    changes += usize::from(between);
+                }
+                VIOLATED if distance > values => {
+                    *activity = if between { ACTIVE } else { INACTIVE };
+                    set(self.multiplier, side as usize, if between { linear } else { T::ZERO });
+                    changes += 1;
+                }
+                _ => {}
+            }
+        }
+        changes
+    }
+
+    /// Slacks, violations and multipliers as an interior point has them: none is negative.
+    #[inline(always)]
+    fn settle(&mut self) {
+        let count = self.counts.sides();
+        for (j, &side) in self.soft.iter().enumerate() {
+            let violated = self.activity.get(side as usize) == Some(&VIOLATED);
+            let lacks = at(self.linear, j as u32) - at(self.multiplier, side);
+            let (violation, other) =
+                if violated { (-at(self.slack, side), T::ZERO) } else { (T::ZERO, lacks) };
+            set(self.slack, count + j, violation.max(T::ZERO));
+            set(self.multiplier, count + j, other.max(T::ZERO));
+        }
+        let sides = self.slack.iter_mut().zip(&mut *self.multiplier);
+        for ((slack, multiplier), &activity) in sides.zip(&*self.activity) {
+            *slack = if activity == INACTIVE { slack.max(T::ZERO) } else { T::ZERO };
+            *multiplier = multiplier.max(T::ZERO);
+        }
+    }
+
+    /// Distances again, from the residuals of a settled point.
+    #[inline(always)]
+    fn unsettle(&mut self) {
+        let count = self.counts.sides();
+        for (distance, &residual) in self.slack.iter_mut().zip(&*self.residual).take(count) {
+            *distance = *distance + residual;
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let (violation, distance) = (at(self.slack, (count + j) as u32), at(self.slack, side));
+            set(self.slack, side as usize, distance - violation);
+        }
+        assign(part_mut(self.target, 0, count), self.multiplier);
+    }
+}
