@@ -51,7 +51,7 @@ impl<T: Real> Iterate<'_, T> {
         self.evaluate_values::<E>();
         self.sides.take_multipliers(solution);
         self.sides.guess();
-        let _ = self.evaluate::<E>(solution.dynamics);
+        self.evaluate_gradient::<E>(solution.dynamics);
         let (mut factor, mut changes) = (true, usize::MAX);
         loop {
             if factor {

@@ -78,6 +78,7 @@ impl<T: Real> From<Largest<T>> for Residuals {
 /// The residuals as a function of its own; the gradient only where there is room for multipliers and the objective.
 struct Evaluate<'s, 'a, T, E> {
     iterate: &'s mut Iterate<'a, T>,
+    values: bool,
     multipliers: Option<(&'s mut [T], &'s mut T)>,
     register: PhantomData<E>,
 }
@@ -85,7 +86,9 @@ struct Evaluate<'s, 'a, T, E> {
 impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
-        self.iterate.values::<E>();
+        if self.values {
+            self.iterate.values::<E>();
+        }
         if let Some((multipliers, objective)) = self.multipliers {
             *objective = self.iterate.gradient::<E>(multipliers);
         }
@@ -134,15 +137,25 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
     /// Lagrangian in `x` zero, and the gradient in `u`. Returns the objective.
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
-        let (mut objective, register) = (T::ZERO, PhantomData);
-        let multipliers = Some((multipliers, &mut objective));
-        E::vectorize(Evaluate::<T, E> { iterate: self, multipliers, register });
-        objective
+        self.evaluate_parts::<E>(true, Some(multipliers))
     }
 
     /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are in `scratch` afterwards.
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
-        E::vectorize(Evaluate::<T, E> { iterate: self, multipliers: None, register: PhantomData });
+        let _ = self.evaluate_parts::<E>(true, None);
+    }
+
+    /// What is left of [`evaluate`](Self::evaluate) after [`evaluate_values`](Self::evaluate_values).
+    pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers));
+    }
+
+    #[inline(always)]
+    fn evaluate_parts<E: Packed<T>>(&mut self, values: bool, multipliers: Option<&mut [T]>) -> T {
+        let (mut objective, register) = (T::ZERO, PhantomData);
+        let multipliers = multipliers.map(|multipliers| (multipliers, &mut objective));
+        E::vectorize(Evaluate::<T, E> { iterate: self, values, multipliers, register });
+        objective
     }
 
     /// The multipliers `π`, the gradient in `u`, and the objective.
