@@ -17,6 +17,7 @@ use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
 use crate::tableau::{Method, Tableau};
 use alloc::boxed::Box;
+use alloc::vec::Vec;
 use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
@@ -179,12 +180,6 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
     /// this is their error, which no method with `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the
     /// solve takes it out of the estimate.
     fn error_at_end(&mut self, start: &Start<'_, M, T>, residuals: &mut usize) -> Result<f64, Failure> {
-        let mut point = *start.point;
-        self.extrapolate(start.h, &mut point);
-        if let Some(time) = point.as_mut().last_mut() {
-            *time = *time + start.h;
-        }
-        self.memory.point = point;
         self.defect(start.h, residuals)?;
         let states = self.memory.error.as_ref().get(..M::Shape::NX).unwrap_or_default();
         Ok(norm(states, start.scale.as_ref()))
@@ -192,24 +187,15 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
 
     /// The estimated error of `(x, z)` from the defect at the point that is there.
     fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
-        let Memory { point, f_point, rows, error, factors, .. } = &mut *self.memory;
+        let Memory { point, f_point, .. } = &mut *self.memory;
         *residuals += 1;
         M::residual::<T>(point, f_point);
         if not_finite(f_point.as_ref()).is_some() {
             return Err(Failure::NotFinite);
         }
-        // The real system is the first, if there is one.
-        for (equation, f) in f_point.as_ref().iter().enumerate() {
-            let [[row]] = &mut rows[slot::<M>(equation)];
-            *row = Complex::zero();
-            row.re[0] = -*f;
-        }
-        factors.solve(rows);
-        // Of methods with an even number of stages it is complex; the error is the real part.
-        let [re, im] = [self.basis.values().re[0], self.basis.values().im[0]].map(|value| h * value);
-        for (index, (error, [[row]])) in error.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
-            *error = if index < M::Shape::NX { re * row.re[0] - im * row.im[0] } else { row.re[0] };
-        }
+        let mut error = *f_point;
+        self.filter(h, &mut error);
+        self.memory.error = error;
         Ok(())
     }
 }
@@ -346,16 +332,52 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
         Err(Failure::Diverges)
     }
 
-    fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
+    fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool {
+        *point = *start.point;
         if !self.tableau.is_stiffly_accurate() {
+            self.extrapolate(start.h, point);
+            if let Some(time) = point.as_mut().last_mut() {
+                *time = *time + start.h;
+            }
+            return true;
+        }
+        for (xdot, k) in point.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
+            *xdot = dot(&self.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
+        }
+        false
+    }
+
+    fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>) {
+        let Memory { rows, factors, .. } = &mut *self.memory;
+        // The real system is the first, if there is one.
+        for (equation, f) in residual.as_ref().iter().enumerate() {
+            let [[row]] = &mut rows[slot::<M>(equation)];
+            *row = Complex::zero();
+            row.re[0] = -*f;
+        }
+        factors.solve(rows);
+        // Of methods with an even number of stages it is complex; the error is the real part.
+        let [re, im] = [self.basis.values().re[0], self.basis.values().im[0]].map(|value| h * value);
+        for (index, (error, [[row]])) in residual.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
+            *error = if index < M::Shape::NX { re * row.re[0] - im * row.im[0] } else { row.re[0] };
+        }
+    }
+
+    fn unknowns(&self, to: &mut Vec<T>) {
+        for y in self.memory.y.as_ref() {
+            to.extend(y.as_flattened().iter().take(S));
+        }
+    }
+
+    fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure> {
+        let mut point = ArrayV::<M, T>::zeroed();
+        let at_end = self.estimates(start, &mut point);
+        self.memory.point = point;
+        if at_end {
             return self.error_at_end(start, residuals);
         }
         // What the method misses is how far the derivative of its polynomial, extrapolated to the start of the step,
         // is from the solution there.
-        self.memory.point = *start.point;
-        for (xdot, k) in self.memory.point.as_mut().iter_mut().zip(&self.memory.y.as_ref()[..M::Shape::NX]) {
-            *xdot = dot(&self.lagrange, k.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
-        }
         self.defect(start.h, residuals)?;
         let error = norm(self.memory.error.as_ref(), start.scale.as_ref());
         if !(again && error >= 1.0) {

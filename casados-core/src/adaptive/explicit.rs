@@ -1,18 +1,19 @@
 //! Explicit pairs for models that are not stiff: the method of higher order advances the solution, the difference to the
 //! other one decides about the step.
 
+use super::consistent::At;
 use super::control::{Proportional, power};
 use super::explicit_step::{Stepper, Take};
 use super::norm::{mean, norm};
 use super::pairs::Pair;
 use super::replay::{Replay, Taken};
-use super::run::{Accepted, After, Run, Span};
+use super::run::{Accepted, After, Base, Run, Span};
 use super::sealed::{Engine, Kind};
 use super::tape::Entry;
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
 use crate::memory::Heap;
-use crate::model::{ArrayK, Dae, Ode, VectorX};
+use crate::model::{ArrayK, ArrayW, ArrayX, Dae, Ode, VectorX};
 use crate::options::Options;
 use crate::quadrature::Along;
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
@@ -39,15 +40,19 @@ impl<M: Dae, B, T: Real, const S: usize> Default for Steps<M, B, T, S> {
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
-    /// At the start of a step.
-    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+    fn erk(&mut self) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
         if self.replay.is_none() {
             let erk: Box<Erk<M, B, S, T, Heap>> = Box::new(Erk::new(Options::default())?);
             self.replay = Some(erk);
         }
         // It is one, whatever the type system knows.
         let erk = self.replay.as_mut().and_then(|replay| replay.downcast_mut::<Erk<M, B, S, T, Heap>>());
-        let erk = erk.ok_or(Error::NoResult)?;
+        erk.ok_or(Error::NoResult)
+    }
+
+    /// At the start of a step.
+    fn go(&mut self, step: &Taken<'_, M, T>) -> Result<&mut Erk<M, B, S, T, Heap>, Error> {
+        let erk = self.erk()?;
         if M::Shape::NP > 0 {
             erk.set_parameters(step.at.p)?;
         }
@@ -87,6 +92,10 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Replay<M, T> for Steps<M, B, T
         self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }
 
+    fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {
+        self.erk()?.slopes(weights, to)
+    }
+
     fn stages(&mut self, _: usize) -> Result<&[T], Error> {
         Ok(&[])
     }
@@ -109,6 +118,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Steps<M, B, T, S> {
         after: After<'_, M, T>,
     ) -> Result<(), Error> {
         run.place(x0, &ArrayK::<M, T>::zeroed(), span.start);
+        run.begin_sensitivities(x0, span.start)?;
         let nx = M::Shape::NX;
         let step = self.open()?;
         step.go(run.base.point.as_ref(), x0.as_slice());
@@ -159,6 +169,17 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             Ok(()) => step.error(h, run.base.rtol.as_ref(), run.base.atol.as_ref()),
             Err(_) => f64::NAN,
         };
+        let error = match &mut run.sensitivities {
+            Some(sensitivities) if error <= 1.0 => {
+                let Base { point, u, parameters, rtol, atol, .. } = &*run.base;
+                let taken = Taken { at: At { x: &x, u, p: parameters, t }, h, y: &[], level: 0 };
+                let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
+                let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
+                // Written so that NaN stays.
+                other.map_or(f64::NAN, |other| if error >= other { error } else { other })
+            }
+            _ => error,
+        };
         if !error.is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -175,6 +196,9 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             continue;
         }
         run.statistics.steps += 1;
+        if let Some(sensitivities) = &mut run.sensitivities {
+            sensitivities.accept();
+        }
         if run.record {
             run.tape.push(t, h, 0, x.as_slice(), &[])?;
         }

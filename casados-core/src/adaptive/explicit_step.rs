@@ -6,7 +6,7 @@ use crate::erk::{Grid, Point, Record, Scheme};
 use crate::error::{Error, Place};
 use crate::model::{ArrayX, Dae, Ode};
 use crate::result::Dense;
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape};
 use alloc::boxed::Box;
 use bytemuck::Zeroable;
@@ -140,12 +140,12 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         combine(&stages, &record.k, difference.as_mut());
         combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
         let fine = norm(difference.as_ref(), scale.as_ref());
-        let Some(coarse) = B::COARSE else { return fine };
-        difference.as_mut().fill(T::ZERO);
-        combine(&coarse, &record.k, difference.as_mut());
-        let coarse = norm(difference.as_ref(), scale.as_ref());
-        let both = fine * fine + 0.01 * coarse * coarse;
-        if both > 0.0 { fine * fine / Scalar::sqrt(both) } else { 0.0 }
+        let coarse = B::COARSE.map(|coarse| {
+            difference.as_mut().fill(T::ZERO);
+            combine(&coarse, &record.k, difference.as_mut());
+            norm(difference.as_ref(), scale.as_ref())
+        });
+        B::combined(fine, coarse)
     }
 
     fn end(&self) -> &[T] {

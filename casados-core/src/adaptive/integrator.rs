@@ -7,6 +7,7 @@ use super::sealed::{Engine, Kind};
 use super::sensitivities::{Frozen, Memory};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
+use super::variational::Variational;
 use crate::error::{Argument, Error};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
@@ -34,6 +35,8 @@ pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) base: Box<Base<M, T>>,
     pub(super) consistent: Consistent<M, T>,
     pub(super) state: B::State,
+    /// Derivatives, if they take part in the choice of the steps.
+    sensitivities: Option<Box<Variational<M, T>>>,
     pub(super) tape: Tape<T>,
     pub(super) statistics: AdaptiveStatistics,
     parameters: bool,
@@ -64,6 +67,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             base,
             consistent: Consistent::default(),
             state: Default::default(),
+            sensitivities: None,
             tape: Tape::default(),
             statistics: AdaptiveStatistics::default(),
             parameters: M::Shape::NP == 0,
@@ -130,6 +134,49 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             check_absolute(atol.to_f64())?;
         }
         stack::<M, T>(&mut self.base.atol, x, z);
+        Ok(())
+    }
+
+    /// Whether the derivatives of the solution take part in the choice of the steps of all following calls: then a step is
+    /// accepted if its estimated errors of the states and of every column of `V = d(x, z)/d(x₀, u, p)` are below the tolerances.
+    ///
+    /// Without it steps are chosen for the states, and derivatives are the exact ones of these steps: those of the solution
+    /// up to an error that need not follow the tolerance. The error of `V_rc` is measured by `atol_r / s_c + rtol_r |V_rc|`,
+    /// with the magnitudes `s` of [`Integrator::set_sensitivity_scales`]. Results are still exact derivatives of the steps that
+    /// are taken. Each step that the states accept is differentiated once more than without, in every call that
+    /// chooses steps, `solve` included; steps that are frozen cost nothing more. Over several intervals, and between events, `V` begins
+    /// as the identity in each.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn control_sensitivities(&mut self, controlled: bool) -> Result<(), Error> {
+        self.sensitivities = match self.sensitivities.take() {
+            _ if !controlled => None,
+            Some(there) => Some(there),
+            None => Some(Box::new(Variational::new::<B>()?)),
+        };
+        Ok(())
+    }
+
+    /// The magnitudes of `x₀`, `u` and `p` by which errors of derivatives are measured, as `p̄` of CVODES. For those that are
+    /// zero, and if never set, the absolute value in each call, or one if that is zero.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`] if one is negative or not finite: then the last ones stay.
+    pub fn set_sensitivity_scales(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        p: &VectorP<M, T>,
+    ) -> Result<(), Error> {
+        let scales = || x0.as_slice().iter().chain(u.as_slice()).chain(p.as_slice());
+        if let Some(scale) = scales().find(|scale| !(scale.is_finite() && **scale >= T::ZERO)) {
+            let (option, value) = ("sensitivity_scales", scale.to_f64());
+            return Err(Error::InvalidOption { option, value, reason: "a magnitude is not negative" });
+        }
+        for (to, from) in self.base.magnitudes.as_mut().iter_mut().zip(scales()) {
+            *to = *from;
+        }
         Ok(())
     }
 
@@ -446,9 +493,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     ) -> Result<(), Error> {
         self.last = None;
         let span = self.begin(x0, u, t_end)?;
-        let Self { options, base, consistent, state, tape, statistics, .. } = self;
+        let Self { options, base, consistent, state, tape, statistics, sensitivities, .. } = self;
         tape.clear();
-        let mut run = Run { options, base, consistent, tape, record, statistics };
+        let sensitivities = sensitivities.as_deref_mut();
+        let mut run = Run { options, base, consistent, tape, record, sensitivities, statistics };
         B::integrate(state, &mut run, x0, span, &mut after)?;
         self.last = Some(span);
         Ok(())

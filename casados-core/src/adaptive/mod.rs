@@ -12,7 +12,7 @@
 //! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels` its loops, `levels` the
 //! methods of a family, `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run` the
 //! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the explicit methods,
-//! `replay` and `sensitivities` derivatives of runs, `along` an integrand, `segment` one of several intervals, `piecewise` those
+//! `replay` and `sensitivities` derivatives of runs, `variational` derivatives that take part in the choice of the steps, `along` an integrand, `segment` one of several intervals, `piecewise` those
 //! with controls of their own and `columns` their derivatives, `events`, `integrator` what users see.
 
 mod along;
@@ -38,6 +38,7 @@ mod stages;
 mod start;
 mod statistics;
 mod tape;
+mod variational;
 
 pub use events::{Crossing, Event, Hybrid, HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient};
 pub use integrator::Integrator;

@@ -3,6 +3,7 @@
 //! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5, II.6 and II.10; the
 //! coefficients of the codes DOPRI5 and DOP853.
 
+use crate::scalar::Scalar;
 use crate::tableau::{DormandPrince5, DormandPrince8, Method};
 
 /// What a method of `S` stages needs besides its tableau. A stage follows them whose point is the end of the step.
@@ -22,6 +23,13 @@ pub trait Pair<const S: usize>: Method<S> {
     const MORE: &'static [More<S>];
     /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end, of those above.
     const POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
+
+    /// The estimate from the two differences.
+    fn combined(fine: f64, coarse: Option<f64>) -> f64 {
+        let Some(coarse) = coarse else { return fine };
+        let both = fine * fine + 0.01 * coarse * coarse;
+        if both > 0.0 { fine * fine / Scalar::sqrt(both) } else { 0.0 }
+    }
 }
 
 /// A stage for dense output.

@@ -7,7 +7,7 @@ use super::consistent::At;
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
-use crate::model::{Dae, VectorX};
+use crate::model::{ArrayW, ArrayX, Dae, VectorX};
 use crate::options::{Options, Start};
 use crate::quadrature::Along;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
@@ -44,6 +44,16 @@ pub trait Replay<M: Dae, T: Real> {
         step: &Taken<'_, M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
+    /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for each direction.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`]
+    fn slopes(
+        &mut self,
+        level: usize,
+        weights: &[f64],
+        to: &mut ArrayW<M, ArrayX<M, T>>,
+    ) -> Result<(), Error>;
     /// The same with second derivatives of `λᵀx` at its end.
     ///
     /// # Errors
@@ -130,6 +140,10 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
         self.go(step)?.adjoint_along(step.at.x, step.at.u, step.h, lambda, along)
     }
 
+    fn slopes(&mut self, _: usize, weights: &[f64], to: &mut ArrayW<M, ArrayX<M, T>>) -> Result<(), Error> {
+        self.0.as_mut().ok_or(Error::NoResult)?.slopes(weights, to)
+    }
+
     fn stages(&mut self, _: usize) -> Result<&[T], Error> {
         self.0.as_mut().ok_or(Error::NoResult)?.stages()
     }
@@ -179,6 +193,15 @@ impl<M: Dae, T: Real, A: Replay<M, T>, B: Replay<M, T>, C: Replay<M, T>> Replay<
         along: Along<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         of_level!(self, step.level, adjoint(step, lambda, along))
+    }
+
+    fn slopes(
+        &mut self,
+        level: usize,
+        weights: &[f64],
+        to: &mut ArrayW<M, ArrayX<M, T>>,
+    ) -> Result<(), Error> {
+        of_level!(self, level, slopes(level, weights, to))
     }
 
     fn stages(&mut self, level: usize) -> Result<&[T], Error> {

@@ -1,6 +1,6 @@
 //! The steps of an interval.
 
-use super::consistent::Consistent;
+use super::consistent::{At, Consistent};
 use super::control::{IMPLICIT, Predictive};
 use super::levels::{Levels, interpolate};
 use super::options::AdaptiveOptions;
@@ -8,12 +8,13 @@ use super::sealed::Family;
 use super::stages::{Convergence, FAST, Failure, Start};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
+use super::variational::Variational;
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;
-use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
+use crate::model::{ArrayK, ArrayV, ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Real, Scalar};
-use crate::shape::{Plain, Shape};
+use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -56,6 +57,8 @@ pub struct Base<M: Dae, T: Plain> {
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
+    /// Magnitudes of `(x₀, u, p)` by which derivatives are measured; zero if they are not given.
+    pub magnitudes: ArrayW<M, T>,
     pub u: VectorU<M, T>,
     /// Whether the constant entries of the Jacobian are there.
     pub(super) ready: bool,
@@ -86,6 +89,8 @@ pub struct Run<'a, M: Dae, T: Real> {
     pub tape: &'a mut Tape<T>,
     /// Whether steps are to be remembered.
     pub record: bool,
+    /// Derivatives, if they take part.
+    pub sensitivities: Option<&'a mut Variational<M, T>>,
     pub statistics: &'a mut AdaptiveStatistics,
 }
 
@@ -119,6 +124,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     ) -> Result<(), Error> {
         let nx = M::Shape::NX;
         self.prepare(x0, span)?;
+        self.begin_sensitivities(x0, span.start)?;
         let mut level = 0;
         self.tighten(B::STAGES);
         let mut stages = levels.get::<B>(level)?;
@@ -228,10 +234,23 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             let residuals = &mut self.statistics.residuals;
             let outcome = stages.solve(&start, self.base.newton_tolerance, &mut convergence, residuals);
             self.statistics.iterations += convergence.iterations;
+            let again = accepted_h.is_none() || rejected;
             let outcome = outcome.and_then(|()| {
                 stages
-                    .error(&start, accepted_h.is_none() || rejected, residuals)
+                    .error(&start, again, residuals)
                     .and_then(|error| if error.is_finite() { Ok(error) } else { Err(Failure::Diverges) })
+            });
+            let outcome = outcome.and_then(|error| match &mut self.sensitivities {
+                Some(sensitivities) if error < 1.0 => {
+                    let Base { point, u, parameters, tight, .. } = &*self.base;
+                    let mut x = VectorX::<M, T>::zeroed();
+                    x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
+                    let at = At { x: &x, u, p: parameters, t };
+                    sensitivities
+                        .implicit(stages, at, level, &start, tight, again)
+                        .map(|other| error.max(other))
+                }
+                _ => Ok(error),
             });
             let error = match outcome {
                 Ok(error) => error,
@@ -283,6 +302,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             self.statistics.steps += 1;
             (troubles, pivoted) = (0, false);
             stages.accept();
+            if let Some(sensitivities) = &mut self.sensitivities {
+                sensitivities.accept();
+            }
             if self.record {
                 let x = &self.base.point.as_ref()[nx..2 * nx];
                 self.tape.push(t, h, level, x, stages.accepted())?;
@@ -335,6 +357,16 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             need = if fast { Need::Factors } else { Need::Jacobian };
         }
+    }
+
+    /// The identity, if derivatives take part.
+    ///
+    /// # Errors
+    /// As [`Consistent::forward`].
+    pub fn begin_sensitivities(&mut self, x0: &VectorX<M, T>, t: T) -> Result<(), Error> {
+        let Some(sensitivities) = &mut self.sensitivities else { return Ok(()) };
+        let Base { u, parameters, start, magnitudes, .. } = &*self.base;
+        sensitivities.begin(&At { x: x0, u, p: parameters, t }, start, magnitudes, self.consistent)
     }
 
     /// Tolerances of the estimate: it is of lower order than the method, `s` instead of `2s − 1`.

@@ -2,6 +2,7 @@
 
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::Real;
+use alloc::vec::Vec;
 
 /// The most stages.
 pub(super) const MOST: usize = 9;
@@ -89,6 +90,13 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// [`Failure::NotFinite`]
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
+    /// The variables where the estimate compares the derivative of the polynomial with the solution; whether that is the
+    /// end of the step, and not its start.
+    fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
+    /// From a residual there to the estimated error of `(x, z)`, in its place.
+    fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>);
+    /// The unknowns of the step that was solved last, stages innermost, at the end of a list.
+    fn unknowns(&self, to: &mut Vec<T>);
     /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a stage: else they are
     /// extrapolated.
     fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool;

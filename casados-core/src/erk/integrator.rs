@@ -258,6 +258,31 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&result.forward)
     }
 
+    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    #[cfg(feature = "alloc")]
+    pub(crate) fn slopes(
+        &mut self,
+        weights: &[f64],
+        to: &mut ArrayW<M, crate::model::ArrayX<M, T>>,
+    ) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
+        let variation = &W::forward(&mut self.forward)?.sweep.forward;
+        for (w, to) in to.as_mut().iter_mut().enumerate() {
+            to.as_mut().fill(T::ZERO);
+            for (weight, dk) in weights.iter().zip(&variation.dk).filter(|(weight, _)| **weight != 0.0) {
+                for (to, row) in to.as_mut().iter_mut().zip(dk.as_ref()) {
+                    *to = *to + T::from_f64(*weight) * row.as_ref()[w];
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The state at the end and its derivatives in the directions of `C` seeds.
     ///
     /// # Errors

@@ -13,6 +13,8 @@ use super::sweep::Sweep;
 use super::write::Target;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
+#[cfg(feature = "alloc")]
+use crate::model::ArrayX;
 use crate::model::{ArrayW, Dae, NO_COLUMN};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::{Lanes, Real};
@@ -95,6 +97,15 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         sweep.write_differential::<Identity<M>>(weights, to);
         let to = &mut Split::<M, _>::new(&mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
         sweep.write_algebraic::<Identity<M>>(lagrange, to);
+    }
+
+    /// The derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn slopes(&self, weights: &[T; S], to: &mut ArrayW<M, ArrayX<M, T>>) {
+        for direction in to.as_mut() {
+            direction.as_mut().fill(T::ZERO);
+        }
+        self.sweep.write_slopes::<Identity<M>>(weights, &mut Rows::<M, T> { rows: to });
     }
 
     /// # Errors
@@ -221,6 +232,21 @@ impl<M: Dae, T: Lanes> Target<T> for Split<'_, M, T> {
     #[inline(always)]
     fn column(&mut self, column: usize) -> &mut [T] {
         self.direction(M::STRUCTURE.directions.get(column).map_or(0, |&index| index as usize))
+    }
+}
+
+/// A row for each direction.
+#[cfg(feature = "alloc")]
+struct Rows<'a, M: Dae, T: Plain> {
+    rows: &'a mut ArrayW<M, ArrayX<M, T>>,
+}
+
+#[cfg(feature = "alloc")]
+impl<M: Dae, T: Real> Target<T> for Rows<'_, M, T> {
+    #[inline(always)]
+    fn column(&mut self, column: usize) -> &mut [T] {
+        let direction = M::STRUCTURE.directions.get(column).map_or(0, |&index| index as usize);
+        self.rows.as_mut().get_mut(direction).map_or(&mut [], |row| row.as_mut())
     }
 }
 

@@ -338,6 +338,24 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&forward.result)
     }
 
+    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`]
+    #[cfg(feature = "alloc")]
+    pub(crate) fn slopes(
+        &mut self,
+        weights: &[f64],
+        to: &mut crate::model::ArrayW<M, crate::model::ArrayX<M, T>>,
+    ) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
+        let weights: &[f64; S] = weights.first_chunk().ok_or(Error::NoResult)?;
+        W::forward(&mut self.forward)?.slopes(&weights.map(T::from_f64), to);
+        Ok(())
+    }
+
     /// The solution at a time inside the interval of the last successful call, and its derivatives with
     /// respect to `x₀`, `u` and `p`.
     ///

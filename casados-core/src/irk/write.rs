@@ -31,6 +31,12 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         self.write::<D, _>(None, M::Shape::NX..M::Shape::NK, Some(lagrange), to);
     }
 
+    /// Writes the derivatives of `Σ_i weight_i k_i`.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn write_slopes<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
+        self.write::<D, _>(None, 0..M::Shape::NX, Some(weights), to);
+    }
+
     /// Writes `V + Σ_i weight_i dy_i` for some unknowns.
     fn write<D: Directions<E>, G: Target<E>>(
         &self,

@@ -1,0 +1,346 @@
+//! Derivatives in the choice of the steps: the estimate of the error of a step, applied to `V = dx/d(x₀, u, p)`.
+//!
+//! A step that the states accept is taken again to rounding and differentiated. Its estimate is a linear function of the
+//! slopes of its stages, and so is that of a column of `V`, with the derivatives `dk_i` of the slopes:
+//!
+//! ```text
+//! δ = (f_ẋ Σ_i w_i dk_i + f_x V + f_z Z + f_w) e_c        E = −hμ (f_ẋ + hμ f_x | f_z)⁻¹ δ        implicit
+//! E = h Σ_i e_i dk_i e_c                                                                        explicit
+//! ```
+//!
+//! where the implicit methods look at their estimate: the start of the step or, if that has no stage there, the end. An
+//! element of `E` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the magnitude `s_c` of what is varied (A. C. Hindmarsh,
+//! R. Serban, User documentation for CVODES, "forward sensitivity analysis"); the worst column counts.
+
+use super::consistent::{At, Consistent};
+use super::norm::mean;
+use super::pairs::Pair;
+use super::replay::{Replay, Taken};
+use super::sealed::Engine;
+use super::stages::{Failure, MOST, Stages, Start};
+use crate::error::Error;
+use crate::linalg::axpy;
+use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, Ode};
+use crate::result::Forward;
+use crate::scalar::Real;
+use crate::shape::{Matrix, Plain, Shape};
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+use bytemuck::allocation::try_zeroed_box;
+use core::marker::PhantomData;
+
+/// What differentiates a step, whatever the method is: a program that does not ask for it contains none of it.
+pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
+    /// # Errors
+    /// Those of Newton's method; a singular matrix.
+    fn forward(&mut self, step: &Taken<'_, M, T>) -> Result<&Forward<M, T>, Error>;
+    /// # Errors
+    /// [`Error::NoResult`]
+    fn slopes(
+        &mut self,
+        level: usize,
+        weights: &[f64],
+        to: &mut ArrayW<M, ArrayX<M, T>>,
+    ) -> Result<(), Error>;
+}
+
+struct Replays<M: Dae, B: Engine<M, T>, T: Real> {
+    state: B::State,
+    model: PhantomData<fn() -> (M, T)>,
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Differentiate<M, T> for Replays<M, B, T> {
+    fn forward(&mut self, step: &Taken<'_, M, T>) -> Result<&Forward<M, T>, Error> {
+        B::replays(&mut self.state).forward(step, None)
+    }
+
+    fn slopes(
+        &mut self,
+        level: usize,
+        weights: &[f64],
+        to: &mut ArrayW<M, ArrayX<M, T>>,
+    ) -> Result<(), Error> {
+        B::replays(&mut self.state).slopes(level, weights, to)
+    }
+}
+
+/// Memory of derivatives, a row for each direction.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+struct Memory<M: Dae, T: Plain> {
+    /// Of `(x, z)` at the start of the step, and at its end.
+    before: ArrayW<M, ArrayK<M, T>>,
+    after: ArrayW<M, ArrayK<M, T>>,
+    /// Of a sum of slopes, by `(x_n, u, p)`.
+    local: ArrayW<M, ArrayX<M, T>>,
+    /// Of two such sums, by `(x₀, u, p)`.
+    slopes: [ArrayW<M, ArrayX<M, T>>; 2],
+    jacobian: M::Jacobian<T>,
+    f: ArrayK<M, T>,
+    point: ArrayV<M, T>,
+    magnitudes: ArrayW<M, T>,
+}
+
+/// The derivatives along a run.
+pub struct Variational<M: Dae, T: Real> {
+    replays: Box<dyn Differentiate<M, T>>,
+    memory: Box<Memory<M, T>>,
+    /// The unknowns of the stages of a step.
+    unknowns: Vec<T>,
+}
+
+impl<M: Dae, T: Real> Variational<M, T> {
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn new<B: Engine<M, T>>() -> Result<Self, Error> {
+        let bytes = size_of::<Memory<M, T>>();
+        let mut memory: Box<Memory<M, T>> = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
+        M::jacobian_constants::<T>(&mut memory.jacobian);
+        let (length, mut unknowns) = (M::Shape::NK * MOST, Vec::new());
+        unknowns
+            .try_reserve_exact(length)
+            .map_err(|_| Error::OutOfMemory { bytes: length * size_of::<T>() })?;
+        let replays = Replays::<M, B, T> { state: B::State::default(), model: PhantomData };
+        Ok(Self { replays: Box::new(replays), memory, unknowns })
+    }
+
+    /// At the start of a run, with the magnitudes of `(x₀, u, p)`: those that are not given are of what is there.
+    ///
+    /// # Errors
+    /// As [`Consistent::forward`].
+    pub fn begin(
+        &mut self,
+        at: &At<'_, M, T>,
+        start: &ArrayK<M, T>,
+        given: &ArrayW<M, T>,
+        consistent: &mut Consistent<M, T>,
+    ) -> Result<(), Error> {
+        let (nx, Memory { before, magnitudes, .. }) = (M::Shape::NX, &mut *self.memory);
+        for (direction, column) in before.as_mut().iter_mut().enumerate() {
+            column.as_mut().fill(T::ZERO);
+            if let Some(element) = column.as_mut()[..nx].get_mut(direction) {
+                *element = T::ONE;
+            }
+        }
+        let values = at.x.as_slice().iter().chain(at.u.as_slice()).chain(at.p.as_slice());
+        for ((magnitude, given), value) in magnitudes.as_mut().iter_mut().zip(given.as_ref()).zip(values) {
+            let known = if *given > T::ZERO { *given } else { value.abs() };
+            *magnitude = if known > T::ZERO { known } else { T::ONE };
+        }
+        if M::Shape::NZ > 0 {
+            let forward = consistent.forward(at, start)?;
+            let z = [forward.dz_dx0.as_slice(), forward.dz_du.as_slice(), forward.dz_dp.as_slice()];
+            let columns = z.into_iter().flat_map(|matrix| matrix.chunks_exact(M::Shape::NZ));
+            for (to, from) in before.as_mut().iter_mut().zip(columns) {
+                to.as_mut()[nx..].copy_from_slice(from);
+            }
+        }
+        Ok(())
+    }
+
+    /// A step was accepted.
+    pub fn accept(&mut self) {
+        let Memory { before, after, .. } = &mut *self.memory;
+        before.as_mut().copy_from_slice(after.as_ref());
+    }
+
+    /// The derivatives at the end of a step.
+    fn take(&mut self, step: &Taken<'_, M, T>) -> Result<(), Error> {
+        let (nx, Memory { before, after, .. }) = (M::Shape::NX, &mut *self.memory);
+        let forward = self.replays.forward(step)?;
+        let x = [forward.dx_dx0.as_slice(), forward.dx_du.as_slice(), forward.dx_dp.as_slice()];
+        let z = [forward.dz_dx0.as_slice(), forward.dz_du.as_slice(), forward.dz_dp.as_slice()];
+        let own = |parts: [&'_ [T]; 3], rows: usize, direction: usize, to: &mut [T]| {
+            let [_, u, p] = parts;
+            let column = direction.wrapping_sub(nx).wrapping_mul(rows);
+            let from = u.get(column..column.saturating_add(rows));
+            let from = from.or_else(|| p.get(column.wrapping_sub(u.len())..)?.get(..rows));
+            to.fill(T::ZERO);
+            if let (true, Some(from)) = (direction >= nx, from) {
+                to.copy_from_slice(from);
+            }
+        };
+        for (direction, (before, after)) in before.as_ref().iter().zip(after.as_mut()).enumerate() {
+            let (states, algebraic) = after.as_mut().split_at_mut(nx);
+            own(x, states.len(), direction, states);
+            own(z, algebraic.len(), direction, algebraic);
+            for (j, v) in before.as_ref()[..nx].iter().enumerate() {
+                axpy(*v, x[0].get(j * nx..(j + 1) * nx).unwrap_or_default(), states);
+                let nz = algebraic.len();
+                axpy(*v, z[0].get(j * nz..(j + 1) * nz).unwrap_or_default(), algebraic);
+            }
+        }
+        Ok(())
+    }
+
+    /// The derivatives of `Σ_i weight_i k_i` of the step that was taken.
+    fn slopes(&mut self, level: usize, weights: &[f64], which: usize) -> Result<(), Error> {
+        let (nx, Memory { before, local, slopes, .. }) = (M::Shape::NX, &mut *self.memory);
+        self.replays.slopes(level, weights, local)?;
+        let Some(slopes) = slopes.get_mut(which) else { return Ok(()) };
+        let (by_states, others) = local.as_ref().split_at(nx);
+        for (direction, (slope, before)) in slopes.as_mut().iter_mut().zip(before.as_ref()).enumerate() {
+            let slope = slope.as_mut();
+            match direction.checked_sub(nx).and_then(|index| others.get(index)) {
+                Some(own) => slope.copy_from_slice(own.as_ref()),
+                None => slope.fill(T::ZERO),
+            }
+            for (v, local) in before.as_ref().iter().zip(by_states) {
+                axpy(*v, local.as_ref(), slope);
+            }
+        }
+        Ok(())
+    }
+
+    /// The estimated error of the derivatives over an implicit step that was solved, relative to what is tolerated;
+    /// `again` as in [`Stages::error`].
+    ///
+    /// # Errors
+    /// The step cannot be differentiated.
+    pub fn implicit(
+        &mut self,
+        stages: &mut dyn Stages<M, T>,
+        at: At<'_, M, T>,
+        level: usize,
+        start: &Start<'_, M, T>,
+        tolerances: &ArrayK<M, (T, T)>,
+        again: bool,
+    ) -> Result<f64, Failure> {
+        let diverges = |_: Error| Failure::Diverges;
+        self.unknowns.clear();
+        stages.unknowns(&mut self.unknowns);
+        let unknowns = core::mem::take(&mut self.unknowns);
+        let taken = self.take(&Taken { at, h: start.h, y: &unknowns, level });
+        self.unknowns = unknowns;
+        taken.map_err(diverges)?;
+        let at_end = stages.estimates(start, &mut self.memory.point);
+        self.slopes(level, &stages.lagrange(if at_end { 1.0 } else { 0.0 }), 0).map_err(diverges)?;
+        let Memory { before, after, slopes: [slopes, _], jacobian, f, point, magnitudes, .. } =
+            &mut *self.memory;
+        M::residual_jacobian::<T>(point, f, jacobian);
+        let there = if at_end { &*after } else { &*before };
+        let mut worst = 0.0f64;
+        for (direction, (slope, y)) in slopes.as_ref().iter().zip(there.as_ref()).enumerate() {
+            let mut y = *y;
+            let mut relative = 0.0;
+            for look in 0..2 {
+                let mut error = ArrayK::<M, T>::zeroed();
+                variation::<M, T>(jacobian, slope.as_ref(), y.as_ref(), direction, error.as_mut());
+                stages.filter(start.h, &mut error);
+                // As for the states: what is extrapolated of `z` is not kept.
+                let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
+                relative = measure(
+                    &error.as_ref()[..counted],
+                    [before.as_ref(), after.as_ref()]
+                        .map(|v| v.get(direction).map_or(&[][..], |v| v.as_ref())),
+                    tolerances.as_ref().iter().copied(),
+                    magnitudes[direction],
+                );
+                if at_end || look > 0 || !(again && relative >= 1.0) {
+                    break;
+                }
+                axpy(T::ONE, error.as_ref(), y.as_mut());
+            }
+            if !relative.is_finite() {
+                return Err(Failure::Diverges);
+            }
+            worst = worst.max(relative);
+        }
+        Ok(worst)
+    }
+}
+
+impl<M: Ode, T: Real> Variational<M, T> {
+    /// The same of a step of an explicit pair with its end; not finite if it cannot be differentiated.
+    pub fn explicit<B: Pair<S>, const S: usize>(
+        &mut self,
+        step: &Taken<'_, M, T>,
+        end: &[T],
+        inputs: &[T],
+        tolerances: impl Iterator<Item = (T, T)> + Clone,
+    ) -> Result<f64, Error> {
+        let (nx, (weights, last)) = (M::Shape::NX, B::DIFFERENCE);
+        self.take(step)?;
+        self.slopes(0, &weights, 0)?;
+        if let Some(coarse) = B::COARSE {
+            self.slopes(0, &coarse, 1)?;
+        }
+        let Memory { before, after, slopes: [fine, coarse], jacobian, f, point, magnitudes, .. } =
+            &mut *self.memory;
+        if last != 0.0 {
+            point.as_mut().copy_from_slice(inputs);
+            point.as_mut()[..nx].fill(T::ZERO);
+            point.as_mut()[nx..2 * nx].copy_from_slice(end);
+            if let Some(time) = point.as_mut().last_mut() {
+                *time = step.at.t + step.h;
+            }
+            M::residual_jacobian::<T>(point, f, jacobian);
+        }
+        let (zero, mut worst) = (ArrayX::<M, T>::zeroed(), 0.0f64);
+        for (direction, (before, after)) in before.as_ref().iter().zip(after.as_ref()).enumerate() {
+            let mut error = fine.as_ref().get(direction).copied().unwrap_or(zero);
+            if last != 0.0 {
+                // ẋ = −f/c at ẋ = 0.
+                let mut defect = ArrayK::<M, T>::zeroed();
+                variation::<M, T>(jacobian, zero.as_ref(), after.as_ref(), direction, defect.as_mut());
+                for (error, (row, coefficient)) in error.as_mut().iter_mut().zip(M::ROWS) {
+                    *error = *error - T::from_f64(last / coefficient) * defect[*row as usize];
+                }
+            }
+            let size = |error: &ArrayX<M, T>| {
+                let states = [before, after].map(|v| v.as_ref());
+                let relative = measure(error.as_ref(), states, tolerances.clone(), magnitudes[direction]);
+                relative * step.h.abs().to_f64()
+            };
+            let fine = size(&error);
+            let coarse = B::COARSE.and_then(|_| coarse.as_ref().get(direction)).map(size);
+            worst = worst.max(B::combined(fine, coarse));
+            if !fine.is_finite() {
+                return Ok(f64::NAN);
+            }
+        }
+        Ok(worst)
+    }
+}
+
+/// `f_ẋ ẋ' + f_(x,z) y' + f_w e_c`
+fn variation<M: Dae, T: Real>(
+    jacobian: &M::Jacobian<T>,
+    slope: &[T],
+    y: &[T],
+    direction: usize,
+    to: &mut [T],
+) {
+    let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+    // Where a direction that is no state is among the variables.
+    let own = direction.checked_sub(nx).map(|index| nx + nk + index);
+    for (entry, value) in jacobian.as_ref().iter().enumerate() {
+        let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
+        let factor = if variable < nx {
+            slope.get(variable).copied()
+        } else if variable < nx + nk {
+            y.get(variable - nx).copied()
+        } else {
+            (Some(variable) == own).then_some(T::ONE)
+        };
+        if let (Some(factor), Some(to)) = (factor, to.get_mut(equation)) {
+            *to = *to + *value * factor;
+        }
+    }
+}
+
+/// The root of the mean of the squares relative to what is tolerated: `(rtol, atol)`.
+fn measure<T: Real>(
+    error: &[T],
+    [before, after]: [&[T]; 2],
+    tolerances: impl Iterator<Item = (T, T)>,
+    magnitude: T,
+) -> f64 {
+    let mut sum = 0.0;
+    for (((error, before), after), (rtol, atol)) in error.iter().zip(before).zip(after).zip(tolerances) {
+        let relative = (*error / (atol / magnitude + rtol * before.abs().max(after.abs()))).to_f64();
+        sum += relative * relative;
+    }
+    mean(sum, error.len())
+}
