@@ -501,3 +501,124 @@ fn integrals_over_piecewise_constant_controls() {
     // Truncation δ⁴ f⁽⁵⁾/30, rounding ε/δ.
     assert!((difference - found.grad_u[1][0]).abs() <= 1e-11, "{difference} {}", found.grad_u[1][0]);
 }
+
+/// The same with all derivatives: those of the integrals as states, of the same tolerance.
+#[test]
+fn derivatives_of_integrals_over_piecewise_constant_controls() {
+    let controls = [vector![0.3], vector![-0.8], vector![0.5]];
+    let ends = [0.4, 0.9, 1.2];
+    let options = AdaptiveOptions { rtol: 1e-11, atol: 1e-12, ..Default::default() };
+    let mut horizon = Piecewise::new(Adaptive::<Swing, Radau>::new(options).unwrap());
+    horizon.integrator().set_parameters(&P).unwrap();
+    let mut states = Piecewise::new(Adaptive::<WithStates, Radau>::new(options).unwrap());
+    states.integrator().set_parameters(&P).unwrap();
+    let start = vector![X0[0], X0[1], 0.0, 0.0];
+    let lambda = vector![LAMBDA[0], LAMBDA[1], NU[0], NU[1]];
+    let expected = states.hessian(&start, &controls, &ends, &lambda).unwrap();
+    // Two sequences of a dozen steps, each with an error of 1e-11 of numbers around one; of second derivatives around ten.
+    let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-8 * b.abs().max(1.0), "{a} {b}");
+
+    let mut integral = Quadrature::<Outputs>::new();
+    integral.nu = NU;
+    let (forward, first) = horizon.with(&mut integral).forward(&X0, &controls, &ends).unwrap();
+    let (found, second) = horizon.with(&mut integral).hessian(&X0, &controls, &ends, &LAMBDA).unwrap();
+    assert_eq!((&found.forward, &second), (&forward, &first));
+    assert_eq!(forward, horizon.forward(&X0, &controls, &ends).unwrap());
+    assert_eq!(integral.dq_dx0, matrix![0.0, 0.0; 0.0, 0.0]);
+    for i in 0..2 {
+        close(integral.q[i], expected.forward.nominal.x[2 + i]);
+        for j in 0..2 {
+            close(first.dq_dx0[(i, j)], expected.forward.dx_dx0[(2 + i, j)]);
+            close(first.dq_dp[(i, j)], expected.forward.dx_dp[(2 + i, j)]);
+            close(found.h_xx[(i, j)], expected.h_xx[(i, j)]);
+            close(found.h_xp[(i, j)], expected.h_xp[(i, j)]);
+            close(found.h_pp[(i, j)], expected.h_pp[(i, j)]);
+        }
+        for k in 0..3 {
+            close(first.dq_du[k][i], expected.forward.dx_du[k][2 + i]);
+            close(found.h_xu[k][i], expected.h_xu[k][i]);
+            close(found.h_up[k][i], expected.h_up[k][i]);
+        }
+        close(found.adjoint.grad_x0[i], expected.adjoint.grad_x0[i]);
+        close(found.adjoint.grad_p[i], expected.adjoint.grad_p[i]);
+    }
+    for (found, expected) in found.h_uu.iter().zip(&expected.h_uu) {
+        close(found[0], expected[0]);
+    }
+    for (found, expected) in found.adjoint.grad_u.iter().zip(&expected.adjoint.grad_u) {
+        close(found[0], expected[0]);
+    }
+}
+
+/// Least squares over several intervals: gradients and exact second derivatives against differences of the same steps.
+#[test]
+fn least_squares_over_piecewise_constant_controls() {
+    let controls = [vector![0.3], vector![-0.8], vector![0.5]];
+    let ends = [0.4, 0.9, 1.2];
+    let mut fit = LeastSquares::<Outputs>::new(&matrix![1.5, 0.2; 0.2, 0.7]);
+    let mut horizon = Piecewise::new(Adaptive::<Swing, Gauss<3>>::new(AdaptiveOptions::default()).unwrap());
+    horizon.integrator().set_parameters(&P).unwrap();
+    horizon.solve(&X0, &controls, &ends).unwrap();
+    horizon.freeze().unwrap();
+    let (found, integral) = horizon.with(&mut fit).hessian(&X0, &controls, &ends, &LAMBDA).unwrap();
+    let adjoint = horizon.with(&mut fit).adjoint(&X0, &controls, &ends, &LAMBDA).unwrap();
+    let forward = &found.forward;
+    assert_close(found.adjoint.grad_x0, adjoint.grad_x0, ROUNDING);
+    assert_close(found.adjoint.grad_p, adjoint.grad_p, ROUNDING);
+    assert_close(forward.dx_dx0.transpose() * LAMBDA + integral.grad_x0, adjoint.grad_x0, ROUNDING);
+    assert_close(forward.dx_dp.transpose() * LAMBDA + integral.grad_p, adjoint.grad_p, ROUNDING);
+    for k in 0..3 {
+        assert_close(forward.dx_du[k].transpose() * LAMBDA + integral.grad_u[k], adjoint.grad_u[k], ROUNDING);
+        let mut moved = |delta: f64| {
+            let mut controls = controls;
+            controls[k][0] += delta;
+            let adjoint = horizon.with(&mut fit).adjoint(&X0, &controls, &ends, &LAMBDA).unwrap();
+            let u = adjoint.grad_u;
+            [
+                adjoint.grad_x0[0],
+                adjoint.grad_x0[1],
+                u[0][0],
+                u[1][0],
+                u[2][0],
+                adjoint.grad_p[0],
+                adjoint.grad_p[1],
+            ]
+        };
+        // Order four with steps of 1e-3: errors of 1e-12 of the value, and as much by rounding.
+        let e = 1e-3;
+        let values = [-2.0, -1.0, 1.0, 2.0].map(|s| moved(s * e));
+        let difference: [f64; 7] = core::array::from_fn(|i| {
+            (values[0][i] - 8.0 * values[1][i] + 8.0 * values[2][i] - values[3][i]) / (12.0 * e)
+        });
+        let uu = |j: usize| found.h_uu[3 * j + k][0];
+        let (xu, up) = (found.h_xu[k], found.h_up[k]);
+        assert_close(difference, [xu[0], xu[1], uu(0), uu(1), uu(2), up[0], up[1]], 1e-9);
+    }
+}
+
+#[function]
+fn deviation(x: f64, u: f64, _p: f64) -> [f64; 2] {
+    [x, 0.5 * u - x]
+}
+
+/// Where nothing is curved, the matrix of Gauss and Newton is the Hessian: to rounding, of sums of a few dozen terms. The
+/// product `p x` is curved, so that only `x₀` and the controls count.
+#[test]
+fn gauss_newton_over_piecewise_constant_controls() {
+    let mut fit = LeastSquares::<Deviation>::new(&matrix![1.0, 0.1; 0.1, 0.4]);
+    let mut horizon = Piecewise::new(Adaptive::<Decay, Radau>::new(AdaptiveOptions::default()).unwrap());
+    horizon.integrator().set_parameters(&vector![0.7]).unwrap();
+    let (controls, ends) = ([vector![0.3], vector![-0.2]], [0.5, 1.3]);
+    let (exact, integral) =
+        horizon.with(&mut fit).hessian(&vector![1.2], &controls, &ends, &vector![0.0]).unwrap();
+    assert_close(integral.h_xx, exact.h_xx, ROUNDING);
+    for k in 0..2 {
+        assert!(exact.h_xu[k][0].abs() > 1e-3);
+        assert_close(integral.h_xu[k], exact.h_xu[k], ROUNDING);
+    }
+    for k in 0..4 {
+        assert_close(integral.h_uu[k], exact.h_uu[k], ROUNDING);
+    }
+    let (_, again) = horizon.with(&mut fit).forward(&vector![1.2], &controls, &ends).unwrap();
+    assert_eq!(again, integral);
+}

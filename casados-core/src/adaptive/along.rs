@@ -1,7 +1,8 @@
 //! An integrand beside an adaptive integration; see [`quadrature`](crate::quadrature).
 
+use super::integrals::Spanning;
 use super::integrator::Integrator;
-use super::piecewise::{Piecewise, PiecewiseAdjoint};
+use super::piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
 use super::sealed::Engine;
 use crate::error::Error;
 use crate::model::{Dae, VectorU, VectorX};
@@ -74,8 +75,8 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Inte
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
-    /// Takes an integrand along, for its integral over all intervals and the gradient of it with that of the solution; see
-    /// [`quadrature`](crate::quadrature).
+    /// Takes an integrand along, for its integral over all intervals and its derivatives with those of the solution; see
+    /// [`quadrature`](crate::quadrature). Derivatives by all controls are returned, and those in the integrand are zero.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -96,6 +97,40 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         ends: &[T],
     ) -> Result<&'a Nominal<M, T>, Error> {
         self.integrator.solve_along(x0, controls, ends, Some(self.integrand))
+    }
+
+    /// See [`Piecewise::forward`]; the integral over all intervals, and its derivatives.
+    ///
+    /// # Errors
+    /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
+    pub fn forward(
+        self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+    ) -> Result<(PiecewiseForward<M, T>, Q::Derivatives), Error>
+    where
+        Q: Spanning<M, T>,
+    {
+        self.integrator.forward_along(x0, controls, ends, self.integrand)
+    }
+
+    /// See [`Piecewise::hessian`]; gradient and Hessian are those of `λᵀx` at the end and the integral over all intervals. The
+    /// integral and its derivatives.
+    ///
+    /// # Errors
+    /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
+    pub fn hessian(
+        self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        lambda: &VectorX<M, T>,
+    ) -> Result<(PiecewiseHessian<M, T>, Q::Derivatives), Error>
+    where
+        Q: Spanning<M, T>,
+    {
+        self.integrator.hessian_along(x0, controls, ends, lambda, self.integrand)
     }
 
     /// See [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end and the integral over all intervals.

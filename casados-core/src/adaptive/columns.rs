@@ -49,6 +49,18 @@ impl<M: Dae> Columns<M> {
         }
     }
 
+    /// `sum += g D`
+    pub fn add<T: Real>(&self, k: usize, gradient: &[T], v: &[T], sum: &mut [T]) {
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        let (states, others) = gradient.split_at(nx);
+        let (controls, parameters) = others.split_at(nu);
+        for (g, v) in states.iter().zip(v.chunks_exact(self.all().max(1))) {
+            axpy(*g, v, sum);
+        }
+        axpy(T::ONE, controls, &mut sum[self.u(k)..]);
+        axpy(T::ONE, parameters, &mut sum[self.p()..]);
+    }
+
     /// `sum += Dᵀ H D`, the product `H D` first.
     pub fn project<T: Real, R: AsRef<[T]>>(
         &self,

@@ -13,7 +13,8 @@
 //! methods of a family, `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run` the
 //! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the explicit methods,
 //! `replay` and `sensitivities` derivatives of runs, `variational` derivatives that take part in the choice of the steps, `along` an integrand, `segment` one of several intervals, `piecewise` those
-//! with controls of their own and `columns` their derivatives, `events`, `integrator` what users see.
+//! with controls of their own and `columns` their derivatives and `integrals` those of
+//! an integrand, `events`, `integrator` what users see.
 
 mod along;
 mod collocation;
@@ -23,6 +24,7 @@ mod control;
 mod events;
 mod explicit;
 mod explicit_step;
+mod integrals;
 mod integrator;
 mod kernels;
 mod levels;
@@ -40,7 +42,10 @@ mod statistics;
 mod tape;
 mod variational;
 
-pub use events::{Crossing, Event, Hybrid, HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient};
+pub use events::{
+    Crossing, Event, Hybrid, HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient,
+};
+pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 pub use integrator::Integrator;
 pub use options::AdaptiveOptions;
 pub use piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};

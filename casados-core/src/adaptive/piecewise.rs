@@ -9,6 +9,7 @@
 //! ```
 
 use super::columns::Columns;
+use super::integrals::{Blocks, Spanning, Sums};
 use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
@@ -22,7 +23,7 @@ use crate::model::{
     Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX, VectorP,
     VectorU, VectorX,
 };
-use crate::quadrature::{Along, begin, finish, reborrow};
+use crate::quadrature::{Along, Backwards, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape, listed};
@@ -176,7 +177,38 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
     ) -> Result<PiecewiseForward<M, T>, Error> {
         self.steps(x0, controls, ends)?;
-        self.sweep(x0, false)
+        self.sweep(x0, false, None, None)
+    }
+
+    /// As [`Piecewise::forward`], with an integrand.
+    pub(super) fn forward_along<Q: Spanning<M, T>>(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        integrand: &mut Q,
+    ) -> Result<(PiecewiseForward<M, T>, Q::Derivatives), Error> {
+        self.steps(x0, controls, ends)?;
+        let mut sums = Sums::new(self.count, integrand, false)?;
+        let forward = self.sweep(x0, false, Some(integrand), Some(&mut sums))?;
+        Ok((forward, Q::derivatives(&sums)?))
+    }
+
+    /// As [`Piecewise::hessian`], with an integrand.
+    pub(super) fn hessian_along<Q: Spanning<M, T>>(
+        &mut self,
+        x0: &VectorX<M, T>,
+        controls: &[VectorU<M, T>],
+        ends: &[T],
+        lambda: &VectorX<M, T>,
+        integrand: &mut Q,
+    ) -> Result<(PiecewiseHessian<M, T>, Q::Derivatives), Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.steps(x0, controls, ends)?;
+        let mut sums = Sums::new(self.count, integrand, true)?;
+        let forward = self.sweep(x0, true, Some(&mut *integrand), Some(&mut sums))?;
+        let derivatives = Q::derivatives(&sums)?;
+        Ok((self.backwards(forward, lambda, sums.second, Some(integrand))?, derivatives))
     }
 
     /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and `p`.
@@ -235,7 +267,19 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     ) -> Result<PiecewiseHessian<M, T>, Error> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
-        let forward = self.sweep(x0, true)?;
+        let forward = self.sweep(x0, true, None, None)?;
+        let at = Columns::<M> { intervals: self.count, model: core::marker::PhantomData };
+        self.backwards(forward, lambda, filled(at.all() * at.all(), T::ZERO)?, None)
+    }
+
+    /// The gradient and the Hessian after [`Piecewise::sweep`], with what an integrand has added to `sum`.
+    fn backwards(
+        &mut self,
+        forward: PiecewiseForward<M, T>,
+        lambda: &VectorX<M, T>,
+        mut sum: Vec<T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<PiecewiseHessian<M, T>, Error> {
         let Self { integrator, segments, count, nominal, .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let mut adjoint = PiecewiseAdjoint {
@@ -244,12 +288,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             grad_u: filled(*count, VectorU::<M, T>::zeroed())?,
             grad_p: VectorP::<M, T>::zeroed(),
         };
-        let mut sum = filled(at.all() * at.all(), T::ZERO)?;
         let mut product = filled(M::Shape::NW * at.all(), T::ZERO)?;
         for (k, segment) in segments.iter_mut().enumerate().take(*count).rev() {
             let history = core::mem::take(&mut segment.history);
             let (mut frozen, state, memory, v) = segment.open(integrator)?;
-            frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, None)?;
+            let mut part = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dynamic(&mut part))?;
             let Memory { hessian, step, .. } = memory;
             adjoint.grad_x0 = hessian.first.grad_x0;
             if let Some(grad_u) = adjoint.grad_u.get_mut(k) {
@@ -260,27 +304,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             at.project(k, step.as_ref(), v, &mut product, &mut sum);
             segment.history = history;
         }
-        let h = |r: usize, c: usize| sum[r.max(c) * at.all() + r.min(c)];
-        let mut result = PiecewiseHessian {
-            forward,
-            adjoint,
-            h_xx: Zeroable::zeroed(),
-            h_xu: filled(*count, MatrixXU::<M, T>::zeroed())?,
-            h_uu: filled(*count * *count, MatrixUU::<M, T>::zeroed())?,
-            h_xp: Zeroable::zeroed(),
-            h_up: filled(*count, MatrixUP::<M, T>::zeroed())?,
-            h_pp: Zeroable::zeroed(),
-        };
-        fill(&mut result.h_xx, h);
-        fill(&mut result.h_xp, |r, c| h(r, at.p() + c));
-        fill(&mut result.h_pp, |r, c| h(at.p() + r, at.p() + c));
-        for (k, (xu, up)) in result.h_xu.iter_mut().zip(&mut result.h_up).enumerate() {
-            fill(xu, |r, c| h(r, at.u(k) + c));
-            fill(up, |r, c| h(at.u(k) + r, at.p() + c));
-        }
-        for (index, uu) in result.h_uu.iter_mut().enumerate() {
-            fill(uu, |r, c| h(at.u(index / *count) + r, at.u(index % *count) + c));
-        }
+        let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(&sum)?;
+        let result = PiecewiseHessian { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp };
         match sum.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(Error::Overflow { step: 0, index }),
             None => Ok(result),
@@ -404,8 +429,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         finish(&mut along)
     }
 
-    /// The same with derivatives, and what those of second order need.
-    fn sweep(&mut self, x0: &VectorX<M, T>, second: bool) -> Result<PiecewiseForward<M, T>, Error> {
+    /// The same with derivatives, and what those of second order need; with an integrand and what it adds up, or without.
+    fn sweep(
+        &mut self,
+        x0: &VectorX<M, T>,
+        second: bool,
+        mut along: Along<'_, '_, M, T>,
+        mut sums: Option<&mut Sums<M, T>>,
+    ) -> Result<PiecewiseForward<M, T>, Error> {
+        begin(&mut along);
         let Self { integrator, segments, count, nominal, .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let (nx, width) = (M::Shape::NX, at.all());
@@ -432,7 +464,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let mut history = core::mem::take(&mut segment.history);
             history.clear();
             let (mut frozen, state, memory, _) = segment.open(integrator)?;
-            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), None)?;
+            let mut part = chain(&mut along, None, second);
+            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
+            if let (Some(sums), Some(integrand)) = (&mut sums, &mut along) {
+                sums.add(k, &mut **integrand, &v, &mut memory.step);
+            }
             let local = &memory.hessian.first.forward;
             x = local.nominal.x;
             collect(nominal, &local.nominal, k);
@@ -454,6 +490,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             fill(du, |r, c| v[r * width + at.u(k) + c]);
         }
         result.nominal = *nominal;
+        finish(&mut along)?;
+        sums.map_or(Ok(()), |sums| sums.check())?;
         match v.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(Error::Overflow { step: 0, index }),
             None => Ok(result),

@@ -67,10 +67,7 @@ impl<F: Function, T: Plain> sealed::Sealed for Quadrature<F, T> {}
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrature<F, T> {
     fn begin(&mut self) {
         self.q.as_mut_slice().fill(T::ZERO);
-        for row in self.dq.as_mut() {
-            row.as_mut().fill(T::ZERO);
-        }
-        self.memory.begin();
+        Integrand::<M, T>::next(self);
     }
 
     fn variables(&self) -> &'static [u32] {
@@ -108,6 +105,35 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrat
 
     fn second(&self) -> Option<&[ArrayW<F, T>]> {
         Some(self.memory.second.as_ref())
+    }
+
+    fn gradients(&self) -> &[ArrayW<F, T>] {
+        self.dq.as_ref()
+    }
+
+    fn matrix(&self) -> Option<&[ArrayW<F, T>]> {
+        None
+    }
+
+    fn next(&mut self) {
+        for row in self.dq.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        self.memory.begin();
+    }
+
+    fn density(&mut self, at: Place) -> Result<T, Error> {
+        self.memory.value(at)?;
+        let products = self.memory.y.as_ref().iter().zip(self.nu.as_slice());
+        Ok(products.fold(T::ZERO, |sum, (y, nu)| sum + *y * *nu))
+    }
+
+    fn prolong(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
+        self.memory.value(at)?;
+        for (dq, y) in self.dq.as_mut().iter_mut().zip(self.memory.y.as_ref()) {
+            axpy(weight * *y, time.as_ref(), dq.as_mut());
+        }
+        Ok(())
     }
 
     fn finish(&mut self) -> Result<(), Error> {

@@ -99,11 +99,7 @@ impl<F: Function, T: Plain> sealed::Sealed for LeastSquares<F, T> {}
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSquares<F, T> {
     fn begin(&mut self) {
         self.value = T::ZERO;
-        self.gradient.as_mut().fill(T::ZERO);
-        for row in self.sum.as_mut() {
-            row.as_mut().fill(T::ZERO);
-        }
-        self.memory.begin();
+        Integrand::<M, T>::next(self);
     }
 
     fn variables(&self) -> &'static [u32] {
@@ -150,6 +146,34 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
 
     fn second(&self) -> Option<&[ArrayW<F, T>]> {
         Some(self.memory.second.as_ref())
+    }
+
+    fn gradients(&self) -> &[ArrayW<F, T>] {
+        core::slice::from_ref(&self.gradient)
+    }
+
+    fn matrix(&self) -> Option<&[ArrayW<F, T>]> {
+        Some(self.sum.as_ref())
+    }
+
+    fn next(&mut self) {
+        self.gradient.as_mut().fill(T::ZERO);
+        for row in self.sum.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        self.memory.begin();
+    }
+
+    fn density(&mut self, at: Place) -> Result<T, Error> {
+        self.memory.value(at)?;
+        Ok(self.multiply())
+    }
+
+    fn prolong(&mut self, weight: T, time: &ArrayW<F, T>, at: Place) -> Result<(), Error> {
+        self.memory.value(at)?;
+        let half = self.multiply();
+        axpy(weight * half, time.as_ref(), self.gradient.as_mut());
+        Ok(())
     }
 
     fn finish(&mut self) -> Result<(), Error> {

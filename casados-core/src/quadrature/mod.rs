@@ -16,8 +16,9 @@
 //! [`Quadrature`] integrates all outputs of a [`Function`](crate::Function); [`LeastSquares`] half of a weighted square of
 //! them, with the matrix of Gauss and Newton. An integrator takes one along: `irk.with(&mut cost).hessian(...)`.
 //!
-//! Integrands are evaluated one stage after the other. An adaptive integrator chooses its steps for the states, not for the
-//! integral. Over intervals with controls of their own there are its value and the gradient by all of them.
+//! Integrands are evaluated one stage after the other, and a batch takes none along. An adaptive integrator chooses its steps
+//! for the states, not for the integral. Over intervals with controls of their own derivatives by all of them are returned
+//! beside those of the solution.
 
 mod integral;
 // What the derive of `Zeroable` writes about a field of type `T`.
@@ -81,6 +82,27 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// The lower triangle of the sum of `Dᵀ ∇² D`, if there is one.
     #[doc(hidden)]
     fn second(&self) -> Option<&[ArrayW<M, T>]>;
+    /// The gradients that were added up, a row for each output.
+    #[doc(hidden)]
+    fn gradients(&self) -> &[ArrayW<M, T>];
+    /// The lower triangle of the matrix of Gauss and Newton that was added up, if there is one.
+    #[doc(hidden)]
+    fn matrix(&self) -> Option<&[ArrayW<M, T>]>;
+    /// Forgets derivatives, but no values.
+    #[doc(hidden)]
+    fn next(&mut self);
+    /// What is integrated at the point, times multipliers.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn density(&mut self, at: Place) -> Result<T, Error>;
+    /// The interval ends `dt = weight · time` later: adds what is integrated at the point times `dt` to the gradients.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error>;
     /// Writes the results.
     ///
     /// # Errors

@@ -10,7 +10,7 @@ use crate::shape::{Array, Shape};
 /// Derivatives by `(x_n, u, p)` become derivatives by `(x₀, u, p)`: `D_i V_n`.
 pub(crate) struct Chained<'a, M: Dae, T: Real> {
     pub inner: &'a mut dyn Integrand<M, T>,
-    /// `V_n = dx_n/dw`, where derivatives are taken.
+    /// `V_n = dx_n/dw`; the identity if there is none.
     pub v: Option<&'a ArrayX<M, ArrayW<M, T>>>,
     /// Whether second derivatives are wanted.
     pub second: bool,
@@ -35,7 +35,9 @@ impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
 
     fn forward(&mut self, weight: T, _: bool, at: Place) -> Result<(), Error> {
         let nx = M::Shape::NX;
-        let v = self.v.map_or(&[][..], |v| v.as_ref());
+        let Some(v) = self.v.map(|v| v.as_ref()) else {
+            return self.inner.forward(weight, self.second, at);
+        };
         let variables = self.inner.variables();
         let (_, rows) = self.inner.point();
         for variable in variables {
@@ -55,6 +57,24 @@ impl<M: Dae, T: Real> Integrand<M, T> for Chained<'_, M, T> {
 
     fn second(&self) -> Option<&[ArrayW<M, T>]> {
         None
+    }
+
+    fn gradients(&self) -> &[ArrayW<M, T>] {
+        self.inner.gradients()
+    }
+
+    fn matrix(&self) -> Option<&[ArrayW<M, T>]> {
+        self.inner.matrix()
+    }
+
+    fn next(&mut self) {}
+
+    fn density(&mut self, at: Place) -> Result<T, Error> {
+        self.inner.density(at)
+    }
+
+    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
+        self.inner.prolong(weight, time, at)
     }
 
     fn finish(&mut self) -> Result<(), Error> {
@@ -92,6 +112,24 @@ impl<M: Dae, T: Real> Integrand<M, T> for Backwards<'_, M, T> {
 
     fn second(&self) -> Option<&[ArrayW<M, T>]> {
         None
+    }
+
+    fn gradients(&self) -> &[ArrayW<M, T>] {
+        self.0.gradients()
+    }
+
+    fn matrix(&self) -> Option<&[ArrayW<M, T>]> {
+        self.0.matrix()
+    }
+
+    fn next(&mut self) {}
+
+    fn density(&mut self, at: Place) -> Result<T, Error> {
+        self.0.density(at)
+    }
+
+    fn prolong(&mut self, weight: T, time: &ArrayW<M, T>, at: Place) -> Result<(), Error> {
+        self.0.prolong(weight, time, at)
     }
 
     fn finish(&mut self) -> Result<(), Error> {
