@@ -66,6 +66,9 @@
 //! let t = end.solution.occurrences[0].t;
 //! assert!((t - (2.0_f64 / 9.81).sqrt()).abs() < 1e-9);
 //! assert!((end.times[0].x0[0] - 0.5 * t).abs() < 1e-8);
+//! // Second derivatives of the height, which is 1.8 √(2gh) − 2.6 h − g/2. `freeze` would keep steps and bounces.
+//! let second = hybrid.hessian(&vector![1.0, 0.0], &vector![], 1.0, &vector![1.0, 0.0])?;
+//! assert!((second.h_xx[(0, 0)] + 0.45 * (2.0_f64 * 9.81).sqrt()).abs() < 1e-8);
 //!
 //! /// Decay with a source that is switched.
 //! #[ode]
@@ -78,6 +81,23 @@
 //! let expected = (1.0 - (-1.0_f64).exp()) * (-2.0_f64).exp();
 //! assert!((end.nominal.x[0] - expected).abs() < 1e-5);
 //! assert!((end.dx_du[0][0] - expected).abs() < 1e-5);
+//!
+//! /// What it costs: half of ∫ x² + u² dt.
+//! #[function]
+//! fn effort(x: f64, u: f64) -> f64 {
+//!     0.5 * (x * x + u * u)
+//! }
+//! // Derivatives take part in the choice of the steps.
+//! horizon.integrator().control_sensitivities(true)?;
+//! let mut cost = Quadrature::<Effort>::new();
+//! cost.nu[0] = 1.0;
+//! let zero = Vector1::new(0.0);
+//! let (end, slopes) = horizon.with(&mut cost).hessian(&zero, &controls, &[1.0, 3.0], &zero)?;
+//! // By the last control: ∫ x x_u dt with x = x₁ e⁻ᵗ and x_u = 1 − e⁻ᵗ, and ∫ x_u² + 1 dt.
+//! let decayed = |t: f64| 1.0 - (-t).exp();
+//! let expected = decayed(1.0) * (decayed(2.0) - 0.5 * decayed(4.0));
+//! assert!((slopes.dq_du[1][0] - expected).abs() < 1e-5);
+//! assert!((end.h_uu[3][0] - (4.0 - 2.0 * decayed(2.0) + 0.5 * decayed(4.0))).abs() < 1e-5);
 //! # Ok::<(), casados::Error>(())
 //! ```
 //!

@@ -142,6 +142,11 @@ pub enum Error {
         /// Its time.
         t: f64,
     },
+    /// Second derivatives over an event need that nothing there depends on the time.
+    DependsOnTime {
+        /// What does.
+        function: &'static str,
+    },
     /// Not one control for each interval, or no interval at all.
     Intervals {
         /// How many controls there are.
@@ -335,6 +340,10 @@ impl fmt::Display for Error {
                     "event {event} touches zero without crossing it at t = {t}: its time has no derivative"
                 )
             }
+            Error::DependsOnTime { function } => write!(
+                f,
+                "{function} depends on the time, by which it has no second derivatives: carry a clock among the states"
+            ),
             Error::Intervals { controls, ends } => {
                 write!(
                     f,

@@ -1,5 +1,6 @@
 //! An integrand beside an adaptive integration; see [`quadrature`](crate::quadrature).
 
+use super::events::{Hybrid, HybridAdjoint, HybridForward, Solution};
 use super::integrals::Spanning;
 use super::integrator::Integrator;
 use super::piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
@@ -145,5 +146,56 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
         self.integrator.adjoint_along(x0, controls, ends, lambda, Some(self.integrand))
+    }
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
+    /// Takes an integrand along, up to the end and over all events, where it may jump with the state; see
+    /// [`quadrature`](crate::quadrature).
+    ///
+    /// At events derivatives are those of the solution, as those of the state: what is integrated before the event, less what
+    /// is after it, times the derivative of its time.
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
+        With { integrator: self, integrand }
+    }
+}
+
+impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybrid<M, B, T>, Q> {
+    /// See [`Hybrid::solve`]; the integral.
+    ///
+    /// # Errors
+    /// See [`Hybrid`]; [`Error::Grazing`].
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<&'a Solution<M, T>, Error> {
+        self.integrator.solve_along(x0, u, t_end, Some(self.integrand))
+    }
+
+    /// See [`Hybrid::forward`]; the integral and its derivatives.
+    ///
+    /// # Errors
+    /// See [`Hybrid`].
+    pub fn forward(
+        self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+    ) -> Result<HybridForward<M, T>, Error> {
+        self.integrator.forward_along(x0, u, t_end, Some(self.integrand))
+    }
+
+    /// See [`Hybrid::adjoint`]; the gradient is that of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// See [`Hybrid`].
+    pub fn adjoint(
+        self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<HybridAdjoint<M, T>, Error> {
+        self.integrator.adjoint_along(x0, u, t_end, lambda, Some(self.integrand))
     }
 }

@@ -5,7 +5,7 @@
 use crate::error::Error;
 use crate::irk::Integrator;
 use crate::memory::Heap;
-use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
+use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, VectorP, VectorU, VectorX};
 use crate::options::{Options, Start};
 use crate::result::Forward;
 use crate::scalar::Real;
@@ -73,6 +73,23 @@ impl<M: Dae, T: Real> Consistent<M, T> {
     /// As [`Consistent::solve`].
     pub fn forward(&mut self, at: &At<'_, M, T>, y: &ArrayK<M, T>) -> Result<&Forward<M, T>, Error> {
         self.euler(at, y)?.forward(at.x, at.u, T::ZERO)
+    }
+}
+
+impl<M: Dae, T: Real> Consistent<M, T> {
+    /// The derivatives of `ẋ` by `(x, u, p)`, a row for each direction, from `(ẋ, z)`.
+    ///
+    /// # Errors
+    /// As [`Consistent::solve`].
+    pub fn slopes(
+        &mut self,
+        at: &At<'_, M, T>,
+        y: &ArrayK<M, T>,
+        to: &mut ArrayW<M, ArrayX<M, T>>,
+    ) -> Result<(), Error> {
+        self.forward(at, y)?;
+        // The slope of the only stage.
+        self.euler.as_mut().ok_or(Error::NoResult)?.slopes(&[1.0], to)
     }
 }
 

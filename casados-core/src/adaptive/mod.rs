@@ -12,9 +12,9 @@
 //! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels` its loops, `levels` the
 //! methods of a family, `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run` the
 //! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the explicit methods,
-//! `replay` and `sensitivities` derivatives of runs, `variational` derivatives that take part in the choice of the steps, `along` an integrand, `segment` one of several intervals, `piecewise` those
-//! with controls of their own and `columns` their derivatives and `integrals` those of
-//! an integrand, `events`, `integrator` what users see.
+//! `replay` and `sensitivities` derivatives of runs, `variational` derivatives that take part in the choice of the steps,
+//! `along` an integrand, `segment` one of several intervals, `piecewise` those with controls of their own, `columns` their
+//! derivatives and `integrals` those of an integrand, `events`, `integrator` what users see.
 
 mod along;
 mod collocation;
@@ -43,7 +43,7 @@ mod tape;
 mod variational;
 
 pub use events::{
-    Crossing, Event, Hybrid, HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient,
+    Crossing, Event, Hybrid, HybridAdjoint, HybridForward, HybridHessian, Occurrence, Solution, TimeGradient,
 };
 pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 pub use integrator::Integrator;

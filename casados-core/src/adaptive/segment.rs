@@ -18,6 +18,8 @@ use bytemuck::Zeroable;
 pub(super) struct Segment<M: Dae, T: Real> {
     pub tape: Tape<T>,
     pub span: Span<T>,
+    /// That of steps that are kept, where these are stretched.
+    pub kept: Span<T>,
     pub u: VectorU<M, T>,
     pub x: VectorX<M, T>,
     /// Start values of `(ẋ, z)`.
@@ -33,6 +35,7 @@ impl<M: Dae, T: Real> Default for Segment<M, T> {
         Self {
             tape: Tape::default(),
             span: Span { start: T::ZERO, end: T::ZERO },
+            kept: Span { start: T::ZERO, end: T::ZERO },
             u: Zeroable::zeroed(),
             x: Zeroable::zeroed(),
             given: Zeroable::zeroed(),

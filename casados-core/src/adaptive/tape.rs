@@ -75,6 +75,18 @@ impl<T: Real> Tape<T> {
         }
     }
 
+    /// The steps fill another interval, each its part of it.
+    pub fn stretch(&mut self, start: T, end: T) {
+        let (Some(first), Some(last)) = (self.entries.first(), self.entries.last()) else { return };
+        let (begin, length) = (first.t, last.t + last.h - first.t);
+        let factor = (end - start) / length;
+        if factor.is_finite() {
+            for entry in &mut self.entries {
+                (entry.t, entry.h) = (start + factor * (entry.t - begin), factor * entry.h);
+            }
+        }
+    }
+
     /// The steps are taken again:
     pub fn rewrite(&mut self) {
         self.again.clear();

@@ -76,12 +76,16 @@ impl<M: Dae, T: Real> core::fmt::Debug for Event<M, T> {
 /// Variables and multipliers to the gradient.
 type Adjoint<M, T> = fn(&ArrayV<M, T>, &[T], &mut ArrayV<M, T>);
 
+/// Variables and multipliers to the entries of the lower triangle of the Hessian.
+type Curvature<M, T> = fn(&ArrayV<M, T>, &[T], &mut dyn FnMut(usize, usize, T));
+
 /// A function with at most as many outputs as there are states.
 pub(super) struct Map<M: Dae, T: Real> {
     pub name: &'static str,
     value: fn(&ArrayV<M, T>, &mut [T]),
     adjoint: Adjoint<M, T>,
     rate: fn(&ArrayV<M, T>, &mut [T]),
+    hessian: Curvature<M, T>,
 }
 
 impl<M: Dae, T: Real> Clone for Map<M, T> {
@@ -100,6 +104,15 @@ fn outputs<F: Function, T: Real>(to: &mut [T], write: impl FnOnce(&mut ArrayY<F,
     }
 }
 
+/// One for each output.
+fn multipliers<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
+    let mut all = ArrayY::<F, T>::zeroed();
+    for (to, from) in all.as_mut().iter_mut().zip(mu) {
+        *to = *from;
+    }
+    all
+}
+
 impl<M: Dae, T: Real> Map<M, T> {
     fn of<F: Function<Shape = M::Shape>>() -> Self {
         const {
@@ -111,14 +124,16 @@ impl<M: Dae, T: Real> Map<M, T> {
         Self {
             name: F::STRUCTURE.name,
             value: |v, y| outputs::<F, T>(y, |y| F::value::<T>(v, y)),
-            adjoint: |v, mu, gradient| {
-                let mut all = ArrayY::<F, T>::zeroed();
-                for (to, from) in all.as_mut().iter_mut().zip(mu) {
-                    *to = *from;
-                }
-                F::adjoint::<T>(v, &all, gradient);
-            },
+            adjoint: |v, mu, gradient| F::adjoint::<T>(v, &multipliers::<F, T>(mu), gradient),
             rate: |v, y| outputs::<F, T>(y, |y| F::time_derivative::<T>(v, y)),
+            hessian: |v, mu, each| {
+                let mut entries = F::Hessian::<T>::zeroed();
+                F::hessian::<T>(v, &multipliers::<F, T>(mu), &mut entries);
+                for (entry, value) in entries.as_ref().iter().enumerate() {
+                    let (row, column) = F::STRUCTURE.hessian.at(entry);
+                    each(row, column, *value);
+                }
+            },
         }
     }
 
@@ -134,6 +149,11 @@ impl<M: Dae, T: Real> Map<M, T> {
         let mut y = ArrayX::<M, T>::zeroed();
         (self.value)(v, y.as_mut());
         y
+    }
+
+    /// The entries of the lower triangle of `∇²(μᵀy)`, row and column among all variables.
+    pub fn hessian(&self, v: &ArrayV<M, T>, mu: &[T], each: &mut dyn FnMut(usize, usize, T)) {
+        (self.hessian)(v, mu, each);
     }
 
     /// `∇(μᵀy)` and `μᵀ ∂y/∂t`.

@@ -9,23 +9,30 @@
 //! λ⁻ = j_xᵀ λ⁺ − (σ/ġ) g_x        λ_w += j_wᵀ λ⁺ − (σ/ġ) g_w        σ = λ⁺ᵀ (j_x f⁻ + j_t − f⁺)
 //! ```
 //!
-//! Between events derivatives are those of the steps that were taken. At events they are those of the solution: a step's
+//! `second` differentiates them once more, `frozen` keeps steps and events. Between events derivatives are those of the steps that were taken. At events they are those of the solution: a step's
 //! derivative by its length is `ẋ`, but for the error of the step.
 
 mod event;
+mod frozen;
+mod second;
 mod trace;
 
 pub use event::{Crossing, Event};
+pub use second::HybridHessian;
 
 use super::integrator::Integrator;
+use super::run::Span;
 use super::sealed::Engine;
 use super::segment::{Segment, dense, filled};
-use super::sensitivities::fill;
+use super::sensitivities::{chain, dynamic, fill};
 use super::statistics::AdaptiveStatistics;
-use crate::error::{Argument, Error};
+use crate::error::{Argument, Error, Place};
 use crate::irk::{check, not_finite};
 use crate::linalg::axpy;
-use crate::model::{ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX};
+use crate::model::{
+    ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
+};
+use crate::quadrature::{Along, Integrand, begin, finish, reborrow};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape, listed, plain};
@@ -54,6 +61,9 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     segments: Vec<Segment<M, T>>,
     /// How many of them belong to the last successful call.
     count: usize,
+    /// The interval that the last successful call was asked for, and that of steps and events that are kept.
+    asked: Option<Span<T>>,
+    frozen: Option<Span<T>>,
     statistics: AdaptiveStatistics,
     solution: Solution<M, T>,
     /// Where a function is evaluated.
@@ -131,9 +141,9 @@ struct Moment<M: Dae, T: Real> {
     /// `g_v`, and `ġ`.
     guard: ArrayV<M, T>,
     rate: T,
-    /// The derivatives of the state on both sides.
-    before: ArrayX<M, T>,
-    after: ArrayX<M, T>,
+    /// `(ẋ, z)` on both sides.
+    before: ArrayK<M, T>,
+    after: ArrayK<M, T>,
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
@@ -152,6 +162,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             most: 1000,
             segments: Vec::new(),
             count: 0,
+            asked: None,
+            frozen: None,
             statistics: AdaptiveStatistics::default(),
             solution,
             v: try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
@@ -207,29 +219,60 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         u: &VectorU<M, T>,
         t_end: T,
     ) -> Result<HybridForward<M, T>, Error> {
+        self.forward_along(x0, u, t_end, None)
+    }
+
+    /// As [`Hybrid::forward`], with an integrand.
+    pub(super) fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<HybridForward<M, T>, Error> {
         self.trace(x0, u, t_end)?;
+        Ok(self.sweep(x0, false, along)?.0)
+    }
+
+    /// Derivatives of all steps and over all events, and what is known about the moments of these; for `second` derivatives, what
+    /// these need.
+    #[allow(clippy::type_complexity)]
+    fn sweep(
+        &mut self,
+        x0: &VectorX<M, T>,
+        second: bool,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<(HybridForward<M, T>, Vec<(Event<M, T>, Moment<M, T>)>), Error> {
+        begin(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-        let mut v = filled(nx * nw, T::ZERO)?;
-        let mut next = filled(nx * nw, T::ZERO)?;
-        for x in 0..nx {
-            v[x * nw + x] = T::ONE;
+        let bytes = size_of::<ArrayX<M, ArrayW<M, T>>>();
+        let zeroed = || try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes });
+        let mut v: Box<ArrayX<M, ArrayW<M, T>>> = zeroed()?;
+        let mut next: Box<ArrayX<M, ArrayW<M, T>>> = zeroed()?;
+        for (x, row) in v.as_mut().as_mut().iter_mut().enumerate() {
+            row[x] = T::ONE;
         }
-        let mut times = Vec::new();
+        let (mut times, mut moments) = (Vec::new(), Vec::new());
         let mut x = *x0;
         for k in 0..self.count {
             let Self { integrator, segments, solution, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             segment.x = x;
+            let mut history = core::mem::take(&mut segment.history);
+            history.clear();
             let (mut frozen, state, memory, _) = segment.open(integrator)?;
-            frozen.forward::<B>(state, &x, memory, None, None)?;
+            // Its derivatives by where a segment begins are multiplied by those of that.
+            let mut part = chain(&mut along, Some(&*v), false);
+            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
             let local = &memory.hessian.first.forward;
             if k == 0 {
                 solution.nominal.z0 = local.nominal.z0;
             }
-            for (r, row) in next.chunks_exact_mut(nw.max(1)).enumerate() {
+            for (r, row) in next.as_mut().as_mut().iter_mut().enumerate() {
+                let row = row.as_mut();
                 row.fill(T::ZERO);
-                for (c, v) in v.chunks_exact(nw.max(1)).enumerate() {
-                    axpy(local.dx_dx0[(r, c)], v, row);
+                for (c, v) in v.as_ref().as_ref().iter().enumerate() {
+                    axpy(local.dx_dx0[(r, c)], v.as_ref(), row);
                 }
                 for (c, element) in row[nx..].iter_mut().enumerate() {
                     let part = if c < nu { local.dx_du[(r, c)] } else { local.dx_dp[(r, c - nu)] };
@@ -237,8 +280,30 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 }
             }
             core::mem::swap(&mut v, &mut next);
+            if second {
+                // Over this segment alone.
+                let mut own = filled(nx * nw, T::ZERO)?;
+                for (index, element) in own.iter_mut().enumerate() {
+                    let (r, w) = (index / nw, index % nw);
+                    *element = if w < nx {
+                        local.dx_dx0[(r, w)]
+                    } else if w < nx + nu {
+                        local.dx_du[(r, w - nx)]
+                    } else {
+                        local.dx_dp[(r, w - nx - nu)]
+                    };
+                }
+                segment.v = own;
+            }
+            segment.history = history;
             let Some((event, moment)) = self.moment(k)? else { break };
-            let time = self.forward_jump(event, &moment, &mut v, &mut next)?;
+            let [v, next] = [&mut v, &mut next].map(|v| ArrayW::<M, T>::flat_mut(v.as_mut().as_mut()));
+            let time = self.forward_jump(event, &moment, v, next)?;
+            if let Some(integrand) = &mut along {
+                self.beside(k, &event, &moment, &mut **integrand, |integrand, sign, at| {
+                    integrand.prolong(sign, &time, at)
+                })?;
+            }
             let mut gradient =
                 TimeGradient::<M, T> { x0: Zeroable::zeroed(), u: Zeroable::zeroed(), p: Zeroable::zeroed() };
             gradient.x0.as_mut_slice().copy_from_slice(&time.as_ref()[..nx]);
@@ -246,10 +311,15 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             gradient.p.as_mut_slice().copy_from_slice(&time.as_ref()[nx + nu..]);
             times.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&gradient) })?;
             times.push(gradient);
+            let moment = (event, moment);
+            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
+            moments.push(moment);
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();
-        if let Some((index, _)) = not_finite(&v) {
+        finish(&mut along)?;
+        let v = ArrayW::<M, T>::flat(v.as_ref().as_ref());
+        if let Some((index, _)) = not_finite(v) {
             return Err(Error::Overflow { step: 0, index });
         }
         let mut result = HybridForward {
@@ -262,7 +332,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         fill(&mut result.dx_dx0, |r, c| v[r * nw + c]);
         fill(&mut result.dx_du, |r, c| v[r * nw + nx + c]);
         fill(&mut result.dx_dp, |r, c| v[r * nw + nx + nu + c]);
-        Ok(result)
+        Ok((result, moments))
     }
 
     /// The solution at the end, and the gradient of `λᵀx`.
@@ -276,8 +346,30 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         t_end: T,
         lambda: &VectorX<M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
-        check(Argument::Lambda, lambda.as_slice())?;
+        self.adjoint_along(x0, u, t_end, lambda, None)
+    }
+
+    /// As [`Hybrid::solve`], with an integrand: the steps are taken again, to rounding.
+    pub(super) fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Solution<M, T>, Error> {
         self.trace(x0, u, t_end)?;
+        self.replay(x0, along)?;
+        Ok(&self.solution)
+    }
+
+    /// All steps again, to rounding, and what is known about the moments of the events.
+    #[allow(clippy::type_complexity)]
+    fn replay(
+        &mut self,
+        x0: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<Vec<(Event<M, T>, Moment<M, T>)>, Error> {
+        begin(&mut along);
         let mut moments = Vec::new();
         let mut x = *x0;
         for k in 0..self.count {
@@ -285,7 +377,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let Some(segment) = segments.get_mut(k) else { break };
             segment.x = x;
             let (mut frozen, state, ..) = segment.open(integrator)?;
-            frozen.solve::<B>(state, &x, None)?;
+            let mut part = chain(&mut along, None, false);
+            frozen.solve::<B>(state, &x, dynamic(&mut part))?;
             if k == 0 {
                 solution.nominal.z0 = integrator.base.result.z0;
             }
@@ -295,6 +388,22 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
         }
         self.collect();
+        finish(&mut along)?;
+        Ok(moments)
+    }
+
+    /// As [`Hybrid::adjoint`], with an integrand.
+    pub(super) fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<HybridAdjoint<M, T>, Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.trace(x0, u, t_end)?;
+        let moments = self.replay(x0, reborrow(&mut along))?;
         let mut result = HybridAdjoint {
             solution: self.solution.clone(),
             grad_x0: *lambda,
@@ -303,12 +412,19 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         };
         for k in (0..self.count).rev() {
             if let Some((event, moment)) = moments.get(k) {
-                self.adjoint_jump(k, *event, moment, &mut result);
+                let mut density = T::ZERO;
+                if let Some(integrand) = &mut along {
+                    self.beside(k, event, moment, &mut **integrand, |integrand, sign, at| {
+                        density = density + sign * integrand.density(at)?;
+                        Ok(())
+                    })?;
+                }
+                self.adjoint_jump(k, *event, moment, density, &mut result);
             }
             let Self { integrator, segments, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             let (mut frozen, state, memory, _) = segment.open(integrator)?;
-            frozen.adjoint::<B>(state, &result.grad_x0, memory, None)?;
+            frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut along))?;
             let gradient = &memory.adjoint;
             result.grad_x0.as_mut_slice().copy_from_slice(gradient.grad_x0.as_slice());
             axpy(T::ONE, gradient.grad_u.as_slice(), result.grad_u.as_mut_slice());
@@ -363,14 +479,39 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(time)
     }
 
-    /// `λ⁺` becomes `λ⁻`.
+    /// Shows an integrand what is before an event, and with the sign of a lower limit what is after it.
+    fn beside(
+        &mut self,
+        k: usize,
+        event: &Event<M, T>,
+        moment: &Moment<M, T>,
+        integrand: &mut dyn Integrand<M, T>,
+        mut each: impl FnMut(&mut dyn Integrand<M, T>, T, Place) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.go(k);
+        let Some(occurrence) = self.solution.occurrences.get(k) else { return Ok(()) };
+        let (nx, nk, at) = (M::Shape::NX, M::Shape::NK, Place { step: k, stage: 0, iteration: 0 });
+        let sides =
+            [(&occurrence.before, &moment.before, T::ONE), (&occurrence.after, &moment.after, -T::ONE)];
+        for (x, y, sign) in sides.into_iter().take(if event.jump.is_some() { 2 } else { 1 }) {
+            let (point, _) = integrand.point();
+            point.copy_from_slice(self.v.as_ref().as_ref());
+            point[nx..2 * nx].copy_from_slice(x.as_slice());
+            point[2 * nx..nx + nk].copy_from_slice(&y.as_ref()[nx..]);
+            each(integrand, sign, at)?;
+        }
+        Ok(())
+    }
+
+    /// `λ⁺` becomes `λ⁻`; `κ = −σ/ġ`. `density` is what an integrand gains where the event is later.
     fn adjoint_jump(
         &mut self,
         k: usize,
         event: Event<M, T>,
         moment: &Moment<M, T>,
+        density: T,
         result: &mut HybridAdjoint<M, T>,
-    ) {
+    ) -> T {
         let (nx, nz, nu) = (M::Shape::NX, M::Shape::NZ, M::Shape::NU);
         let dot = |a: &[T], b: &[T]| a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b);
         let inputs = 2 * nx + nz;
@@ -388,9 +529,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                     - dot(lambda.as_slice(), moment.after.as_ref())
             }
         };
-        let (factor, guard) = (-(sigma / moment.rate), moment.guard.as_ref());
+        let (factor, guard) = (-((sigma + density) / moment.rate), moment.guard.as_ref());
         axpy(factor, &guard[nx..2 * nx], result.grad_x0.as_mut_slice());
         axpy(factor, &guard[inputs..inputs + nu], result.grad_u.as_mut_slice());
         axpy(factor, &guard[inputs + nu..], result.grad_p.as_mut_slice());
+        factor
     }
 }

@@ -9,7 +9,7 @@ use super::super::statistics::AdaptiveStatistics;
 use super::{Event, Hybrid, Moment, Occurrence};
 use crate::error::{Argument, Error, Place};
 use crate::irk::{check, not_finite};
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU, VectorX};
+use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
@@ -20,7 +20,7 @@ const PIECES: usize = 4;
 /// A crossing is enclosed by so many bisections, to a millionth of a piece; then the step itself is made to end there.
 const BISECTIONS: usize = 20;
 /// By so many iterations of Newton's method at most.
-const ITERATIONS: usize = 20;
+pub(super) const ITERATIONS: usize = 20;
 /// So many units of rounding of its terms are zero.
 const ROUNDING: f64 = 64.0;
 
@@ -34,16 +34,22 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// Integrates to the end, from event to event.
     pub(super) fn trace(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
         self.statistics = AdaptiveStatistics::default();
-        self.count = 0;
-        self.solution.occurrences.clear();
-        self.solution.terminal = false;
         self.integrator.reserve()?;
         check(Argument::X0, x0.as_slice())?;
         let (start, given) = (self.integrator.start, self.integrator.base.given);
+        if let Some(frozen) = self.frozen {
+            let result = self.repeat(x0, u, t_end, frozen);
+            self.integrator.base.given = given;
+            return result;
+        }
+        (self.count, self.asked) = (0, None);
+        self.solution.occurrences.clear();
+        self.solution.terminal = false;
         let result = self.follow(x0, u, t_end);
         (self.integrator.start, self.integrator.base.given) = (start, given);
-        if result.is_err() {
-            self.count = 0;
+        match &result {
+            Ok(()) => self.asked = Some(Span { start, end: t_end }),
+            Err(_) => self.count = 0,
         }
         result
     }
@@ -254,7 +260,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     }
 
     /// `(ẋ, z)` at a state.
-    fn slope(&mut self, x: &VectorX<M, T>, u: &VectorU<M, T>, t: T) -> Result<ArrayK<M, T>, Error> {
+    pub(super) fn slope(
+        &mut self,
+        x: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t: T,
+    ) -> Result<ArrayK<M, T>, Error> {
         let base = &mut self.integrator.base;
         let (nx, point) = (M::Shape::NX, base.point.as_ref());
         // From where the last step ended.
@@ -299,13 +310,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             rate = rate + *g * *f;
         }
         self.check_slope(k, &event, index, rate)?;
-        let mut moment =
-            Moment { guard, rate, before: states::<M, T>(&slope), after: ArrayX::<M, T>::zeroed() };
+        let mut moment = Moment { guard, rate, before: slope, after: ArrayK::<M, T>::zeroed() };
         if let Some(jump) = event.jump {
             let mut after = VectorX::<M, T>::zeroed();
             after.as_mut_slice().copy_from_slice(jump.all(&self.v).as_ref());
             finite(jump.name, after.as_slice(), k)?;
-            moment.after = states::<M, T>(&self.slope(&after, &u, t)?);
+            moment.after = self.slope(&after, &u, t)?;
             if let Some(at) = self.solution.occurrences.get_mut(k) {
                 at.after = after;
             }
@@ -338,13 +348,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     }
 }
 
-/// `ẋ` of `(ẋ, z)`.
-fn states<M: Dae, T: Real>(y: &ArrayK<M, T>) -> ArrayX<M, T> {
-    let mut slope = ArrayX::<M, T>::zeroed();
-    slope.as_mut().copy_from_slice(&y.as_ref()[..M::Shape::NX]);
-    slope
-}
-
 /// The state and the time to where they lie among the variables.
 fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, t: T) {
     let nx = M::Shape::NX;
@@ -356,7 +359,7 @@ fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, t: T) {
 }
 
 /// The function of an event at a state.
-fn evaluate<M: Dae, T: Real>(
+pub(super) fn evaluate<M: Dae, T: Real>(
     event: &Event<M, T>,
     v: &mut ArrayV<M, T>,
     x: &VectorX<M, T>,
@@ -371,7 +374,7 @@ fn evaluate<M: Dae, T: Real>(
 
 /// # Errors
 /// [`Error::NonFiniteFunction`]
-fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
+pub(super) fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
     let at = Place { step, stage: 0, iteration: 0 };
     match not_finite(values) {
         None => Ok(()),

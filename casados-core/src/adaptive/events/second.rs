@@ -1,0 +1,279 @@
+//! Second derivatives over events: the jump of the sensitivities, differentiated once more.
+//!
+//! An event is the map `S(x⁻, w) = F⁺(−τ, j(F⁻(τ, x⁻)))`: along the flow to where `g = 0`, then the jump, and the flow behind it
+//! back to the same time. With `κ = −σ/ġ` and `λ⁻ = j_xᵀ λ⁺ + κ g_x` of the adjoint, all at the event:
+//!
+//! ```text
+//! τ' = −(g_x, g_w)/ġ      Y = (I, 0) + f⁻ τ'      S' = j_x Y + (0, j_w) − f⁺ τ'      D = (S'; 0 I)      E = (Y; 0 I)
+//! H⁻ = Dᵀ H⁺ D + Eᵀ ∇²(λ⁺ᵀj + κ g) E + τ'ᵀ e + eᵀ τ' + (b_x f⁻ − c_x f⁺) τ'ᵀ τ'
+//! b = λ⁻ᵀ df⁻/d(x, w)      c = λ⁺ᵀ df⁺/d(x, w)      e = b − c_x S' − (0, c_w)
+//! ```
+//!
+//! Here nothing depends on the time: neither models nor functions have second derivatives by it.
+
+use super::super::columns::Columns;
+use super::super::consistent::At;
+use super::super::sealed::Engine;
+use super::super::sensitivities::{fill, place};
+use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
+use crate::error::{Argument, Error};
+use crate::irk::{check, not_finite};
+use crate::linalg::axpy;
+use crate::model::{
+    ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,
+    VectorX,
+};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Plain, Shape, listed};
+use alloc::boxed::Box;
+use bytemuck::Zeroable;
+use bytemuck::allocation::try_zeroed_box;
+use core::marker::PhantomData;
+
+/// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+pub struct HybridHessian<M: Dae, T: Real = f64> {
+    /// The solution and its derivatives.
+    pub forward: HybridForward<M, T>,
+    /// The gradient.
+    pub adjoint: HybridAdjoint<M, T>,
+    /// `∂²(λᵀx)/∂x₀²`
+    pub h_xx: MatrixXX<M, T>,
+    /// `∂²(λᵀx)/∂x₀∂u`
+    pub h_xu: MatrixXU<M, T>,
+    /// `∂²(λᵀx)/∂u²`
+    pub h_uu: MatrixUU<M, T>,
+    /// `∂²(λᵀx)/∂x₀∂p`
+    pub h_xp: MatrixXP<M, T>,
+    /// `∂²(λᵀx)/∂u∂p`
+    pub h_up: MatrixUP<M, T>,
+    /// `∂²(λᵀx)/∂p²`
+    pub h_pp: MatrixPP<M, T>,
+}
+
+listed!([M: Dae, T: Real] HybridHessian<M, T> { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
+
+/// Memory, symmetric matrices in full.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+struct Second<M: Dae, T: Plain> {
+    /// The Hessian over the state that was reached, `u` and `p`, and one in the making.
+    h: ArrayW<M, ArrayW<M, T>>,
+    sum: ArrayW<M, ArrayW<M, T>>,
+    product: ArrayW<M, ArrayW<M, T>>,
+    /// `S'`, and `E` of all variables.
+    s: [ArrayX<M, ArrayW<M, T>>; 2],
+    e: ArrayV<M, ArrayW<M, T>>,
+    /// Derivatives of `ẋ`, a row for each direction.
+    slopes: ArrayW<M, ArrayX<M, T>>,
+}
+
+fn dot<T: Real>(a: &[T], b: &[T]) -> T {
+    a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b)
+}
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
+    /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+    ///
+    /// Between events second derivatives are those of the steps that were taken, at events those of the solution.
+    ///
+    /// # Errors
+    /// See [`Hybrid`]; [`Error::DependsOnTime`] if at an event the model, its function or its jump does: a clock that is a state
+    /// (`ẋ = 1`) says the same.
+    pub fn hessian(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t_end: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<HybridHessian<M, T>, Error> {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.trace(x0, u, t_end)?;
+        let (forward, moments) = self.sweep(x0, true, None)?;
+        let bytes = size_of::<Second<M, T>>();
+        let mut second: Box<Second<M, T>> = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
+        let mut adjoint = HybridAdjoint {
+            solution: self.solution.clone(),
+            grad_x0: *lambda,
+            grad_u: Zeroable::zeroed(),
+            grad_p: Zeroable::zeroed(),
+        };
+        let columns = Columns::<M> { intervals: 1, model: PhantomData };
+        for k in (0..self.count).rev() {
+            if let Some((event, moment)) = moments.get(k) {
+                let after = adjoint.grad_x0;
+                let kappa = self.adjoint_jump(k, *event, moment, T::ZERO, &mut adjoint);
+                self.second_jump(k, *event, moment, [&after, &adjoint.grad_x0], kappa, &mut second)?;
+            }
+            let Self { integrator, segments, .. } = self;
+            let Some(segment) = segments.get_mut(k) else { break };
+            let history = core::mem::take(&mut segment.history);
+            let (mut frozen, state, memory, v) = segment.open(integrator)?;
+            let result = frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, None);
+            if result.is_ok() {
+                let Second { h, sum, product, .. } = &mut *second;
+                place(&memory.hessian, sum);
+                let [product, total] =
+                    [product, &mut *sum].map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
+                columns.project(0, h.as_ref(), v, product, total);
+                h.as_mut().copy_from_slice(sum.as_ref());
+                let gradient = &memory.hessian.first;
+                adjoint.grad_x0 = gradient.grad_x0;
+                axpy(T::ONE, gradient.grad_u.as_slice(), adjoint.grad_u.as_mut_slice());
+                axpy(T::ONE, gradient.grad_p.as_slice(), adjoint.grad_p.as_mut_slice());
+            }
+            segment.history = history;
+            result?;
+        }
+        let (nx, nu, h) = (M::Shape::NX, M::Shape::NU, second.h.as_ref());
+        if let Some((index, _)) = not_finite(ArrayW::<M, T>::flat(h)) {
+            return Err(Error::Overflow { step: 0, index });
+        }
+        // To the last bit symmetric: of the two that differ by rounding the lower one.
+        let at = |r: usize, c: usize| h[r.max(c)][r.min(c)];
+        let mut result = HybridHessian {
+            forward,
+            adjoint,
+            h_xx: Zeroable::zeroed(),
+            h_xu: Zeroable::zeroed(),
+            h_uu: Zeroable::zeroed(),
+            h_xp: Zeroable::zeroed(),
+            h_up: Zeroable::zeroed(),
+            h_pp: Zeroable::zeroed(),
+        };
+        fill(&mut result.h_xx, at);
+        fill(&mut result.h_xu, |r, c| at(r, nx + c));
+        fill(&mut result.h_uu, |r, c| at(nx + r, nx + c));
+        fill(&mut result.h_xp, |r, c| at(r, nx + nu + c));
+        fill(&mut result.h_up, |r, c| at(nx + r, nx + nu + c));
+        fill(&mut result.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
+        Ok(result)
+    }
+
+    /// `H⁺` becomes `H⁻`, with `λ⁺` and `λ⁻`.
+    fn second_jump(
+        &mut self,
+        k: usize,
+        event: Event<M, T>,
+        moment: &Moment<M, T>,
+        [lambda, before]: [&VectorX<M, T>; 2],
+        kappa: T,
+        second: &mut Second<M, T>,
+    ) -> Result<(), Error> {
+        self.go(k);
+        self.check_time(k, &event, moment)?;
+        let (nx, nz, nw) = (M::Shape::NX, M::Shape::NZ, M::Shape::NW);
+        let Second { h, sum, product, s, e, slopes } = second;
+        // S' and τ' from the identity.
+        for rows in s.iter_mut() {
+            for (x, row) in rows.as_mut().iter_mut().enumerate() {
+                row.as_mut().fill(T::ZERO);
+                row[x] = T::ONE;
+            }
+        }
+        let [v, next] = s.each_mut().map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
+        let time = self.forward_jump(event, moment, v, next)?;
+        // Dᵀ H⁺ D
+        for row in sum.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        let columns = Columns::<M> { intervals: 1, model: PhantomData };
+        let [product, total] = [product, &mut *sum].map(|rows| ArrayW::<M, T>::flat_mut(rows.as_mut()));
+        columns.project(0, h.as_ref(), v, product, total);
+        // Eᵀ ∇² E
+        for row in e.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
+        for (x, row) in e.as_mut()[nx..2 * nx].iter_mut().enumerate() {
+            row[x] = T::ONE;
+            axpy(moment.before[x], time.as_ref(), row.as_mut());
+        }
+        for (input, row) in e.as_mut()[2 * nx + nz..].iter_mut().enumerate().take(nw - nx) {
+            row[nx + input] = T::ONE;
+        }
+        let e = e.as_ref();
+        let mut curve = |r: usize, c: usize, value: T| {
+            for (i, row) in sum.as_mut().iter_mut().enumerate() {
+                axpy(value * e[r][i], e[c].as_ref(), row.as_mut());
+                if r != c {
+                    axpy(value * e[c][i], e[r].as_ref(), row.as_mut());
+                }
+            }
+        };
+        event.guard.hessian(&self.v, &[kappa], &mut curve);
+        if let Some(jump) = event.jump {
+            jump.hessian(&self.v, lambda.as_slice(), &mut curve);
+        }
+        // What the slopes change by.
+        let Some(at) = self.solution.occurrences.get(k) else { return Ok(()) };
+        let u = self.segments.get(k).map_or_else(Zeroable::zeroed, |segment| segment.u);
+        let base = &mut self.integrator.base;
+        let mut product = |lambda: &VectorX<M, T>, x: &VectorX<M, T>, y: &ArrayK<M, T>| {
+            let at = At { x, u: &u, p: &base.parameters, t: at.t };
+            self.integrator.consistent.slopes(&at, y, slopes)?;
+            let slopes = slopes.as_ref();
+            Ok::<_, Error>(ArrayW::<M, T>::from_fn(|w| dot(slopes[w].as_ref(), lambda.as_slice())))
+        };
+        let mut change = product(before, &at.before, &moment.before)?;
+        let mut twice = dot(&change.as_ref()[..nx], moment.before.as_ref());
+        if event.jump.is_some() {
+            let after = product(lambda, &at.after, &moment.after)?;
+            twice = twice - dot(&after.as_ref()[..nx], moment.after.as_ref());
+            for (c, row) in after.as_ref().iter().zip(v.chunks_exact(nw.max(1))) {
+                axpy(-*c, row, change.as_mut());
+            }
+            axpy(-T::ONE, &after.as_ref()[nx..], &mut change.as_mut()[nx..]);
+        }
+        for (i, row) in sum.as_mut().iter_mut().enumerate() {
+            axpy(time[i], change.as_ref(), row.as_mut());
+            axpy(change[i] + twice * time[i], time.as_ref(), row.as_mut());
+        }
+        h.as_mut().copy_from_slice(sum.as_ref());
+        Ok(())
+    }
+
+    /// Nothing at an event is another at other times, to the last bit.
+    ///
+    /// # Errors
+    /// [`Error::DependsOnTime`]
+    fn check_time(&mut self, k: usize, event: &Event<M, T>, moment: &Moment<M, T>) -> Result<(), Error> {
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let Some(at) = self.solution.occurrences.get(k) else { return Ok(()) };
+        let mut v = *self.v;
+        let part = self.segments.get(k).map_or(T::ZERO, |segment| segment.span.end - segment.span.start);
+        let part = if part == T::ZERO { T::ONE } else { part };
+        let others = [-0.37, 0.11, 0.83].map(|share| at.t + T::from_f64(share) * part);
+        let model = |x: &VectorX<M, T>, y: &ArrayK<M, T>, t: T| {
+            let (mut point, mut f) = (v, ArrayK::<M, T>::zeroed());
+            let numbers = point.as_mut();
+            numbers[..nx].copy_from_slice(&y.as_ref()[..nx]);
+            numbers[nx..2 * nx].copy_from_slice(x.as_slice());
+            numbers[2 * nx..nx + nk].copy_from_slice(&y.as_ref()[nx..]);
+            if let Some(time) = numbers.last_mut() {
+                *time = t;
+            }
+            M::residual::<T>(&point, &mut f);
+            f
+        };
+        let sides = [(&at.before, &moment.before), (&at.after, &moment.after)];
+        for (x, y) in sides.into_iter().take(if event.jump.is_some() { 2 } else { 1 }) {
+            let there = model(x, y, at.t);
+            if others.iter().any(|t| model(x, y, *t) != there) {
+                return Err(Error::DependsOnTime { function: "the model" });
+            }
+        }
+        let functions = [Some(&event.guard), event.jump.as_ref()];
+        for map in functions.into_iter().flatten() {
+            let mut value = |t: T| {
+                if let Some(time) = v.as_mut().last_mut() {
+                    *time = t;
+                }
+                map.all(&v)
+            };
+            let there = value(at.t);
+            if others.iter().any(|t| value(*t) != there) {
+                return Err(Error::DependsOnTime { function: map.name });
+            }
+        }
+        Ok(())
+    }
+}
