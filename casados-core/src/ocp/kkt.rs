@@ -2,7 +2,9 @@
 
 use super::linearise::dot;
 use crate::linalg::axpy;
-use crate::qp::{QpView, Residuals, Solution, StageDims, bound_residuals, part, part_mut, symmetric};
+use crate::qp::{
+    QpView, Residuals, Solution, StageDims, add_symmetric, assign, bound_residuals, part, part_mut,
+};
 use crate::scalar::Real;
 
 /// The residuals, and penalties of soft bounds. Residuals as in [`qp::residuals`](crate::qp::residuals), which goes element by
@@ -23,13 +25,12 @@ pub(super) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let next = stages.peek().map_or(&[][..], |next| next.x);
         let view = stage.arrays();
         let (n, ld) = (view.n, view.ld);
-        let v = part(all, begin, n);
+        let v = part(all, begin, ld);
         begin += ld;
-        let sum = part_mut(scratch, 0, n);
-        for (sum, &gradient) in sum.iter_mut().zip(view.gradient) {
-            *sum = gradient;
-        }
-        symmetric(sum, view.hessian, ld, v, n);
+        let sum = part_mut(scratch, 0, ld);
+        assign(sum, view.gradient);
+        add_symmetric(sum, view.hessian, ld, v, n);
+        let (v, sum) = (part(v, 0, n), part_mut(sum, 0, n));
         let mut columns = view.matrix.chunks_exact(ld.max(1));
         let dynamics = point.dynamics.iter().zip(view.offset).zip(next);
         for (((&pi, &offset), &x), column) in dynamics.zip(columns.by_ref()) {

@@ -9,7 +9,7 @@ use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 use super::point::{Terms, read};
 use super::problem::{Formulation, Problem};
-use crate::qp::{Arrays, Residuals, Solution, StageDims, assign, pad, part, part_mut, symmetric};
+use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
@@ -162,9 +162,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if !convex {
                 convexify(curvature.convexification(), hessian, stage_ld, n, data.scratch);
             }
-            let product = part_mut(data.scratch, 0, n);
+            let product = part_mut(data.scratch, 0, stage_ld);
             product.fill(T::ZERO);
-            symmetric(product, hessian, stage_ld, part(v, k * ld, n), n);
+            add_symmetric(product, hessian, stage_ld, part(v, k * ld, stage_ld), n);
             for (gradient, &product) in gradient.iter_mut().zip(&*product) {
                 *gradient = *gradient - product;
             }

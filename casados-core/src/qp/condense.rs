@@ -12,7 +12,7 @@
 //! memory passes by in each iteration.
 
 use super::error::{Field, QpError};
-use super::interior::{Columns, MORE, Part, Source, add_transposed, product, subtract};
+use super::interior::{Columns, MORE, Part, Source, add_transposed, product, subtract, symmetric};
 use super::layout::{Place, Places, StageDims, assign, pad, part, part_mut};
 use super::memory::reserve;
 use super::problem::{HeapQp, QpView, Row};
@@ -457,13 +457,8 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
             {
                 *g = linear + upper - lower;
             }
-            super::interior::symmetric(
-                g,
-                part(data, place.matrix(), place.hessian()),
-                ld,
-                part(v, place.v, ld),
-                n,
-            );
+            let hessian = part(data, place.matrix(), place.hessian());
+            symmetric::<T, E>(g, hessian, ld, part(v, place.v, ld), n);
             for (minus, &pi) in minus.iter_mut().zip(part(dynamics, place.dynamics, next)) {
                 *minus = -pi;
             }

@@ -271,6 +271,10 @@ pub trait Packed<T>: Lanes {
     fn cells_mut(numbers: &mut [T]) -> &mut [Self::Cell];
     /// `self − a b`, rounded once where the machine has an instruction for it.
     fn minus_product(self, a: Self, b: Self) -> Self;
+    /// The sum of the lanes.
+    fn total(self) -> T;
+    /// The largest lane; any of them if one is NaN.
+    fn largest(self) -> T;
 }
 
 /// A computation on slices that is made in registers of whatever width.

@@ -172,6 +172,14 @@ macro_rules! real {
             fn minus_product(self, a: $t, b: $t) -> $t {
                 self - a * b
             }
+            #[inline(always)]
+            fn total(self) -> $t {
+                self
+            }
+            #[inline(always)]
+            fn largest(self) -> $t {
+                self
+            }
         }
 
         impl Real for $t {

@@ -5,7 +5,7 @@ use crate::ocp::data::split;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
-use crate::qp::{Bounds, Solution, StageDims, part, part_mut, symmetric};
+use crate::qp::{Bounds, Solution, StageDims, add_symmetric, assign, part, part_mut};
 use crate::scalar::{Real, Scalar};
 use crate::shape::Shape;
 
@@ -119,23 +119,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut soft = -penalties;
         for (stage, point) in self.qp.view().stages().zip(solution.stages()) {
             let view = stage.arrays();
-            let (v, w) = (part(from, begin, view.n), part(to, begin, view.n));
+            let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
             begin += view.ld;
-            let (first, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
-            let (direction, gradient) = (part_mut(first, 0, view.n), part_mut(rest, 0, view.n));
+            let (direction, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
+            let gradient = part_mut(rest, 0, view.ld);
             for ((d, &w), &v) in direction.iter_mut().zip(w).zip(v) {
                 *d = w - v;
             }
-            gradient.copy_from_slice(part(view.gradient, 0, view.n));
-            symmetric(gradient, view.hessian, view.ld, v, view.n);
+            assign(gradient, part(view.gradient, 0, view.ld));
+            add_symmetric(gradient, view.hessian, view.ld, v, view.n);
             slope = gradient.iter().zip(&*direction).fold(slope, |sum, (&g, &d)| sum + g * d);
             gradient.fill(T::ZERO);
-            symmetric(gradient, view.hessian, view.ld, direction, view.n);
+            add_symmetric(gradient, view.hessian, view.ld, direction, view.n);
             curvature = gradient.iter().zip(&*direction).fold(curvature, |sum, (&g, &d)| sum + g * d);
             let x = |i: usize| point.x.get(i).copied().unwrap_or(T::ZERO);
             let u = |i: usize| point.u.get(i).copied().unwrap_or(T::ZERO);
             let g = |i: usize| {
-                let column = part(view.matrix, (view.next + i) * view.ld, view.n);
+                let column = part(view.matrix, (view.next + i) * view.ld, view.ld);
                 crate::ocp::linearise::dot(column, w)
             };
             soft += sides(&stage.x_bounds(), x).objective

@@ -6,7 +6,7 @@
 //! then keeps sums in memory, which takes twice as long. Everything is inlined into the function that was compiled for `E`.
 
 use crate::qp::layout::part;
-use crate::scalar::{Packed, Piece, Real};
+use crate::scalar::{Packed, Piece, Real, Registers};
 use core::marker::PhantomData;
 use core::ops::Range;
 
@@ -329,6 +329,71 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
     }
 }
 
+/// `target + H v` with a symmetric matrix whose lower triangle is there; above it may be anything. Target and `v` are padded, `v` with
+/// zeros.
+#[inline(always)]
+pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
+    let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();
+    for lane in 0..E::LANES {
+        E::set_lane(&mut index, lane, lane as f64);
+    }
+    let index = E::load(&index);
+    let below = |column: usize| splat::<T, E>(T::from_f64((column % E::LANES) as f64));
+    let strict = |cell: &E::Cell, column: usize| {
+        E::select(below(column).is_smaller(index), E::load(cell), E::from_f64(0.0))
+    };
+    // What is below the diagonal, row by row of registers.
+    for (i, target) in E::cells_mut(target).iter_mut().take(n.div_ceil(E::LANES)).enumerate() {
+        let mut sum = E::load(target);
+        let columns = h.chunks_exact(ld.max(1)).zip(v);
+        for (column, &v) in columns.clone().take(i * E::LANES) {
+            if let Some(cell) = E::cells(column).get(i) {
+                sum = sum.minus_product(E::load(cell), splat::<T, E>(-v));
+            }
+        }
+        for (j, (column, &v)) in columns.enumerate().take(n).skip(i * E::LANES).take(E::LANES) {
+            if let Some(cell) = E::cells(column).get(i) {
+                sum = sum.minus_product(strict(cell, j), splat::<T, E>(-v));
+            }
+        }
+        sum.store(target);
+    }
+    // And its transpose, with the diagonal.
+    let v_cells = E::cells(v).get(..n.div_ceil(E::LANES)).unwrap_or_default();
+    for (j, (column, target)) in h.chunks_exact(ld.max(1)).zip(target).take(n).enumerate() {
+        let first = j / E::LANES;
+        let (cells, factors) = (E::cells(column).get(first..), v_cells.get(first..));
+        let mut products = cells.unwrap_or_default().iter().zip(factors.unwrap_or_default());
+        let Some((cell, factor)) = products.next() else { return };
+        let mut sum = E::from_f64(0.0).minus_product(strict(cell, j), E::load(factor));
+        for (cell, factor) in products {
+            sum = sum.minus_product(E::load(cell), E::load(factor));
+        }
+        let diagonal = column.get(j).zip(v.get(j)).map_or(T::ZERO, |(&h, &v)| h * v);
+        *target = *target + (diagonal - sum.total());
+    }
+}
+
+/// `target + H v` as [`symmetric`], for whoever is not in registers yet.
+pub fn add_symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
+    T::registers(AddSymmetric { target, h, ld, v, n });
+}
+
+struct AddSymmetric<'a, T> {
+    target: &'a mut [T],
+    h: &'a [T],
+    ld: usize,
+    v: &'a [T],
+    n: usize,
+}
+
+impl<T: Real> Registers<T> for AddSymmetric<'_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        symmetric::<T, E>(self.target, self.h, self.ld, self.v, self.n);
+    }
+}
+
 /// Products of the first `C` columns with `v`.
 #[inline(always)]
 fn dots<T: Real, E: Packed<T>, const C: usize>(x: Columns<'_, T>, v: &[E::Cell]) -> [T; C] {
@@ -349,7 +414,7 @@ fn dots<T: Real, E: Packed<T>, const C: usize>(x: Columns<'_, T>, v: &[E::Cell])
     }
     let mut dots = [T::ZERO; C];
     for (dot, sum) in dots.iter_mut().zip(sums) {
-        *dot = -total::<T, E>(sum);
+        *dot = -sum.total();
     }
     dots
 }
@@ -370,14 +435,6 @@ pub fn scale<T: Real, E: Packed<T>>(target: &mut [T], factor: T) {
     for target in E::cells_mut(target) {
         (E::load(target) * factor).store(target);
     }
-}
-
-/// The sum over the lanes.
-#[inline(always)]
-pub fn total<T: Real, E: Packed<T>>(register: E) -> T {
-    let mut cell = <E::Cell as bytemuck::Zeroable>::zeroed();
-    register.store(&mut cell);
-    (0..E::LANES).fold(T::ZERO, |sum, lane| sum + T::from_f64(E::lane(&cell, lane)))
 }
 
 /// The upper triangle from the lower one.
@@ -467,6 +524,24 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// The definition, with what must not be read above the diagonal.
+    #[test]
+    fn symmetric_products_of_all_sizes() {
+        for n in 1..27 {
+            let ld = pad::<f64>(n);
+            let mut h = integers(n, n, 1);
+            let v = integers(n, 1, 2);
+            let before = integers(n, 1, 3);
+            let expected: Vec<f64> = (0..n)
+                .map(|i| before[i] + (0..n).map(|j| h[i.min(j) * ld + i.max(j)] * v[j]).sum::<f64>())
+                .collect();
+            (0..n).for_each(|j| h[j * ld..j * ld + j].fill(f64::NAN));
+            let mut target = before.clone();
+            add_symmetric(&mut target, &h, ld, &v, n);
+            assert_eq!(target[..n], expected, "{n}");
         }
     }
 }

@@ -11,9 +11,9 @@ mod sides;
 mod store;
 mod vector;
 
+pub(crate) use kernels::add_symmetric;
 #[cfg(feature = "alloc")]
-pub(super) use kernels::{Columns, MORE, Part, Source, add_transposed, product, subtract};
-pub(crate) use newton::symmetric;
+pub(super) use kernels::{Columns, MORE, Part, Source, add_transposed, product, subtract, symmetric};
 pub use options::InteriorPointOptions;
 pub use store::Store;
 

@@ -1,6 +1,6 @@
 //! One iterate of the interior point, its residuals, and the step from it.
 
-use super::kernels::{Columns, add_transposed, subtract};
+use super::kernels::{Columns, add_transposed, subtract, symmetric};
 use super::riccati::{Equations, First, Riccati};
 use super::sides::{Counts, Sides, set};
 use super::vector::{
@@ -182,7 +182,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             let g = part_mut(self.stationarity, place.row, ld);
             let v = part(self.v, place.row, ld);
             g.fill(T::ZERO);
-            symmetric(g, hessian, ld, v, n);
+            symmetric::<T, E>(g, hessian, ld, v, n);
             largest = larger::<T, E>(largest, g);
             largest = larger::<T, E>(largest, linear);
             for ((g, &linear), &v) in g.iter_mut().zip(linear).zip(v) {
@@ -558,24 +558,6 @@ pub fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: im
     for (&row, value) in rows.iter().zip(values) {
         if let Some(target) = target.get_mut(row as usize) {
             *target = change(*target, value);
-        }
-    }
-}
-
-/// `target + H v`, of which the lower triangle is there.
-#[inline(always)]
-pub fn symmetric<T: Real>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
-    for (j, column) in h.chunks_exact(ld.max(1)).take(n).enumerate() {
-        let Some(&here) = v.get(j) else { return };
-        let (Some(below), Some(v_below)) = (column.get(j + 1..n), v.get(j + 1..n)) else { return };
-        let mut sum = column.get(j).map_or(T::ZERO, |&d| d * here);
-        let target_below = target.get_mut(j + 1..n).unwrap_or_default();
-        for ((target, &h), &v) in target_below.iter_mut().zip(below).zip(v_below) {
-            *target = *target + h * here;
-            sum = sum + h * v;
-        }
-        if let Some(target) = target.get_mut(j) {
-            *target = *target + sum;
         }
     }
 }

@@ -18,7 +18,7 @@ pub fn dot<T: Real, E: Packed<T>>(a: &[T], b: &[T]) -> T {
         let sum = &mut sums[i % 2];
         *sum = sum.minus_product(E::load(a), E::load(b));
     }
-    let whole = -super::kernels::total::<T, E>(sums[0] + sums[1]);
+    let whole = -(sums[0] + sums[1]).total();
     a_rest.iter().zip(b_rest).fold(whole, |sum, (&a, &b)| sum + a * b)
 }
 
@@ -30,7 +30,7 @@ pub fn largest_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
     for (a, b) in a.iter().zip(b) {
         largest = (E::load(a) * E::load(b)).max(largest);
     }
-    let whole = extreme::<T, E>(largest);
+    let whole = largest.largest();
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (a * b).max(largest))
 }
 
@@ -42,7 +42,7 @@ pub fn largest_negative_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T
     for (a, b) in a.iter().zip(b) {
         largest = (-(E::load(a) * E::load(b))).max(largest);
     }
-    let whole = extreme::<T, E>(largest);
+    let whole = largest.largest();
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a * b)).max(largest))
 }
 
@@ -54,7 +54,7 @@ pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T])
     for (a, b) in a.iter().zip(b) {
         largest = (-(E::load(a) / E::load(b))).max(largest);
     }
-    let whole = extreme::<T, E>(largest);
+    let whole = largest.largest();
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a / b)).max(largest))
 }
 
@@ -66,7 +66,7 @@ pub fn larger<T: Real, E: Packed<T>>(least: T, all: &[T]) -> T {
     for a in a {
         largest = E::load(a).abs().max(largest);
     }
-    let whole = extreme::<T, E>(largest);
+    let whole = largest.largest();
     rest.iter().fold(whole, |largest, a| a.abs().max(largest))
 }
 
@@ -76,15 +76,6 @@ pub fn largest_size<T: Real, E: Packed<T>>(all: &[T]) -> T {
     let largest = larger::<T, E>(T::ZERO, all);
     // What is compared with NaN does not show it: sums do.
     if dot::<T, E>(all, all).is_finite() { largest } else { T::from_f64(f64::NAN) }
-}
-
-/// The largest lane.
-#[inline(always)]
-fn extreme<T: Real, E: Packed<T>>(register: E) -> T {
-    let mut cell = <E::Cell as bytemuck::Zeroable>::zeroed();
-    register.store(&mut cell);
-    let first = T::from_f64(E::lane(&cell, 0));
-    (1..E::LANES).fold(first, |largest, lane| T::from_f64(E::lane(&cell, lane)).max(largest))
 }
 
 /// `a + factor · b`

@@ -57,6 +57,8 @@ pub mod neon_f64 {
 
     shared!(f64, 2, vld1q_f64, vst1q_f64);
     define! {
+        total(a: Register) -> f64 { vaddvq_f64(a) }
+        largest(a: Register) -> f64 { vmaxvq_f64(a) }
         splat(a: f64) -> Register { vdupq_n_f64(a) }
         add(a: Register, b: Register) -> Register { vaddq_f64(a, b) }
         sub(a: Register, b: Register) -> Register { vsubq_f64(a, b) }
@@ -107,6 +109,8 @@ pub mod neon_f32 {
 
     shared!(f32, 4, vld1q_f32, vst1q_f32);
     define! {
+        total(a: Register) -> f32 { vaddvq_f32(a) }
+        largest(a: Register) -> f32 { vmaxvq_f32(a) }
         splat(a: f32) -> Register { vdupq_n_f32(a) }
         add(a: Register, b: Register) -> Register { vaddq_f32(a, b) }
         sub(a: Register, b: Register) -> Register { vsubq_f32(a, b) }

@@ -246,6 +246,14 @@ macro_rules! register {
             fn minus_product(self, a: Self, b: Self) -> Self {
                 self.subtract_product(a, b)
             }
+            #[inline(always)]
+            fn total(self) -> $element {
+                $ops::total(self.0)
+            }
+            #[inline(always)]
+            fn largest(self) -> $element {
+                $ops::largest(self.0)
+            }
         }
 
         impl<const N: usize> Lanes for $name<N> {

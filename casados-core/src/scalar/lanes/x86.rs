@@ -81,6 +81,24 @@ macro_rules! enter {
     };
 }
 
+/// The sum of all lanes, and the largest, from those of half as many.
+macro_rules! halves {
+    ($element:ty, $half:ident, $low:ident, $high:ident) => {
+        #[inline(always)]
+        pub fn total(a: Register) -> $element {
+            // SAFETY: see the head of the file.
+            let (low, high) = unsafe { ($low(a), $high::<1>(a)) };
+            $half::total($half::add(low, high))
+        }
+        #[inline(always)]
+        pub fn largest(a: Register) -> $element {
+            // SAFETY: see the head of the file.
+            let (low, high) = unsafe { ($low(a), $high::<1>(a)) };
+            $half::largest($half::max(low, high))
+        }
+    };
+}
+
 /// Two `f64`.
 pub mod sse2_f64 {
     use super::*;
@@ -108,6 +126,8 @@ pub mod sse2_f64 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm_or_pd;
     }
     define! {
+        total(a: Register) -> f64 { _mm_cvtsd_f64(_mm_add_sd(a, _mm_unpackhi_pd(a, a))) }
+        largest(a: Register) -> f64 { _mm_cvtsd_f64(_mm_max_sd(a, _mm_unpackhi_pd(a, a))) }
         /// Rounded twice.
         mul_add(a: Register, b: Register, c: Register) -> Register { _mm_add_pd(_mm_mul_pd(a, b), c) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm_sub_pd(c, _mm_mul_pd(a, b)) }
@@ -152,6 +172,14 @@ pub mod sse_f32 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm_or_ps;
     }
     define! {
+        total(a: Register) -> f32 {{
+            let pairs = _mm_add_ps(a, _mm_movehl_ps(a, a));
+            _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps::<1>(pairs, pairs)))
+        }}
+        largest(a: Register) -> f32 {{
+            let pairs = _mm_max_ps(a, _mm_movehl_ps(a, a));
+            _mm_cvtss_f32(_mm_max_ss(pairs, _mm_shuffle_ps::<1>(pairs, pairs)))
+        }}
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm_sub_ps(c, _mm_mul_ps(a, b)) }
         mask_not(a: Mask) -> Mask { _mm_xor_ps(a, _mm_castsi128_ps(_mm_set1_epi32(-1))) }
         select(m: Mask, a: Register, b: Register) -> Register { _mm_or_ps(_mm_and_ps(m, a), _mm_andnot_ps(m, b)) }
@@ -169,6 +197,7 @@ pub mod avx2_f64 {
     pub const FUSED: bool = true;
 
     enter!("avx2,fma");
+    halves!(f64, sse2_f64, _mm256_castpd256_pd128, _mm256_extractf128_pd);
     memory!(f64, 4, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_setr_pd; 0 1 2 3);
     wrap! {
         splat(a: f64) -> Register = _mm256_set1_pd;
@@ -216,6 +245,7 @@ pub mod avx2_f32 {
     pub type Mask = __m256;
 
     enter!("avx2,fma");
+    halves!(f32, sse_f32, _mm256_castps256_ps128, _mm256_extractf128_ps);
     memory!(f32, 8, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_setr_ps; 0 1 2 3 4 5 6 7);
     wrap! {
         splat(a: f32) -> Register = _mm256_set1_ps;
@@ -282,6 +312,7 @@ pub mod avx512_f64 {
     pub const FUSED: bool = true;
 
     enter!("avx512f,avx512dq,avx512vl");
+    halves!(f64, avx2_f64, _mm512_castpd512_pd256, _mm512_extractf64x4_pd);
     masked!(f64, 8, u8, _mm512_mask_loadu_pd, _mm512_mask_storeu_pd, _mm512_mask_blend_pd);
     wrap! {
         splat(a: f64) -> Register = _mm512_set1_pd;
@@ -324,6 +355,7 @@ pub mod avx512_f32 {
     pub type Mask = __mmask16;
 
     enter!("avx512f,avx512dq,avx512vl");
+    halves!(f32, avx2_f32, _mm512_castps512_ps256, _mm512_extractf32x8_ps);
     masked!(f32, 16, u16, _mm512_mask_loadu_ps, _mm512_mask_storeu_ps, _mm512_mask_blend_ps);
     wrap! {
         splat(a: f32) -> Register = _mm512_set1_ps;
