@@ -1,6 +1,8 @@
 //! What happens between two nodes of a horizon.
 
 use super::error::OcpError;
+use crate::model::Dae;
+use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 
@@ -96,6 +98,30 @@ pub struct Step<'a, T> {
 impl<T: Real> Default for Step<'_, T> {
     fn default() -> Self {
         Self { x: &[], dx: &[], du: &[], dp: &[], hessian: [&[]; 3], cost: IntegralTerms::default() }
+    }
+}
+
+impl<'a, M: Dae, T: Real> From<&'a Nominal<M, T>> for Step<'a, T> {
+    fn from(result: &'a Nominal<M, T>) -> Self {
+        Self { x: result.x.as_slice(), ..Self::default() }
+    }
+}
+
+impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for Step<'a, T> {
+    fn from(result: &'a Forward<M, T>) -> Self {
+        Self {
+            dx: result.dx_dx0.as_slice(),
+            du: result.dx_du.as_slice(),
+            dp: result.dx_dp.as_slice(),
+            ..Self::from(&result.nominal)
+        }
+    }
+}
+
+impl<'a, M: Dae, T: Real> From<&'a Hessian<M, T>> for Step<'a, T> {
+    fn from(result: &'a Hessian<M, T>) -> Self {
+        let hessian = [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()];
+        Self { hessian, ..Self::from(&result.first.forward) }
     }
 }
 

@@ -1,13 +1,13 @@
 //! A batch as dynamics: all intervals in one call.
 
-use super::dynamics::{Dynamics, IntegralTerms, Names, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, Names, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::single::names;
 use crate::batch::{BatchError, Integrator, Intervals};
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Shape};
+use crate::shape::Shape;
 use alloc::vec::Vec;
 
 /// All intervals of a horizon at once: lanes of registers, and threads (feature `parallel`).
@@ -107,7 +107,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
         let Self { batch, x, u, p, h, t, nominal, .. } = self;
         batch.solve(&Intervals { x0: x, u, p, h, t0: t }, nominal).map_err(failed)?;
         for (k, result) in nominal.iter().enumerate() {
-            sink(k, &Step { x: result.x.as_slice(), ..Step::default() });
+            sink(k, &result.into());
         }
         Ok(())
     }
@@ -118,16 +118,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
         let Self { batch, x, u, p, h, t, forward, .. } = self;
         batch.forward(&Intervals { x0: x, u, p, h, t0: t }, forward).map_err(failed)?;
         for (k, result) in forward.iter().enumerate() {
-            sink(
-                k,
-                &Step {
-                    x: result.nominal.x.as_slice(),
-                    dx: result.dx_dx0.as_slice(),
-                    du: result.dx_du.as_slice(),
-                    dp: result.dx_dp.as_slice(),
-                    ..Step::default()
-                },
-            );
+            sink(k, &result.into());
         }
         Ok(())
     }
@@ -140,18 +131,7 @@ impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Shooting<M, B, S, T>
         let Self { batch, x, u, p, h, t, lambda, hessian, .. } = self;
         batch.hessian(&Intervals { x0: x, u, p, h, t0: t }, lambda, hessian).map_err(failed)?;
         for (k, result) in hessian.iter().enumerate() {
-            let forward = &result.first.forward;
-            sink(
-                k,
-                &Step {
-                    x: forward.nominal.x.as_slice(),
-                    dx: forward.dx_dx0.as_slice(),
-                    du: forward.dx_du.as_slice(),
-                    dp: forward.dx_dp.as_slice(),
-                    hessian: [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()],
-                    cost: IntegralTerms::default(),
-                },
-            );
+            sink(k, &result.into());
         }
         Ok(())
     }

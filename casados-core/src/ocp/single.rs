@@ -104,7 +104,7 @@ macro_rules! single {
                     at(k, self.begin(&interval))?;
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let result = at(k, self.solve(&x, &u, interval.h))?;
-                    sink(k, &Step { x: result.x.as_slice(), ..Step::default() });
+                    sink(k, &result.into());
                 }
                 Ok(())
             }
@@ -113,16 +113,7 @@ macro_rules! single {
                     at(k, self.begin(&interval))?;
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let result = at(k, self.forward(&x, &u, interval.h))?;
-                    sink(
-                        k,
-                        &Step {
-                            x: result.nominal.x.as_slice(),
-                            dx: result.dx_dx0.as_slice(),
-                            du: result.dx_du.as_slice(),
-                            dp: result.dx_dp.as_slice(),
-                            ..Step::default()
-                        },
-                    );
+                    sink(k, &result.into());
                 }
                 Ok(())
             }
@@ -136,18 +127,7 @@ macro_rules! single {
                     at(k, self.begin(&interval))?;
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let result = at(k, self.hessian(&x, &u, interval.h, &vector(interval.multipliers)))?;
-                    let forward = &result.first.forward;
-                    sink(
-                        k,
-                        &Step {
-                            x: forward.nominal.x.as_slice(),
-                            dx: forward.dx_dx0.as_slice(),
-                            du: forward.dx_du.as_slice(),
-                            dp: forward.dx_dp.as_slice(),
-                            hessian: [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()],
-                            cost: IntegralTerms::default(),
-                        },
-                    );
+                    sink(k, &result.into());
                 }
                 Ok(())
             }
@@ -167,7 +147,7 @@ macro_rules! single {
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let result = at(k, integrator.with(integral).solve(&x, &u, interval.h))?;
                     let cost = IntegralTerms { value: integral.terms().value, ..IntegralTerms::default() };
-                    sink(k, &Step { x: result.x.as_slice(), cost, ..Step::default() });
+                    sink(k, &Step { cost, ..result.into() });
                 }
                 Ok(())
             }
@@ -178,17 +158,7 @@ macro_rules! single {
                     integral.prepare();
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let result = at(k, integrator.with(integral).forward(&x, &u, interval.h))?;
-                    sink(
-                        k,
-                        &Step {
-                            x: result.nominal.x.as_slice(),
-                            dx: result.dx_dx0.as_slice(),
-                            du: result.dx_du.as_slice(),
-                            dp: result.dx_dp.as_slice(),
-                            hessian: [&[]; 3],
-                            cost: integral.terms(),
-                        },
-                    );
+                    sink(k, &Step { cost: integral.terms(), ..result.into() });
                 }
                 Ok(())
             }
@@ -205,20 +175,9 @@ macro_rules! single {
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let lambda: VectorX<M, T> = vector(interval.multipliers);
                     let result = at(k, integrator.with(integral).hessian(&x, &u, interval.h, &lambda))?;
-                    let forward = &result.first.forward;
                     // The Hessian is that of both together: what the integral would add is in it.
                     let cost = IntegralTerms { hessian: [&[]; 3], ..integral.terms() };
-                    sink(
-                        k,
-                        &Step {
-                            x: forward.nominal.x.as_slice(),
-                            dx: forward.dx_dx0.as_slice(),
-                            du: forward.dx_du.as_slice(),
-                            dp: forward.dx_dp.as_slice(),
-                            hessian: [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()],
-                            cost,
-                        },
-                    );
+                    sink(k, &Step { cost, ..result.into() });
                 }
                 Ok(())
             }
