@@ -16,7 +16,6 @@ mod plot;
 
 use casados::ocp::{HeapSqp, Outcome, Shooting};
 use casados::prelude::*;
-use casados::qp::{Condensing, HeapInteriorPoint};
 use chain::Chain;
 use data::Record;
 use plot::{Picture, Series};
@@ -55,10 +54,12 @@ macro_rules! solve {
     ($nx:literal, $stages:literal, $steps:literal) => {{
         let record = Record::load(&format!("ocp/chain_{}.json", ($nx - 3) / 6 + 2))?;
         let (rest, x0) = (record.list("xrest")?, record.list("x0")?);
-        let options = Options { steps: $steps, ..Default::default() };
+        // Below what the whole is solved to, and from the stages of the iteration before.
+        let newton = Newton { tolerance: 1e-9, ..Default::default() };
+        let options = Options { steps: $steps, start: Start::Warm, newton, ..Default::default() };
         let batch = Batch::<Chain<$nx>, Gauss<$stages>>::new(options)?;
         let mut ocp = chain_problem::problem!($nx, rest.clone(), x0, Shooting::new(batch));
-        let mut sqp = HeapSqp::with_solver(&ocp, Condensing::new(5, HeapInteriorPoint::new()))?;
+        let mut sqp = HeapSqp::new(&ocp)?;
         let mut best: Option<Outcome> = None;
         for _ in 0..REPETITIONS {
             ocp.guess(&rest, &[0.0; 3])?;

@@ -141,7 +141,8 @@ fn chain(picture: &mut Picture) -> Result<(), Box<dyn Error>> {
     const NX: usize = 9;
     let record = Record::load("ocp/chain_3.json")?;
     let (rest, x0) = (record.list("xrest")?, record.list("x0")?);
-    let options = Options { steps: 2, ..Default::default() };
+    let newton = Newton { tolerance: 1e-9, ..Default::default() };
+    let options = Options { steps: 2, start: Start::Warm, newton, ..Default::default() };
     let batch = Batch::<Chain<NX>, Gauss<2>>::new(options)?;
     let mut ocp = chain_problem::problem!(9, rest.clone(), x0, Shooting::new(batch));
     // Disturbances know no walls: it is soft.
