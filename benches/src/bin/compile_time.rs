@@ -58,8 +58,6 @@ nalgebra = { version = "0.35", default-features = false, features = ["std", "mac
 [profile.release]
 codegen-units = 4
 
-[profile.release.build-override]
-opt-level = 2
 "#;
 
 /// Prints the operations of the model. All calls are compiled, and none is optimised away.
