@@ -6,7 +6,7 @@ use super::intervals::{Inputs, Intervals};
 use super::statistics::BatchStatistics;
 #[cfg(feature = "parallel")]
 use super::work::parallel;
-use super::work::{Share, Width, Work, Worker};
+use super::work::{Share, Work, Worker, width};
 use crate::error::{Argument, Error};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorX, VectorZ};
@@ -17,7 +17,6 @@ use crate::shape::Matrix;
 use crate::tableau::{Custom, Method, Tableau};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
-use core::marker::PhantomData;
 
 /// Integrates many intervals of one model with `S` stages of the method `B`; see [`Batch`](super::Batch).
 ///
@@ -202,7 +201,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
             fill(&mut self.records, count.saturating_mul(steps), Zeroable::zeroed())?;
         }
         let missing = self.options.start == Start::Given && self.given.is_none();
-        let lanes = if missing { 1 } else { T::widest(Width::<M, R, S>(PhantomData)).unwrap_or(1) };
+        let lanes = if missing { 1 } else { width::<M, T, R, S>() };
         let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
         let work = Work { inputs, options: &self.options, tableau: &self.tableau, given, lanes };
         let share = Share {

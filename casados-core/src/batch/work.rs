@@ -26,15 +26,27 @@ use core::marker::PhantomData;
 /// and again. Measured (AVX2, chains of masses, s = 4): faster side by side with 290 kB, slower with 480 kB.
 const WORKING_SET: usize = 3 << 17;
 
-/// How many intervals are computed together.
-pub struct Width<M, R, const S: usize>(pub PhantomData<(M, R)>);
+/// How many intervals are computed together: as many as the widest register has whose group fits into [`WORKING_SET`].
+pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>() -> usize {
+    let mut most = MOST_LANES;
+    loop {
+        match T::widest(most, Fits::<M, R, S>(PhantomData)) {
+            Ok((lanes, true)) => return lanes,
+            Ok((lanes, false)) => most = lanes.saturating_sub(1),
+            Err(_) => return 1,
+        }
+    }
+}
 
-impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Width<M, R, S> {
-    type Output = usize;
-    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> usize {
+/// The lanes of a register, and whether they are to be used.
+struct Fits<M, R, const S: usize>(PhantomData<(M, R)>);
+
+impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Fits<M, R, S> {
+    type Output = (usize, bool);
+    fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> (usize, bool) {
         let bytes = size_of::<M::Factors<[[E; S]; S]>>() + R::columns::<E, S>();
         // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
-        if M::STRUCTURE.elimination.pivots.is_empty() || bytes > WORKING_SET { 1 } else { E::LANES }
+        (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && bytes <= WORKING_SET)
     }
 }
 
@@ -113,18 +125,21 @@ pub fn parallel<M: Dae, B, R: Answer<M, T>, T: Real, const S: usize>(
     Ok(())
 }
 
+/// Groups of the registers that a machine has.
+type Groups = [Option<Box<dyn Any + Send + Sync>>; 2];
+
 /// What computes, with memory of its own.
 pub struct Worker<M: Dae, B, const S: usize, T: Real> {
     single: irk::Integrator<M, B, S, T, Heap>,
-    /// A [`Group`] of the registers of this machine.
-    group: Option<Box<dyn Any + Send + Sync>>,
+    /// A [`Group`] for each kind of register: results of several kinds may need different ones.
+    groups: Groups,
     pub statistics: BatchStatistics,
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
     pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         let single = irk::Integrator::build(options, tableau)?;
-        Ok(Self { single, group: None, statistics: BatchStatistics::default() })
+        Ok(Self { single, groups: [None, None], statistics: BatchStatistics::default() })
     }
 
     pub fn run<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
@@ -146,10 +161,10 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
         let several = intervals.iter().flatten().count() > 1;
         let mut done = [false; MOST_LANES];
         if several {
-            let (group, statistics, share) = (&mut self.group, &mut self.statistics, &mut share);
-            let together = Together { work, group, statistics, intervals: &intervals, share };
+            let (groups, statistics, share) = (&mut self.groups, &mut self.statistics, &mut share);
+            let together = Together { work, groups, statistics, intervals: &intervals, share };
             // What did not get memory side by side may get it alone.
-            done = T::widest(together).ok().and_then(Result::ok).unwrap_or_default();
+            done = T::widest(work.lanes, together).ok().and_then(Result::ok).unwrap_or_default();
         }
         for (i, (interval, done)) in intervals.iter().zip(done).enumerate() {
             let (Some(interval), false) = (interval, done) else { continue };
@@ -224,7 +239,7 @@ impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
 /// The intervals of a group side by side.
 struct Together<'a, 'b, 'c, M: Dae, T: Real, R, const S: usize> {
     work: &'a Work<'b, M, T, S>,
-    group: &'a mut Option<Box<dyn Any + Send + Sync>>,
+    groups: &'a mut Groups,
     statistics: &'a mut BatchStatistics,
     intervals: &'a [Option<Interval<'b, M, T>>; MOST_LANES],
     share: &'a mut Share<'c, M, T, R, S>,
@@ -235,12 +250,15 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
     type Output = Result<[bool; MOST_LANES], Error>;
 
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output {
-        let Self { work, group, statistics, intervals, share } = self;
+        let Self { work, groups, statistics, intervals, share } = self;
         let mut done = [false; MOST_LANES];
-        if !group.as_ref().is_some_and(|group| (**group).is::<Group<M, E, S>>()) {
-            *group = Some(Box::new(Group::<M, E, S>::new(work.options, work.tableau)));
-        }
-        let group = group.as_mut().and_then(|group| group.downcast_mut::<Group<M, E, S>>());
+        let is_mine = |group: &Box<dyn Any + Send + Sync>| (**group).is::<Group<M, E, S>>();
+        // Its own place, or one that is free.
+        let place = groups.iter_mut().find(|place| place.as_ref().is_none_or(is_mine));
+        let group = place.map(|group| {
+            group.get_or_insert_with(|| Box::new(Group::<M, E, S>::new(work.options, work.tableau)))
+        });
+        let group = group.and_then(|group| group.downcast_mut::<Group<M, E, S>>());
         // Lanes that nobody needs hold a copy of the first interval.
         let first = intervals.iter().position(Option::is_some);
         let (Some(group), Some(first)) = (group, first) else { return Ok(done) };

@@ -308,13 +308,13 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + De
         computation.run::<Self>();
     }
 
-    /// Runs a computation with the widest register of such numbers that this machine has; not with those of two
-    /// numbers where there are any wider ones.
+    /// Runs a computation with the widest register of such numbers that this machine has and that is no wider than
+    /// `lanes`; not with those of two numbers where there are any wider ones.
     ///
     /// # Errors
     /// The computation, if there is none.
     #[doc(hidden)]
-    fn widest<C: Widest<Self>>(computation: C) -> Result<C::Output, C> {
+    fn widest<C: Widest<Self>>(_lanes: usize, computation: C) -> Result<C::Output, C> {
         Err(computation)
     }
 }

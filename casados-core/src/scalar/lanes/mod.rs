@@ -89,11 +89,15 @@ pub(crate) use side_by_side;
 #[cfg(target_arch = "x86_64")]
 macro_rules! widest_register {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
-        fn widest<C: crate::scalar::Widest<Self>>(computation: C) -> Result<C::Output, C> {
+        fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
             use crate::scalar::lanes::{Level, level};
             match level() {
-                Level::Avx512 => Ok(computation.call::<crate::scalar::lanes::$avx512<$most>>()),
-                Level::Avx2 => Ok(computation.call::<crate::scalar::lanes::$avx2<$more>>()),
+                Level::Avx512 if lanes >= $most => {
+                    Ok(computation.call::<crate::scalar::lanes::$avx512<$most>>())
+                }
+                Level::Avx512 | Level::Avx2 if lanes >= $more => {
+                    Ok(computation.call::<crate::scalar::lanes::$avx2<$more>>())
+                }
                 _ => Err(computation),
             }
         }
@@ -102,9 +106,9 @@ macro_rules! widest_register {
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 macro_rules! widest_register {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
-        fn widest<C: crate::scalar::Widest<Self>>(computation: C) -> Result<C::Output, C> {
+        fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
             use crate::scalar::lanes::{Level, level};
-            if level() < Level::Base {
+            if level() < Level::Base || lanes < $few {
                 return Err(computation);
             }
             Ok(computation.call::<crate::scalar::lanes::$base<$few>>())
