@@ -50,8 +50,10 @@ pub trait Arithmetic {
 }
 
 /// Rounded twice.
+#[cfg(any(test, not(target_arch = "aarch64")))]
 pub struct Separate;
 
+#[cfg(any(test, not(target_arch = "aarch64")))]
 impl Arithmetic for Separate {
     #[inline(always)]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
