@@ -55,6 +55,13 @@ pub enum Error {
         /// Where.
         at: Place,
     },
+    /// The planned elimination was not good enough here, or Newton's method did not converge with it, and the memory of the
+    /// integrator has no place to pivot the whole matrix:
+    /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also of a model without a plan.
+    NotPivoted {
+        /// The step.
+        step: usize,
+    },
     /// Newton's method did not converge.
     NotConverged {
         /// The residual of an equation relative to the magnitude of its terms, the largest.
@@ -293,6 +300,11 @@ impl fmt::Display for Error {
                 f,
                 "the Newton matrix is singular in the column of `{unknown}` at {at}: with this step size the \
                  equations do not determine it"
+            ),
+            Error::NotPivoted { step } => write!(
+                f,
+                "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
+                 whole matrix"
             ),
             Error::NotConverged { residual, equation, unknown, increment, at } => write!(
                 f,

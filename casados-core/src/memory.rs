@@ -76,6 +76,9 @@ pub trait Memory: sealed::Sealed + 'static {
     /// A place for what second-order sensitivities remember of every step.
     type HessianTape<V: Stored>: Default + Send + Sync;
 
+    /// What is done where the planned elimination is not good enough.
+    type Fallback: Fallback;
+
     /// The most steps that there is memory for.
     const STEPS: usize;
 
@@ -153,11 +156,11 @@ pub trait WithHessian: WithForward {
 }
 
 /// No place.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Zeroable)]
 pub struct Absent;
 
 /// A value inside the integrator.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub struct Inside<V>(V);
 
 impl<V: Zeroable> Default for Inside<V> {
@@ -166,18 +169,91 @@ impl<V: Zeroable> Default for Inside<V> {
     }
 }
 
-/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps.
+/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps; with what it is to fall back on
+/// ([`fallback`]), or without.
 #[derive(Clone, Copy, Debug)]
-pub struct Inline<Mode, const STEPS: usize = 1>(PhantomData<fn() -> Mode>);
+pub struct Inline<Mode, const STEPS: usize = 1, F = fallback::Pivoting>(PhantomData<fn() -> (Mode, F)>);
 
-impl<Mode, const STEPS: usize> sealed::Sealed for Inline<Mode, STEPS> {}
+impl<Mode, const STEPS: usize, F> sealed::Sealed for Inline<Mode, STEPS, F> {}
+
+/// What an implicit integrator does where the planned elimination is not good enough.
+pub mod fallback {
+    /// It pivots the whole matrix. With three stages or more it has memory for the mean Jacobian of the stages too, which
+    /// Newton's method takes where iterations are not fixed.
+    #[derive(Clone, Copy, Debug)]
+    pub struct Pivoting;
+
+    /// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no other worst case than the
+    /// usual one. Neither the whole matrix nor the mean Jacobian of the stages has any memory or any code: for firmware
+    /// with fixed iterations.
+    ///
+    /// ```
+    /// # use casados_core::{Dae, Error, Gauss, Inline, Irk, memory::fallback, mode};
+    /// type Whole<M> = Irk<M, Gauss<4>, f64, Inline<mode::Forward>>;
+    /// type Lean<M> = Irk<M, Gauss<4>, f64, Inline<mode::Forward, 1, fallback::Refusing>>;
+    /// fn saved<M: Dae>() -> usize {
+    ///     Whole::<M>::SIZE - Lean::<M>::SIZE
+    /// }
+    /// ```
+    #[derive(Clone, Copy, Debug)]
+    pub struct Refusing;
+}
+
+/// [`fallback::Pivoting`] or [`fallback::Refusing`].
+pub trait Fallback: sealed::Sealed + 'static {
+    /// A place for what only the fallback needs.
+    type Place<V: Stored + Copy>: Kept<V>;
+    /// Whether there is one.
+    const KEPT: bool;
+}
+
+/// A place that has a value, or has none.
+pub trait Kept<V>: Stored + Copy {
+    /// The value.
+    fn get(&self) -> Option<&V>;
+    /// The value, to be written.
+    fn get_mut(&mut self) -> Option<&mut V>;
+}
+
+impl sealed::Sealed for fallback::Pivoting {}
+impl Fallback for fallback::Pivoting {
+    type Place<V: Stored + Copy> = Inside<V>;
+    const KEPT: bool = true;
+}
+impl sealed::Sealed for fallback::Refusing {}
+impl Fallback for fallback::Refusing {
+    type Place<V: Stored + Copy> = Absent;
+    const KEPT: bool = false;
+}
+
+impl<V: Stored + Copy> Kept<V> for Inside<V> {
+    #[inline(always)]
+    fn get(&self) -> Option<&V> {
+        Some(&self.0)
+    }
+    #[inline(always)]
+    fn get_mut(&mut self) -> Option<&mut V> {
+        Some(&mut self.0)
+    }
+}
+impl<V> Kept<V> for Absent {
+    #[inline(always)]
+    fn get(&self) -> Option<&V> {
+        None
+    }
+    #[inline(always)]
+    fn get_mut(&mut self) -> Option<&mut V> {
+        None
+    }
+}
 
 /// The places of one mode.
 macro_rules! inline {
     ([$($constant:ident)?] $mode:ty {
         forward: $forward:ty, directional: $directional:ty, adjoint: $adjoint:ty, hessian: $hessian:ty, hessian_tape: $tape:ty,
     }) => {
-        impl<$(const $constant: usize,)? const STEPS: usize> Memory for Inline<$mode, STEPS> {
+        impl<$(const $constant: usize,)? const STEPS: usize, F: Fallback> Memory for Inline<$mode, STEPS, F> {
+            type Fallback = F;
             type Nominal<V: Stored> = Inside<V>;
             type Tape<V: Stored> = Inside<[V; STEPS]>;
             type Forward<V: Stored> = $forward;
@@ -215,31 +291,33 @@ inline!([] mode::Hessian {
     hessian_tape: Inside<[V; STEPS]>,
 });
 
-impl<const STEPS: usize> WithForward for Inline<mode::Forward, STEPS> {
+impl<const STEPS: usize, F: Fallback> WithForward for Inline<mode::Forward, STEPS, F> {
     fn forward<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
         Ok(&mut place.0)
     }
 }
-impl<const STEPS: usize> WithForward for Inline<mode::Hessian, STEPS> {
+impl<const STEPS: usize, F: Fallback> WithForward for Inline<mode::Hessian, STEPS, F> {
     fn forward<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
         Ok(&mut place.0)
     }
 }
-impl<const C: usize, const STEPS: usize> WithDirectional<C> for Inline<mode::Directional<C>, STEPS> {
+impl<const C: usize, const STEPS: usize, F: Fallback> WithDirectional<C>
+    for Inline<mode::Directional<C>, STEPS, F>
+{
     fn directional<M: Dae, T: Real, const S: usize>(
         place: &mut Self::Directional<M, T, S>,
     ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error> {
         Ok(&mut place.0)
     }
 }
-impl<const C: usize, const STEPS: usize> WithAdjoint<C> for Inline<mode::Adjoint<C>, STEPS> {
+impl<const C: usize, const STEPS: usize, F: Fallback> WithAdjoint<C> for Inline<mode::Adjoint<C>, STEPS, F> {
     fn adjoint<M: Dae, T: Real, const S: usize>(
         place: &mut Self::Adjoint<M, T, S>,
     ) -> Result<&mut AdjointMemory<M, T, S, C>, Error> {
         Ok(&mut place.0)
     }
 }
-impl<const STEPS: usize> WithHessian for Inline<mode::Hessian, STEPS> {
+impl<const STEPS: usize, F: Fallback> WithHessian for Inline<mode::Hessian, STEPS, F> {
     fn hessian<V: Stored>(place: &mut Inside<V>) -> Result<&mut V, Error> {
         Ok(&mut place.0)
     }
@@ -339,6 +417,7 @@ mod heap {
         type Adjoint<M: Dae, T: Real, const S: usize> = AllocatedByType;
         type Hessian<V: Stored> = Allocated<V>;
         type HessianTape<V: Stored> = AllocatedTape<V>;
+        type Fallback = fallback::Pivoting;
         const STEPS: usize = usize::MAX;
         fn nominal<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
             place.open()

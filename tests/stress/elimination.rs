@@ -1,6 +1,8 @@
 //! The elimination planned by the macro, on models made to break a static order: the pivoted factorisation of
 //! the whole matrix takes over, and results stay right.
 
+use casados::memory::fallback::Refusing;
+use casados::mode;
 use casados::prelude::*;
 use nalgebra::{SVector, vector};
 
@@ -32,6 +34,44 @@ fn t21_pivots_that_vanish() {
             (step.dz_dp[(0, 0)] - by_p).abs() <= 16.0 * f64::EPSILON * condition * by_p.abs().max(by_u.abs())
         );
     }
+}
+
+/// Without memory to pivot the whole matrix: the same bits where the plan is good enough, in less memory, and an error where
+/// it is not; after which the integrator is as it was.
+#[test]
+fn without_a_fallback() {
+    fn check<const S: usize>(newton: Newton)
+    where
+        RadauIIA<S>: casados::tableau::Method<S>,
+    {
+        type Whole<const S: usize> = Irk<Vanishing, RadauIIA<S>, f64, Inline<mode::Forward>>;
+        type Lean<const S: usize> = Irk<Vanishing, RadauIIA<S>, f64, Inline<mode::Forward, 1, Refusing>>;
+        // The matrix over three unknowns at all stages, at the least.
+        assert!(Lean::<S>::SIZE + 9 * S * S * 8 <= Whole::<S>::SIZE);
+        let options = Options { newton, ..Default::default() };
+        let mut whole = Whole::<S>::inline(options).unwrap();
+        let mut lean = Lean::<S>::inline(options).unwrap();
+        let mut refused = 0;
+        for p in [0.0, 0.5, 1e-300, 2.0, 1e9, 0.0, 0.25] {
+            whole.set_parameters(&vector![p]).unwrap();
+            lean.set_parameters(&vector![p]).unwrap();
+            let expected = *whole.forward(&vector![1.0], &vector![0.25], 0.1).unwrap();
+            let found = lean.forward(&vector![1.0], &vector![0.25], 0.1).copied();
+            if whole.statistics().dense > 0 {
+                assert_eq!(found.unwrap_err(), Error::NotPivoted { step: 0 });
+                refused += 1;
+            } else {
+                assert_eq!(found.unwrap(), expected);
+            }
+        }
+        assert!((1..7).contains(&refused), "{refused}");
+    }
+    let fixed = Newton { fixed_iterations: Some(2), ..Default::default() };
+    check::<1>(fixed);
+    check::<3>(fixed);
+    check::<2>(Newton::default());
+    // These equations are linear: with any number of stages one iteration is exact, and the mean Jacobian has no part in it.
+    check::<4>(Newton::default());
 }
 
 /// Rows scaled by up to `10^±120` against each other: nothing changes but rounding.

@@ -79,7 +79,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
     pub fn new(options: &Options, tableau: &Tableau<S>) -> Self {
         Self {
             options: *options,
-            coefficients: Coefficients::new(*tableau),
+            coefficients: Coefficients::new(*tableau, true),
             statistics: Statistics::default(),
             work: Default::default(),
             steps: Default::default(),

@@ -8,7 +8,7 @@ use super::step::{Base, Counts, Grid, Record, Scheme};
 use crate::error::{Argument, Error};
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;
-use crate::memory::{Inline, Memory, WithForward, WithHessian};
+use crate::memory::{Fallback, Inline, Memory, WithForward, WithHessian};
 use crate::model::{ArrayK, ArrayW, MatrixXC, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
 use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Nominal, Seeds};
@@ -91,10 +91,10 @@ impl<M: Ode, const S: usize, T: Real> Integrator<M, Custom<S>, S, T, Heap> {
     }
 }
 
-impl<M: Ode, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: usize>
-    Integrator<M, B, S, T, Inline<Mode, STEPS>>
+impl<M: Ode, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fallback>
+    Integrator<M, B, S, T, Inline<Mode, STEPS, F>>
 where
-    Inline<Mode, STEPS>: Memory,
+    Inline<Mode, STEPS, F>: Memory,
 {
     /// An integrator that is its own memory, for at most `STEPS` steps.
     ///
@@ -106,10 +106,10 @@ where
     }
 }
 
-impl<M: Ode, const S: usize, T: Real, Mode: 'static, const STEPS: usize>
-    Integrator<M, Custom<S>, S, T, Inline<Mode, STEPS>>
+impl<M: Ode, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fallback>
+    Integrator<M, Custom<S>, S, T, Inline<Mode, STEPS, F>>
 where
-    Inline<Mode, STEPS>: Memory,
+    Inline<Mode, STEPS, F>: Memory,
 {
     /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS` steps.
     ///

@@ -10,6 +10,7 @@ use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::step::check;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
@@ -49,13 +50,22 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     }
 
     /// `μ` of a step that is linearised, by the factors that are there; whether it satisfies its equations.
-    pub(crate) fn stages(&mut self, work: &mut Work<M, E, S>, coefficients: &Coefficients<E, S>) -> E::Mask {
+    pub(crate) fn stages<F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+    ) -> E::Mask {
         self.solve(&work.linear, coefficients, work.inputs.time.step);
         work.verify_adjoint(self, coefficients)
     }
 
     /// `μ`
-    pub(crate) fn solve(&mut self, linear: &Linearization<M, E, S>, coefficients: &Coefficients<E, S>, h: E) {
+    pub(crate) fn solve<F: Fallback>(
+        &mut self,
+        linear: &Linearization<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+        h: E,
+    ) {
         let Self { lambda, mu, source, sourced, .. } = self;
         dispatch(RightHandSide { lambda: lambda.as_ref(), b: &coefficients.b, h, mu: mu.as_mut() });
         if *sourced {
@@ -70,7 +80,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     }
 
     /// `λ_n` from `λ_{n+1}` and `μ`.
-    pub(crate) fn advance(&mut self, linear: &Linearization<M, E, S>) {
+    pub(crate) fn advance<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>) {
         let Self { lambda, gradient, mu, shift, sourced, .. } = self;
         let (jacobian, mu) = (linear.jacobian.as_ref(), mu.as_ref());
         let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
@@ -91,9 +101,9 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.
-    pub(crate) fn step(
+    pub(crate) fn step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S>,
+        work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
@@ -190,7 +200,7 @@ copy!([M: Dae, T: Plain, const S: usize, const C: usize] AdjointMemory<M, T, S, 
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C> {
     /// The result, after the first step.
-    pub(crate) fn collect(&mut self, work: &Work<M, E, S>) {
+    pub(crate) fn collect<F: Fallback>(&mut self, work: &Work<M, E, S, F>) {
         let Self { result, backward } = self;
         result.nominal = work.result;
         let nx = M::Shape::NX;
@@ -213,7 +223,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C>
 impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> {
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, work: &Work<M, T, S>) -> Result<(), Error> {
+    pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>) -> Result<(), Error> {
         self.collect(work);
         let result = &self.result;
         check(result.grad_x0.as_slice(), 0)?;

@@ -12,7 +12,7 @@ use super::record::{Coefficients, Step, Work};
 use super::run::Parts;
 use super::sweep::Sweep;
 use crate::error::{Error, Place};
-use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
+use crate::memory::{Fallback, Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{ArrayW, Dae, VectorU, VectorX};
 pub(super) use crate::quadrature::{Along, begin, finish, reborrow};
 use crate::quadrature::{Integrand, With};
@@ -20,7 +20,7 @@ use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// The variables at a stage, which are in `points`, to where the integrand takes them from.
     fn point_of<'a>(
         &self,
@@ -93,7 +93,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> Parts<'_, M, T, S> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
     /// What the stages of a step add to the value and its derivatives, with those of the stages.
     ///
     /// # Errors

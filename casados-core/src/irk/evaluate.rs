@@ -5,11 +5,12 @@
 
 use super::record::{Coefficients, Stage, Times, Work};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide};
 use crate::shape::{Matrix, Shape};
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Writes `u` and `p`, which are the same at all points of an interval.
     pub(crate) fn place_inputs(&mut self) {
         let u = 2 * M::Shape::NX + M::Shape::NZ;

@@ -13,6 +13,7 @@ use super::sweep::Sweep;
 use super::write::Target;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::memory::Fallback;
 #[cfg(feature = "alloc")]
 use crate::model::ArrayX;
 use crate::model::{ArrayW, Dae, NO_COLUMN};
@@ -35,9 +36,9 @@ copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
     /// A step that is linearised, by the factors that are there; whether the derivatives satisfy their equations.
-    pub(crate) fn advance(
+    pub(crate) fn advance<F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S>,
+        work: &mut Work<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
         n: usize,
         curved: Option<&mut [E]>,
@@ -71,9 +72,9 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
     ///
     /// # Errors
     /// [`Error::Singular`]
-    pub(crate) fn step(
+    pub(crate) fn step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S>,
+        work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
         n: usize,
         count: usize,
@@ -110,7 +111,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
 
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, work: &Work<M, T, S>, step: usize) -> Result<(), Error> {
+    pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>, step: usize) -> Result<(), Error> {
         self.result.forward.nominal = work.result;
         check_result(&self.result.forward, step)
     }
@@ -294,9 +295,9 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
     ///
     /// # Errors
     /// [`Error::Singular`]
-    pub(crate) fn step(
+    pub(crate) fn step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S>,
+        work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
         n: usize,
         count: usize,
@@ -327,7 +328,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
 
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, work: &Work<M, T, S>, step: usize) -> Result<(), Error> {
+    pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>, step: usize) -> Result<(), Error> {
         self.result.nominal = work.result;
         check(self.result.dx.as_slice(), step)?;
         check(self.result.dz.as_slice(), step)?;

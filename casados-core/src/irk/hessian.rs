@@ -16,6 +16,7 @@ use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide};
@@ -48,26 +49,26 @@ copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 /// What the way back needs of a step.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct HessianStep<M: Dae, T: Plain, const S: usize> {
-    linear: Linearization<M, T, S>,
+pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
+    linear: Linearization<M, T, S, F>,
     /// The rows of `D` at all stages that enter second derivatives, in panels.
     d: ArrayV<M, [ArrayW<M, T>; S]>,
 }
-copy!([M: Dae, T: Plain, const S: usize] HessianStep<M, T, S>);
+copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
-impl<M: Dae, E: Lanes, const S: usize> HessianStep<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     /// Where the way forth writes `D`.
     pub(crate) fn curved(&mut self) -> &mut [E] {
         Array::flat_mut(self.d.as_mut().as_flattened_mut())
     }
 
     /// Remembers the linearisation on the way forth.
-    pub(crate) fn record(&mut self, work: &Work<M, E, S>) {
+    pub(crate) fn record(&mut self, work: &Work<M, E, S, F>) {
         self.linear.copy_from(&work.linear);
     }
 
     /// Brings it back.
-    pub(crate) fn recall(&self, work: &mut Work<M, E, S>) {
+    pub(crate) fn recall(&self, work: &mut Work<M, E, S, F>) {
         work.linear.copy_from(&self.linear);
     }
 }
@@ -78,12 +79,12 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     /// # Errors
     /// A second derivative of the model that is not finite, a singular matrix.
     #[allow(clippy::too_many_arguments)]
-    pub(crate) fn run(
+    pub(crate) fn run<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S>,
+        work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
         steps: &[Step<M, T, S>],
-        records: &[HessianStep<M, T, S>],
+        records: &[HessianStep<M, T, S, F>],
         seed: &[T],
         statistics: &mut Statistics,
         mut along: Along<'_, '_, M, T>,
@@ -119,9 +120,9 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     }
 
     /// `∇²(μ_iᵀ f)` at all stages of a step.
-    pub(crate) fn curvature(
+    pub(crate) fn curvature<F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S>,
+        work: &mut Work<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
         n: usize,
         step: &Step<M, E, S>,
@@ -146,7 +147,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     }
 
     /// `sum −= Σ_i D_iᵀ H_i D_i`
-    pub(crate) fn subtract(&mut self, record: &HessianStep<M, E, S>) {
+    pub(crate) fn subtract<F: Fallback>(&mut self, record: &HessianStep<M, E, S, F>) {
         let Self { g, sum, entries, .. } = self;
         dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
             entries: entries.as_ref(),

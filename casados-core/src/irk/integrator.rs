@@ -8,7 +8,7 @@ use super::run::{Arguments, Run, check};
 use crate::error::{Argument, Error};
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;
-use crate::memory::{Inline, Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
+use crate::memory::{Fallback, Inline, Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
 use crate::model::{Dae, MatrixXC, VectorP, VectorU, VectorX, VectorZ};
 use crate::options::Options;
 use crate::result::{
@@ -37,7 +37,7 @@ pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
     directional: W::Directional<M, T, S>,
     adjoint: W::Adjoint<M, T, S>,
     hessian: W::Hessian<HessianMemory<M, T, S>>,
-    hessian_tape: W::HessianTape<HessianStep<M, T, S>>,
+    hessian_tape: W::HessianTape<HessianStep<M, T, S, W::Fallback>>,
     /// The step of the last successful call whose derivatives are in the memory of `forward`.
     sweep: Option<usize>,
     method: PhantomData<fn() -> B>,
@@ -66,10 +66,10 @@ impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T, Heap> {
     }
 }
 
-impl<M: Dae, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: usize>
-    Integrator<M, B, S, T, Inline<Mode, STEPS>>
+impl<M: Dae, B: Method<S>, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fallback>
+    Integrator<M, B, S, T, Inline<Mode, STEPS, F>>
 where
-    Inline<Mode, STEPS>: Memory,
+    Inline<Mode, STEPS, F>: Memory,
 {
     /// An integrator that is its own memory, for at most `STEPS` steps.
     ///
@@ -80,10 +80,10 @@ where
     }
 }
 
-impl<M: Dae, const S: usize, T: Real, Mode: 'static, const STEPS: usize>
-    Integrator<M, Custom<S>, S, T, Inline<Mode, STEPS>>
+impl<M: Dae, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fallback>
+    Integrator<M, Custom<S>, S, T, Inline<Mode, STEPS, F>>
 where
-    Inline<Mode, STEPS>: Memory,
+    Inline<Mode, STEPS, F>: Memory,
 {
     /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS` steps.
     ///

@@ -25,8 +25,9 @@
 
 use super::record::{Coefficients, Work};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
-use crate::options::{Jacobian, Options};
+use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::{Lanes, Scalar};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
@@ -126,7 +127,7 @@ impl Progress {
 /// More lanes than any register has.
 const MOST_LANES: usize = 16;
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis.
     const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
@@ -149,25 +150,42 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
     ) -> Solved<E> {
+        let Newton { fixed_iterations, jacobian, .. } = options.newton;
+        match fixed_iterations {
+            Some(count) => self.iterate(coefficients, jacobian, count, step, x, y, statistics),
+            None => self.converge(coefficients, options, step, x, y, statistics),
+        }
+    }
+
+    /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is computed before it is known
+    /// whether it is needed.
+    #[inline(never)]
+    fn converge(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        options: &Options,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &mut ArrayK<M, [E; S]>,
+        statistics: &mut Statistics,
+    ) -> Solved<E> {
         let Options { newton: options, compensated, .. } = options;
-        let test = options.fixed_iterations.is_none();
-        let most = options.fixed_iterations.unwrap_or(options.max_iterations);
+        let most = options.max_iterations;
         let rounding = if *compensated { LITTLE } else { ROUNDING } * E::EPSILON;
         let rule = Rule {
-            // Without a test nothing is computed in `f64`.
-            tolerance: if test { options.tolerance.max(rounding) } else { rounding },
+            tolerance: options.tolerance.max(rounding),
             stagnation: E::STAGNATION,
-            full: options.jacobian == Jacobian::Full || options.jacobian == Jacobian::Auto && !test,
+            full: options.jacobian == Jacobian::Full,
             // Of linear equations every step has one matrix, which may be that of all steps.
             exact: M::STRUCTURE.linear_in_state,
         };
         let h = self.inputs.time.step;
-        let rate = Some(self.validity.rate).filter(|rate| test && *rate > 0.0);
+        let rate = Some(self.validity.rate).filter(|rate| *rate > 0.0);
         let mut lanes = [Progress { state: State::Active, last: 0.0, rate }; MOST_LANES];
         let lanes = lanes.get_mut(..E::LANES).unwrap_or_default();
         let simplified = options.jacobian == Jacobian::Simplified;
         let adaptive = simplified || options.jacobian == Jacobian::Auto;
-        let basis = coefficients.basis.as_ref().filter(|_| test && adaptive && !rule.exact);
+        let basis = coefficients.basis.as_ref().filter(|_| F::KEPT && adaptive && !rule.exact);
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
         let mut renewals = 0;
@@ -189,22 +207,22 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
                 // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
                 mean = basis.is_some() && (simplified || renewals < MEANS);
                 renewals += 1;
-                match basis {
-                    Some(basis) if mean => self.mean.factor(&self.linear.jacobian, basis, h),
+                match (basis, self.mean.get_mut()) {
+                    (Some(basis), Some(factors)) if mean => factors.factor(&self.linear.jacobian, basis, h),
                     _ => self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h),
                 }
             } else {
                 statistics.residuals += 1;
                 self.evaluate_residual();
             }
-            if rule.exact && test && iteration > 0 {
+            if rule.exact && iteration > 0 {
                 self.validity.factors = true;
                 let satisfied = self.is_satisfied();
                 if E::all(satisfied) || iteration == REFINEMENTS {
                     return Solved { converged: satisfied, exact: true };
                 }
             }
-            if test && !rule.exact && iteration > 1 && lanes.iter().any(Progress::is_stuck) {
+            if !rule.exact && iteration > 1 && lanes.iter().any(Progress::is_stuck) {
                 let satisfied = self.is_satisfied();
                 let satisfied = cell(E::select(satisfied, E::from_f64(1.0), E::from_f64(0.0)));
                 for (lane, progress) in lanes.iter_mut().enumerate() {
@@ -219,22 +237,10 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
             }
             iteration += 1;
             statistics.iterations += 1;
-            for (equation, f) in self.f.as_ref().iter().enumerate() {
-                if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
-                    *to = f.map(|f| [f]);
-                }
-            }
-            match basis {
-                Some(basis) if mean => self.mean.solve(basis, &mut self.increment),
+            self.place_residual();
+            match (basis, self.mean.get_mut()) {
+                (Some(basis), Some(factors)) if mean => factors.solve(basis, &mut self.increment),
                 _ => self.linear.factors.solve(&mut self.increment),
-            }
-            if !test {
-                // Nobody asks how large the increment is.
-                dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
-                if iteration == most {
-                    return Solved { converged: active, exact: false };
-                }
-                continue;
             }
             let floor = E::from_f64(rounding / rule.tolerance);
             let sizes = dispatch(Update {
@@ -295,7 +301,53 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// So many iterations, whose increments nobody asks for: on a processor without an FPU for double precision they take
+    /// no operation of it.
+    #[allow(clippy::too_many_arguments)]
+    fn iterate(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        jacobian: Jacobian,
+        count: usize,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &mut ArrayK<M, [E; S]>,
+        statistics: &mut Statistics,
+    ) -> Solved<E> {
+        let kept = self.validity.factors
+            && (M::STRUCTURE.constant_matrix
+                || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
+        for _ in 0..count {
+            self.place(coefficients, step, x, y);
+            if kept {
+                statistics.residuals += 1;
+                self.evaluate_residual();
+            } else {
+                statistics.jacobians += 1;
+                statistics.factorizations += 1;
+                self.evaluate_jacobian();
+                let h = self.inputs.time.step;
+                self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+            }
+            statistics.iterations += 1;
+            self.place_residual();
+            self.linear.factors.solve(&mut self.increment);
+            dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
+        }
+        let zero = E::from_f64(0.0);
+        Solved { converged: E::le(zero, zero), exact: false }
+    }
+
+    /// The residual in the slots of the equations.
+    fn place_residual(&mut self) {
+        for (equation, f) in self.f.as_ref().iter().enumerate() {
+            if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
+                *to = f.map(|f| [f]);
+            }
+        }
+    }
+
     /// After the last iteration: no lane is active any more.
     fn solved(&mut self, lanes: &[Progress], mean: bool) -> Solved<E> {
         // Lanes that failed have no say in what the others do next.

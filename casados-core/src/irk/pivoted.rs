@@ -13,6 +13,7 @@ use super::evaluate::not_finite;
 use super::record::{Coefficients, Work};
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::slot;
+use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};
 use crate::options::{Jacobian, Newton};
 use crate::scalar::Real;
@@ -24,7 +25,7 @@ const ROUNDING: f64 = 4.0;
 /// Residuals that no longer shrink are rounding errors of the model below this many ε of their terms.
 const NOISE: f64 = 256.0;
 
-impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// Solves the stages of a step from the start values in `y`.
     ///
     /// # Errors
@@ -127,12 +128,15 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
         let h = self.inputs.time.step;
         statistics.factorizations += 1;
         statistics.dense += usize::from(!M::STRUCTURE.elimination.pivots.is_empty());
-        self.linear.factors.factor_dense(&self.linear.jacobian, &coefficients.a, h).map_err(
-            |(unknown, stage)| Error::Singular {
-                unknown: unknown_name::<M>(unknown),
-                at: Place { step, stage, iteration },
-            },
-        )
+        self.linear.factors.factor_dense(&self.linear.jacobian, &coefficients.a, h).map_err(|missing| {
+            match missing {
+                Some((unknown, stage)) => Error::Singular {
+                    unknown: unknown_name::<M>(unknown),
+                    at: Place { step, stage, iteration },
+                },
+                None => Error::NotPivoted { step },
+            }
+        })
     }
 
     /// # Errors

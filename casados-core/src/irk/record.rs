@@ -1,6 +1,7 @@
 //! What is remembered about steps, and the memory that all calls work in.
 
 use crate::linalg::{Eigenbasis, Factors, MeanFactors};
+use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Lanes;
@@ -38,7 +39,8 @@ pub(crate) struct Coefficients<E, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Coefficients<E, S> {
-    pub fn new(tableau: Tableau<S>) -> Self {
+    /// With the eigenbasis, if `mean` Jacobians are to be used.
+    pub fn new(tableau: Tableau<S>, mean: bool) -> Self {
         let mut end = tableau.lagrange(1.0);
         if tableau.is_stiffly_accurate() {
             // The last stage is the end: not even a rounding error apart.
@@ -54,7 +56,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
             end: end.map(E::from_f64),
             // Polynomials of higher degree are not worth much outside of their interval.
             next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
-            basis: if S < 3 { None } else { Eigenbasis::new(&tableau) },
+            basis: if S < 3 || !mean { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
     }
@@ -93,17 +95,17 @@ pub(crate) struct Times<T> {
 /// The linearisation of the stages of a step.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize> {
+pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     /// Entries of the Jacobian of the model, each at all stages.
     pub jacobian: M::Jacobian<[T; S]>,
     /// Factors of the Newton matrix.
-    pub factors: Factors<M, T, S>,
+    pub factors: Factors<M, T, S, F>,
 }
 
 /// The memory that every call works in.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Work<M: Dae, T: Lanes, const S: usize> {
+pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// The solution of the last call.
     pub(crate) result: Nominal<M, T>,
     /// The solution at the last time that was asked for.
@@ -130,9 +132,9 @@ pub struct Work<M: Dae, T: Lanes, const S: usize> {
     pub(crate) weights: ArrayK<M, T>,
     /// The sizes of the last increments.
     pub(crate) sizes: ArrayK<M, T>,
-    pub(crate) linear: Linearization<M, T, S>,
+    pub(crate) linear: Linearization<M, T, S, F>,
     /// Factors of the mean Jacobian of the stages, which iterations take where that is cheaper.
-    pub(crate) mean: MeanFactors<M, T, S>,
+    pub(crate) mean: F::Place<MeanFactors<M, T, S>>,
     /// Where derivatives are tried on their equations: sums, and the sizes of their terms.
     pub(crate) probe: [ArrayV<M, [T; S]>; 2],
     pub(crate) terms: ArrayK<M, [T; S]>,
@@ -169,10 +171,10 @@ pub(crate) struct Validity {
 copy!([M: Dae, T: Plain] Stage<M, T>);
 copy!([M: Dae, T: Plain, const S: usize] Step<M, T, S>);
 copy!([M: Dae, T: Plain] Inputs<M, T>);
-copy!([M: Dae, T: Plain, const S: usize] Linearization<M, T, S>);
-copy!([M: Dae, T: Lanes, const S: usize] Work<M, T, S>);
+copy!([M: Dae, T: Plain, const S: usize, F: Fallback] Linearization<M, T, S, F>);
+copy!([M: Dae, T: Lanes, const S: usize, F: Fallback] Work<M, T, S, F>);
 
-impl<M: Dae, E: Lanes, const S: usize> Linearization<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
     /// Copies what holds.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         assign(&mut self.jacobian, &other.jacobian);
@@ -180,7 +182,7 @@ impl<M: Dae, E: Lanes, const S: usize> Linearization<M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// To be called before anything else.
     pub(crate) fn prepare(&mut self) {
         if !self.ready {

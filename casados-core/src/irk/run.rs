@@ -5,7 +5,7 @@ use super::evaluate::not_finite;
 use super::record::{Coefficients, Step, Work};
 use super::step::From;
 use crate::error::{Argument, Error};
-use crate::memory::Memory;
+use crate::memory::{Fallback, Memory};
 #[cfg(feature = "alloc")]
 use crate::model::ArrayV;
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
@@ -20,7 +20,7 @@ pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
     pub options: Options,
     pub coefficients: Coefficients<T, S>,
     pub statistics: Statistics,
-    work: W::Nominal<Work<M, T, S>>,
+    work: W::Nominal<Work<M, T, S, W::Fallback>>,
     /// The record of the last successful call, and that of the call that runs.
     tapes: [W::Tape<Step<M, T, S>>; 2],
     kept: usize,
@@ -41,8 +41,8 @@ pub(crate) struct Arguments<'a, M: Dae, T: Real> {
 }
 
 /// What a call has to work with after its steps were taken.
-pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize> {
-    pub work: &'a mut Work<M, T, S>,
+pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
+    pub work: &'a mut Work<M, T, S, F>,
     pub coefficients: &'a Coefficients<T, S>,
     pub steps: &'a [Step<M, T, S>],
     pub statistics: &'a mut Statistics,
@@ -58,7 +58,10 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
                 reason: "the memory of the integrator has fewer",
             });
         }
-        let coefficients = Coefficients::<T, S>::new(tableau);
+        if !W::Fallback::KEPT && M::STRUCTURE.elimination.pivots.is_empty() {
+            return Err(Error::NotPivoted { step: 0 });
+        }
+        let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::KEPT);
         let ends = [&coefficients.start, &coefficients.end];
         if M::Shape::NZ > 0 && ends.iter().any(|weights| not_finite(*weights).is_some()) {
             return Err(Error::NoInterpolation);
@@ -118,8 +121,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     pub fn steps(
         &mut self,
         arguments: &Arguments<'_, M, T>,
-        mut after: impl FnMut(&mut Parts<'_, M, T, S>, usize, &Step<M, T, S>, bool) -> Result<(), Error>,
-    ) -> Result<Parts<'_, M, T, S>, Error> {
+        mut after: impl FnMut(
+            &mut Parts<'_, M, T, S, W::Fallback>,
+            usize,
+            &Step<M, T, S>,
+            bool,
+        ) -> Result<(), Error>,
+    ) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
         let Self { options, coefficients, statistics, work, tapes, .. } = self;
         *statistics = Statistics::default();
         check(Argument::X0, arguments.x0.as_slice())?;
@@ -194,7 +202,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     /// Everything succeeded: the record of this call is the one to keep.
-    pub fn keep(&mut self) -> Result<&Work<M, T, S>, Error> {
+    pub fn keep(&mut self) -> Result<&Work<M, T, S, W::Fallback>, Error> {
         let work = W::nominal(&mut self.work)?;
         work.kept = work.inputs;
         self.kept = 1 - self.kept;
@@ -204,7 +212,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     /// The last successful call.
-    pub fn last(&mut self) -> Result<Parts<'_, M, T, S>, Error> {
+    pub fn last(&mut self) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
         if !self.any {
             return Err(Error::NoResult);
         }
@@ -215,7 +223,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> Parts<'_, M, T, S> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
     /// See [`Work::linearize`].
     pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, exact: bool) -> Result<(), Error> {
         self.work.linearize(self.coefficients, n, step, exact, self.statistics)

@@ -4,6 +4,7 @@ use super::evaluate::{dot, not_finite};
 use super::record::{Coefficients, Step, Validity, Work};
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::options::Options;
 use crate::scalar::{Field, Lanes, Real, two_sum};
@@ -17,7 +18,7 @@ pub(crate) enum From<'a, M: Dae, E: Lanes, const S: usize> {
     Record(&'a [Step<M, E, S>]),
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// What comes before the first step of a call.
     pub(crate) fn begin(&mut self) {
         self.place_inputs();
@@ -79,7 +80,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// Integrates the interval: `x` at its start becomes `x` at its end. After each step, `after` is called
     /// with what is known about it, and whether the factors that are there are those of its solution.
     ///
@@ -137,6 +138,9 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
             }
             self.start(coefficients, from, n, None, y);
         }
+        if !F::KEPT {
+            return Err(Error::NotPivoted { step: n });
+        }
         self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics)?;
         Ok(false)
     }
@@ -162,7 +166,7 @@ impl<M: Dae, T: Real, const S: usize> Work<M, T, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The linearisation at the solution of a step, by the plan if there is one.
     pub(crate) fn linearize_planned(
         &mut self,

@@ -5,6 +5,7 @@ use super::directions::{Directions, panel, panel_mut, panels, weight};
 use super::evaluate::entries;
 use super::record::{Coefficients, Work, copy};
 use crate::linalg::{Arithmetic, Kernel, Packet, Planned, dispatch, slot, solve_packets};
+use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
@@ -51,9 +52,9 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
 
     /// The step that follows, which is linearised; the `first` of the interval or a later one. Whether the derivatives
     /// of the stages satisfy their equations. The rows of `D` for second derivatives go to `curved`.
-    pub(crate) fn step<D: Directions<E>>(
+    pub(crate) fn step<D: Directions<E>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S>,
+        work: &mut Work<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
         directions: &D,
         first: bool,
@@ -64,15 +65,15 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 
     /// The same step again.
-    pub(crate) fn repeat<D: Directions<E>>(
+    pub(crate) fn repeat<D: Directions<E>, F: Fallback>(
         &mut self,
-        work: &mut Work<M, E, S>,
+        work: &mut Work<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
         directions: &D,
         first: bool,
         mut curved: Option<&mut [E]>,
     ) -> E::Mask {
-        let mut run = |this: &mut Self, work: &Work<M, E, S>, phase, second| {
+        let mut run = |this: &mut Self, work: &Work<M, E, S, F>, phase, second| {
             let Self { v, end, dy, sums, start_sums } = this;
             let [start, other] = v;
             let (v, next) = if *end { (start, other) } else { (other, start) };
@@ -98,7 +99,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             run(self, work, Phase::Whole, false);
         } else {
             run(self, work, Phase::Before, false);
-            self.solve_columns::<D>(work);
+            self.solve_columns::<D, F>(work);
             run(self, work, Phase::After, false);
         }
         let good = work.verify_forward(self, coefficients, directions, false);
@@ -120,7 +121,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 
     /// Solves by the factors of the whole matrix, column by column.
-    fn solve_columns<D: Directions<E>>(&mut self, work: &mut Work<M, E, S>) {
+    fn solve_columns<D: Directions<E>, F: Fallback>(&mut self, work: &mut Work<M, E, S, F>) {
         let Work { increment, linear, .. } = work;
         let rows = M::Shape::NK;
         let dy = R::flat_mut(self.dy.as_mut().as_flattened_mut());

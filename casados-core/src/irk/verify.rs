@@ -13,6 +13,7 @@ use super::evaluate::entries;
 use super::record::{Coefficients, Work};
 use super::sweep::{STRANDS, Sweep};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::memory::Fallback;
 use crate::model::Dae;
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Shape};
@@ -24,7 +25,7 @@ const ROUNDING: f64 = 4096.0;
 /// A residual is zero below this many ε of its terms.
 const RESIDUAL: f64 = 16.0;
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
     ///
     /// Where the directions happen to cancel in the sum, its rounding errors look large beside it. They hardly do in
@@ -77,7 +78,7 @@ impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Work<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Whether the residual is at the level of the rounding errors of its terms, `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`,
     /// lane by lane.
     pub(crate) fn is_satisfied(&mut self) -> E::Mask {

@@ -4,6 +4,7 @@ use super::block::Block;
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
+use crate::memory::{Fallback, Kept, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Array, Plain, assign};
@@ -21,24 +22,24 @@ pub fn slot<M: Dae>(equation: usize) -> usize {
 /// The factors, by the plan or dense.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct Factors<M: Dae, T: Plain, const S: usize> {
+pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     blocks: M::Factors<Block<T, S>>,
     /// `−hA` of the blocks.
     coupling: Block<T, S>,
     /// Memory that is touched only where the plan is not good enough.
-    dense: Dense<M, T, S>,
+    dense: F::Place<Dense<M, T, S>>,
     /// Whether the dense factors are the ones that hold.
     is_dense: bool,
 }
 
-impl<M: Dae, T: Plain, const S: usize> Clone for Factors<M, T, S> {
+impl<M: Dae, T: Plain, const S: usize, F: Fallback> Clone for Factors<M, T, S, F> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Dae, T: Plain, const S: usize> Copy for Factors<M, T, S> {}
+impl<M: Dae, T: Plain, const S: usize, F: Fallback> Copy for Factors<M, T, S, F> {}
 
-impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all stages. A pivot
     /// that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
@@ -50,19 +51,17 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
 
     /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        if self.is_dense {
-            self.dense.solve(b);
-        } else {
-            sparse::solve(self.planned(), b.as_mut());
+        match self.dense() {
+            Some(dense) => dense.solve(b),
+            None => sparse::solve(self.planned(), b.as_mut()),
         }
     }
 
     /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their slots.
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        if self.is_dense {
-            self.dense.solve_transposed(b);
-        } else {
-            sparse::solve_transposed(self.planned(), b.as_mut());
+        match self.dense() {
+            Some(dense) => dense.solve_transposed(b),
+            None => sparse::solve_transposed(self.planned(), b.as_mut()),
         }
     }
 
@@ -73,14 +72,20 @@ impl<M: Dae, E: Lanes, const S: usize> Factors<M, E, S> {
 
     /// Whether the factors that are there are those of the plan.
     pub fn is_planned(&self) -> bool {
-        !self.is_dense
+        self.dense().is_none()
+    }
+
+    /// The factors of the whole matrix, if they are the ones that hold.
+    #[inline(always)]
+    fn dense(&self) -> Option<&Dense<M, E, S>> {
+        self.dense.get().filter(|_| self.is_dense)
     }
 
     /// Copies what holds.
     pub fn copy_from(&mut self, other: &Self) {
         self.is_dense = other.is_dense;
-        if other.is_dense {
-            assign(&mut self.dense, &other.dense);
+        if let (Some(to), Some(from)) = (self.dense.get_mut(), other.dense()) {
+            assign(to, from);
         } else {
             assign(&mut self.blocks, &other.blocks);
             self.coupling = other.coupling;
@@ -132,33 +137,34 @@ impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> Factors<M, T, S> {
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
     /// By pivoting the whole matrix, with the row of each equation in its slot.
     ///
     /// # Errors
-    /// The unknown and the stage for which there is no pivot.
+    /// The unknown and the stage for which there is no pivot; nothing if there is no memory for it.
     pub fn factor_dense(
         &mut self,
         jacobian: &M::Jacobian<[T; S]>,
         a: &[[T; S]; S],
         h: T,
-    ) -> Result<(), (usize, usize)> {
+    ) -> Result<(), Option<(usize, usize)>> {
         let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+        let Some(dense) = self.dense.get_mut() else { return Err(None) };
         self.is_dense = true;
-        self.dense.clear();
+        dense.clear();
         for (e, values) in jacobian.as_ref().iter().enumerate().take(blocks[3]) {
             let (r, c) = pattern.at(e);
             let r = slot::<M>(r);
             for (stage, value) in values.iter().enumerate() {
                 if e < blocks[1] {
-                    self.dense.add(r, c, stage, *value);
+                    dense.add(r, c, stage, *value);
                 } else if e < blocks[2] {
-                    self.dense.add_row(r, c - nx, stage, h * *value, &a[stage]);
+                    dense.add_row(r, c - nx, stage, h * *value, &a[stage]);
                 } else {
-                    self.dense.add(r, c - nx, stage, *value);
+                    dense.add(r, c - nx, stage, *value);
                 }
             }
         }
-        self.dense.factor()
+        dense.factor().map_err(Some)
     }
 }

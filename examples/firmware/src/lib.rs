@@ -5,6 +5,8 @@
 #[cfg_attr(not(target_os = "none"), path = "board/desk.rs")]
 pub mod board;
 pub mod closed_loop;
+pub mod lost;
+pub mod measure;
 pub mod memory;
 pub mod mpc;
 pub mod report;

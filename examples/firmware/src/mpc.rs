@@ -3,6 +3,7 @@
 
 use crate::pendulum::Pendulum;
 use crate::{board, report};
+use casados::memory::fallback::Refusing;
 use casados::ocp::{Horizon, LeastSquaresCost, OcpError, Problem, RealTime};
 use casados::qp::{InteriorPoint, StageDims};
 use casados::{Gauss, Inline, Irk, Real, function, mode};
@@ -28,12 +29,11 @@ pub fn end(x: [f64; 4], _u: [f64; 1]) -> [f64; 4] {
     x
 }
 
+/// Nothing to fall back on: that would be an error, in which the plan is as it was.
+type Dynamics<T> = Irk<Pendulum, Gauss<2>, T, Inline<mode::Forward, 1, Refusing>>;
+
 /// The problem: an integrator that is its own memory, and squares of deviations.
-pub type Controlled<T> = Problem<
-    Irk<Pendulum, Gauss<2>, T, Inline<mode::Forward>>,
-    LeastSquaresCost<Deviation, T>,
-    LeastSquaresCost<End, T>,
->;
+pub type Controlled<T> = Problem<Dynamics<T>, LeastSquaresCost<Deviation, T>, LeastSquaresCost<End, T>>;
 
 /// All memory of the controller in one static of a size that is known here.
 #[macro_export]
@@ -80,7 +80,7 @@ pub fn run<T: Real>(
     let (problem, rest) = numbers.split_at_mut_checked(problem).unwrap_or_default();
     let (plan, solver) = rest.split_at_mut_checked(plan).unwrap_or_default();
 
-    let integrator = Irk::<Pendulum, Gauss<2>, T, Inline<mode::Forward>>::inline(crate::options(3))
+    let integrator = Dynamics::<T>::inline(crate::options(3))
         .map_err(|error| OcpError::Integration { interval: 0, error })?;
     let mut ocp = Problem::new(integrator)
         .stage_cost(LeastSquaresCost::<Deviation, T>::diagonal(&[1.0, 10.0, 0.1, 0.1, 0.01].map(number)))
@@ -92,10 +92,6 @@ pub fn run<T: Real>(
     let mut qp_solver = InteriorPoint::in_memory(solver, indices);
     // A sample takes so long at most.
     (qp_solver.options.max_iterations, qp_solver.options.locate) = (20, false);
-    if T::EPSILON > 1e-10 {
-        // Gradients are some hundreds where the pendulum hangs: single precision gives no more digits of them.
-        qp_solver.options.tolerance = 5e-2;
-    }
     let mut controller = RealTime::in_memory(ocp, qp_solver, dims, plan)?;
 
     let (mut preparation, mut feedback, mut iterations) = ([u32::MAX, 0], [u32::MAX, 0], [u32::MAX, 0]);

@@ -104,7 +104,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     fn run(
         &mut self,
         qp: QpView<'_, T>,
-        penalties: Penalties,
+        penalties: Penalties<T>,
         start: Start,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
@@ -118,7 +118,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let first = if fixed { First::Fixed } else { First::Free };
         let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
         let mut result = Ok(Statistics::default());
-        let scale = if let Penalties::Elastic(weight) = penalties { T::from_f64(weight) } else { T::ONE };
+        let scale = if let Penalties::Elastic(weight) = penalties { weight } else { T::ONE };
         T::registers(Run {
             iterate: &mut iterate,
             options: &self.options,
@@ -137,7 +137,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let largest = |all: &[T]| all.iter().fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
         let gradients = qp.stages().map(|s| largest(s.gradient_x()).max(largest(s.gradient_u())));
         let weight = 1e4 * (1.0 + gradients.fold(0.0, f64::max));
-        let _ = self.run(qp, Penalties::Elastic(weight), Start::Cold, solution);
+        let _ = self.run(qp, Penalties::Elastic(T::from_f64(weight)), Start::Cold, solution);
         run::worst(qp, solution, 1e2 * self.options.tolerance)
     }
 }

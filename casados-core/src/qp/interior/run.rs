@@ -130,7 +130,7 @@ impl<T: Real> Iterate<'_, T> {
     ) -> Result<Statistics, QpError> {
         let (mut short, mut refine) = (0, false);
         let mut known = self.mu;
-        loop {
+        let failure = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.hold(residuals, self.terms);
             // Terms change on the way.
@@ -145,7 +145,7 @@ impl<T: Real> Iterate<'_, T> {
                 }
                 if small && statistics.refinements > 3 {
                     let iterations = statistics.iterations;
-                    return Err(QpError::Stalled { iterations, residuals: residuals.into() });
+                    break QpError::Stalled { iterations, residuals: residuals.into() };
                 }
                 // Multipliers and slacks are good: the next step is to correct the others only.
                 refine = small;
@@ -155,8 +155,7 @@ impl<T: Real> Iterate<'_, T> {
             let floor = T::from_f64(0.01) * limits.of(self.terms).forces;
             let iterations = statistics.iterations;
             if iterations >= options.max_iterations {
-                let _ = self.evaluate::<E>(solution.dynamics);
-                return Err(QpError::MaxIterations { iterations, residuals: residuals.into() });
+                break QpError::MaxIterations { iterations, residuals: residuals.into() };
             }
             self.sides.aim(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
@@ -183,16 +182,18 @@ impl<T: Real> Iterate<'_, T> {
             }
             statistics.iterations += 1;
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) {
-                return Err(QpError::Stalled { iterations, residuals: residuals.into() });
+                break QpError::Stalled { iterations, residuals: residuals.into() };
             }
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
             if short > 4 {
-                let _ = self.evaluate::<E>(solution.dynamics);
-                return Err(QpError::Stalled { iterations, residuals: residuals.into() });
+                break QpError::Stalled { iterations, residuals: residuals.into() };
             }
             self.advance::<E>(alpha);
             refine = false;
-        }
+        };
+        // The multipliers of the dynamics belong to the point that is left.
+        let _ = self.evaluate::<E>(solution.dynamics);
+        Err(failure)
     }
 
     /// The point and its multipliers.

@@ -11,12 +11,12 @@ use crate::scalar::Real;
 
 /// What violations of bounds cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Penalties {
+pub enum Penalties<T> {
     /// What the problem says.
     Given,
     /// This, linearly, where the problem says that there are none. Bounds of controls, which are more often what nature
     /// gives than what somebody wants, cost ten times as much.
-    Elastic(f64),
+    Elastic(T),
 }
 
 /// How many there are.
@@ -69,7 +69,7 @@ enum Kind<T> {
     Soft(T, T),
 }
 
-fn kind<T: Real>(bound: T, (linear, quadratic): (T, T), penalties: Penalties) -> Kind<T> {
+fn kind<T: Real>(bound: T, (linear, quadratic): (T, T), penalties: Penalties<T>) -> Kind<T> {
     if !bound.is_finite() {
         return Kind::Absent;
     }
@@ -79,7 +79,7 @@ fn kind<T: Real>(bound: T, (linear, quadratic): (T, T), penalties: Penalties) ->
             if linear > T::ZERO || quadratic > T::ZERO { Kind::Soft(linear, quadratic) } else { Kind::Absent }
         }
         Penalties::Given => Kind::Hard,
-        Penalties::Elastic(weight) => Kind::Soft(T::from_f64(weight), T::ZERO),
+        Penalties::Elastic(weight) => Kind::Soft(weight, T::ZERO),
     }
 }
 
@@ -115,9 +115,9 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
 
 impl<T: Real> Constraint<T> {
     /// Whether it is an equation, and otherwise its sides.
-    fn kinds(&self, penalties: Penalties) -> (bool, Kind<T>, Kind<T>) {
+    fn kinds(&self, penalties: Penalties<T>) -> (bool, Kind<T>, Kind<T>) {
         let penalties = match penalties {
-            Penalties::Elastic(weight) if self.control => Penalties::Elastic(10.0 * weight),
+            Penalties::Elastic(weight) if self.control => Penalties::Elastic(T::from_f64(10.0) * weight),
             others => others,
         };
         let lower = kind(self.lower, self.lower_penalty, penalties);
@@ -128,7 +128,7 @@ impl<T: Real> Constraint<T> {
 }
 
 /// How many sides there are.
-pub fn count<T: Real>(qp: QpView<'_, T>, fixed: bool, penalties: Penalties) -> Counts {
+pub fn count<T: Real>(qp: QpView<'_, T>, fixed: bool, penalties: Penalties<T>) -> Counts {
     let mut counts = Counts::default();
     constraints(qp, fixed, |constraint| {
         let (equation, lower, upper) = constraint.kinds(penalties);
@@ -192,7 +192,7 @@ impl<'a, T: Real> Sides<'a, T> {
     pub fn list(
         qp: QpView<'_, T>,
         fixed: bool,
-        penalties: Penalties,
+        penalties: Penalties<T>,
         counts: Counts,
         numbers: &mut &'a mut [T],
         indices: &mut &'a mut [u32],

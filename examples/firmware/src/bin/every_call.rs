@@ -47,11 +47,22 @@ macro_rules! every_call {
     (dense Erk, $integrator:ident, $h:ident) => {};
 }
 
+/// An integrator that does not pivot.
+#[inline(never)]
+fn refusing() -> Result<(), Error> {
+    type Refusing = Inline<mode::Hessian, 3, casados::memory::fallback::Refusing>;
+    let mut integrator = Irk::<Pendulum, Gauss<3>, f64, Refusing>::inline(black_box(Options::default()))?;
+    let (x, u) = black_box((SVector::<f64, 4>::from_element(0.1), SVector::<f64, 1>::from_element(0.1)));
+    integrator.hessian(&x, &u, black_box(0.05), &x)?;
+    Ok(())
+}
+
 #[cfg_attr(target_os = "none", cortex_m_rt::entry)]
 fn main() -> ! {
     let mut good = every_call!(Irk, Pendulum, 4, 1, Gauss<2>, f64);
     good &= every_call!(Irk, Pendulum, 4, 1, RadauIIA<3>, f32);
     good &= every_call!(Irk, Quadrotor, 12, 4, Gauss<1>, f32);
+    good &= refusing().is_ok();
     good &= every_call!(Erk, Pendulum, 4, 1, Rk4, f64);
     good &= every_call!(Erk, Quadrotor, 12, 4, DormandPrince5, f32);
     board::exit(good)
