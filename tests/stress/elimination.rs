@@ -74,6 +74,26 @@ fn without_a_fallback() {
     check::<4>(Newton::default());
 }
 
+/// A Jacobian for each step, as the option says, and a step for each Jacobian: with enough iterations the same as Newton's own.
+#[test]
+fn frozen_means_once_in_a_step() {
+    let run = |jacobian, fixed_iterations| {
+        let newton = Newton { jacobian, fixed_iterations, ..Default::default() };
+        let mut irk = Irk::<Scaled, Gauss<2>>::new(Options { steps: 3, newton, ..Default::default() }).unwrap();
+        irk.set_parameters(&vector![1.0, 1.0]).unwrap();
+        let x = irk.solve(&vector![1.0, 0.5], &SVector::zeros(), 0.3).unwrap().x;
+        (x, irk.statistics())
+    };
+    let (expected, _) = run(Jacobian::Full, None);
+    // The cubic term is 0.1 of the others: increments shrink at least tenfold.
+    let (frozen, statistics) = run(Jacobian::Frozen, Some(16));
+    assert!((frozen - expected).amax() <= 20.0 * f64::EPSILON, "{}", frozen - expected);
+    assert_eq!((statistics.jacobians, statistics.factorizations), (3, 3));
+    assert_eq!((statistics.residuals, statistics.iterations), (45, 48));
+    let (_, full) = run(Jacobian::Full, Some(4));
+    assert_eq!((full.jacobians, full.factorizations, full.residuals), (12, 12, 0));
+}
+
 /// Rows scaled by up to `10^±120` against each other: nothing changes but rounding.
 #[dae]
 fn scaled(xdot: [f64; 2], x: [f64; 2], p: [f64; 2]) -> [f64; 2] {

@@ -318,9 +318,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let kept = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
-        for _ in 0..count {
+        for iteration in 0..count {
             self.place(coefficients, step, x, y);
-            if kept {
+            if kept || iteration > 0 && jacobian == Jacobian::Frozen {
                 statistics.residuals += 1;
                 self.evaluate_residual();
             } else {
