@@ -79,10 +79,11 @@ fn without_a_fallback() {
 fn frozen_means_once_in_a_step() {
     let run = |jacobian, fixed_iterations| {
         let newton = Newton { jacobian, fixed_iterations, ..Default::default() };
-        let mut irk = Irk::<Scaled, Gauss<2>>::new(Options { steps: 3, newton, ..Default::default() }).unwrap();
+        let mut irk =
+            Irk::<Scaled, Gauss<2>>::new(Options { steps: 3, newton, ..Default::default() }).unwrap();
         irk.set_parameters(&vector![1.0, 1.0]).unwrap();
         let x = irk.solve(&vector![1.0, 0.5], &SVector::zeros(), 0.3).unwrap().x;
-        (x, irk.statistics())
+        (x, irk.statistics().clone())
     };
     let (expected, _) = run(Jacobian::Full, None);
     // The cubic term is 0.1 of the others: increments shrink at least tenfold.
