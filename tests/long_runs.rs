@@ -1,7 +1,6 @@
 //! What shows only after a million steps. Unoptimised they take minutes: `cargo test --release --test long_runs`.
 
-use casados::{Gauss, Irk, Options, ode};
-use nalgebra::{SVector, vector};
+use casados::{Gauss, Irk, Options};
 use orbit::{Kepler, STEP, changes};
 
 #[path = "stress/orbit.rs"]
@@ -23,30 +22,4 @@ fn t07_t08_t09_a_million_steps_around_the_sun() {
     assert!(plain[0] <= 3e-13 && plain[1] <= 5e-13, "{plain:?}");
     assert!(compensated[0] <= 5e-14 && compensated[1] <= 2e-13, "{compensated:?}");
     assert!(2.0 * compensated[0] <= plain[0] && compensated[1] <= plain[1], "{plain:?} {compensated:?}");
-}
-
-/// Two decays, one into the other.
-#[ode]
-fn decay(x: [f64; 2], p: f64) -> [f64; 2] {
-    [p * x[0], p * x[1] + x[0]]
-}
-
-/// Numbers below the smallest normal one cost no more than five times as much.
-#[test]
-#[cfg_attr(debug_assertions, ignore = "times of unoptimised code say nothing")]
-fn t28_denormal_numbers_are_not_slow() {
-    let time = |start: f64| {
-        let mut irk =
-            Irk::<Decay, Gauss<3>>::new(Options { steps: 20, ..Default::default() }).expect("valid");
-        irk.set_parameters(&vector![-1e-3]).expect("finite");
-        let runs = (0..200).map(|_| {
-            let begin = std::time::Instant::now();
-            irk.solve(&vector![start, start], &SVector::zeros(), 1.0).expect("a solution");
-            begin.elapsed()
-        });
-        runs.min().expect("some runs").as_secs_f64()
-    };
-    let (normal, denormal) = (time(1.0), time(1e-310));
-    println!("{normal:e} s, {denormal:e} s");
-    assert!(denormal <= 5.0 * normal, "{denormal:e} s instead of {normal:e} s");
 }

@@ -16,7 +16,7 @@
 //! | 22 | index two | `failures`, `adaptive`; at compile time `tests/ui/structurally_singular.rs` |
 //! | 24, 25, 33 | inconsistent start values, branches, warm starts | `starts`, `adaptive` |
 //! | 26, 29, 30, 31, 32 | models without a value, jumps, blow-up, divergence, quality of Newton's method | `failures`, `adaptive` |
-//! | 27, 28, 36 | powers of two, denormal numbers, lengths of steps | `scaling`, `adaptive`; run time in `tests/long_runs.rs` |
+//! | 27, 28, 36 | powers of two, denormal numbers, lengths of steps | `scaling`, `adaptive` |
 //! | 34 | threads | `tests/batch.rs` |
 //! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `endpoints` |
 //! | 39 | rounding of the data | `stiffness` |
