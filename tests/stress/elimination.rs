@@ -83,7 +83,7 @@ fn frozen_means_once_in_a_step() {
             Irk::<Scaled, Gauss<2>>::new(Options { steps: 3, newton, ..Default::default() }).unwrap();
         irk.set_parameters(&vector![1.0, 1.0]).unwrap();
         let x = irk.solve(&vector![1.0, 0.5], &SVector::zeros(), 0.3).unwrap().x;
-        (x, irk.statistics().clone())
+        (x, *irk.statistics())
     };
     let (expected, _) = run(Jacobian::Full, None);
     // The cubic term is 0.1 of the others: increments shrink at least tenfold.
