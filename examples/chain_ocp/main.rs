@@ -54,9 +54,9 @@ macro_rules! solve {
     ($nx:literal, $stages:literal, $steps:literal) => {{
         let record = Record::load(&format!("ocp/chain_{}.json", ($nx - 3) / 6 + 2))?;
         let (rest, x0) = (record.list("xrest")?, record.list("x0")?);
-        // Below what the whole is solved to, and from the stages of the iteration before.
+        // A thousand times below what the whole is solved to.
         let newton = Newton { tolerance: 1e-9, ..Default::default() };
-        let options = Options { steps: $steps, start: Start::Warm, newton, ..Default::default() };
+        let options = Options { steps: $steps, newton, ..Default::default() };
         let batch = Batch::<Chain<$nx>, Gauss<$stages>>::new(options)?;
         let mut ocp = chain_problem::problem!($nx, rest.clone(), x0, Shooting::new(batch));
         let mut sqp = HeapSqp::new(&ocp)?;

@@ -79,9 +79,9 @@ macro_rules! row {
         let masses = ($nx - 3) / 6 + 2;
         let record = load(&format!("tests/data/ocp/chain_{masses}.json"))?;
         let (rest, x0) = (numbers(&record["xrest"]), numbers(&record["x0"]));
-        // Ten times below what the whole is solved to, and from the stages of the iteration before.
+        // A thousand times below what the whole is solved to.
         let newton = Newton { tolerance: 1e-9, ..Default::default() };
-        let options = Options { steps: $steps, start: Start::Warm, newton, ..Default::default() };
+        let options = Options { steps: $steps, newton, ..Default::default() };
         let batch = || Batch::<Chain<$nx>, Gauss<$stages>>::new(options);
         let mut ocp = chain_problem::problem!($nx, rest.clone(), x0, Shooting::new(batch()?));
         let mut riccati = HeapSqp::new(&ocp)?;
