@@ -14,8 +14,7 @@
 //! violated   λ = l − q d     until d > 0
 //! ```
 
-use super::newton::{Iterate, Terms, at, scatter};
-use super::riccati::Equations;
+use super::newton::{Iterate, Terms, at};
 use super::run::Limits;
 use super::sides::{Sides, set};
 use super::vector::{largest_negative_product, largest_product};
@@ -100,29 +99,8 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
         let weight = Self::equation_weight();
-        let sides = &mut self.sides;
-        sides.force(weight);
-        assign(self.gradient, self.stationarity);
-        let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
-        let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
-        scatter(self.gradient, lower, of_lower, |g, &force| g - force);
-        scatter(self.gradient, upper, of_upper, |g, &force| g + force);
-        scatter(self.gradient, sides.equations, sides.equation_residual, |g, &residual| {
-            g + weight * residual
-        });
-        if factor {
-            self.weights.fill(T::ZERO);
-            scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
-            scatter(self.weights, sides.equations, sides.free, |sum, _| sum + weight);
-        }
-        let equations = Equations {
-            qp: self.qp,
-            first: self.first,
-            weights: self.weights,
-            gradient: self.gradient,
-            dynamics: self.dynamics,
-        };
-        if self.riccati.solve::<E>(equations, factor, self.step).is_err() || self.riccati.regularised > 0 {
+        self.sides.force(weight);
+        if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;
         }
         for (v, &step) in self.v.iter_mut().zip(&*self.step) {
@@ -131,12 +109,12 @@ impl<T: Real> Iterate<'_, T> {
         // A whole step leaves nothing of these.
         self.stationarity.fill(T::ZERO);
         self.dynamics.fill(T::ZERO);
+        let sides = &mut self.sides;
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
         for ((&row, free), residual) in equations {
             *residual = *residual + at(self.step, row);
             *free = *free - weight * *residual;
         }
-        sides.gather(self.step, |value, _| value, |value, _| -value);
         sides.follow(weight);
         true
     }
@@ -170,7 +148,7 @@ impl<T: Real> Sides<'_, T> {
         assign(part_mut(self.target, 0, count), self.multiplier);
     }
 
-    /// Weights, and into `scratch` what the sides pull with beyond what the gradient knows of.
+    /// Weights, and into `scratch` what the sides add to the gradient beyond what it knows of.
     #[inline(always)]
     fn force(&mut self, weight: T) {
         for (&activity, side_weight) in self.activity.iter().zip(&mut *self.weight) {
@@ -178,7 +156,7 @@ impl<T: Real> Sides<'_, T> {
         }
         let forces = self.multiplier.iter().zip(&*self.target).zip(self.weight.iter().zip(&*self.slack));
         for (scratch, ((&force, &known), (&weight, &distance))) in self.scratch.iter_mut().zip(forces) {
-            *scratch = force - known - weight * distance;
+            *scratch = known - force + weight * distance;
         }
         for (&side, &quadratic) in self.soft.iter().zip(&*self.quadratic) {
             if self.activity.get(side as usize) == Some(&VIOLATED) {

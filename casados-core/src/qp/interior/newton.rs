@@ -32,9 +32,9 @@ pub struct Iterate<'a, T> {
     /// Gradient of the Lagrangian.
     pub stationarity: &'a mut [T],
     /// Right-hand side of Newton's equations.
-    pub gradient: &'a mut [T],
+    gradient: &'a mut [T],
     /// Weights of rows.
-    pub weights: &'a mut [T],
+    weights: &'a mut [T],
     /// `A x + B u + b − x₊`
     pub dynamics: &'a mut [T],
     /// The multiplier of a given state at the start.
@@ -288,9 +288,18 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Newton's step, with `s Δλ + λ Δs = s · target`. Changes of slacks and multipliers are those of pairs afterwards.
     #[inline(always)]
     pub fn newton<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
+        self.sides.push(factor);
+        self.solve::<E>(factor)?;
+        self.sides.steps();
+        Ok(())
+    }
+
+    /// Newton's equations with the weights of the sides, and what they add to the gradient in `scratch`, where the changes of
+    /// their distances are afterwards.
+    #[inline(always)]
+    pub fn solve<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
         let weight = Self::equation_weight();
         let sides = &mut self.sides;
-        sides.push(factor);
         assign(self.gradient, self.stationarity);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
         let (of_lower, of_upper) = sides.scratch.split_at_checked(lower.len()).unwrap_or_default();
@@ -312,9 +321,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             dynamics: self.dynamics,
         };
         self.riccati.solve::<E>(equations, factor, self.step)?;
-        let sides = &mut self.sides;
-        sides.gather(self.step, |value, _| value, |value, _| -value);
-        sides.steps();
+        self.sides.gather(self.step, |value, _| value, |value, _| -value);
         Ok(())
     }
 
@@ -363,7 +370,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// A function of the value of the row and the bound, for every side, into `scratch`.
     #[inline(always)]
-    pub fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
+    fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
         let count = self.counts.lower;
         let (lower_rows, upper_rows) = self.rows.split_at_checked(count).unwrap_or_default();
         let (lower_bounds, upper_bounds) = self.bound.split_at_checked(count).unwrap_or_default();
@@ -554,7 +561,7 @@ pub fn at<T: Real>(slice: &[T], index: u32) -> T {
 
 /// Changes rows by values that belong to them.
 #[inline(always)]
-pub fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
+fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
     for (&row, value) in rows.iter().zip(values) {
         if let Some(target) = target.get_mut(row as usize) {
             *target = change(*target, value);
