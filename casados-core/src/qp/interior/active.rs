@@ -24,9 +24,9 @@ use crate::qp::statistics::Statistics;
 use crate::scalar::{Packed, Real};
 
 /// What a side is, as an element of a list of indices.
-pub const INACTIVE: u32 = 0;
-pub const ACTIVE: u32 = 1;
-pub const VIOLATED: u32 = 2;
+const INACTIVE: u32 = 0;
+const ACTIVE: u32 = 1;
+const VIOLATED: u32 = 2;
 
 /// Solves with the same factors, at most.
 const REFINEMENTS: usize = 3;
@@ -122,6 +122,12 @@ impl<T: Real> Iterate<'_, T> {
 
 /// Here `slack` is the distance `d`, which may be negative, and `target` the force that the gradient knows of.
 impl<T: Real> Sides<'_, T> {
+    /// `l − q d`, the force of a violated side.
+    #[inline(always)]
+    fn penalty(&self, j: usize, distance: T) -> T {
+        at(self.linear, j as u32) - at(self.quadratic, j as u32) * distance
+    }
+
     /// What sides are, from their distances in `scratch` and their multipliers.
     fn guess(&mut self) {
         let count = self.counts.sides();
@@ -133,7 +139,7 @@ impl<T: Real> Sides<'_, T> {
         }
         for (j, &side) in self.soft.iter().enumerate() {
             let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
-            let force = at(self.linear, j as u32) - at(self.quadratic, j as u32) * distance;
+            let force = self.penalty(j, distance);
             // Of a violation and the force that its multiplier lacks one is zero.
             if distance < T::ZERO && -distance > force - multiplier {
                 set(self.activity, side as usize, VIOLATED);
@@ -177,9 +183,7 @@ impl<T: Real> Sides<'_, T> {
         }
         for (j, &side) in self.soft.iter().enumerate() {
             if self.activity.get(side as usize) == Some(&VIOLATED) {
-                let distance = at(self.slack, side);
-                let force = at(self.linear, j as u32) - at(self.quadratic, j as u32) * distance;
-                set(self.multiplier, side as usize, force);
+                set(self.multiplier, side as usize, self.penalty(j, at(self.slack, side)));
             }
         }
         assign(part_mut(self.target, 0, self.counts.sides()), self.multiplier);
@@ -201,10 +205,9 @@ impl<T: Real> Sides<'_, T> {
             }
         }
         for (j, &side) in self.soft.iter().enumerate() {
-            let Some(activity) = self.activity.get_mut(side as usize) else { break };
             let (distance, multiplier) = (at(self.slack, side), at(self.multiplier, side));
-            let linear = at(self.linear, j as u32);
-            let whole = linear - at(self.quadratic, j as u32) * distance;
+            let (linear, whole) = (at(self.linear, j as u32), self.penalty(j, distance));
+            let Some(activity) = self.activity.get_mut(side as usize) else { break };
             // Without a linear penalty there is nothing between inactive and violated.
             let between = linear > T::ZERO;
             match *activity {
