@@ -54,9 +54,12 @@ fn nested(head: &str, tail: &str, n: usize) -> String {
     format!("{}x[0]{}", head.repeat(n), tail.repeat(n))
 }
 
-/// Tests run in threads of 2 MiB, unoptimised: what does not overflow here does so nowhere.
 #[test]
 fn nesting_is_bounded() {
+    super::like_a_compiler(nest);
+}
+
+fn nest() {
     // The first of these are expressions, the others blocks, closures and calls.
     const EXPRESSIONS: usize = 13;
     let forms = [
@@ -98,9 +101,12 @@ fn nesting_is_bounded() {
         if let Err(error) = evaluate(&source(depth)) {
             panic!("{depth} times {head} {tail}: {error}");
         }
-        if let Err(error) = evaluate(&source(150)) {
-            let error = error.to_string();
-            assert!(error.contains("nested too deeply"), "150 times {head} {tail}: {error}");
+        // At most one, two, three brackets for a level: as deep as the parser is let, and deeper.
+        for depth in [84, 126, 150, 250, 300] {
+            if let Err(error) = evaluate(&source(depth)) {
+                let error = error.to_string();
+                assert!(error.contains("nested too deeply"), "{depth} times {head} {tail}: {error}");
+            }
         }
     }
     // Calls nest as well.

@@ -60,9 +60,17 @@ fn nodes(evaluator: &mut Evaluator, value: &Value, list: &mut Vec<Node>) {
     }
 }
 
+/// Runs a test as compilers run macros: on a stack of 8 MiB.
+pub fn like_a_compiler(test: fn()) {
+    let thread = std::thread::Builder::new().stack_size(8 << 20).spawn(test).unwrap();
+    thread.join().unwrap();
+}
+
 /// Executes `fn f(x: [f64; 6])` symbolically.
 pub fn evaluate(source: &str) -> syn::Result<(Evaluator, Vec<Node>)> {
-    let item = Rc::new(syn::parse_str::<syn::ItemFn>(source)?);
+    let tokens = syn::parse_str(source)?;
+    super::nesting::check(&tokens)?;
+    let item = Rc::new(syn::parse2::<syn::ItemFn>(tokens)?);
     let mut evaluator = Evaluator::default();
     let x = (0..6).map(|index| Value::Real(evaluator.graph.variable(index))).collect();
     let function = Function { item, scope: Rc::default(), turbofish: Vec::new(), owner: None };
