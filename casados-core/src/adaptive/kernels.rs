@@ -33,6 +33,7 @@ pub struct Split<'a, M: Dae, T, const S: usize, const L: usize, const G: usize> 
 }
 
 impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for Split<'_, M, T, S, L, G> {
+    type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -72,6 +73,7 @@ pub struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
 }
 
 impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance<'_, '_, T, S, L, G> {
+    type Number = T;
     type Output = Groups<T, G>;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> Groups<T, G> {
@@ -138,6 +140,7 @@ pub struct Continue<'a, T, const S: usize, const G: usize> {
 }
 
 impl<T: Real, const S: usize, const G: usize> Kernel for Continue<'_, T, S, G> {
+    type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

@@ -298,6 +298,7 @@ struct Pack<'a, T, E> {
 }
 
 impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -320,6 +321,7 @@ struct Unpack<'a, T, E> {
 }
 
 impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {

@@ -222,6 +222,7 @@ struct Distribute<'a, E: Lanes, W, R> {
 }
 
 impl<E: Lanes, W: Wide<E, R>, R> Kernel for Distribute<'_, E, W, R> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

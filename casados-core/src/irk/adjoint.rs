@@ -131,6 +131,7 @@ struct RightHandSide<'a, E, const S: usize, const C: usize> {
 }
 
 impl<E: Lanes, const S: usize, const C: usize> Kernel for RightHandSide<'_, E, S, C> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -156,6 +157,7 @@ struct Advance<'a, M, E, const S: usize, const C: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M, E, S, C> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

@@ -71,6 +71,7 @@ pub(crate) struct Take<'a, E: Lanes, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Kernel for Take<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -90,6 +91,7 @@ pub(crate) struct Give<'a, E: Lanes, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Kernel for Give<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -142,6 +144,7 @@ struct Place<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

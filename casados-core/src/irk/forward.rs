@@ -172,6 +172,7 @@ struct Product<'a, E> {
 }
 
 impl<E: Lanes> Kernel for Product<'_, E> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

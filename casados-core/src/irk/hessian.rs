@@ -273,6 +273,7 @@ struct Subtract<'a, M, E, R, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {

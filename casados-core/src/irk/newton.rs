@@ -382,6 +382,7 @@ struct Subtract<'a, E, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -410,6 +411,7 @@ struct Update<'a, E: Lanes, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Kernel for Update<'_, E, S> {
+    type Number = E;
     type Output = [E; 2];
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> [E; 2] {
@@ -468,6 +470,7 @@ struct Measure<'a, E, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Kernel for Measure<'_, E, S> {
+    type Number = E;
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {

@@ -207,6 +207,7 @@ struct Combine<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for Combine<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -233,6 +234,7 @@ struct Continue<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -265,6 +267,7 @@ struct Advance<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -285,6 +288,7 @@ struct AdvanceCompensated<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for AdvanceCompensated<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

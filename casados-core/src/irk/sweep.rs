@@ -150,6 +150,7 @@ struct Start<'a, E, D> {
 }
 
 impl<E: Lanes, D: Directions<E>> Kernel for Start<'_, E, D> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -183,6 +184,7 @@ struct Step<'a, M, E, D, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, E, D, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {

@@ -101,6 +101,7 @@ struct Satisfied<'a, M, E, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
+    type Number = E;
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
@@ -152,6 +153,7 @@ struct VerifyForward<'a, M, E, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
+    type Number = E;
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
@@ -237,6 +239,7 @@ struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<'_, M, E, S, C> {
+    type Number = E;
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {

@@ -80,6 +80,7 @@ struct WriteRows<'a, M: Dae, E: Lanes, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -147,6 +148,7 @@ struct Write<'a, E, D, G, const S: usize> {
 }
 
 impl<E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Write<'_, E, D, G, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

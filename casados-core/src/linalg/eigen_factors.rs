@@ -111,6 +111,7 @@ struct Assemble<'a, T, const L: usize> {
 }
 
 impl<T: Real, const L: usize> Kernel for Assemble<'_, T, L> {
+    type Number = T;
     type Output = bool;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> bool {

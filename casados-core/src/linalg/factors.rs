@@ -105,6 +105,7 @@ struct Assemble<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

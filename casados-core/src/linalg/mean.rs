@@ -63,6 +63,7 @@ struct AssembleMean<'a, E, const S: usize, const L: usize> {
 }
 
 impl<E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, E, S, L> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -103,6 +104,7 @@ struct Split<'a, T, const S: usize, const L: usize> {
 }
 
 impl<T: Lanes, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
+    type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -121,6 +123,7 @@ struct Join<'a, T, const S: usize, const L: usize> {
 }
 
 impl<T: Lanes, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
+    type Number = T;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

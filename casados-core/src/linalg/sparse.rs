@@ -74,6 +74,7 @@ pub(super) struct Factor<'a, E, const S: usize> {
 }
 
 impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -145,6 +146,7 @@ struct Solve<'a, E, R, const S: usize> {
 }
 
 impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
@@ -164,6 +166,7 @@ pub fn solve_transposed<E: Field + Plain, R: Array<E>, const S: usize>(
 struct SolveTransposed<'a, E, R, const S: usize>(Solve<'a, E, R, S>);
 
 impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, E, R, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {

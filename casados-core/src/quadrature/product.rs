@@ -17,6 +17,7 @@ pub(crate) struct Subtract<'a, E, R, const S: usize> {
 }
 
 impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
