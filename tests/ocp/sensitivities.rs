@@ -1,9 +1,10 @@
 //! Derivatives of solutions against differences of problems that are solved again, and against the regulator.
 
 use crate::Test;
+use casados::LeastSquares;
 use casados::ocp::{
-    Constraint, Convexification, Exact, GaussNewton, GeneralCost, HeapSqp, Horizon, LeastSquaresCost, Map,
-    OcpError, Problem, Sensitivities,
+    Along, Constraint, Convexification, Exact, GaussNewton, GeneralCost, HeapSqp, Horizon, LeastSquaresCost,
+    Map, OcpError, Problem, Sensitivities,
 };
 use casados::prelude::*;
 
@@ -116,6 +117,169 @@ fn linear_problems() -> Test {
         }
         if k < 25 {
             assert!((gain[0] * stage.x[0] + gain[1] * stage.x[1] - stage.u[0]).abs() < 1e-12);
+        }
+    }
+    Ok(())
+}
+
+/// A pendulum whose length and a weight are parameters.
+mod parameters {
+    use casados::prelude::*;
+
+    #[ode]
+    pub fn pendulum(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> [f64; 2] {
+        [x[1], -p[0] * x[0].sin() + u[0] * x[0].cos()]
+    }
+    #[function]
+    pub fn tracking(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> [f64; 3] {
+        [x[0] - 0.4 * p[0], 0.3 * p[1] * x[1] * x[1], 0.2 * u[0] + 0.1 * p[1] * x[0]]
+    }
+    #[function]
+    pub fn energy(x: [f64; 2], _u: [f64; 1], p: [f64; 2]) -> f64 {
+        0.5 * x[1] * x[1] - p[0] * x[0].cos() + p[1] * x[0] * x[0]
+    }
+    #[function]
+    pub fn speed(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> f64 {
+        p[1] * x[1] + 0.1 * p[0] * u[0] * x[0]
+    }
+    #[function]
+    pub fn push(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> [f64; 2] {
+        [x[0] + 0.15 * x[1], x[1] + 0.15 * (u[0] * x[0].cos() - p[0] * x[0].sin())]
+    }
+}
+
+/// The same, where both are states that do not change.
+mod states {
+    use casados::prelude::*;
+
+    #[ode]
+    pub fn pendulum(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
+        [x[1], -x[2] * x[0].sin() + u[0] * x[0].cos(), 0.0, 0.0]
+    }
+    #[function]
+    pub fn tracking(x: [f64; 4], u: [f64; 1]) -> [f64; 3] {
+        [x[0] - 0.4 * x[2], 0.3 * x[3] * x[1] * x[1], 0.2 * u[0] + 0.1 * x[3] * x[0]]
+    }
+    #[function]
+    pub fn energy(x: [f64; 4], _u: [f64; 1]) -> f64 {
+        0.5 * x[1] * x[1] - x[2] * x[0].cos() + x[3] * x[0] * x[0]
+    }
+    #[function]
+    pub fn speed(x: [f64; 4], u: [f64; 1]) -> f64 {
+        x[3] * x[1] + 0.1 * x[2] * u[0] * x[0]
+    }
+    #[function]
+    pub fn push(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
+        [x[0] + 0.15 * x[1], x[1] + 0.15 * (u[0] * x[0].cos() - x[2] * x[0].sin()), x[2], x[3]]
+    }
+}
+
+const P: [f64; 2] = [1.3, 0.8];
+
+/// A problem with this dynamics, solved, and its derivatives; `full` is the initial state, with parameters behind it that are states.
+macro_rules! solved {
+    ($module:ident, $dynamics:expr, $full:expr, $p:expr, $curvature:expr) => {{
+        let mut ocp = Problem::new($dynamics)
+            .stage_cost(LeastSquaresCost::<$module::Tracking>::diagonal(&[1.0, 0.5, 2.0]))
+            .terminal_cost(GeneralCost::<$module::Energy>::new())
+            .path_constraints(Constraint::<$module::Speed>::new([f64::NEG_INFINITY], [0.5]))
+            .terminal_constraints(Constraint::<$module::Energy>::new([f64::NEG_INFINITY], [5.0]))
+            .on(Horizon::uniform(N, 0.15))?;
+        let mut result = Sensitivities::new(&ocp)?;
+        ocp.fix_initial_state(&$full)?.bound("u", .., -2.0, 1.2)?.guess(&$full, &[0.0])?;
+        if !$p.is_empty() {
+            ocp.set_parameters(.., &$p)?;
+        }
+        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        sqp.options.globalisation = casados::ocp::Globalisation::Merit;
+        (sqp.options.tolerance, sqp.options.max_iterations) = (1e-10, 100);
+        sqp.qp_solver.options.tolerance = 1e-12;
+        assert!(sqp.solve(&mut ocp)?.is_converged(), "{}", sqp.log());
+        ocp.differentiate($curvature, &mut result)?;
+        (ocp, result)
+    }};
+}
+
+macro_rules! integrator {
+    ($module:ident) => {
+        Irk::<$module::Pendulum, Gauss<2>>::new(Options::default())?
+    };
+}
+
+const N: usize = 12;
+const EXACT: Exact = Exact { convexification: Convexification::None };
+
+/// Parameters are states that do not change, and need no columns of their own: dynamics of an integrator, of one with an integral, of
+/// a map; exact and of Gauss and Newton. Constraints are active somewhere.
+#[test]
+fn parameters_as_states() -> Test {
+    macro_rules! compare {
+        ($dynamics:ident, $curvature:expr) => {{
+            let x0 = [-0.8, 0.1, P[0], P[1]];
+            let (ocp, with) = solved!(parameters, $dynamics!(parameters), [x0[0], x0[1]], P, $curvature);
+            let (_, without) = solved!(states, $dynamics!(states), x0, [0.0; 0], $curvature);
+            let count = ocp.iterate().stages().filter(|s| s.g_upper.iter().any(|&m| m > 1e-3)).count();
+            assert!((1..N).contains(&count), "{count}");
+            let mut largest = 0.0_f64;
+            for k in 0..=N {
+                for p in 0..2 {
+                    let (dx, other) = (&with.dx_dp(k)[2 * p..][..2], &without.dx(k)[4 * (2 + p)..][..2]);
+                    let (du, others) = if k < N { (&with.du_dp(k)[p..=p], &without.du(k)[2 + p..=2 + p]) } else { (&[][..], &[][..]) };
+                    for (a, b) in dx.iter().chain(du).zip(other.iter().chain(others)) {
+                        largest = largest.max(a.abs());
+                        // Two solutions to 1e-10, whose multipliers are at least 1e-3; bounds as springs of 1e8.
+                        assert!((a - b).abs() < 1e-6, "{k} {p}: {a} {b}");
+                    }
+                }
+            }
+            assert!(largest > 0.1);
+        }};
+    }
+    macro_rules! integral {
+        ($module:ident) => {
+            Along::new(
+                integrator!($module),
+                LeastSquares::<$module::Tracking>::new(&nalgebra::Matrix3::identity()),
+            )
+        };
+    }
+    macro_rules! map {
+        ($module:ident) => {
+            Map::<$module::Push, f64>::new()
+        };
+    }
+    compare!(integrator, EXACT);
+    compare!(integral, EXACT);
+    compare!(map, EXACT);
+    compare!(integrator, GaussNewton { convexification: Convexification::None });
+    compare!(integral, GaussNewton { convexification: Convexification::None });
+    Ok(())
+}
+
+/// Differences of solutions with other parameters.
+#[test]
+fn differences_by_parameters() -> Test {
+    let x0 = [-0.8, 0.1];
+    let (ocp, result) = solved!(parameters, integrator!(parameters), x0, P, EXACT);
+    let bounded = ocp.iterate().stages().filter(|s| s.u_upper.iter().any(|&m| m > 1e-3)).count();
+    assert!((1..N).contains(&bounded), "{bounded}");
+    let step = 1e-5;
+    for p in 0..2 {
+        let mut sides = Vec::new();
+        for sign in [1.0, -1.0] {
+            let mut other = P;
+            other[p] += sign * step;
+            let (ocp, _) = solved!(parameters, integrator!(parameters), x0, other, EXACT);
+            sides.push(ocp.iterate().stages().map(|s| [s.x, s.u].concat()).collect::<Vec<_>>());
+        }
+        for (k, (plus, minus)) in sides[0].iter().zip(&sides[1]).enumerate() {
+            let dx = &result.dx_dp(k)[2 * p..][..2];
+            let du = if k < N { &result.du_dp(k)[p..=p] } else { &[] };
+            for ((a, b), derivative) in plus.iter().zip(minus).zip(dx.iter().chain(du)) {
+                let difference = (a - b) / (2.0 * step);
+                // Solutions to 1e-10 over 2e-5, multipliers of 1e-3.
+                assert!((difference - derivative).abs() < 1e-4, "{k} {p}: {difference} {derivative}");
+            }
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! Constraints at the nodes.
 
 use super::error::{OcpError, Part};
-use super::point::{Terms, check, position};
+use super::point::{Cross, Terms, check, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape};
@@ -43,6 +43,9 @@ pub trait Constraints<S: Shape, T: Real> {
     /// Adds the Hessian of `μᵀg`.
     #[doc(hidden)]
     fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>);
+    /// `∂g/∂p`, a row for each of the constraints; adds what parameters change of the gradient of `μᵀg`, if `μ` is given.
+    #[doc(hidden)]
+    fn cross(&mut self, v: &S::ArrayV<T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>);
     /// The function of a row, and which of its outputs it is.
     #[doc(hidden)]
     fn name(row: usize) -> (&'static str, usize);
@@ -68,6 +71,7 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
         Ok(())
     }
     fn curve(&mut self, _: &S::ArrayV<T>, _: &[T], _: &mut Terms<'_, T>) {}
+    fn cross(&mut self, _: &S::ArrayV<T>, _: Option<&[T]>, _: &mut [T], _: &mut Cross<'_, T>) {}
     fn name(row: usize) -> (&'static str, usize) {
         ("", row)
     }
@@ -107,6 +111,12 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
         let (first, second) = mu.split_at_checked(A::ROWS).unwrap_or_default();
         self.0.curve(v, first, terms);
         self.1.curve(v, second, terms);
+    }
+    fn cross(&mut self, v: &S::ArrayV<T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {
+        let (mine, others) = slopes.split_at_mut_checked(A::ROWS * S::NP).unwrap_or_default();
+        let (first, second) = mu.and_then(|mu| mu.split_at_checked(A::ROWS)).unzip();
+        self.0.cross(v, first, mine, cross);
+        self.1.cross(v, second, others, cross);
     }
     fn name(row: usize) -> (&'static str, usize) {
         match row.checked_sub(A::ROWS) {
@@ -218,6 +228,22 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
         let mu = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
         F::hessian::<T>(v, &mu, &mut self.hessian);
         terms.curvature::<F>(&self.hessian, T::ONE);
+    }
+    fn cross(&mut self, v: &ArrayV<F, T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {
+        F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
+        for (&value, (row, variable)) in self.jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter()) {
+            let Some(p) = parameter::<F::Shape>(variable) else { continue };
+            if let Some(slope) = slopes.get_mut(row * F::Shape::NP + p) {
+                *slope = value;
+            }
+        }
+        if let Some(mu) = mu
+            && !F::STRUCTURE.hessian.is_empty()
+        {
+            let mu = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
+            F::hessian::<T>(v, &mu, &mut self.hessian);
+            cross.curvature::<F>(&self.hessian, T::ONE);
+        }
     }
     fn name(row: usize) -> (&'static str, usize) {
         (F::STRUCTURE.name, row)

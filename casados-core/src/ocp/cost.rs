@@ -1,7 +1,7 @@
 //! Costs at the nodes.
 
 use super::error::{OcpError, Part};
-use super::point::{Terms, check, position};
+use super::point::{Cross, Terms, check, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function, FunctionStructure, MatrixYY};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain, Shape};
@@ -41,6 +41,19 @@ pub trait Cost<S: Shape, T: Real> {
         at: At<T>,
         terms: &mut Terms<'_, T>,
     ) -> Result<T, OcpError>;
+
+    /// Adds what parameters change of the gradient, times the factor.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`]
+    #[doc(hidden)]
+    fn cross(
+        &mut self,
+        v: &S::ArrayV<T>,
+        reference: &[T],
+        at: At<T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError>;
 }
 
 /// Where, how much, and whether the Hessian is to be exact.
@@ -62,6 +75,9 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     }
     fn add(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<T>, _: &mut Terms<'_, T>) -> Result<T, OcpError> {
         Ok(T::ZERO)
+    }
+    fn cross(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<T>, _: &mut Cross<'_, T>) -> Result<(), OcpError> {
+        Ok(())
     }
 }
 
@@ -86,6 +102,17 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     ) -> Result<T, OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
         Ok(self.0.add(v, first, at, terms)? + self.1.add(v, second, at, terms)?)
+    }
+    fn cross(
+        &mut self,
+        v: &S::ArrayV<T>,
+        reference: &[T],
+        at: At<T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
+        self.0.cross(v, first, at, cross)?;
+        self.1.cross(v, second, at, cross)
     }
 }
 
@@ -256,6 +283,31 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
         }
         Ok(at.factor * value)
     }
+
+    fn cross(
+        &mut self,
+        v: &ArrayV<F, T>,
+        reference: &[T],
+        at: At<T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        self.square(reference, at.stage)?;
+        let Self { weights, mu, jacobian, hessian, .. } = self;
+        let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
+        for (&a, (k, variable)) in entries() {
+            let Some(i) = position::<F::Shape>(variable) else { continue };
+            for (&b, (l, variable)) in entries() {
+                let Some(p) = parameter::<F::Shape>(variable) else { continue };
+                cross.add(i, p, at.factor * weights[(k, l)] * a * b);
+            }
+        }
+        if at.exact && !F::STRUCTURE.hessian.is_empty() {
+            F::hessian::<T>(v, mu, hessian);
+            cross.curvature::<F>(hessian, at.factor);
+        }
+        Ok(())
+    }
 }
 
 /// Adds the lower triangle of `weight · a bᵀ`.
@@ -342,5 +394,20 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
             terms.curvature::<F>(&self.hessian, at.factor);
         }
         Ok(at.factor * value)
+    }
+
+    fn cross(
+        &mut self,
+        v: &ArrayV<F, T>,
+        _: &[T],
+        at: At<T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        if !F::STRUCTURE.hessian.is_empty() {
+            self.mu = Array::from_fn(|_| T::ONE);
+            F::hessian::<T>(v, &self.mu, &mut self.hessian);
+            cross.curvature::<F>(&self.hessian, at.factor);
+        }
+        Ok(())
     }
 }

@@ -91,13 +91,23 @@ pub struct Step<'a, T> {
     pub dp: &'a [T],
     /// `∇²(πᵀφ + integral)`: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
+    /// The blocks `xp`, `up` of the same.
+    pub hessian_p: [&'a [T]; 2],
     /// The integral cost.
     pub cost: IntegralTerms<'a, T>,
 }
 
 impl<T: Real> Default for Step<'_, T> {
     fn default() -> Self {
-        Self { x: &[], dx: &[], du: &[], dp: &[], hessian: [&[]; 3], cost: IntegralTerms::default() }
+        Self {
+            x: &[],
+            dx: &[],
+            du: &[],
+            dp: &[],
+            hessian: [&[]; 3],
+            hessian_p: [&[]; 2],
+            cost: IntegralTerms::default(),
+        }
     }
 }
 
@@ -121,7 +131,8 @@ impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for Step<'a, T> {
 impl<'a, M: Dae, T: Real> From<&'a Hessian<M, T>> for Step<'a, T> {
     fn from(result: &'a Hessian<M, T>) -> Self {
         let hessian = [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()];
-        Self { hessian, ..Self::from(&result.first.forward) }
+        let hessian_p = [result.h_xp.as_slice(), result.h_up.as_slice()];
+        Self { hessian, hessian_p, ..Self::from(&result.first.forward) }
     }
 }
 
@@ -136,11 +147,13 @@ pub struct IntegralTerms<'a, T> {
     pub u: &'a [T],
     /// The matrix of Gauss and Newton: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
+    /// Its blocks `xp`, `up`.
+    pub hessian_p: [&'a [T]; 2],
 }
 
 impl<T: Real> Default for IntegralTerms<'_, T> {
     fn default() -> Self {
-        Self { value: T::ZERO, x: &[], u: &[], hessian: [&[]; 3] }
+        Self { value: T::ZERO, x: &[], u: &[], hessian: [&[]; 3], hessian_p: [&[]; 2] }
     }
 }
 

@@ -68,6 +68,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub fn linearise<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C) -> Result<(), OcpError> {
+        self.linearise_watched(curvature, |_, _| {})
+    }
+
+    /// [`Ocp::linearise`], and shows every interval to `watch`.
+    pub(super) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        mut watch: impl FnMut(usize, &Step<'_, T>),
+    ) -> Result<(), OcpError> {
         self.check()?;
         let intervals = self.intervals();
         let (nx, np) = (P::Shape::NX, P::Shape::NP);
@@ -143,7 +152,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             for ((offset, &x), column) in offset.iter_mut().zip(step.x).zip(matrix.chunks_exact(ld.max(1))) {
                 *offset = x - dot(column, here);
             }
-            let IntegralTerms { value, x, u, hessian: blocks } = step.cost;
+            watch(k, step);
+            let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             objective = objective + value;
             let mut terms = Terms { gradient, hessian, ld };
             for (i, &slope) in x.iter().chain(u).enumerate() {

@@ -2,7 +2,7 @@
 
 use super::dynamics::{Dynamics, Names, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
-use super::point::{position, read};
+use super::point::{parameter, position, read};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Outputs, Plain, Shape};
@@ -24,6 +24,8 @@ pub struct Map<F: Function, T: Plain> {
     h_xx: <F::Shape as Shape>::MatrixXX<T>,
     h_xu: <F::Shape as Shape>::MatrixXU<T>,
     h_uu: <F::Shape as Shape>::MatrixUU<T>,
+    h_xp: <F::Shape as Shape>::MatrixXP<T>,
+    h_up: <F::Shape as Shape>::MatrixUP<T>,
 }
 
 impl<F: Function, T: Real> Map<F, T> {
@@ -64,16 +66,20 @@ impl<F: Function, T: Real> Map<F, T> {
                     }
                 }
             }
-            let mut hessian = [&[][..]; 3];
+            let (mut hessian, mut hessian_p) = ([&[][..]; 3], [&[][..]; 2]);
             if second {
                 crate::qp::assign(self.mu.as_mut(), interval.multipliers);
                 F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
                 for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
                     let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
-                    let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column))
-                    else {
-                        continue;
-                    };
+                    let Some(column) = position::<F::Shape>(column) else { continue };
+                    if let Some(p) = parameter::<F::Shape>(row) {
+                        match column.checked_sub(nx) {
+                            None => self.h_xp[(column, p)] = value,
+                            Some(column) => self.h_up[(column, p)] = value,
+                        }
+                    }
+                    let Some(row) = position::<F::Shape>(row) else { continue };
                     match (row.checked_sub(nx), column.checked_sub(nx)) {
                         (None, _) => {
                             self.h_xx[(row, column)] = value;
@@ -87,10 +93,11 @@ impl<F: Function, T: Real> Map<F, T> {
                     }
                 }
                 hessian = [self.h_xx.as_slice(), self.h_xu.as_slice(), self.h_uu.as_slice()];
+                hessian_p = [self.h_xp.as_slice(), self.h_up.as_slice()];
             }
             let (x, dx, du, dp) =
                 (self.x.as_slice(), self.dx.as_slice(), self.du.as_slice(), self.dp.as_slice());
-            sink(k, &Step { x, dx, du, dp, hessian, ..Step::default() });
+            sink(k, &Step { x, dx, du, dp, hessian, hessian_p, ..Step::default() });
         }
         Ok(())
     }

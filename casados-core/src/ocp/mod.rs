@@ -22,7 +22,7 @@
 //!
 //! with full steps or line searches (merit function, filter, second-order correction), penalties where a QP is infeasible
 //! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. [`RealTime`] takes one step in
-//! each sample, in two phases. `Sensitivities` are derivatives of solutions, and feedback gains.
+//! each sample, in two phases. `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback gains.
 //!
 //! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
 //! stage 0 given by equal bounds. So are parameters that are to be found.

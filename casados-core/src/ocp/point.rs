@@ -18,6 +18,12 @@ pub(super) fn position<S: Shape>(variable: usize) -> Option<usize> {
     }
 }
 
+/// The index of a parameter among the variables.
+#[inline(always)]
+pub(super) fn parameter<S: Shape>(variable: usize) -> Option<usize> {
+    variable.checked_sub(2 * S::NX + S::NZ + S::NU).filter(|&p| p < S::NP)
+}
+
 /// Writes the variables `(0, x, 0, u, p, t)`.
 #[inline(always)]
 pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, x: &[T], u: &[T], p: &[T], t: T) {
@@ -82,6 +88,40 @@ impl<T: Real> Terms<'_, T> {
             let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
             if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
                 self.curve(row, column, factor * value);
+            }
+        }
+    }
+}
+
+/// Derivatives of a gradient over `(x, u)` with respect to parameters, a column for each, to be added to.
+pub struct Cross<'a, T> {
+    pub(super) columns: &'a mut [T],
+    /// `NX + NU`, the distance of columns.
+    pub(super) ld: usize,
+}
+
+impl<T: Real> Cross<'_, T> {
+    /// Adds to the derivative of element `row` by parameter `p`.
+    pub(super) fn add(&mut self, row: usize, p: usize, value: T) {
+        if let Some(element) = self.columns.get_mut(p * self.ld + row) {
+            *element = *element + value;
+        }
+    }
+    /// Adds the entries of the Hessian of a function.
+    pub(super) fn curvature<F: Function>(&mut self, hessian: &F::Hessian<T>, factor: T) {
+        for (entry, &value) in hessian.as_ref().iter().enumerate() {
+            // Parameters come after states and controls: they are rows of the lower triangle.
+            let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
+            if let (Some(p), Some(position)) = (parameter::<F::Shape>(row), position::<F::Shape>(column)) {
+                self.add(position, p, factor * value);
+            }
+        }
+    }
+    /// Adds matrices `xp` and `up`, column after column.
+    pub(super) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up]: [&[T]; 2]) {
+        for (first, rows, block) in [(0, nx, xp), (nx, nu, up)] {
+            for (p, column) in block.chunks_exact(rows.max(1)).enumerate() {
+                column.iter().enumerate().for_each(|(i, &value)| self.add(first + i, p, value));
             }
         }
     }

@@ -55,6 +55,7 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for Leas
             x: self.grad_x0.as_slice(),
             u: self.grad_u.as_slice(),
             hessian: [self.h_xx.as_slice(), self.h_xu.as_slice(), self.h_uu.as_slice()],
+            hessian_p: [self.h_xp.as_slice(), self.h_up.as_slice()],
         }
     }
 }
@@ -70,7 +71,7 @@ impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T:
             value: self.q.as_slice().first().copied().unwrap_or(T::ZERO),
             x: self.dq_dx0.as_slice(),
             u: self.dq_du.as_slice(),
-            hessian: [&[]; 3],
+            ..IntegralTerms::default()
         }
     }
 }
@@ -176,7 +177,7 @@ macro_rules! single {
                     let lambda: VectorX<M, T> = vector(interval.multipliers);
                     let result = at(k, integrator.with(integral).hessian(&x, &u, interval.h, &lambda))?;
                     // The Hessian is that of both together: what the integral would add is in it.
-                    let cost = IntegralTerms { hessian: [&[]; 3], ..integral.terms() };
+                    let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 2], ..integral.terms() };
                     sink(k, &Step { cost, ..result.into() });
                 }
                 Ok(())

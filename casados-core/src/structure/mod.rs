@@ -98,6 +98,11 @@ impl Pattern {
     pub fn get(&self, entry: usize) -> Option<(usize, usize)> {
         Some((*self.rows.get(entry)? as usize, *self.columns.get(entry)? as usize))
     }
+
+    /// `(row, column)` of all entries.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        self.rows.iter().zip(self.columns).map(|(&row, &column)| (row as usize, column as usize))
+    }
 }
 
 /// Numbers of arithmetic operations of one evaluation; an elementary function counts as one.

@@ -1,0 +1,120 @@
+//! What parameters change of the conditions of optimality.
+
+use super::{get, zeros};
+use crate::ocp::constraint::Constraints;
+use crate::ocp::cost::{At, Cost};
+use crate::ocp::data::{inputs, split};
+use crate::ocp::dynamics::Step;
+use crate::ocp::error::OcpError;
+use crate::ocp::instance::Ocp;
+use crate::ocp::point::{Cross, read};
+use crate::ocp::problem::{Formulation, Problem};
+use crate::qp::{StageDims, assign, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// Derivatives with respect to `p`, one stage after the other.
+#[derive(Clone, Debug)]
+pub(super) struct Parameters<T> {
+    /// `NX`, `NU`, `NP`
+    dims: [usize; 3],
+    /// Rows of the constraints of a stage but the last.
+    rows: usize,
+    /// `∂φ/∂p`, column after column.
+    ends: Vec<T>,
+    /// `∂²L/∂(x, u)∂p`, column after column.
+    gradients: Vec<T>,
+    /// `∂g/∂p`, row after row.
+    slopes: Vec<T>,
+    /// `μ` of the constraints of a stage.
+    mu: Vec<T>,
+}
+
+impl<T: Real> Parameters<T> {
+    pub(super) fn new<P: Formulation<T>>(n: usize) -> Result<Self, OcpError> {
+        let dims @ [nx, nu, np] = [P::Shape::NX, P::Shape::NU, P::Shape::NP];
+        Ok(Self {
+            dims,
+            rows: P::Path::ROWS,
+            ends: zeros(n * nx * np)?,
+            gradients: zeros((n + 1) * (nx + nu) * np)?,
+            slopes: zeros((n * P::Path::ROWS + P::Terminal::ROWS) * np)?,
+            mu: zeros(P::Path::ROWS.max(P::Terminal::ROWS))?,
+        })
+    }
+
+    /// `∂φ/∂p` of an interval.
+    pub(super) fn end(&self, k: usize) -> &[T] {
+        let [nx, _, np] = self.dims;
+        part(&self.ends, k * nx * np, nx * np)
+    }
+    /// `∂²L/∂(x, u)∂p` of a stage.
+    pub(super) fn gradient(&self, k: usize) -> &[T] {
+        let [nx, nu, np] = self.dims;
+        part(&self.gradients, k * (nx + nu) * np, (nx + nu) * np)
+    }
+    /// `∂g/∂p` of a constraint of a stage.
+    pub(super) fn slope(&self, k: usize, row: usize) -> &[T] {
+        let [_, _, np] = self.dims;
+        part(&self.slopes, (k * self.rows + row) * np, np)
+    }
+
+    /// What an interval adds.
+    pub(super) fn take(&mut self, k: usize, step: &Step<'_, T>) {
+        let [nx, nu, np] = self.dims;
+        let size = nx + nu;
+        assign(part_mut(&mut self.ends, k * nx * np, nx * np), step.dp);
+        let columns = part_mut(&mut self.gradients, k * size * np, size * np);
+        columns.fill(T::ZERO);
+        let mut cross = Cross { columns, ld: size };
+        cross.add_blocks([nx, nu], step.hessian_p);
+        cross.add_blocks([nx, nu], step.cost.hessian_p);
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Adds costs and constraints to what the intervals have added.
+    pub(super) fn differentiate_functions(
+        &mut self,
+        exact: bool,
+        result: &mut Parameters<T>,
+    ) -> Result<(), OcpError> {
+        let intervals = self.intervals();
+        let (np, size) = (P::Shape::NP, inputs::<P::Shape>());
+        if np == 0 {
+            return Ok(());
+        }
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = self.problem.parts();
+        let Parameters { gradients, slopes, mu, rows, .. } = result;
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, at) in self.iterate.stages().enumerate() {
+            let time = get(data.times, k);
+            read::<P::Shape, T>(&mut point, at.x, at.u, part(data.p, k * np, np), time);
+            let columns = part_mut(gradients, k * size * np, size * np);
+            if k == intervals {
+                columns.fill(T::ZERO);
+            }
+            let mut cross = Cross { columns, ld: size };
+            for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
+                *mu = upper - lower;
+            }
+            let slopes = slopes.get_mut(k * *rows * np..).unwrap_or_default();
+            let place = |factor| At { stage: k, factor, exact };
+            let references = P::StageCost::REFERENCES;
+            if k < intervals {
+                let factor = if *running { get(data.times, k + 1) - time } else { T::ONE };
+                let reference = part(data.references, k * references, references);
+                stage_cost.cross(&point, reference, place(factor), &mut cross)?;
+                path.cross(&point, exact.then_some(mu), slopes, &mut cross);
+            } else {
+                let reference = part(data.references, k * references, P::TerminalCost::REFERENCES);
+                terminal_cost.cross(&point, reference, place(T::ONE), &mut cross)?;
+                terminal.cross(&point, exact.then_some(mu), slopes, &mut cross);
+            }
+        }
+        Ok(())
+    }
+}
