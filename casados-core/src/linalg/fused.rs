@@ -108,6 +108,11 @@ pub trait Kernel {
 #[allow(unsafe_code)]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    // Never inlined, so that callers are small.
+    #[inline(never)]
+    fn base<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Separate>()
+    }
     #[target_feature(enable = "avx2,fma")]
     fn avx2<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Fused>()
@@ -116,17 +121,20 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     fn avx512<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Fused>()
     }
-    let level = level();
     // Only what lies in such registers needs AVX-512: other kernels are up to a tenth faster without.
-    if const { size_of::<K::Number>() > 32 } && level == Level::Avx512 {
-        // SAFETY: the one condition of calling a function with target features is that the machine has
-        // them, which is what `level` says.
-        unsafe { avx512(kernel) }
-    } else if level >= Level::Avx2 {
-        // SAFETY: as above.
-        unsafe { avx2(kernel) }
+    if const { size_of::<K::Number>() > 32 } {
+        match level() {
+            // SAFETY: the one condition of calling a function with target features is that the machine has
+            // them, which is what `level` says.
+            Level::Avx512 => unsafe { avx512(kernel) },
+            _ => base(kernel),
+        }
     } else {
-        kernel.run::<Separate>()
+        match level() {
+            // SAFETY: as above.
+            Level::Avx512 | Level::Avx2 => unsafe { avx2(kernel) },
+            _ => base(kernel),
+        }
     }
 }
 
