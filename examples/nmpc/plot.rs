@@ -46,7 +46,11 @@ impl Picture {
             let (left, right) = root.margin(8, 8, 8, 8).split_horizontally(560);
             let (pendulum, chain) = left.split_vertically(312);
             curves(&pendulum, "A pendulum swings up, and is pushed every four seconds", &self.pendulum)?;
-            curves(&chain, "A chain, disturbed every four seconds: distances from rest, m", &self.chain)?;
+            curves(
+                &chain,
+                "A chain, disturbed every four seconds: distances from references, m",
+                &self.chain,
+            )?;
             self.histogram(&right)?;
             root.present()?;
         }

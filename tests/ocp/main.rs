@@ -8,6 +8,7 @@ mod chain_problem;
 #[path = "../data/mod.rs"]
 mod data;
 
+mod algebraic;
 mod bounds;
 mod chain;
 mod closed_form;

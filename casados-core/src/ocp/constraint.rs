@@ -1,13 +1,13 @@
 //! Constraints at the nodes.
 
 use super::error::{OcpError, Part};
-use super::point::{Cross, Terms, check, parameter, position};
+use super::point::{Cross, Terms, There, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
 
-/// Constraints at a node, as functions of `(x, u, p, t)` with bounds: `()` is none, a pair is both.
+/// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is both.
 pub trait Constraints<S: Shape, T: Real> {
     /// How many rows.
     const ROWS: usize;
@@ -17,7 +17,7 @@ pub trait Constraints<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NotThere`]
     #[doc(hidden)]
-    fn check(&self, terminal: bool) -> Result<(), OcpError>;
+    fn check(&self, there: There) -> Result<(), OcpError>;
     /// The bounds that hold where nothing else is said: lower ones, upper ones, linear and quadratic penalties.
     #[doc(hidden)]
     fn bounds(&self, limits: [&mut [T]; 4]);
@@ -53,7 +53,7 @@ pub trait Constraints<S: Shape, T: Real> {
 
 impl<S: Shape, T: Real> Constraints<S, T> for () {
     const ROWS: usize = 0;
-    fn check(&self, _: bool) -> Result<(), OcpError> {
+    fn check(&self, _: There) -> Result<(), OcpError> {
         Ok(())
     }
     fn bounds(&self, _: [&mut [T]; 4]) {}
@@ -79,9 +79,9 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
 
 impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<S, T> for (A, B) {
     const ROWS: usize = A::ROWS + B::ROWS;
-    fn check(&self, terminal: bool) -> Result<(), OcpError> {
-        self.0.check(terminal)?;
-        self.1.check(terminal)
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        self.0.check(there)?;
+        self.1.check(there)
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
         let [(l, lower), (u, upper), (i, linear), (q, quadratic)] =
@@ -126,7 +126,7 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
     }
 }
 
-/// `lower ≤ g(x, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal bounds are an equation.
+/// `lower ≤ g(x, z, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal bounds are an equation.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Constraint<F: Function, T: Plain = f64> {
@@ -171,8 +171,8 @@ impl<F: Function, T: Real> Constraint<F, T> {
 impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
     const ROWS: usize = F::Outputs::NY;
 
-    fn check(&self, terminal: bool) -> Result<(), OcpError> {
-        let part = if terminal { Part::TerminalBounds } else { Part::PathBounds };
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        let part = if there.u { Part::PathBounds } else { Part::TerminalBounds };
         for (index, (&lower, &upper)) in self.lower.as_ref().iter().zip(self.upper.as_ref()).enumerate() {
             super::bounds::check(part, 0, index, lower, upper)?;
         }
@@ -181,7 +181,7 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
         {
             super::bounds::check_penalty(0, index, linear, quadratic)?;
         }
-        check::<F>(terminal)
+        there.check::<F>()
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
         let given = [&self.lower, &self.upper, &self.linear, &self.quadratic];

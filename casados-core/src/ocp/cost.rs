@@ -1,14 +1,14 @@
 //! Costs at the nodes.
 
 use super::error::{OcpError, Part};
-use super::point::{Cross, Terms, check, parameter, position};
+use super::point::{Cross, Terms, There, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function, FunctionStructure, MatrixYY};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
 use core::ops::Range;
 
-/// A cost at a node, as a function of `(x, u, p, t)`: `()` is none, and a pair of costs is their sum.
+/// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their sum.
 pub trait Cost<S: Shape, T: Real> {
     /// How many numbers a reference has.
     const REFERENCES: usize;
@@ -20,7 +20,7 @@ pub trait Cost<S: Shape, T: Real> {
     /// # Errors
     /// [`OcpError::NotThere`], [`OcpError::InvalidValue`]
     #[doc(hidden)]
-    fn check(&self, terminal: bool) -> Result<(), OcpError>;
+    fn check(&self, there: There) -> Result<(), OcpError>;
 
     /// The value at a point.
     ///
@@ -67,7 +67,7 @@ pub struct At<T> {
 impl<S: Shape, T: Real> Cost<S, T> for () {
     const REFERENCES: usize = 0;
     const CONVEX: bool = true;
-    fn check(&self, _: bool) -> Result<(), OcpError> {
+    fn check(&self, _: There) -> Result<(), OcpError> {
         Ok(())
     }
     fn value(&mut self, _: &S::ArrayV<T>, _: &[T], _: usize) -> Result<T, OcpError> {
@@ -85,9 +85,9 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
 impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     const REFERENCES: usize = A::REFERENCES + B::REFERENCES;
     const CONVEX: bool = A::CONVEX && B::CONVEX;
-    fn check(&self, terminal: bool) -> Result<(), OcpError> {
-        self.0.check(terminal)?;
-        self.1.check(terminal)
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        self.0.check(there)?;
+        self.1.check(there)
     }
     fn value(&mut self, v: &S::ArrayV<T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
@@ -116,7 +116,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     }
 }
 
-/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, u, p, t)` of a function and a reference `r`, which every stage has for itself.
+/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and a reference `r`, which every stage has for itself.
 ///
 /// Its Hessian is `JᵀWJ`, that of Gauss and Newton; the exact one has the second derivatives of `y` too.
 #[derive(Zeroable)]
@@ -185,10 +185,10 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
     }
 }
 
-/// Entries of the Jacobian in one row that belong to `x` and to `u`, row by row.
+/// Entries of the Jacobian in one row that belong to `x`, to `z` and to `u`, row by row.
 struct Rows {
     structure: FunctionStructure,
-    begins: [usize; 2],
+    begins: [usize; 3],
     row: usize,
 }
 
@@ -196,17 +196,17 @@ impl Rows {
     #[inline(always)]
     fn new<F: Function>() -> Self {
         let structure = F::STRUCTURE;
-        Self { structure, begins: [structure.blocks[1], structure.blocks[3]], row: 0 }
+        Self { structure, begins: [structure.blocks[1], structure.blocks[2], structure.blocks[3]], row: 0 }
     }
 }
 
 impl Iterator for Rows {
-    type Item = [Range<usize>; 2];
+    type Item = [Range<usize>; 3];
     #[inline(always)]
     fn next(&mut self) -> Option<Self::Item> {
         let (rows, blocks) = (self.structure.jacobian.rows, self.structure.blocks);
-        let mut ranges = [0..0, 0..0];
-        let ends = [blocks[2], blocks[4]];
+        let mut ranges = [0..0, 0..0, 0..0];
+        let ends = [blocks[2], blocks[3], blocks[4]];
         for ((range, begin), end) in ranges.iter_mut().zip(&mut self.begins).zip(ends) {
             let start = *begin;
             while *begin < end && rows.get(*begin).is_some_and(|&row| row as usize == self.row) {
@@ -222,11 +222,11 @@ impl Iterator for Rows {
 /// The entries, as positions and values.
 #[inline(always)]
 fn entries<'a, F: Function, T: Real>(
-    ranges: [Range<usize>; 2],
+    ranges: [Range<usize>; 3],
     jacobian: &'a [T],
 ) -> impl Iterator<Item = (usize, T)> + Clone + 'a {
-    let [x, u] = ranges;
-    x.chain(u).filter_map(move |entry| {
+    let [x, z, u] = ranges;
+    x.chain(u).chain(z).filter_map(move |entry| {
         let (_, variable) = F::STRUCTURE.jacobian.get(entry)?;
         Some((position::<F::Shape>(variable)?, *jacobian.get(entry)?))
     })
@@ -236,14 +236,14 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
 
-    fn check(&self, terminal: bool) -> Result<(), OcpError> {
+    fn check(&self, there: There) -> Result<(), OcpError> {
         for (index, value) in self.weights.as_slice().iter().enumerate() {
             if !value.is_finite() {
                 let value = value.to_f64();
                 return Err(OcpError::InvalidValue { part: Part::Weights, stage: 0, index, value });
             }
         }
-        check::<F>(terminal)
+        there.check::<F>()
     }
 
     fn value(&mut self, v: &ArrayV<F, T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
@@ -330,7 +330,7 @@ fn multiply<T: Real>(
     }
 }
 
-/// The sum of all outputs `y(x, u, p, t)` of a function, with its exact Hessian.
+/// The sum of all outputs `y(x, z, u, p, t)` of a function, with its exact Hessian.
 ///
 /// If that is not positive semidefinite, the stages are made convex.
 #[derive(Zeroable)]
@@ -360,8 +360,8 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
     const REFERENCES: usize = 0;
     const CONVEX: bool = F::STRUCTURE.hessian.is_empty();
 
-    fn check(&self, terminal: bool) -> Result<(), OcpError> {
-        check::<F>(terminal)
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        there.check::<F>()
     }
 
     fn value(&mut self, v: &ArrayV<F, T>, _: &[T], stage: usize) -> Result<T, OcpError> {

@@ -1,5 +1,6 @@
 //! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
 
+use super::algebraic::{extended, kept};
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::problem::Formulation;
@@ -19,6 +20,10 @@ pub(super) struct Data<'a, T> {
     pub lower: &'a mut [T],
     /// Upper ones.
     pub upper: &'a mut [T],
+    /// Algebraic states of every stage but the last, and `∂z/∂(x, u)`, row after row.
+    pub algebraic: &'a mut [T],
+    /// Room for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and its constraints; nothing if there is no `z`.
+    pub extended: &'a mut [T],
     /// Room for two matrices and a vector over `(x, u)`.
     pub scratch: &'a mut [T],
 }
@@ -28,28 +33,39 @@ pub(super) const fn inputs<S: Shape>() -> usize {
     S::NX + S::NU
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 6] {
+const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 8] {
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
     let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
     let n = inputs::<P::Shape>();
-    [intervals + 1, (intervals + 1) * P::Shape::NP, references, rows, rows, (2 * n + 1) * pad::<T>(n)]
+    let constraints = if P::Path::ROWS > P::Terminal::ROWS { P::Path::ROWS } else { P::Terminal::ROWS };
+    [
+        intervals + 1,
+        (intervals + 1) * P::Shape::NP,
+        references,
+        rows,
+        rows,
+        intervals * kept::<P::Shape>(),
+        extended::<P::Shape>(constraints),
+        (2 * n + 1) * pad::<T>(n),
+    ]
 }
 
 /// How many numbers it takes.
 pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
-    let [a, b, c, d, e, f] = lengths::<P, T>(intervals);
-    a + b + c + d + e + f
+    let [a, b, c, d, e, f, g, h] = lengths::<P, T>(intervals);
+    a + b + c + d + e + f + g + h
 }
 
 /// The parts.
 pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
     let mut rest = memory;
-    let [times, p, references, lower, upper, scratch] = lengths::<P, T>(intervals).map(|length| {
-        let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
-        rest = behind;
-        part
-    });
-    Data { times, p, references, lower, upper, scratch }
+    let [times, p, references, lower, upper, algebraic, extended, scratch] =
+        lengths::<P, T>(intervals).map(|length| {
+            let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
+            rest = behind;
+            part
+        });
+    Data { times, p, references, lower, upper, algebraic, extended, scratch }
 }
 
 /// The dimensions of a stage.

@@ -83,6 +83,10 @@ impl<'a, T: Real> Nodes<'a, T> {
 pub struct Step<'a, T> {
     /// The state at the end, `φ(x, u, p)`.
     pub x: &'a [T],
+    /// The algebraic states at the start; empty if there are none.
+    pub z: &'a [T],
+    /// `∂z/∂x`, `∂z/∂u` and `∂z/∂p`
+    pub dz: [&'a [T]; 3],
     /// `∂φ/∂x`
     pub dx: &'a [T],
     /// `∂φ/∂u`
@@ -101,6 +105,8 @@ impl<T: Real> Default for Step<'_, T> {
     fn default() -> Self {
         Self {
             x: &[],
+            z: &[],
+            dz: [&[]; 3],
             dx: &[],
             du: &[],
             dp: &[],
@@ -113,7 +119,7 @@ impl<T: Real> Default for Step<'_, T> {
 
 impl<'a, M: Dae, T: Real> From<&'a Nominal<M, T>> for Step<'a, T> {
     fn from(result: &'a Nominal<M, T>) -> Self {
-        Self { x: result.x.as_slice(), ..Self::default() }
+        Self { x: result.x.as_slice(), z: result.z0.as_slice(), ..Self::default() }
     }
 }
 
@@ -123,6 +129,7 @@ impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for Step<'a, T> {
             dx: result.dx_dx0.as_slice(),
             du: result.dx_du.as_slice(),
             dp: result.dx_dp.as_slice(),
+            dz: [result.dz0_dx0.as_slice(), result.dz0_du.as_slice(), result.dz0_dp.as_slice()],
             ..Self::from(&result.nominal)
         }
     }
@@ -174,6 +181,8 @@ pub trait Dynamics<T: Real> {
     type Shape: Shape;
     /// Names of the variables.
     const NAMES: Names;
+    /// Whether [`Step::z`] says what the algebraic states are at nodes.
+    const ALGEBRAIC: bool = false;
 
     /// The ends of all intervals, and integral costs.
     ///

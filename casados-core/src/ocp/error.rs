@@ -159,8 +159,8 @@ pub enum OcpError {
         /// The stage.
         stage: usize,
     },
-    /// A cost or constraint depends on something that does not exist where it is evaluated: algebraic states at nodes, or
-    /// controls at the end of the horizon.
+    /// A cost or constraint depends on something that does not exist where it is evaluated: algebraic states or controls at the end of
+    /// the horizon, algebraic states of a map.
     NotThere {
         /// The function.
         function: &'static str,

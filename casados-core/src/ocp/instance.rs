@@ -4,9 +4,11 @@ use super::bounds::{check_finite, check_vector};
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::data::{self, Data, split};
+use super::dynamics::Dynamics;
 use super::dynamics::Nodes;
 use super::error::{OcpError, Part};
 use super::horizon::Horizon;
+use super::point::There;
 use super::problem::{Formulation, Problem};
 use crate::qp::{Qp, QpView, Solution, SolutionStage, StageDims, assign, pad, part, part_mut};
 use crate::scalar::Real;
@@ -151,10 +153,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(OcpError::Missing { part: Part::Times, stage: 0 });
         }
         let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
-        stage_cost.check(false)?;
-        terminal_cost.check(true)?;
-        path.check(false)?;
-        terminal.check(true)?;
+        let z = P::Dynamics::ALGEBRAIC;
+        stage_cost.check(There { z, u: true })?;
+        terminal_cost.check(There { z: false, u: false })?;
+        path.check(There { z, u: true })?;
+        terminal.check(There { z: false, u: false })?;
         let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), intervals);
         horizon.write(times)?;
         // Parameters that nobody sets are found in this way.

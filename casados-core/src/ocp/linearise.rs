@@ -1,5 +1,6 @@
 //! The QP at an iterate.
 
+use super::algebraic::{self, Extended};
 use super::constraint::Constraints;
 use super::convexify::{Convexification, convexify};
 use super::cost::{At, Cost};
@@ -87,66 +88,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = problem.parts();
         let (v, multipliers) = iterate.vectors();
 
-        // Costs and constraints, stage by stage.
-        let mut objective = T::ZERO;
-        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-        for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
-            let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            hessian.fill(T::ZERO);
-            gradient.fill(T::ZERO);
-            let time = data.times.get(k).copied().unwrap_or(T::ZERO);
-            read::<P::Shape, T>(&mut point, at.x, at.u, part(data.p, k * np, np), time);
-            let mut terms = Terms { gradient, hessian, ld };
-            let columns = matrix.get_mut(next * ld..).unwrap_or_default();
-            // Values lie where the lower bounds are written afterwards.
-            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
-            let values = lower.get_mut(ld..).unwrap_or_default();
-            let first = k * P::Path::ROWS;
-            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
-            let values = part_mut(values, 0, count);
-            if k < intervals {
-                let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
-                let factor = if *running { end - time } else { T::ONE };
-                let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
-                let place = At { stage: k, factor, exact: C::EXACT };
-                objective = objective + stage_cost.add(&point, reference, place, &mut terms)?;
-                path.linearise(&point, values, columns, ld, k)?;
-            } else {
-                let begin = intervals * P::StageCost::REFERENCES;
-                let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
-                let place = At { stage: k, factor: T::ONE, exact: C::EXACT };
-                objective = objective + terminal_cost.add(&point, reference, place, &mut terms)?;
-                terminal.linearise(&point, values, columns, ld, k)?;
-            }
-            if C::EXACT && count > 0 {
-                // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
-                let mu = part_mut(rest, ld, count);
-                for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
-                    *mu = upper - lower;
-                }
-                if k < intervals {
-                    path.curve(&point, mu, &mut terms);
-                } else {
-                    terminal.curve(&point, mu, &mut terms);
-                }
-            }
-            // Bounds of what is linear: `lg − g + [C D] v`.
-            let here = part(v, k * ld_of::<P::Shape, T>(), n);
-            let upper = part_mut(rest, ld, count);
-            for (row, (value, upper)) in values.iter_mut().zip(upper).enumerate() {
-                let column = part(columns, row * ld, n);
-                let shift = dot(column, here) - *value;
-                *value = data.lower.get(first + row).copied().unwrap_or(T::ZERO) + shift;
-                *upper = data.upper.get(first + row).copied().unwrap_or(T::ZERO) + shift;
-            }
-        }
-
         // Dynamics, all intervals in one call.
+        let mut objective = T::ZERO;
         let mut stages = qp.stages_mut();
         let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
             let Arrays { n, ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
+            hessian.fill(T::ZERO);
+            gradient.fill(T::ZERO);
+            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             write_dynamics(matrix, ld, nx, step);
             let here = part(v, k * ld, n);
             for ((offset, &x), column) in offset.iter_mut().zip(step.x).zip(matrix.chunks_exact(ld.max(1))) {
@@ -163,6 +114,74 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             add_blocks(&mut terms, nx, step.hessian);
         })?;
         drop(stages);
+
+        // Costs and constraints, stage by stage.
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
+            let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
+            if k == intervals {
+                hessian.fill(T::ZERO);
+                gradient.fill(T::ZERO);
+            }
+            let time = data.times.get(k).copied().unwrap_or(T::ZERO);
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
+            let mut direct = Terms { gradient, hessian, ld };
+            let columns = matrix.get_mut(next * ld..).unwrap_or_default();
+            // Where there are algebraic states, over them too.
+            let is_extended = !z.is_empty();
+            let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
+            let (terms, slopes, ld_slopes) = if is_extended {
+                let ld = room.terms.ld;
+                (&mut room.terms, &mut *room.columns, ld)
+            } else {
+                (&mut direct, &mut *columns, ld)
+            };
+            // Values lie where the lower bounds are written afterwards.
+            let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
+            let values = lower.get_mut(ld..).unwrap_or_default();
+            let first = k * P::Path::ROWS;
+            let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
+            let values = part_mut(values, 0, count);
+            if k < intervals {
+                let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
+                let factor = if *running { end - time } else { T::ONE };
+                let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
+                let place = At { stage: k, factor, exact: C::EXACT };
+                objective = objective + stage_cost.add(&point, reference, place, terms)?;
+                path.linearise(&point, values, slopes, ld_slopes, k)?;
+            } else {
+                let begin = intervals * P::StageCost::REFERENCES;
+                let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
+                let place = At { stage: k, factor: T::ONE, exact: C::EXACT };
+                objective = objective + terminal_cost.add(&point, reference, place, terms)?;
+                terminal.linearise(&point, values, slopes, ld_slopes, k)?;
+            }
+            if C::EXACT && count > 0 {
+                // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
+                let mu = part_mut(rest, ld, count);
+                for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
+                    *mu = upper - lower;
+                }
+                if k < intervals {
+                    path.curve(&point, mu, terms);
+                } else {
+                    terminal.curve(&point, mu, terms);
+                }
+            }
+            if is_extended {
+                room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
+            }
+            // Bounds of what is linear: `lg − g + [C D] v`.
+            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let upper = part_mut(rest, ld, count);
+            for (row, (value, upper)) in values.iter_mut().zip(upper).enumerate() {
+                let column = part(columns, row * ld, n);
+                let shift = dot(column, here) - *value;
+                *value = data.lower.get(first + row).copied().unwrap_or(T::ZERO) + shift;
+                *upper = data.upper.get(first + row).copied().unwrap_or(T::ZERO) + shift;
+            }
+        }
 
         // Gradients of what is quadratic: `∇f − H v`.
         for (k, mut stage) in qp.stages_mut().enumerate() {
@@ -207,13 +226,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
         dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
             objective = objective + step.cost.value;
+            algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             assign(part_mut(ends, k * nx, nx), step.x);
         })?;
         let values = ends.get_mut(intervals * nx..).unwrap_or_default();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in at.stages().enumerate() {
             let time = data.times.get(k).copied().unwrap_or(T::ZERO);
-            read::<P::Shape, T>(&mut point, at.x, at.u, part(data.p, k * np, np), time);
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
             let (begin, length) = (k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
             if k < intervals {
                 let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);

@@ -50,7 +50,7 @@ impl<F: Function, T: Real> Map<F, T> {
     fn run(&mut self, nodes: &Nodes<'_, T>, second: bool, sink: Sink<'_, T>) -> Result<(), OcpError> {
         let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
         for (k, interval) in nodes.iter().enumerate() {
-            read::<F::Shape, T>(&mut self.v, interval.x, interval.u, interval.p, interval.t);
+            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
             F::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
             self.check(k)?;
             self.x = vector(self.y.as_ref());
@@ -72,14 +72,15 @@ impl<F: Function, T: Real> Map<F, T> {
                 F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
                 for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
                     let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
-                    let Some(column) = position::<F::Shape>(column) else { continue };
+                    let here = |variable| position::<F::Shape>(variable).filter(|&i| i < nx + nu);
+                    let Some(column) = here(column) else { continue };
                     if let Some(p) = parameter::<F::Shape>(row) {
                         match column.checked_sub(nx) {
                             None => self.h_xp[(column, p)] = value,
                             Some(column) => self.h_up[(column, p)] = value,
                         }
                     }
-                    let Some(row) = position::<F::Shape>(row) else { continue };
+                    let Some(row) = here(row) else { continue };
                     match (row.checked_sub(nx), column.checked_sub(nx)) {
                         (None, _) => {
                             self.h_xx[(row, column)] = value;
@@ -118,7 +119,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         for (k, interval) in nodes.iter().enumerate() {
-            read::<F::Shape, T>(&mut self.v, interval.x, interval.u, interval.p, interval.t);
+            read::<F::Shape, T>(&mut self.v, [interval.x, &[], interval.u, interval.p], interval.t);
             F::value::<T>(&self.v, &mut self.y);
             self.check(k)?;
             sink(k, &Step { x: self.y.as_ref(), ..Step::default() });

@@ -1,8 +1,8 @@
 //! Problems of optimal control, discretised by direct multiple shooting.
 //!
 //! ```text
-//! min  Σ_k l(x_k, u_k, p_k, t_k) + e(x_N)        x_{k+1} = φ(x_k, u_k, p_k)
-//!      lb ≤ (x_k, u_k) ≤ ub        lg ≤ g(x_k, u_k, p_k, t_k) ≤ ug        each side optional, each side hard or soft
+//! min  Σ_k l(x_k, z_k, u_k, p_k, t_k) + e(x_N)        x_{k+1} = φ(x_k, u_k, p_k)        z_k = ζ(x_k, u_k, p_k)
+//!      lb ≤ (x_k, u_k) ≤ ub        lg ≤ g(x_k, z_k, u_k, p_k, t_k) ≤ ug        each side optional, each side hard or soft
 //! ```
 //!
 //! | | |
@@ -24,12 +24,16 @@
 //! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. [`RealTime`] takes one step in
 //! each sample, in two phases. `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback gains.
 //!
+//! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its stages to there (`z0` of its results), with their exact
+//! first derivatives; second derivatives of `ζ` itself are in no Hessian. At the end of the horizon there are none.
+//!
 //! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
 //! stage 0 given by equal bounds. So are parameters that are to be found.
 //!
 //! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose length is a constant of the types
 //! ([`Problem::memory`]), and integrators with `Inline` memory are dynamics too.
 
+mod algebraic;
 mod bounds;
 mod constraint;
 mod convexify;

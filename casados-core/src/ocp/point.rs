@@ -5,12 +5,14 @@ use crate::function::{Function, FunctionStructure};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// The index in `(x, u)` of a variable in `(ẋ, x, z, u, p, t)`, if it is one of these.
+/// The index in `(x, u, z)` of a variable in `(ẋ, x, z, u, p, t)`, if it is one of these.
 #[inline(always)]
 pub(super) fn position<S: Shape>(variable: usize) -> Option<usize> {
     let (nx, nz, nu) = (S::NX, S::NZ, S::NU);
     if (nx..2 * nx).contains(&variable) {
         Some(variable - nx)
+    } else if (2 * nx..2 * nx + nz).contains(&variable) {
+        Some(variable - nx + nu)
     } else if (2 * nx + nz..2 * nx + nz + nu).contains(&variable) {
         Some(variable - nx - nz)
     } else {
@@ -24,12 +26,12 @@ pub(super) fn parameter<S: Shape>(variable: usize) -> Option<usize> {
     variable.checked_sub(2 * S::NX + S::NZ + S::NU).filter(|&p| p < S::NP)
 }
 
-/// Writes the variables `(0, x, 0, u, p, t)`.
+/// Writes the variables `(0, x, z, u, p, t)`.
 #[inline(always)]
-pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, x: &[T], u: &[T], p: &[T], t: T) {
+pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, [x, z, u, p]: [&[T]; 4], t: T) {
     let begin = 2 * S::NX + S::NZ;
-    let parts =
-        [(S::NX, x), (begin, u), (begin + S::NU, p), (begin + S::NU + S::NP, core::slice::from_ref(&t))];
+    let time = core::slice::from_ref(&t);
+    let parts = [(S::NX, x), (2 * S::NX, z), (begin, u), (begin + S::NU, p), (begin + S::NU + S::NP, time)];
     for (begin, part) in parts {
         let target = v.as_mut().get_mut(begin..).unwrap_or_default();
         for (to, &from) in target.iter_mut().zip(part) {
@@ -38,27 +40,38 @@ pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, x: &[T], u: &[T], p:
     }
 }
 
-/// Whether a function depends on what is there only.
-pub(super) fn check<F: Function>(terminal: bool) -> Result<(), OcpError> {
-    let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
-    let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
-    for &variable in variables {
-        let Some(index) = (variable as usize).checked_sub(2 * nx) else { continue };
-        let missing = if index < nz {
-            z.get(index)
-        } else if terminal && index < nz + nu {
-            u.get(index - nz)
-        } else {
-            None
-        };
-        if let Some(&variable) = missing {
-            return Err(OcpError::NotThere { function, variable, terminal });
-        }
-    }
-    Ok(())
+/// What is there where a function is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct There {
+    /// Algebraic states.
+    pub(super) z: bool,
+    /// Controls: not at the end of the horizon.
+    pub(super) u: bool,
 }
 
-/// A gradient and the lower triangle of a Hessian over `(x, u)`, to be added to.
+impl There {
+    /// Whether a function depends on this only.
+    pub(super) fn check<F: Function>(self) -> Result<(), OcpError> {
+        let FunctionStructure { name: function, variables, z, u, .. } = F::STRUCTURE;
+        let (nx, nz, nu) = (F::Shape::NX, F::Shape::NZ, F::Shape::NU);
+        for &variable in variables {
+            let Some(index) = (variable as usize).checked_sub(2 * nx) else { continue };
+            let missing = if index < nz {
+                z.get(index).filter(|_| !self.z)
+            } else if index < nz + nu {
+                u.get(index - nz).filter(|_| !self.u)
+            } else {
+                None
+            };
+            if let Some(&variable) = missing {
+                return Err(OcpError::NotThere { function, variable, terminal: !self.u });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A gradient and the lower triangle of a Hessian over `(x, u)`, or `(x, u, z)`, to be added to.
 pub struct Terms<'a, T> {
     pub(super) gradient: &'a mut [T],
     pub(super) hessian: &'a mut [T],
@@ -87,16 +100,19 @@ impl<T: Real> Terms<'_, T> {
         for (entry, &value) in hessian.as_ref().iter().enumerate() {
             let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
             if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
+                // Controls come before algebraic states here, and behind them in a model.
+                let swap = F::Shape::NZ > 0 && row < column;
+                let (row, column) = if swap { (column, row) } else { (row, column) };
                 self.curve(row, column, factor * value);
             }
         }
     }
 }
 
-/// Derivatives of a gradient over `(x, u)` with respect to parameters, a column for each, to be added to.
+/// Derivatives of a gradient over `(x, u)`, or `(x, u, z)`, with respect to parameters, a column for each, to be added to.
 pub struct Cross<'a, T> {
     pub(super) columns: &'a mut [T],
-    /// `NX + NU`, the distance of columns.
+    /// The distance of columns.
     pub(super) ld: usize,
 }
 
@@ -118,6 +134,7 @@ impl<T: Real> Cross<'_, T> {
         }
     }
     /// Adds matrices `xp` and `up`, column after column.
+    #[cfg(feature = "alloc")]
     pub(super) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up]: [&[T]; 2]) {
         for (first, rows, block) in [(0, nx, xp), (nx, nu, up)] {
             for (p, column) in block.chunks_exact(rows.max(1)).enumerate() {

@@ -100,6 +100,7 @@ fn failed(error: BatchError) -> OcpError {
 impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
     type Shape = M::Shape;
     const NAMES: Names = names::<M>();
+    const ALGEBRAIC: bool = true;
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes)?;

@@ -99,6 +99,7 @@ macro_rules! single {
         {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
+            const ALGEBRAIC: bool = true;
 
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 for (k, interval) in nodes.iter().enumerate() {
@@ -139,6 +140,7 @@ macro_rules! single {
         {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
+            const ALGEBRAIC: bool = true;
 
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 let Self { integrator, integral } = self;

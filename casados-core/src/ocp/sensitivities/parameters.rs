@@ -1,6 +1,7 @@
 //! What parameters change of the conditions of optimality.
 
 use super::{get, zeros};
+use crate::ocp::algebraic::{self, Extended};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::cost::{At, Cost};
 use crate::ocp::data::{inputs, split};
@@ -28,8 +29,13 @@ pub(super) struct Parameters<T> {
     gradients: Vec<T>,
     /// `∂g/∂p`, row after row.
     slopes: Vec<T>,
-    /// `μ` of the constraints of a stage.
+    /// `∂z/∂p`, column after column.
+    algebraic: Vec<T>,
+    /// `∂²L/∂(x, u, z)∂p` of a stage, where `z` stays.
+    extended: Vec<T>,
+    /// `μ` of the constraints of a stage, and their values.
     mu: Vec<T>,
+    values: Vec<T>,
 }
 
 impl<T: Real> Parameters<T> {
@@ -41,7 +47,10 @@ impl<T: Real> Parameters<T> {
             ends: zeros(n * nx * np)?,
             gradients: zeros((n + 1) * (nx + nu) * np)?,
             slopes: zeros((n * P::Path::ROWS + P::Terminal::ROWS) * np)?,
+            algebraic: zeros(n * P::Shape::NZ * np)?,
+            extended: zeros((nx + nu + P::Shape::NZ) * np)?,
             mu: zeros(P::Path::ROWS.max(P::Terminal::ROWS))?,
+            values: zeros(P::Path::ROWS)?,
         })
     }
 
@@ -64,7 +73,8 @@ impl<T: Real> Parameters<T> {
     /// What an interval adds.
     pub(super) fn take(&mut self, k: usize, step: &Step<'_, T>) {
         let [nx, nu, np] = self.dims;
-        let size = nx + nu;
+        let (size, nz) = (nx + nu, step.z.len());
+        assign(part_mut(&mut self.algebraic, k * nz * np, nz * np), step.dz[2]);
         assign(part_mut(&mut self.ends, k * nx * np, nx * np), step.dp);
         let columns = part_mut(&mut self.gradients, k * size * np, size * np);
         columns.fill(T::ZERO);
@@ -88,11 +98,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = self.problem.parts();
-        let Parameters { gradients, slopes, mu, rows, .. } = result;
+        let Parameters { gradients, slopes, algebraic: dz_dp, extended, mu, values, rows, .. } = result;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in self.iterate.stages().enumerate() {
             let time = get(data.times, k);
-            read::<P::Shape, T>(&mut point, at.x, at.u, part(data.p, k * np, np), time);
+            let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
             let columns = part_mut(gradients, k * size * np, size * np);
             if k == intervals {
                 columns.fill(T::ZERO);
@@ -101,19 +112,35 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
                 *mu = upper - lower;
             }
+            let mu = exact.then_some(&**mu);
             let slopes = slopes.get_mut(k * *rows * np..).unwrap_or_default();
             let place = |factor| At { stage: k, factor, exact };
             let references = P::StageCost::REFERENCES;
-            if k < intervals {
-                let factor = if *running { get(data.times, k + 1) - time } else { T::ONE };
-                let reference = part(data.references, k * references, references);
-                stage_cost.cross(&point, reference, place(factor), &mut cross)?;
-                path.cross(&point, exact.then_some(mu), slopes, &mut cross);
-            } else {
+            if k == intervals {
                 let reference = part(data.references, k * references, P::TerminalCost::REFERENCES);
                 terminal_cost.cross(&point, reference, place(T::ONE), &mut cross)?;
-                terminal.cross(&point, exact.then_some(mu), slopes, &mut cross);
+                terminal.cross(&point, mu, slopes, &mut cross);
+                continue;
             }
+            let factor = if *running { get(data.times, k + 1) - time } else { T::ONE };
+            let reference = part(data.references, k * references, references);
+            if z.is_empty() {
+                stage_cost.cross(&point, reference, place(factor), &mut cross)?;
+                path.cross(&point, mu, slopes, &mut cross);
+                continue;
+            }
+            extended.fill(T::ZERO);
+            let mut direct = Cross { columns: extended, ld: size + z.len() };
+            stage_cost.cross(&point, reference, place(factor), &mut direct)?;
+            path.cross(&point, mu, slopes, &mut direct);
+            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
+            stage_cost.add(&point, reference, place(factor), &mut terms)?;
+            path.linearise(&point, values, columns, terms.ld, k)?;
+            if let Some(mu) = mu {
+                path.curve(&point, mu, &mut terms);
+            }
+            let dp = part(dz_dp, k * z.len() * np, z.len() * np);
+            Extended { terms, columns }.fold_parameters::<P::Shape>([dz, dp], extended, &mut cross, slopes);
         }
         Ok(())
     }

@@ -1,0 +1,132 @@
+//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the integrator.
+
+use super::dynamics::Step;
+#[cfg(feature = "alloc")]
+use super::point::Cross;
+use super::point::Terms;
+use crate::qp::{part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+/// `NX + NU` and `NZ`.
+const fn lengths<S: Shape>() -> [usize; 2] {
+    [S::NX + S::NU, S::NZ]
+}
+
+/// How many numbers a stage keeps: `z`, and `∂z/∂(x, u)` row after row.
+pub(super) const fn kept<S: Shape>() -> usize {
+    let [n, nz] = lengths::<S>();
+    nz * (1 + n)
+}
+
+/// How many numbers [`Extended`] takes, for stages with so many constraints.
+pub(super) const fn extended<S: Shape>(rows: usize) -> usize {
+    let [n, nz] = lengths::<S>();
+    if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
+}
+
+/// Keeps what an interval says about the algebraic states at its start.
+pub(super) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &Step<'_, T>) {
+    let [n, nz] = lengths::<S>();
+    if nz == 0 {
+        return;
+    }
+    let (z, rows) = part_mut(all, k * kept::<S>(), kept::<S>()).split_at_mut_checked(nz).unwrap_or_default();
+    crate::qp::assign(z, step.z);
+    let [dx, du, _] = step.dz;
+    for (j, column) in dx.chunks_exact(nz).chain(du.chunks_exact(nz)).enumerate() {
+        for (i, &value) in column.iter().enumerate() {
+            if let Some(element) = rows.get_mut(i * n + j) {
+                *element = value;
+            }
+        }
+    }
+}
+
+/// What was kept of a stage: nothing of the last one.
+pub(super) fn at<S: Shape, T>(all: &[T], k: usize) -> (&[T], &[T]) {
+    part(all, k * kept::<S>(), kept::<S>()).split_at_checked(S::NZ).unwrap_or_default()
+}
+
+/// Derivatives of a stage over `(x, u, z)`.
+pub(super) struct Extended<'a, T> {
+    pub(super) terms: Terms<'a, T>,
+    /// Of the constraints, `ld` apart as columns of the Hessian are.
+    pub(super) columns: &'a mut [T],
+}
+
+impl<'a, T: Real> Extended<'a, T> {
+    /// Zeros; nothing if there are no algebraic states.
+    pub(super) fn new<S: Shape>(memory: &'a mut [T]) -> Self {
+        memory.fill(T::ZERO);
+        let [n, nz] = lengths::<S>();
+        let ld = n + nz;
+        let (gradient, rest) = memory.split_at_mut_checked(ld).unwrap_or_default();
+        let (hessian, columns) = rest.split_at_mut_checked(ld * ld).unwrap_or_default();
+        Self { terms: Terms { gradient, hessian, ld }, columns }
+    }
+
+    /// An element of the symmetric Hessian.
+    fn hessian(&self, i: usize, j: usize) -> T {
+        get(self.terms.hessian, i.min(j) * self.terms.ld + i.max(j))
+    }
+
+    /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of the constraints it is all there is.
+    pub(super) fn fold<S: Shape>(&self, dz: &[T], to: &mut Terms<'_, T>, columns: &mut [T], ld: usize) {
+        let [n, _] = lengths::<S>();
+        let rows = || dz.chunks_exact(n.max(1)).enumerate();
+        // `a_j + Σ_i a_zi ∂z_i/∂v_j`
+        let total = |a: &dyn Fn(usize) -> T, j: usize| {
+            rows().fold(a(j), |sum, (i, row)| sum + a(n + i) * get(row, j))
+        };
+        for j in 0..n {
+            to.slope(j, total(&|i| get(self.terms.gradient, i), j));
+            for i in j..n {
+                // Column j of `H [I; Z]`, and then row i of `[I Zᵀ]` times it.
+                let column = |row: usize| total(&|l| self.hessian(row, l), j);
+                to.curve(i, j, total(&column, i));
+            }
+        }
+        let mine = self.columns.chunks_exact(self.terms.ld.max(1));
+        for (mine, column) in mine.zip(columns.chunks_exact_mut(ld.max(1))) {
+            for (j, element) in column.iter_mut().enumerate().take(n) {
+                *element = total(&|i| get(mine, i), j);
+            }
+        }
+    }
+
+    /// Adds what parameters do through `z` as well: `dz` as in [`Extended::fold`], `dp` the columns of `∂z/∂p`, `direct` what they do over
+    /// `(x, u, z)` where `z` stays, and `slopes` the rows of `∂g/∂p`.
+    #[cfg(feature = "alloc")]
+    pub(super) fn fold_parameters<S: Shape>(
+        &self,
+        [dz, dp]: [&[T]; 2],
+        direct: &[T],
+        to: &mut Cross<'_, T>,
+        slopes: &mut [T],
+    ) {
+        let [n, nz] = lengths::<S>();
+        for (p, (direct, dp)) in
+            direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate()
+        {
+            let through = |i: usize| {
+                dp.iter().enumerate().fold(get(direct, i), |sum, (l, &dp)| sum + self.hessian(i, n + l) * dp)
+            };
+            for j in 0..n {
+                let rows = dz.chunks_exact(n.max(1)).enumerate();
+                to.add(j, p, rows.fold(through(j), |sum, (i, row)| sum + through(n + i) * get(row, j)));
+            }
+            let mine = self.columns.chunks_exact(self.terms.ld.max(1));
+            for (mine, slopes) in mine.zip(slopes.chunks_exact_mut(S::NP.max(1))) {
+                if let Some(slope) = slopes.get_mut(p) {
+                    *slope = dp.iter().enumerate().fold(*slope, |sum, (l, &dp)| sum + get(mine, n + l) * dp);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn get<T: Real>(values: &[T], index: usize) -> T {
+    values.get(index).copied().unwrap_or(T::ZERO)
+}
