@@ -2,6 +2,7 @@
 
 use casados::dual::DualModel;
 use casados::model::{ArrayK, ArrayV, Pattern};
+use casados::scalar::Tangent;
 use casados::shape::Array;
 use casados::{Dae, Ode, Shape, dae, ode};
 use num_dual::DualNum;
@@ -83,6 +84,27 @@ fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
             &dense(&M::STRUCTURE.jacobian, jacobian.as_ref(), M::Shape::NV),
             &dense(&G::STRUCTURE.jacobian, sparse.as_ref(), M::Shape::NV),
         );
+
+        // In one direction, term by term: also the product with the Jacobian, whose terms are as large.
+        let direction = |i: usize| if i + 1 < M::Shape::NV { 0.7 - 0.2 * (i % 5) as f64 } else { 0.0 };
+        let along = ArrayV::<M, Tangent<f64>>::from_fn(|i| Tangent { value: v[i], derivative: direction(i) });
+        let nothing = |_| Tangent { value: f64::NAN, derivative: f64::NAN };
+        let mut of_dual = ArrayK::<M, Tangent<f64>>::from_fn(nothing);
+        let mut of_graph = of_dual;
+        M::tangent::<f64>(&along, &mut of_dual);
+        G::tangent::<f64>(&along, &mut of_graph);
+        let parts = |f: &ArrayK<M, Tangent<f64>>| -> (Vec<f64>, Vec<f64>) {
+            f.as_ref().iter().map(|f| (f.value, f.derivative)).unzip()
+        };
+        assert_eq!(parts(&of_graph).0, g.as_ref());
+        close("values of duals", &parts(&of_dual).0, f.as_ref());
+        let mut product = vec![0.0; M::Shape::NK];
+        for (entry, value) in sparse.as_ref().iter().enumerate() {
+            let (row, column) = G::STRUCTURE.jacobian.at(entry);
+            product[row] += value * direction(column);
+        }
+        close("tangent of duals", &parts(&of_dual).1, &product);
+        close("tangent of the graph", &parts(&of_graph).1, &product);
 
         let (mut a, mut b) = (ArrayV::<M, f64>::from_fn(zero), ArrayV::<M, f64>::from_fn(zero));
         M::adjoint::<f64>(&v, &mu, &mut a);

@@ -4,13 +4,14 @@
 //! `f ∈ R^{nx+nz}`, index 1: `∂f/∂(ẋ, z)` is invertible. Its variables are one flat array
 //! `v = (ẋ, x, z, u, p, t)`; derivatives are taken with respect to all of them but `t`.
 
-use crate::scalar::{Lanes, Scalar};
+use crate::scalar::{Lanes, Scalar, Tangent};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
     Assembly, Cost, Elimination, NO_COLUMN, Operations, Pattern, Pivot, Structure, Term, all, columns,
     symmetric,
 };
+use bytemuck::Zeroable;
 
 /// `[T; NX]` of a model.
 pub type ArrayX<M, T> = <<M as Dae>::Shape as Shape>::ArrayX<T>;
@@ -84,6 +85,28 @@ pub trait Dae: 'static {
         f: &mut ArrayK<Self, S::Cell>,
         jacobian: &mut Self::Jacobian<S::Cell>,
     );
+
+    /// The residual and its derivative in one direction, `∂f/∂v v'`, where every variable comes with its `v'`; that of `t` is
+    /// zero. Written models compute it term by term (see [`Tangent`]); without that it is the product with the Jacobian.
+    fn tangent<S: Lanes>(v: &ArrayV<Self, Tangent<S>>, f: &mut ArrayK<Self, Tangent<S>>) {
+        let mut point = ArrayV::<Self, S::Cell>::zeroed();
+        for (cell, variable) in point.as_mut().iter_mut().zip(v.as_ref()) {
+            variable.value.store(cell);
+        }
+        let (mut values, mut jacobian) =
+            (ArrayK::<Self, S::Cell>::zeroed(), Self::Jacobian::<S::Cell>::zeroed());
+        Self::jacobian_constants::<S>(&mut jacobian);
+        Self::residual_jacobian::<S>(&point, &mut values, &mut jacobian);
+        for (f, value) in f.as_mut().iter_mut().zip(values.as_ref()) {
+            *f = Tangent { value: S::load(value), derivative: S::from_f64(0.0) };
+        }
+        for (entry, value) in jacobian.as_ref().iter().enumerate() {
+            let (row, column) = Self::STRUCTURE.jacobian.at(entry);
+            if let (Some(f), Some(variable)) = (f.as_mut().get_mut(row), v.as_ref().get(column)) {
+                f.derivative = f.derivative + S::load(value) * variable.derivative;
+            }
+        }
+    }
 
     /// The gradient `∇ᵥ(μᵀ f)` over `(ẋ, x, z, u, p)`. The last element, that of `t`, is set to zero.
     fn adjoint<S: Lanes>(

@@ -11,8 +11,9 @@ pub struct Options {
     pub newton: Newton,
     /// Where Newton's method starts.
     pub start: Start,
-    /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's summation): for
-    /// thousands of steps in one interval, where the rounding errors of `x` would add up.
+    /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's summation), and implicit
+    /// methods compute the sums of their stages with twice the digits: for thousands of steps in one interval, where
+    /// rounding errors of `x` would add up.
     pub compensated: bool,
 }
 

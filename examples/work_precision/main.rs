@@ -94,7 +94,7 @@ fn measure(problem: &Problem, method: &Method, accuracy: f64, derivatives: bool,
 fn ours(problem: &Problem, derivatives: bool, seconds: f64) -> Vec<Run> {
     let mut runs = Vec::new();
     for method in &problem.methods {
-        if derivatives && method.name != "Radau" {
+        if derivatives && method.fixed {
             continue;
         }
         let accuracies: Vec<f64> = if method.fixed {

@@ -73,9 +73,9 @@ impl Problem {
     }
 }
 
-/// A method with a tolerance; `$forward` takes its derivatives, if it is asked for them.
+/// A method with a tolerance, with derivatives that are known or not.
 macro_rules! adaptive {
-    ($problem:ident, $model:ty, $method:ty, $name:literal, $values:expr, $forward:expr) => {{
+    ($problem:ident, $model:ty, $method:ty, $name:literal, $values:expr, $derivatives:ident) => {{
         let (x0, p, t, ratio) = ($problem.x0.clone(), $problem.p.clone(), $problem.t, $problem.atol);
         let open = move |rtol: f64, derivatives: bool| -> Result<Solver, Error> {
             let options =
@@ -86,7 +86,7 @@ macro_rules! adaptive {
             Ok(Box::new(move || {
                 let mut call = Call::default();
                 if derivatives {
-                    $forward(&mut solver, &x0, t, &mut call)?;
+                    derivatives!($derivatives, solver, x0, t, $values, call);
                 } else {
                     let result = solver.solve(&x0, &SVector::zeros(), t)?;
                     call.y = $values(result.x.as_slice(), result.z.as_slice());
@@ -101,23 +101,14 @@ macro_rules! adaptive {
     }};
 }
 
-/// No derivatives.
-macro_rules! none {
-    () => {
-        |_: &mut _, _: &_, _: f64, _: &mut Call| Ok::<(), Error>(())
-    };
-}
-
-/// The derivatives of all states by `(x₀, p)`.
+/// The derivatives of all states by `(x₀, p)`, where they are known; a model is not differentiated where they are not.
 macro_rules! derivatives {
-    ($model:ty, $values:expr) => {
-        |solver: &mut Adaptive<$model, Radau>, x0: &_, t: f64, call: &mut Call| {
-            let result = solver.forward(x0, &SVector::zeros(), t)?;
-            call.y = $values(result.nominal.x.as_slice(), result.nominal.z.as_slice());
-            for (left, right) in result.dx_dx0.row_iter().zip(result.dx_dp.row_iter()) {
-                call.derivatives.extend(left.iter().chain(right.iter()));
-            }
-            Ok::<(), Error>(())
+    (unknown, $($rest:tt)*) => {};
+    (known, $solver:ident, $x0:ident, $t:ident, $values:expr, $call:ident) => {
+        let result = $solver.forward(&$x0, &SVector::zeros(), $t)?;
+        $call.y = $values(result.nominal.x.as_slice(), result.nominal.z.as_slice());
+        for (left, right) in result.dx_dx0.row_iter().zip(result.dx_dp.row_iter()) {
+            $call.derivatives.extend(left.iter().chain(right.iter()));
         }
     };
 }
@@ -145,14 +136,14 @@ macro_rules! fixed {
 /// The problem with its methods.
 macro_rules! problem {
     ($model:ty, $problem:expr, $values:expr) => {
-        problem!($model, $problem, $values, none!())
+        problem!($model, $problem, $values, unknown)
     };
-    ($model:ty, $problem:expr, $values:expr, $forward:expr) => {{
+    ($model:ty, $problem:expr, $values:expr, $derivatives:ident) => {{
         let mut problem = $problem;
-        adaptive!(problem, $model, Radau, "Radau", $values, $forward);
-        adaptive!(problem, $model, RadauIIA<3>, "Radau IIA, s = 3", $values, none!());
-        adaptive!(problem, $model, RadauIIA<5>, "Radau IIA, s = 5", $values, none!());
-        adaptive!(problem, $model, RadauIIA<7>, "Radau IIA, s = 7", $values, none!());
+        adaptive!(problem, $model, Radau, "Radau", $values, $derivatives);
+        adaptive!(problem, $model, RadauIIA<3>, "Radau IIA, s = 3", $values, $derivatives);
+        adaptive!(problem, $model, RadauIIA<5>, "Radau IIA, s = 5", $values, $derivatives);
+        adaptive!(problem, $model, RadauIIA<7>, "Radau IIA, s = 7", $values, $derivatives);
         fixed!(problem, $model, RadauIIA<3>, "Radau IIA, s = 3, equal steps", $values);
         problem
     }};
@@ -172,36 +163,16 @@ pub fn all() -> Result<Vec<Problem>, String> {
     e5.x0.truncate(3);
     let rest = |x: &[f64], z: &[f64]| vec![x[0], x[1], z[0], x[2]];
     let mut pleiades = problem!(Pleiades, load("pleiades", "Pleiades", 3.0, 1.0)?, states);
-    adaptive!(pleiades, Pleiades, DormandPrince5, "Dormand-Prince 5", states, none!());
-    adaptive!(pleiades, Pleiades, DormandPrince8, "Dormand-Prince 8", states, none!());
+    adaptive!(pleiades, Pleiades, DormandPrince5, "Dormand-Prince 5", states, unknown);
+    adaptive!(pleiades, Pleiades, DormandPrince8, "Dormand-Prince 8", states, unknown);
     Ok(vec![
-        problem!(
-            Robertson,
-            load("robertson", "Robertson", 1e11, 1e-8)?,
-            states,
-            derivatives!(Robertson, states)
-        ),
+        problem!(Robertson, load("robertson", "Robertson", 1e11, 1e-8)?, states, known),
         problem!(Hires, load("hires", "HIRES", 321.8122, 1e-3)?, states),
-        problem!(
-            VanDerPol,
-            load("van_der_pol_1e3", "Van der Pol, μ = 1e3", 2e3, 1e-3)?,
-            states,
-            derivatives!(VanDerPol, states)
-        ),
+        problem!(VanDerPol, load("van_der_pol_1e3", "Van der Pol, μ = 1e3", 2e3, 1e-3)?, states, known),
         problem!(VanDerPol, load("van_der_pol_1e6", "Van der Pol, μ = 1e6", 2e6, 1e-6)?, states),
-        problem!(
-            Oregonator,
-            load("oregonator", "Oregonator", 360.0, 1e-2)?,
-            states,
-            derivatives!(Oregonator, states)
-        ),
+        problem!(Oregonator, load("oregonator", "Oregonator", 360.0, 1e-2)?, states, known),
         problem!(E5Conserved, e5, rest),
-        problem!(
-            AkzoNobel,
-            load("akzo_nobel", "Chemical Akzo Nobel", 180.0, 1e-3)?,
-            states,
-            derivatives!(AkzoNobel, states)
-        ),
+        problem!(AkzoNobel, load("akzo_nobel", "Chemical Akzo Nobel", 180.0, 1e-3)?, states, known),
         problem!(
             TransistorAmplifier,
             load("transistor_amplifier", "Transistor amplifier", 0.2, 1e-2)?,

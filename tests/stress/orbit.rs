@@ -16,9 +16,11 @@ pub fn kepler(x: [f64; 4]) -> [f64; 4] {
 /// The length of a step: 80 in an orbit.
 pub const STEP: f64 = core::f64::consts::TAU / 80.0;
 
-/// At the perihelion; semi-major axis one, period 2π.
-pub fn perihelion(eccentricity: f64) -> SVector<f64, 4> {
-    vector![1.0 - eccentricity, 0.0, 0.0, ((1.0 + eccentricity) / (1.0 - eccentricity)).sqrt()]
+/// At the perihelion, with the axis turned; semi-major axis one, period 2π.
+pub fn perihelion(eccentricity: f64, angle: f64) -> SVector<f64, 4> {
+    let ((sin, cos), r) = (angle.sin_cos(), 1.0 - eccentricity);
+    let v = ((1.0 + eccentricity) / r).sqrt();
+    vector![r * cos, r * sin, -v * sin, v * cos]
 }
 
 fn angular_momentum(x: &SVector<f64, 4>) -> f64 {
@@ -29,10 +31,13 @@ fn energy(x: &SVector<f64, 4>) -> f64 {
     (x[2] * x[2] + x[3] * x[3]) / 2.0 - 1.0 / x[0].hypot(x[1])
 }
 
-/// The largest relative changes of angular momentum and energy, looked at after each of so many intervals, from an orbit of
-/// eccentricity 0.6.
-pub fn changes(integrator: &mut impl Integrator<Kepler>, intervals: usize, h: f64) -> [f64; 2] {
-    let mut x = perihelion(0.6);
+/// The largest relative changes of angular momentum and energy, looked at after each of so many intervals.
+pub fn changes(
+    integrator: &mut impl Integrator<Kepler>,
+    mut x: SVector<f64, 4>,
+    intervals: usize,
+    h: f64,
+) -> [f64; 2] {
     let start = [angular_momentum(&x), energy(&x)];
     let mut worst = [0.0f64; 2];
     for _ in 0..intervals {

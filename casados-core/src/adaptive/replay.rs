@@ -119,7 +119,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
         step: &Taken<'_, M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        self.go(step)?.forward_along(step.at.x, step.at.u, step.h, along)
+        self.go(step)?.forward_refined(step.at.x, step.at.u, step.h, along)
     }
 
     fn hessian(

@@ -16,8 +16,9 @@ pub use structure::{hessian_pattern, jacobian_pattern};
 pub use tracked::Tracked;
 
 use crate::model::{ArrayK, ArrayV, Dae};
-use crate::scalar::Lanes;
+use crate::scalar::{Lanes, Tangent};
 use crate::shape::Shape;
+use bytemuck::Zeroable;
 use num_dual::{Dual64, HyperDual64};
 use std::sync::OnceLock;
 use structure::{hessian_entry, jacobian_entry};
@@ -65,6 +66,30 @@ pub fn residual_jacobian<M: DualModel, S: Lanes>(
             |i| S::lane(&v[i], lane),
             |row, column, value| {
                 S::set_lane(&mut jacobian[jacobian_entry::<M::Shape>(row, column)], lane, value);
+            },
+        );
+    }
+}
+
+/// `f(v)` and `∂f/∂v v'`, by one dual number for each variable.
+pub fn tangent<M: DualModel, S: Lanes>(v: &ArrayV<M, Tangent<S>>, f: &mut ArrayK<M, Tangent<S>>) {
+    let cells = |number: S| {
+        let mut cell: S::Cell = Zeroable::zeroed();
+        number.store(&mut cell);
+        cell
+    };
+    let parts = |number: Tangent<S>| [cells(number.value), cells(number.derivative)];
+    for lane in 0..S::LANES {
+        M::evaluate::<Dual64>(
+            |i| {
+                let [value, derivative] = parts(v[i]);
+                Dual64::new(S::lane(&value, lane), S::lane(&derivative, lane))
+            },
+            |row, found| {
+                let [mut value, mut derivative] = parts(f[row]);
+                S::set_lane(&mut value, lane, found.re);
+                S::set_lane(&mut derivative, lane, found.eps);
+                f[row] = Tangent { value: S::load(&value), derivative: S::load(&derivative) };
             },
         );
     }

@@ -2,10 +2,11 @@
 
 use super::along::Along;
 use crate::error::{Error, Place, Quantity};
+use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, moved};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::quadrature::Integrand;
 use crate::result::Nominal;
-use crate::scalar::{Real, two_sum};
+use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -209,23 +210,50 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
         end: &mut ArrayX<M, T>,
         rest: Option<&mut ArrayX<M, T>>,
     ) -> Result<(), Error> {
-        end.as_mut().fill(T::ZERO);
-        for (&b, k) in scheme.b.iter().zip(&self.k) {
-            add(b, k.as_ref(), end.as_mut());
-        }
-        let increments = end.as_mut().iter_mut().zip(self.x.as_ref());
         match rest {
-            None => increments.for_each(|(end, &x)| *end = x + grid.h * *end),
-            Some(rest) => {
-                for ((end, &x), rest) in increments.zip(rest.as_mut()) {
-                    let before = if step == 0 { T::ZERO } else { *rest };
-                    [*end, *rest] = two_sum(x, before + grid.h * *end);
+            None => {
+                end.as_mut().fill(T::ZERO);
+                for (&b, k) in scheme.b.iter().zip(&self.k) {
+                    add(b, k.as_ref(), end.as_mut());
                 }
+                for (end, &x) in end.as_mut().iter_mut().zip(self.x.as_ref()) {
+                    *end = x + grid.h * *end;
+                }
+            }
+            Some(rest) => {
+                if step == 0 {
+                    rest.as_mut().fill(T::ZERO);
+                }
+                let (end, rest) = (end.as_mut(), rest.as_mut());
+                dispatch(EndCompensated { end, rest, record: self, b: &scheme.b, h: grid.h });
             }
         }
         match end.as_ref().iter().position(|end| !end.is_finite()) {
             Some(index) => Err(Error::Overflow { step, index }),
             None => Ok(()),
+        }
+    }
+}
+
+/// `end + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
+struct EndCompensated<'a, M: Ode, T: Real, const S: usize> {
+    end: &'a mut [T],
+    rest: &'a mut [T],
+    record: &'a Record<M, T, S>,
+    b: &'a [T; S],
+    h: T,
+}
+
+impl<M: Ode, T: Real, const S: usize> Kernel for EndCompensated<'_, M, T, S> {
+    type Number = T;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { end, rest, record, b, h } = self;
+        let x = record.x.as_ref().iter();
+        for (index, ((end, rest), &x)) in end.iter_mut().zip(rest).zip(x).enumerate() {
+            let slopes = record.k.iter().filter_map(|k| k.as_ref().get(index));
+            [*end, *rest] = moved::<A, T>([x, *rest], h, dot_compensated::<A, T>(b.iter().zip(slopes)));
         }
     }
 }

@@ -68,11 +68,11 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
-    /// After a step that is linearised.
+    /// After a step that is linearised; refined where digits were lost, if that is asked for.
     ///
     /// # Errors
     /// [`Error::Singular`]
-    pub(crate) fn step<F: Fallback>(
+    pub(crate) fn step<F: Fallback, const REFINED: bool>(
         &mut self,
         work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
@@ -85,6 +85,9 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         if !good && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
             self.sweep.repeat(work, coefficients, &Identity::<M>::ALL, n == 0, curved);
+        }
+        if const { REFINED } {
+            self.sweep.refine(work, coefficients, &Identity::<M>::ALL, n == 0);
         }
         self.collect(coefficients, n, count);
         Ok(())

@@ -286,7 +286,22 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        Ok(&self.differentiate(&Arguments { x0, u, h }, None, along)?.forward)
+        Ok(&self.differentiate::<false>(&Arguments { x0, u, h }, None, along)?.forward)
+    }
+
+    /// The same, with derivatives refined where digits were lost.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn forward_refined(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        Ok(&self.differentiate::<true>(&Arguments { x0, u, h }, None, along)?.forward)
     }
 
     /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the derivatives.
@@ -304,10 +319,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         check(Argument::Lambda, lambda.as_slice())?;
-        self.differentiate(&Arguments { x0, u, h }, Some(lambda.as_slice()), None)
+        self.differentiate::<false>(&Arguments { x0, u, h }, Some(lambda.as_slice()), None)
     }
 
-    fn differentiate(
+    fn differentiate<const REFINED: bool>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
         lambda: Option<&[T]>,
@@ -322,7 +337,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            forward.step(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
+            forward.step::<_, REFINED>(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
             match &mut along {
                 Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
                 None => Ok(()),
@@ -378,7 +393,14 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let first = done.map_or(0, |done| done + 1);
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;
-            forward.step(parts.work, parts.coefficients, n, usize::MAX, parts.statistics, None)?;
+            forward.step::<_, false>(
+                parts.work,
+                parts.coefficients,
+                n,
+                usize::MAX,
+                parts.statistics,
+                None,
+            )?;
         }
         self.sweep = Some(point.step);
         let h = parts.work.kept.time.step;
@@ -583,7 +605,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };
             let curved = Some(record.curved());
-            forward.step(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
+            forward.step::<_, false>(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }

@@ -19,6 +19,7 @@
 
 mod adjoint;
 mod along;
+mod compensated;
 mod dense;
 mod directions;
 mod evaluate;
@@ -28,6 +29,7 @@ mod integrator;
 mod newton;
 mod pivoted;
 mod record;
+mod refine;
 mod run;
 mod step;
 mod sweep;

@@ -200,6 +200,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let mut active = mask::<E>(lanes, State::Active);
         loop {
             self.place(coefficients, step, x, y);
+            // The first iteration of nonlinear equations is far away in any case.
+            let compensate = *compensated && (iteration > 0 || rule.exact);
+            if compensate {
+                self.place_compensated(coefficients, x, y);
+            }
             if renew {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
@@ -214,6 +219,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             } else {
                 statistics.residuals += 1;
                 self.evaluate_residual();
+            }
+            if compensate {
+                self.correct_residual();
             }
             if rule.exact && iteration > 0 {
                 self.validity.factors = true;

@@ -135,7 +135,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     pub(crate) linear: Linearization<M, T, S, F>,
     /// Factors of the mean Jacobian of the stages, which iterations take where that is cheaper.
     pub(crate) mean: F::Place<MeanFactors<M, T, S>>,
-    /// Where derivatives are tried on their equations: sums, and the sizes of their terms.
+    /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While stages are solved with
+    /// compensated sums, what they are beyond their digits.
     pub(crate) probe: [ArrayV<M, [T; S]>; 2],
     pub(crate) terms: ArrayK<M, [T; S]>,
     /// One stage, for machines whose registers do not hold all of them.

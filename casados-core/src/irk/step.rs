@@ -1,5 +1,6 @@
 //! The steps of an interval, one after the other.
 
+use super::compensated;
 use super::evaluate::{dot, not_finite};
 use super::record::{Coefficients, Step, Validity, Work};
 use crate::error::Error;
@@ -7,7 +8,7 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::options::Options;
-use crate::scalar::{Field, Lanes, Real, two_sum};
+use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Matrix, Shape, assign};
 use crate::statistics::Statistics;
 
@@ -58,15 +59,15 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     pub(crate) fn advance(
         &mut self,
         coefficients: &Coefficients<E, S>,
-        compensated: bool,
+        compensate: bool,
         step: &Step<M, E, S>,
         n: usize,
         count: usize,
     ) {
         let h = self.inputs.time.step;
         let (x, y, b) = (self.x.as_mut(), step.y.as_ref(), &coefficients.b);
-        if compensated {
-            dispatch(AdvanceCompensated { x, rest: self.rest.as_mut(), y, b, h });
+        if compensate {
+            dispatch(compensated::Advance { x, rest: self.rest.as_mut(), y, b, h });
         } else {
             dispatch(Advance { x, y, b, h });
         }
@@ -274,27 +275,6 @@ impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
         let Self { x, y, b, h } = self;
         for (x, k) in x.iter_mut().zip(y) {
             *x = *x + h * dot(b, k);
-        }
-    }
-}
-
-/// `x + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
-struct AdvanceCompensated<'a, E, const S: usize> {
-    x: &'a mut [E],
-    rest: &'a mut [E],
-    y: &'a [[E; S]],
-    b: &'a [E; S],
-    h: E,
-}
-
-impl<E: Field, const S: usize> Kernel for AdvanceCompensated<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { x, rest, y, b, h } = self;
-        for ((x, rest), k) in x.iter_mut().zip(rest).zip(y) {
-            [*x, *rest] = two_sum(*x, *rest + h * dot(b, k));
         }
     }
 }

@@ -74,26 +74,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         mut curved: Option<&mut [E]>,
     ) -> E::Mask {
         let mut run = |this: &mut Self, work: &Work<M, E, S, F>, phase, second| {
-            let Self { v, end, dy, sums, start_sums } = this;
-            let [start, other] = v;
-            let (v, next) = if *end { (start, other) } else { (other, start) };
-            dispatch(Step::<M, E, D, S> {
-                phase,
-                jacobian: work.linear.jacobian.as_ref(),
-                factors: work.linear.factors.planned(),
-                coefficients,
-                h: work.inputs.time.step,
-                directions,
-                first,
-                v: R::flat(v.as_ref()),
-                next: R::flat_mut(next.as_mut()),
-                dy: R::flat_mut(dy.as_mut().as_flattened_mut()),
-                sums: sums.as_mut(),
-                start_sums: start_sums.as_mut(),
-                curved: curved.as_deref_mut(),
-                second,
-                model: PhantomData,
-            });
+            this.run(work, coefficients, directions, first, curved.as_deref_mut(), phase, second);
         };
         if work.linear.factors.is_planned() {
             run(self, work, Phase::Whole, false);
@@ -110,6 +91,50 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         E::or(good, work.verify_forward(self, coefficients, directions, true))
     }
 
+    #[allow(clippy::too_many_arguments)]
+    fn run<D: Directions<E>, F: Fallback>(
+        &mut self,
+        work: &Work<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+        directions: &D,
+        first: bool,
+        curved: Option<&mut [E]>,
+        phase: Phase,
+        second: bool,
+    ) {
+        let Self { v, end, dy, sums, start_sums } = self;
+        let [start, other] = v;
+        let (v, next) = if *end { (start, other) } else { (other, start) };
+        dispatch(Step::<M, E, D, S> {
+            phase,
+            jacobian: work.linear.jacobian.as_ref(),
+            factors: work.linear.factors.planned(),
+            coefficients,
+            h: work.inputs.time.step,
+            directions,
+            first,
+            v: R::flat(v.as_ref()),
+            next: R::flat_mut(next.as_mut()),
+            dy: R::flat_mut(dy.as_mut().as_flattened_mut()),
+            sums: sums.as_mut(),
+            start_sums: start_sums.as_mut(),
+            curved,
+            second,
+            model: PhantomData,
+        });
+    }
+
+    /// What follows from derivatives of the stages that are others now: `V_{n+1}`, and the sums over all directions.
+    pub(super) fn conclude<D: Directions<E>, F: Fallback>(
+        &mut self,
+        work: &Work<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+        directions: &D,
+        first: bool,
+    ) {
+        self.run(work, coefficients, directions, first, None, Phase::After, false);
+    }
+
     /// `V` at the end of the step, or at its start.
     pub(super) fn v(&self, end: bool) -> &[E] {
         self.v.get(usize::from(self.end == end)).map_or(&[], |v| R::flat(v.as_ref()))
@@ -118,6 +143,11 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// The derivatives of the stages.
     pub(super) fn dy(&self) -> &[E] {
         R::flat(self.dy.as_ref().as_flattened())
+    }
+
+    /// The derivatives of the stages.
+    pub(super) fn dy_mut(&mut self) -> &mut [R] {
+        self.dy.as_mut().as_flattened_mut()
     }
 
     /// Solves by the factors of the whole matrix, column by column.
@@ -140,6 +170,13 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             }
         });
     }
+}
+
+/// The sum of all strands.
+#[inline(always)]
+pub(super) fn total<E: Field>(strands: &[E; STRANDS]) -> E {
+    let [a, b, c, d] = *strands;
+    (a + b) + (c + d)
 }
 
 /// See [`Sweep::start`].

@@ -11,7 +11,7 @@ use super::adjoint::Backward;
 use super::directions::{Directions, weight};
 use super::evaluate::entries;
 use super::record::{Coefficients, Work};
-use super::sweep::{STRANDS, Sweep};
+use super::sweep::{STRANDS, Sweep, total};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::memory::Fallback;
 use crate::model::Dae;
@@ -215,13 +215,6 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         }
         good
     }
-}
-
-/// The sum of all strands.
-#[inline(always)]
-fn total<E: Field>(strands: &[E; STRANDS]) -> E {
-    let [a, b, c, d] = *strands;
-    (a + b) + (c + d)
 }
 
 struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {

@@ -20,6 +20,7 @@ mod fused;
 mod kernels;
 mod mean;
 mod sparse;
+mod twice;
 
 pub(crate) use block::Packet;
 #[cfg(feature = "alloc")]
@@ -32,3 +33,4 @@ pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;
 pub(crate) use mean::MeanFactors;
 pub(crate) use sparse::{Planned, solve_packets};
+pub(crate) use twice::{dot_compensated, moved, two_product};

@@ -14,9 +14,11 @@ pub(crate) mod lanes;
 mod real;
 #[cfg(all(feature = "libm", any(test, not(feature = "std"))))]
 mod single;
+mod tangent;
 
 #[doc(hidden)]
 pub use float::Float;
+pub use tangent::Tangent;
 
 use crate::shape::Plain;
 use core::fmt::Debug;

@@ -148,6 +148,13 @@ pub fn write(model: &Model) -> TokenStream {
                     #krate::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
                 }
 
+                fn tangent<CasadosS: #krate::Lanes>(
+                    variables: &[#krate::scalar::Tangent<CasadosS>; #lv],
+                    residual: &mut [#krate::scalar::Tangent<CasadosS>; #lk],
+                ) {
+                    #krate::dual::tangent::<Self, CasadosS>(variables, residual);
+                }
+
                 fn adjoint<CasadosS: #krate::Lanes>(
                     variables: &[CasadosS::Cell; #lv],
                     seeds: &[CasadosS::Cell; #lk],

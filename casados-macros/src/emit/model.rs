@@ -67,6 +67,11 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
             }
 
             #[inline]
+            fn tangent<S: #krate::Lanes>(v: &[#krate::scalar::Tangent<S>; #lv], f: &mut [#krate::scalar::Tangent<S>; #lk]) {
+                code::residual::<#krate::scalar::Tangent<S>>(#c v, f);
+            }
+
+            #[inline]
             fn adjoint<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], gradient: &mut [S::Cell; #lv]) {
                 code::adjoint::<S>(#c v, mu, gradient);
                 S::from_f64(0.0).store(&mut gradient[#time]);

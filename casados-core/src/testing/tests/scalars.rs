@@ -1,6 +1,6 @@
 //! The scalars that the checks rest on agree with each other, function by function.
 
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, Tangent};
 use crate::testing::bounded::Bounded;
 use crate::testing::forward::Forward;
 use num_complex::Complex64;
@@ -61,7 +61,7 @@ fn arguments() -> impl Iterator<Item = (f64, f64)> {
     values.into_iter().flat_map(move |a| [-1.3, -0.4, 0.7, 2.2].into_iter().map(move |b| (a, b)))
 }
 
-/// Values and first derivatives by complex step and by dual numbers, against [`Forward`] within its rounding bound.
+/// Values and first derivatives by complex step, by dual numbers and by tangents, against [`Forward`] within its rounding bound.
 #[test]
 fn first_derivatives_agree() {
     const H: f64 = 1e-200;
@@ -73,7 +73,12 @@ fn first_derivatives_agree() {
                 functions(Forward { re: exact(a), d: exact(da) }, Forward { re: exact(b), d: exact(db) });
             let complex = functions(Complex64::new(a, da * H), Complex64::new(b, db * H));
             let dual = functions(Dual64::new(a, da), Dual64::new(b, db));
-            for ((&(name, reference), (_, complex)), (_, dual)) in reference.iter().zip(complex).zip(dual) {
+            let tangent =
+                functions(Tangent { value: a, derivative: da }, Tangent { value: b, derivative: db });
+            let others = complex.into_iter().zip(dual).zip(tangent);
+            for (&(name, reference), (((_, complex), (_, dual)), (_, tangent))) in
+                reference.iter().zip(others)
+            {
                 let (value, d) = (reference.re, reference.d);
                 if !value.value.is_finite() || !d.error.is_finite() {
                     continue;
@@ -91,6 +96,8 @@ fn first_derivatives_agree() {
                 near(dual.re, value);
                 near(complex.im / H, d);
                 near(dual.eps, d);
+                near(tangent.value, value);
+                near(tangent.derivative, d);
             }
         }
     }
