@@ -29,6 +29,12 @@ impl Growth {
     pub fn exponent(&self, mode: usize) -> f64 {
         slope(self.points.iter().map(|(nx, times)| (*nx as f64, times[mode].time.median)))
     }
+
+    /// The same of the time for each iteration of Newton's method: longer chains need more of them.
+    pub fn exponent_of_an_iteration(&self, mode: usize) -> f64 {
+        let time = |measured: &Measured| measured.time.median / measured.iterations as f64;
+        slope(self.points.iter().map(|(nx, times)| (*nx as f64, time(&times[mode]))))
+    }
 }
 
 /// A time and the errors of state and Jacobian against the exact flow.

@@ -228,6 +228,8 @@ fn growth(text: &mut String, results: &Results) -> std::fmt::Result {
         }
         let [a, b, c, d] = [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.exponent(mode)));
         writeln!(text, "| exponent | {a} | {b} | {c} | {d} |")?;
+        let [a, b, c, d] = [0, 1, 2, 3].map(|mode| format!("{:.2}", growth.exponent_of_an_iteration(mode)));
+        writeln!(text, "| of an iteration of Newton's method | {a} | {b} | {c} | {d} |")?;
     }
     Ok(())
 }
