@@ -16,6 +16,11 @@ pub trait Calls {
     /// # Errors
     /// Those of the integrator.
     fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error>;
+    /// One call with every input, whose results are kept: what a batch is compared with, which keeps them too.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn call_all(&mut self, mode: Mode) -> Result<(), Error>;
     /// What one call gives.
     ///
     /// # Errors
@@ -200,6 +205,26 @@ struct Typed<M: Dae, I> {
     inputs: Vec<(VectorX<M, f64>, VectorU<M, f64>)>,
     lambda: VectorX<M, f64>,
     h: f64,
+    results: Results<M>,
+}
+
+/// Places of results, one for each input, once they are asked for.
+struct Results<M: Dae> {
+    nominal: Vec<Nominal<M>>,
+    forward: Vec<Forward<M>>,
+    adjoint: Vec<Adjoint<M>>,
+    hessian: Vec<Hessian<M>>,
+}
+
+impl<M: Dae> Results<M> {
+    const NONE: Self =
+        Self { nominal: Vec::new(), forward: Vec::new(), adjoint: Vec::new(), hessian: Vec::new() };
+}
+
+/// So many places.
+fn places<R: Default>(results: &mut Vec<R>, count: usize) -> &mut [R] {
+    results.resize_with(count, Default::default);
+    results
 }
 
 /// A vector of the model's own type.
@@ -217,7 +242,7 @@ fn rows<V: Matrix<f64>>(matrix: &V, row: usize) -> impl Iterator<Item = f64> {
 impl<M: Dae, I: Integrator<M>> Typed<M, I> {
     fn new(case: &Case, integrator: I) -> Self {
         let inputs = case.inputs.iter().map(|(x0, u)| (vector(x0), vector(u))).collect();
-        Self { integrator, inputs, lambda: vector(&case.lambda), h: case.t }
+        Self { integrator, inputs, lambda: vector(&case.lambda), h: case.t, results: Results::NONE }
     }
 }
 
@@ -242,10 +267,7 @@ struct Side<M: Dae, B, const S: usize> {
     u: Vec<VectorU<M, f64>>,
     lambda: Vec<VectorX<M, f64>>,
     h: f64,
-    nominal: Vec<Nominal<M>>,
-    forward: Vec<Forward<M>>,
-    adjoint: Vec<Adjoint<M>>,
-    hessian: Vec<Hessian<M>>,
+    results: Results<M>,
 }
 
 impl<M: Dae, B, const S: usize> Side<M, B, S> {
@@ -256,17 +278,14 @@ impl<M: Dae, B, const S: usize> Side<M, B, S> {
             u: case.inputs.iter().map(|(_, u)| vector(u)).collect(),
             lambda: vec![vector(&case.lambda); case.inputs.len()],
             h: case.t,
-            nominal: Vec::new(),
-            forward: Vec::new(),
-            adjoint: Vec::new(),
-            hessian: Vec::new(),
+            results: Results::NONE,
         }
     }
 }
 
 impl<M: Dae, B: Send + Sync, const S: usize> Together for Side<M, B, S> {
     fn call(&mut self, mode: Mode) -> Result<(), BatchError> {
-        let Self { batch, x0, u, lambda, h, nominal, forward, adjoint, hessian } = self;
+        let Self { batch, x0, u, lambda, h, results } = self;
         let count = x0.len();
         let intervals = Intervals {
             x0: black_box(x0),
@@ -276,22 +295,22 @@ impl<M: Dae, B: Send + Sync, const S: usize> Together for Side<M, B, S> {
         };
         match mode {
             Mode::Simulation => {
-                nominal.resize_with(count, Default::default);
+                let nominal = places(&mut results.nominal, count);
                 batch.solve(&intervals, nominal)?;
                 black_box(nominal);
             }
             Mode::Forward => {
-                forward.resize_with(count, Default::default);
+                let forward = places(&mut results.forward, count);
                 batch.forward(&intervals, forward)?;
                 black_box(forward);
             }
             Mode::Adjoint => {
-                adjoint.resize_with(count, Default::default);
+                let adjoint = places(&mut results.adjoint, count);
                 batch.adjoint(&intervals, lambda, adjoint)?;
                 black_box(adjoint);
             }
             Mode::Hessian => {
-                hessian.resize_with(count, Default::default);
+                let hessian = places(&mut results.hessian, count);
                 batch.hessian(&intervals, lambda, hessian)?;
                 black_box(hessian);
             }
@@ -303,10 +322,10 @@ impl<M: Dae, B: Send + Sync, const S: usize> Together for Side<M, B, S> {
         self.call(mode)?;
         let mut values = Values::default();
         match mode {
-            Mode::Simulation => of_nominal(&self.nominal[0], &mut values),
-            Mode::Forward => of_forward(&self.forward[0], &mut values),
-            Mode::Adjoint => of_adjoint(&self.adjoint[0], &mut values),
-            Mode::Hessian => of_hessian(&self.hessian[0], &mut values),
+            Mode::Simulation => of_nominal(&self.results.nominal[0], &mut values),
+            Mode::Forward => of_forward(&self.results.forward[0], &mut values),
+            Mode::Adjoint => of_adjoint(&self.results.adjoint[0], &mut values),
+            Mode::Hessian => of_hessian(&self.results.hessian[0], &mut values),
         }
         Ok(values)
     }
@@ -341,6 +360,26 @@ impl<M: Dae, I: Integrator<M>> Calls for Typed<M, I> {
             Mode::Forward => drop(black_box(self.integrator.forward(x0, u, self.h)?)),
             Mode::Adjoint => drop(black_box(self.integrator.adjoint(x0, u, self.h, lambda)?)),
             Mode::Hessian => drop(black_box(self.integrator.hessian(x0, u, self.h, lambda)?)),
+        }
+        Ok(())
+    }
+
+    fn call_all(&mut self, mode: Mode) -> Result<(), Error> {
+        let Self { integrator, inputs, lambda, h, results } = self;
+        let (inputs, lambda, h) = (black_box(&**inputs), black_box(&*lambda), *h);
+        macro_rules! keep {
+            ($results:ident, |$x0:ident, $u:ident| $call:expr) => {{
+                for (place, ($x0, $u)) in places(&mut results.$results, inputs.len()).iter_mut().zip(inputs) {
+                    place.clone_from($call?);
+                }
+                black_box(&results.$results);
+            }};
+        }
+        match mode {
+            Mode::Simulation => keep!(nominal, |x0, u| integrator.solve(x0, u, h)),
+            Mode::Forward => keep!(forward, |x0, u| integrator.forward(x0, u, h)),
+            Mode::Adjoint => keep!(adjoint, |x0, u| integrator.adjoint(x0, u, h, lambda)),
+            Mode::Hessian => keep!(hessian, |x0, u| integrator.hessian(x0, u, h, lambda)),
         }
         Ok(())
     }

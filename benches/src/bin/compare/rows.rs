@@ -83,7 +83,7 @@ fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Eff
     let mut timers = vec![
         Timer::new(case, 1e-8, Start::Zero, mode, single.clone())?,
         Timer::new(case, 0.0, Start::Zero, mode, single)?,
-        Timer::new(case, 1e-8, Start::Zero, mode, 0..case.inputs.len())?,
+        Timer::new(case, 1e-8, Start::Zero, mode, 0..case.inputs.len())?.keeping(),
     ];
     if warm {
         timers.push(Timer::new(case, 1e-8, Start::Warm, mode, 0..2)?);
@@ -137,6 +137,8 @@ pub struct Timer {
     calls: Box<dyn Calls>,
     mode: Mode,
     inputs: Range<usize>,
+    /// Whether the results of all inputs are kept, as a batch keeps them.
+    keeps: bool,
     error: Option<f64>,
     rounds: Vec<Summary>,
 }
@@ -152,13 +154,23 @@ impl Timer {
         let mut calls = open(case, options(case, tolerance, start))?;
         let values = calls.values(mode, 0).map_err(|e| format!("{}: {e}", case.name))?;
         let error = case.reference.as_ref().and_then(|(_, reference)| values.error(reference, mode));
-        Ok(Self { calls, mode, inputs, error, rounds: Vec::new() })
+        Ok(Self { calls, mode, inputs, keeps: false, error, rounds: Vec::new() })
+    }
+
+    /// With all inputs, whose results are kept.
+    fn keeping(self) -> Self {
+        Self { keeps: true, ..self }
     }
 
     pub fn round(&mut self, effort: Effort) -> Result<(), Failure> {
         let budget = effort.budget() / ROUNDS as u32;
-        let time = measure(budget, || self.inputs.clone().try_for_each(|k| self.calls.call(self.mode, k)))
-            .map_err(|e| e.to_string())?;
+        let Self { calls, mode, inputs, keeps, .. } = &mut *self;
+        let time = if *keeps {
+            measure(budget, || calls.call_all(*mode))
+        } else {
+            measure(budget, || inputs.clone().try_for_each(|k| calls.call(*mode, k)))
+        };
+        let time = time.map_err(|e| e.to_string())?;
         self.rounds.push(time.divided(self.inputs.len() as f64));
         Ok(())
     }
