@@ -3,6 +3,7 @@
 //! A stage has the variables `v = (x, u)`. Its matrices lie column after column, and every column begins at a
 //! multiple of [`pad`] numbers, so that whole registers can be read from it. What is padding is zero.
 
+use crate::scalar::lanes::REGISTERS;
 use core::iter::FusedIterator;
 use core::marker::PhantomData;
 
@@ -25,10 +26,11 @@ impl StageDims {
     }
 }
 
-/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of type `T`.
+/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of type `T`. Where there are no registers an
+/// even number is enough, which tiles need: firmware has half the memory then, and nothing to compute with what is padding.
 #[must_use]
 pub(crate) const fn pad<T>(n: usize) -> usize {
-    let width = 64 / size_of::<T>();
+    let width = if REGISTERS { 64 / size_of::<T>() } else { 2 };
     n.div_ceil(width) * width
 }
 
@@ -156,15 +158,18 @@ pub(crate) struct Places<'a, T> {
     next: usize,
     number: PhantomData<T>,
     front: Place,
-    back: Place,
+    /// Only where somebody goes backwards.
+    back: Option<Place>,
 }
 
 impl<'a, T> Places<'a, T> {
     /// Those of stages with numbers of type `T`.
     pub fn new(dims: &'a [StageDims]) -> Self {
-        let back = end::<T>(dims);
-        let front = Place::default();
-        Self { dims, taken: 0, next: 0, number: PhantomData, front, back }
+        Self { dims, taken: 0, next: 0, number: PhantomData, front: Place::default(), back: None }
+    }
+    /// The same, for whoever knows [`end`] and goes backwards.
+    pub fn ending(dims: &'a [StageDims], end: Place) -> Self {
+        Self { back: Some(end), ..Self::new(dims) }
     }
 }
 
@@ -188,8 +193,12 @@ impl<T> DoubleEndedIterator for Places<'_, T> {
     #[inline]
     fn next_back(&mut self) -> Option<Place> {
         let (&last, rest) = self.dims.split_last()?;
-        let place = Place::new::<T>(self.taken + rest.len(), last, self.next).before(&self.back);
-        (self.dims, self.back, self.next) = (rest, place, last.nx);
+        let back = match self.back {
+            Some(back) => back,
+            None => behind::<T>(self.front, self.taken, self.dims),
+        };
+        let place = Place::new::<T>(self.taken + rest.len(), last, self.next).before(&back);
+        (self.dims, self.back, self.next) = (rest, Some(place), last.nx);
         Some(place)
     }
 }
@@ -199,9 +208,12 @@ impl<T> FusedIterator for Places<'_, T> {}
 
 /// The place behind the last stage: its begins are the lengths of the arrays of the horizon.
 pub(crate) const fn end<T>(dims: &[StageDims]) -> Place {
+    behind::<T>(Place::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
+}
+
+/// The place behind stages that follow a place, from that one on whose number is given.
+const fn behind<T>(mut place: Place, mut stage: usize, dims: &[StageDims]) -> Place {
     let mut rest = dims;
-    let mut place = Place::new::<T>(0, StageDims::new(0, 0, 0), 0);
-    let mut stage = 0;
     while let Some((&first, after)) = rest.split_first() {
         let next = match after.first() {
             Some(dims) => dims.nx,
@@ -264,6 +276,14 @@ mod tests {
         let mut backwards: alloc::vec::Vec<_> = Places::<f32>::new(&dims).rev().map(parts).collect();
         backwards.reverse();
         assert_eq!(forwards, backwards);
+        // From where it is known to end, and from both sides.
+        let mut known: alloc::vec::Vec<_> =
+            Places::<f32>::ending(&dims, end::<f32>(&dims)).rev().map(parts).collect();
+        known.reverse();
+        assert_eq!(forwards, known);
+        let mut places = Places::<f32>::new(&dims).map(parts);
+        let ends = [places.next(), places.next_back(), places.next(), places.next_back()];
+        assert_eq!(ends.map(Option::unwrap), [0, 3, 1, 2].map(|stage| forwards[stage]));
         assert_eq!(forwards.iter().map(|p| p[2]).collect::<alloc::vec::Vec<_>>(), [9, 2, 5, 0]);
     }
 }

@@ -7,6 +7,8 @@
 
 #[cfg(feature = "testing")]
 mod complex;
+#[cfg(not(feature = "std"))]
+mod double;
 #[cfg(feature = "num-dual")]
 mod dual;
 mod float;

@@ -1,11 +1,11 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
-#[cfg(not(feature = "std"))]
-use super::single;
 use super::{Field, Lanes, Packed, Real, Scalar, own_cell};
+#[cfg(not(feature = "std"))]
+use super::{double, single};
 
-/// The methods of one real type, from `std` where it is there, else from `libm` and `single`.
+/// The methods of one real type, from `std` where it is there, else from `libm`, `single` and `double`.
 macro_rules! real {
     ($t:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
         impl Field for $t {
@@ -195,11 +195,11 @@ macro_rules! real {
     };
 }
 
-real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = libm::sqrt, cbrt = libm::cbrt, exp = libm::exp,
+real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = libm::sqrt, cbrt = libm::cbrt, exp = double::exp,
     exp2 = libm::exp2, exp_m1 = libm::expm1, ln = libm::log, ln_1p = libm::log1p, log2 = libm::log2, log10 = libm::log10,
-    sin = libm::sin, cos = libm::cos, tan = libm::tan, asin = libm::asin, acos = libm::acos, atan = libm::atan,
+    sin = double::sin, cos = double::cos, tan = double::tan, asin = libm::asin, acos = libm::acos, atan = libm::atan,
     sinh = libm::sinh, cosh = libm::cosh, tanh = libm::tanh, asinh = libm::asinh, acosh = libm::acosh,
-    atanh = libm::atanh; libm::pow, libm::atan2, libm::hypot, libm::sincos);
+    atanh = libm::atanh; libm::pow, libm::atan2, libm::hypot, double::sin_cos);
 real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = single::sqrt, cbrt = single::cbrt, exp = libm::expf,
     exp2 = single::exp2, exp_m1 = libm::expm1f, ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f,
     log10 = libm::log10f, sin = single::sin, cos = single::cos, tan = single::tan, asin = single::asin,

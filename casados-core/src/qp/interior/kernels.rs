@@ -481,9 +481,11 @@ mod tests {
         }
     }
 
-    /// Small integers, of which sums are exact, in columns of `rows`.
-    fn integers(rows: usize, columns: usize, seed: usize) -> Vec<f64> {
-        let ld = pad::<f64>(rows);
+    /// What columns are padded to: registers, and an even number, which is enough without them.
+    const PADDINGS: [fn(usize) -> usize; 2] = [pad::<f64>, |n| n.next_multiple_of(2)];
+
+    /// Small integers, of which sums are exact, in columns of `rows` that are `ld` apart.
+    fn integers(rows: usize, columns: usize, ld: usize, seed: usize) -> Vec<f64> {
         (0..ld * columns)
             .map(|i| if i % ld < rows { ((i * 7 + seed * 13) % 11) as f64 - 5.0 } else { 0.0 })
             .collect()
@@ -492,35 +494,28 @@ mod tests {
     /// Every size around the edges of tiles, with memory that ends with the last column.
     #[test]
     fn products_of_all_sizes() {
-        for rows in 1..14 {
-            for columns in 1..14 {
-                for depth in 0..5 {
-                    for part in [Part::Full, Part::Lower] {
-                        let (ld, ld_y) = (pad::<f64>(rows), pad::<f64>(columns));
-                        let (x, y) = (integers(rows, depth, 1), integers(columns, depth, 2));
-                        let before = integers(rows, columns + MORE, 3);
-                        let mut target = before.clone();
-                        let matrices = (Columns { data: &x[..], ld }, Columns { data: &y[..], ld: ld_y });
-                        let size = (rows, columns, depth);
-                        f64::registers(Case {
-                            target: &mut target,
-                            x: matrices.0,
-                            y: matrices.1,
-                            size,
-                            part,
-                        });
-                        for column in 0..columns {
-                            for row in if part == Part::Lower { column } else { 0 }..rows {
-                                let sum =
-                                    (0..depth).map(|k| x[k * ld + row] * y[k * ld_y + column]).sum::<f64>();
-                                let source = if depth % 2 == 0 { 0.0 } else { before[column * ld + row] };
-                                assert_eq!(
-                                    target[column * ld + row],
-                                    source - sum,
-                                    "{size:?} {row} {column}"
-                                );
-                            }
-                        }
+        for (padding, padded) in PADDINGS.into_iter().enumerate() {
+            for case in 0..13 * 13 * 5 * 2 {
+                let (rows, columns, depth) = (1 + case % 13, 1 + case / 13 % 13, case / 169 % 5);
+                let part = if case < 845 { Part::Full } else { Part::Lower };
+                let size = (rows, columns, depth);
+                let (ld, ld_y) = (padded(rows), padded(columns));
+                let (x, y) = (integers(rows, depth, ld, 1), integers(columns, depth, ld_y, 2));
+                let before = integers(rows, columns + MORE, ld, 3);
+                let mut target = before.clone();
+                let (x_columns, y_columns) =
+                    (Columns { data: &x[..], ld }, Columns { data: &y[..], ld: ld_y });
+                let product = Case { target: &mut target, x: x_columns, y: y_columns, size, part };
+                if padding == 0 {
+                    f64::registers(product)
+                } else {
+                    product.run::<f64>()
+                }
+                for column in 0..columns {
+                    for row in if part == Part::Lower { column } else { 0 }..rows {
+                        let sum = (0..depth).map(|k| x[k * ld + row] * y[k * ld_y + column]).sum::<f64>();
+                        let source = if depth % 2 == 0 { 0.0 } else { before[column * ld + row] };
+                        assert_eq!(target[column * ld + row], source - sum, "{size:?} {row} {column} {ld}");
                     }
                 }
             }
@@ -530,17 +525,21 @@ mod tests {
     /// The definition, with what must not be read above the diagonal.
     #[test]
     fn symmetric_products_of_all_sizes() {
-        for n in 1..27 {
-            let ld = pad::<f64>(n);
-            let mut h = integers(n, n, 1);
-            let v = integers(n, 1, 2);
-            let before = integers(n, 1, 3);
+        for (n, padding) in (1..27).flat_map(|n| [(n, 0), (n, 1)]) {
+            let ld = PADDINGS[padding](n);
+            let mut h = integers(n, n, ld, 1);
+            let v = integers(n, 1, ld, 2);
+            let before = integers(n, 1, ld, 3);
             let expected: Vec<f64> = (0..n)
                 .map(|i| before[i] + (0..n).map(|j| h[i.min(j) * ld + i.max(j)] * v[j]).sum::<f64>())
                 .collect();
             (0..n).for_each(|j| h[j * ld..j * ld + j].fill(f64::NAN));
             let mut target = before.clone();
-            add_symmetric(&mut target, &h, ld, &v, n);
+            if padding == 0 {
+                add_symmetric(&mut target, &h, ld, &v, n);
+            } else {
+                symmetric::<f64, f64>(&mut target, &h, ld, &v, n);
+            }
             assert_eq!(target[..n], expected, "{n}");
         }
     }

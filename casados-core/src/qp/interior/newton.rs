@@ -111,11 +111,12 @@ impl<'a, T: Real> Iterate<'a, T> {
 
     /// In memory that is zero.
     pub fn new(qp: QpView<'a, T>, first: First, sides: Sides<'a, T>, numbers: &mut &'a mut [T]) -> Self {
-        let (end, initial) = (end::<T>(qp.dims), first_nx(qp.dims));
+        let (riccati, initial) = (Riccati::new(qp.dims, numbers), first_nx(qp.dims));
+        let end = riccati.end;
         Self {
             qp,
             first,
-            riccati: Riccati::new(qp.dims, numbers),
+            riccati,
             sides,
             v: take_mut(numbers, end.row),
             step: take_mut(numbers, end.row),
@@ -173,7 +174,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
         largest = larger::<T, E>(largest, forces);
-        for place in Places::<T>::new(self.qp.dims).rev() {
+        for place in Places::<T>::ending(self.qp.dims, self.riccati.end).rev() {
             let Place { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };

@@ -53,6 +53,8 @@ pub struct Riccati<'a, T> {
     pub regularised: usize,
     /// The largest element of the diagonals so far: what elimination has subtracted was as large as that.
     largest: T,
+    /// Behind the last stage.
+    pub end: Place,
 }
 
 /// The largest dimensions.
@@ -110,6 +112,7 @@ impl<'a, T: Real> Riccati<'a, T> {
             minus: take_mut(memory, pad::<T>(next_and_ng)),
             regularised: 0,
             largest: T::ZERO,
+            end,
         }
     }
 }
@@ -178,7 +181,7 @@ impl<T: Real> Riccati<'_, T> {
             self.regularised = 0;
             self.largest = T::ZERO;
         }
-        for place in Places::<T>::new(qp.dims).rev() {
+        for place in Places::<T>::ending(qp.dims, self.end).rev() {
             let Place { nx, nu, n, ng, ld, next, ld_next, .. } = place;
             let data = part(qp.data, place.data, place.data_len());
             let matrix = Columns { data: part(data, 0, place.matrix()), ld };

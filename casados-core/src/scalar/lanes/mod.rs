@@ -19,8 +19,12 @@
 //! functions are those of [`functions`], with the bounds that are listed there.
 #![allow(dead_code)]
 
-#[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
-mod functions;
+#[cfg(any(
+    not(feature = "std"),
+    target_arch = "x86_64",
+    all(target_arch = "aarch64", target_feature = "neon")
+))]
+pub mod functions;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 mod neon;
 #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
@@ -34,6 +38,10 @@ use core::sync::atomic::{AtomicU8, Ordering};
 #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
 #[allow(unused_imports)]
 pub use register::*;
+
+/// Whether there are any registers of several numbers.
+pub const REGISTERS: bool =
+    cfg!(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")));
 
 /// The registers that may be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -274,10 +282,17 @@ pub fn level() -> Level {
     match LEVEL.load(Ordering::Relaxed) {
         level if level == Level::Single as u8 => Level::Single,
         level if level == Level::Base as u8 => Level::Base,
-        level if level == Level::Avx2 as u8 => Level::Avx2,
-        level if level == Level::Avx512 as u8 => Level::Avx512,
+        level if may_be(Level::Avx2) && level == Level::Avx2 as u8 => Level::Avx2,
+        level if may_be(Level::Avx512) && level == Level::Avx512 as u8 => Level::Avx512,
         _ => find(),
     }
+}
+
+/// Whether a machine that runs this may have these registers: without `std` nobody asks it, and it has what the program
+/// was compiled for. What is for others is not in the program then.
+#[inline(always)]
+fn may_be(level: Level) -> bool {
+    cfg!(feature = "std") || is_there(level)
 }
 
 #[cold]

@@ -33,6 +33,8 @@
 
 mod exponential;
 mod logarithm;
+#[cfg(any(test, not(feature = "std")))]
+mod number;
 mod pair;
 mod root;
 mod trigonometric;
@@ -74,6 +76,21 @@ pub trait Single: Lanes {
     fn widen(self) -> [Self::Double; 2];
     /// The number that has these halves, rounded.
     fn narrow(low: Self::Double, high: Self::Double) -> Self;
+}
+
+/// The functions of one number that are called for rare lanes, where those of a scalar are the ones below.
+mod one {
+    macro_rules! one {
+        ($($name:ident)*) => { $(
+            pub fn $name(a: f64) -> f64 {
+                #[cfg(feature = "std")]
+                return a.$name();
+                #[cfg(not(feature = "std"))]
+                return libm::$name(a);
+            }
+        )* };
+    }
+    one!(sin cos tan);
 }
 
 /// Replaces the lanes of `result` that are rare by what the function of one number gives.

@@ -5,7 +5,7 @@
 
 use super::exponential::{ROUND, clamp, copy_sign};
 use super::pair::{Pair, c, ordered_sum, pattern, polynomial, product, sum};
-use super::{Double, repair, repair2};
+use super::{Double, one, repair, repair2};
 use crate::scalar::Scalar;
 use core::f64::consts::{FRAC_2_PI, FRAC_PI_4, PI};
 
@@ -98,8 +98,8 @@ pub fn sin_cos<D: Double>(a: D) -> (D, D) {
     let (_, sign_of_cos) = quadrant(shifted + c(1.0));
     let mut sin = D::select(odd, co, s).xor_bits(sign).xor_bits(a.and_bits(c(-0.0)));
     let mut cos = D::select(odd, s, co).xor_bits(sign_of_cos);
-    repair(rare, a, &mut sin, <f64 as Scalar>::sin);
-    repair(rare, a, &mut cos, <f64 as Scalar>::cos);
+    repair(rare, a, &mut sin, one::sin);
+    repair(rare, a, &mut cos, one::cos);
     (sin, cos)
 }
 
@@ -111,7 +111,7 @@ pub fn sin<D: Double>(a: D) -> D {
     let (s, co) = near_zero(r);
     let (odd, sign) = quadrant(shifted);
     let mut sin = Pair::select(odd, co, s).round().xor_bits(sign).xor_bits(a.and_bits(c(-0.0)));
-    repair(rare, a, &mut sin, <f64 as Scalar>::sin);
+    repair(rare, a, &mut sin, one::sin);
     sin
 }
 
@@ -123,7 +123,7 @@ pub fn cos<D: Double>(a: D) -> D {
     let (s, co) = near_zero(r);
     let (odd, sign) = quadrant(shifted + c(1.0));
     let mut cos = Pair::select(odd, co, s).round().xor_bits(sign);
-    repair(rare, a, &mut cos, <f64 as Scalar>::cos);
+    repair(rare, a, &mut cos, one::cos);
     cos
 }
 
@@ -139,7 +139,7 @@ pub fn tan<D: Double>(a: D) -> D {
     // So small a number is its own tangent, and its products would underflow.
     let result = D::select(magnitude.lt(c(1e-9)), magnitude, quotient);
     let mut result = result.xor_bits(a.and_bits(c(-0.0)));
-    repair(rare, a, &mut result, <f64 as Scalar>::tan);
+    repair(rare, a, &mut result, one::tan);
     result
 }
 

@@ -2,6 +2,7 @@
 
 use super::reference::{self, Function};
 use super::{cell, inside, on_every_register, same, specials};
+use crate::scalar::lanes::functions::{self, Call};
 use crate::scalar::lanes::*;
 use crate::scalar::{Lanes, Scalar};
 use std::vec::Vec;
@@ -190,6 +191,35 @@ fn errors_are_below_the_documented_bounds() {
         };
     }
     on_every_register!(check);
+}
+
+/// A number as a register of one, which is what firmware computes with, has the same bounds.
+#[test]
+fn numbers_as_registers_of_one() {
+    let count = if cfg!(debug_assertions) { 4000 } else { 200_000 };
+    let mut random = Random(0x2545_F491_4F6C_DD1D);
+    macro_rules! check {
+        ($($name:ident, $argument:ident, $bound:literal;)*) => { $(
+            for _ in 0..count {
+                let (a, _) = $argument(&mut random);
+                let (one, result) = (Scalar::$name(a), <functions::$name as Call<f64>>::call(a));
+                if a.abs() > 1e-290 && (1e-290..1e307).contains(&one.abs()) {
+                    let error = error(result, reference::$name(a, 0.0), 53);
+                    assert!(error <= $bound, "{}({a:e}) = {result:e}: {error} units", stringify!($name));
+                }
+            }
+            for a in specials() {
+                let (one, result): (f64, _) = (Scalar::$name(a), <functions::$name as Call<f64>>::call(a));
+                let close = (result - one).abs() <= 2.0 * f64::EPSILON * one.abs() + 5e-324;
+                assert!(same(result, one) || one != 0.0 && close, "{}({a:e}) = {result:e}", stringify!($name));
+            }
+        )* };
+    }
+    check! { sin, angle, 0.80; cos, angle, 0.80; tan, angle, 0.90; exp, exponent, 0.80; }
+    for a in (0..count).map(|_| angle(&mut random).0).chain(specials()) {
+        let (sin, cos) = functions::sin_cos::call(a);
+        assert!(same(sin, functions::sin::call(a)) && same(cos, functions::cos::call(a)), "{a:e}");
+    }
 }
 
 /// Zeros keep their sign, infinities and NaN are where they are for one number, and all else is finite and close to
