@@ -37,17 +37,29 @@ typedef enum {
    */
   CasadosOk = 0,
   /**
-   * A pointer that may not be null is, or memory is too small or not aligned.
+   * A pointer that may not be null is.
    */
-  CasadosInvalidPointer = 1,
+  CasadosNull = 1,
+  /**
+   * An address is not a multiple of what it has to be.
+   */
+  CasadosMisaligned = 2,
+  /**
+   * There is less memory than the integrator takes.
+   */
+  CasadosTooSmall = 3,
+  /**
+   * There is no integrator with such options.
+   */
+  CasadosInvalidOption = 4,
   /**
    * A state, a control or the length of the step is not finite.
    */
-  CasadosNonFinite = 2,
+  CasadosNonFinite = 5,
   /**
-   * The equations could not be solved.
+   * The equations could not be solved, or results would not be finite.
    */
-  CasadosFailed = 3,
+  CasadosFailed = 6,
 } CasadosStatus;
 
 /**
@@ -60,15 +72,16 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Makes an integrator in `size` bytes of memory, which is to live as long as it; null if that does not do, or if there
- * are no iterations.
+ * Makes an integrator in `size` bytes of memory, which is to live as long as it, with so many iterations, at least one.
+ * After an error `*integrator` is null.
  *
  * # Safety
- * `memory` is null, or points to `size` bytes that nothing else uses.
+ * `memory` is null, or points to `size` bytes that nothing else uses; `integrator` is null, or points to a pointer.
  */
-CasadosPendulum *casados_new(uint8_t *memory,
-                             uintptr_t size,
-                             uintptr_t iterations);
+CasadosStatus casados_new(uint8_t *memory,
+                          uintptr_t size,
+                          uintptr_t iterations,
+                          CasadosPendulum **integrator);
 
 /**
  * One step of length `h`: from the state `x` and the control `u` to the state at its end, and its derivatives, column

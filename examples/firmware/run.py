@@ -18,8 +18,8 @@ TARGET = "thumbv7em-none-eabihf"
 BOARDS = {"cortex-m7": "mps2-an500", "cortex-m4": "mps2-an386"}
 
 
-def cargo(arguments, **variables):
-    subprocess.run(["cargo", *arguments], cwd=HERE, env=os.environ | variables, check=True)
+def cargo(arguments, stderr=None, **variables):
+    subprocess.run(["cargo", *arguments], cwd=HERE, env=os.environ | variables, stderr=stderr, check=True)
 
 
 def build(cpu, programs, **variables):
@@ -87,7 +87,7 @@ def lines(text):
     values = {}
     for line in text.splitlines():
         name, *words = line.split()
-        numbers = [struct.unpack(">d", bytes.fromhex(w[2:]))[0] if w.startswith("0x") else int(w) for w in words]
+        numbers = [struct.unpack(">d", bytes.fromhex(w[2:].zfill(16)))[0] if w.startswith("0x") else int(w) for w in words]
         values.setdefault(name, []).extend(numbers)
     return values
 
@@ -144,6 +144,17 @@ def distance(a, b):
     return max(abs(x - y) / max(abs(x), abs(y), 1.0) for x, y in zip(a, b, strict=True))
 
 
+def links(cpu, program):
+    """Whether a program links; that another than the linker is against it is an error."""
+    try:
+        build(cpu, [program], stderr=subprocess.PIPE)
+    except subprocess.CalledProcessError as error:
+        if b"undefined symbol: a_panic_is_reachable" not in error.stderr:
+            sys.exit(error.stderr.decode())
+        return False
+    return True
+
+
 def check():
     budgets = tomllib.loads((HERE / "budgets.toml").read_text())
     mistakes = []
@@ -165,8 +176,9 @@ def check():
             hold(name, "RAM without stack, bytes", ram, case["ram"])
             for what, most in case.get("most", {}).items():
                 hold(name, what, max(results[what]), most)
-            for what in case.get("constant", []):
+            for what, most in case.get("steady", {}).items():
                 least, largest = results[what]
+                hold(name, what, largest, most)
                 hold(name, f"variation of {what}, %", round(100 * (largest / least - 1), 2), 0.5)
             if "apart" in case:
                 apart = distance(results["state"], on_desk[program]["state"])
@@ -174,6 +186,8 @@ def check():
             if case.get("single"):
                 found = doubles(cpu, programs[program])
                 hold(name, "calls of double precision", sum(found.values()), 0)
+    if links("cortex-m7", "panics"):
+        mistakes.append("panics: a program that can panic links")
     sys.exit("\n".join(mistakes) if mistakes else 0)
 
 
@@ -205,5 +219,36 @@ def tables():
                 print("|" + "|".join(f" {cell} " for cell in row) + "|", flush=True)
 
 
+MODES = {
+    "pendulum": "pendulum, Gauss, 2 stages",
+    "pendulum-erk": "pendulum, `Rk4`",
+    "catalyst": "DAE, 3 states and an algebraic one, Radau IIA, 2 stages",
+    "six": "6 states, Gauss, 2 stages",
+    "twelve": "12 states, Gauss, 1 stage",
+    "twelve-erk": "12 states, `Rk4`",
+}
+
+
+def modes():
+    """What every kind of call takes, in `f64` and `f32`: the most instructions, and how much more that is than the least."""
+    results = []
+    for cpu, number in (("cortex-m7", "f64"), ("cortex-m7", "f32"), ("cortex-m4", "f32")):
+        program = f"modes_{number}"
+        results.append(run(cpu, build(cpu, [program])[program]))
+    calls = ["solve", "forward", "adjoint", "hessian"]
+    print("\nEvery kind of call, `f64` on a Cortex-M7, `f32` on a Cortex-M7 and on a Cortex-M4:\n")
+    columns = ["model, method", *(f"`{call}`" for call in calls), "variation"]
+    print("|" + "|".join(f" {column} " for column in columns) + "|\n" + "|---" * len(columns) + "|")
+    for name, model in MODES.items():
+        ranges = [[result[f"{name}-{call}"] for result in results] for call in calls]
+        variation = max(most / least - 1 for call in ranges for least, most in call)
+        cells = [", ".join(str(most) for _, most in call) for call in ranges]
+        print("|" + "|".join(f" {cell} " for cell in [model, *cells, f"{100 * variation:.2f} %"]) + "|")
+
+
 if __name__ == "__main__":
-    tables() if "--tables" in sys.argv else check()
+    if "--tables" in sys.argv:
+        tables()
+        modes()
+    else:
+        check()

@@ -30,39 +30,59 @@ const _: () = assert!(Integrator::SIZE <= CASADOS_SIZE && align_of::<Integrator>
 pub enum CasadosStatus {
     /// All results are there and finite.
     CasadosOk = 0,
-    /// A pointer that may not be null is, or memory is too small or not aligned.
-    CasadosInvalidPointer = 1,
+    /// A pointer that may not be null is.
+    CasadosNull = 1,
+    /// An address is not a multiple of what it has to be.
+    CasadosMisaligned = 2,
+    /// There is less memory than the integrator takes.
+    CasadosTooSmall = 3,
+    /// There is no integrator with such options.
+    CasadosInvalidOption = 4,
     /// A state, a control or the length of the step is not finite.
-    CasadosNonFinite = 2,
-    /// The equations could not be solved.
-    CasadosFailed = 3,
+    CasadosNonFinite = 5,
+    /// The equations could not be solved, or results would not be finite.
+    CasadosFailed = 6,
 }
-use CasadosStatus::{CasadosFailed, CasadosInvalidPointer, CasadosNonFinite, CasadosOk};
+use CasadosStatus::{
+    CasadosFailed, CasadosInvalidOption, CasadosMisaligned, CasadosNonFinite, CasadosNull, CasadosOk,
+    CasadosTooSmall,
+};
 
 /// An integrator: two Gauss stages, and as many Newton iterations in every step as it was made with.
 pub struct CasadosPendulum(Integrator);
 
-/// Makes an integrator in `size` bytes of memory, which is to live as long as it; null if that does not do, or if there
-/// are no iterations.
+/// Makes an integrator in `size` bytes of memory, which is to live as long as it, with so many iterations, at least one.
+/// After an error `*integrator` is null.
 ///
 /// # Safety
-/// `memory` is null, or points to `size` bytes that nothing else uses.
+/// `memory` is null, or points to `size` bytes that nothing else uses; `integrator` is null, or points to a pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn casados_new(
     memory: *mut u8,
     size: usize,
     iterations: usize,
-) -> *mut CasadosPendulum {
+    integrator: *mut *mut CasadosPendulum,
+) -> CasadosStatus {
     let place = memory.cast::<MaybeUninit<CasadosPendulum>>();
-    if place.is_null() || !place.is_aligned() || size < size_of::<CasadosPendulum>() {
-        return ptr::null_mut();
+    if let Err(status) = check(integrator.cast_const()) {
+        return status;
+    }
+    // SAFETY: not null, aligned, and what the caller promises.
+    let result = unsafe { &mut *integrator };
+    *result = ptr::null_mut();
+    if let Err(status) = check(place.cast_const()) {
+        return status;
+    }
+    if size < size_of::<CasadosPendulum>() {
+        return CasadosTooSmall;
     }
     let newton = Newton { fixed_iterations: Some(iterations), ..Default::default() };
-    match Integrator::inline(Options { newton, ..Default::default() }) {
-        // SAFETY: aligned, large enough, and nobody else's.
-        Ok(integrator) => ptr::from_mut(unsafe { &mut *place }.write(CasadosPendulum(integrator))),
-        Err(_) => ptr::null_mut(),
-    }
+    let Ok(integrator) = Integrator::inline(Options { newton, ..Default::default() }) else {
+        return CasadosInvalidOption;
+    };
+    // SAFETY: aligned, large enough, and nobody else's.
+    *result = ptr::from_mut(unsafe { &mut *place }.write(CasadosPendulum(integrator)));
+    CasadosOk
 }
 
 /// One step of length `h`: from the state `x` and the control `u` to the state at its end, and its derivatives, column
@@ -81,10 +101,13 @@ pub unsafe extern "C" fn casados_step(
     dx_dx: *mut f64,
     dx_du: *mut f64,
 ) -> CasadosStatus {
-    if integrator.is_null() || x.is_null() || u.is_null() || x_next.is_null() {
-        return CasadosInvalidPointer;
+    let required = [check(integrator.cast_const()), check(x), check(u), check(x_next.cast_const())];
+    let derivatives =
+        [dx_dx, dx_du].map(|place| if place.is_null() { Ok(()) } else { check(place.cast_const()) });
+    if let Some(status) = required.into_iter().chain(derivatives).find_map(Result::err) {
+        return status;
     }
-    // SAFETY: not null, and what the caller promises.
+    // SAFETY: not null, aligned, and what the caller promises.
     let (integrator, x, u) = unsafe {
         (&mut (*integrator).0, *x.cast::<[f64; CASADOS_STATES]>(), *u.cast::<[f64; CASADOS_CONTROLS]>())
     };
@@ -107,6 +130,15 @@ pub unsafe extern "C" fn casados_step(
     }
 }
 
+/// Whether a pointer may be used.
+fn check<T>(pointer: *const T) -> Result<(), CasadosStatus> {
+    match pointer {
+        pointer if pointer.is_null() => Err(CasadosNull),
+        pointer if !pointer.is_aligned() => Err(CasadosMisaligned),
+        _ => Ok(()),
+    }
+}
+
 /// # Safety
 /// `to` is null or points to as many numbers as there are.
 unsafe fn write(to: *mut f64, from: &[f64]) {
@@ -116,20 +148,12 @@ unsafe fn write(to: *mut f64, from: &[f64]) {
     }
 }
 
-/// On a microcontroller what calls this does not link: nothing panics. On the desk, where kernels are compiled for several
-/// kinds of registers, the optimiser does not see as much.
+/// What calls this does not link: the optimiser has proved that nothing panics.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    #[cfg(target_os = "none")]
-    {
-        unsafe extern "C" {
-            fn a_panic_is_reachable() -> !;
-        }
-        // SAFETY: no program that links has this call.
-        unsafe { a_panic_is_reachable() }
+    unsafe extern "C" {
+        fn a_panic_is_reachable() -> !;
     }
-    #[cfg(not(target_os = "none"))]
-    loop {
-        core::hint::spin_loop();
-    }
+    // SAFETY: no program that links has this call.
+    unsafe { a_panic_is_reachable() }
 }

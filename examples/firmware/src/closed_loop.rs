@@ -17,18 +17,34 @@ const SAMPLES: usize = 250;
 /// The gain of a linear quadratic regulator: weights 1, 10, 0.1, 0.1 of the state, 0.01 of the force.
 const GAIN: [f64; 4] = [-8.65, 73.7, -10.88, 19.44];
 
-/// Runs the loop, and prints every fiftieth state, how many instructions a sample takes and how much stack.
+/// Bytes of the predictor: `cargo doc` prints the numbers.
+pub const SIZE: [usize; 2] = [Predictor::<f32>::SIZE, Predictor::<f64>::SIZE];
+
+/// Makes the predictor and runs the loop. Prints what both take of the stack.
 pub fn run<T: Real>(name: &str, memory: &'static Static<Predictor<T>>) -> Result<(), Error> {
     let top = board::paint();
-    let Some(predictor) = memory.set(Predictor::<T>::inline(options(3))?) else {
+    let Some(predictor) = start(memory)? else {
         return Err(Error::NoResult);
     };
     report::numbers("start-stack", &[board::used(top)]);
+    let top = board::paint();
+    drive(name, predictor)?;
+    report::numbers("stack", &[board::used(top)]);
+    report::numbers("size", &[Predictor::<T>::SIZE as u32]);
+    Ok(())
+}
 
+#[inline(never)]
+fn start<T: Real>(memory: &'static Static<Predictor<T>>) -> Result<Option<&'static mut Predictor<T>>, Error> {
+    Ok(memory.set(Predictor::<T>::inline(options(3))?))
+}
+
+/// Runs the loop, and prints every fiftieth state and how many instructions a sample takes.
+#[inline(never)]
+fn drive<T: Real>(name: &str, predictor: &mut Predictor<T>) -> Result<(), Error> {
     let number = T::from_f64;
     let mut x = Vector4::new(number(0.1), number(0.25), number(0.0), number(-0.2));
     let (mut least, mut most) = (u32::MAX, 0);
-    let top = board::paint();
     for sample in 0..SAMPLES {
         let (instructions, next) = board::count(|| control(predictor, &x));
         x = next?;
@@ -37,8 +53,6 @@ pub fn run<T: Real>(name: &str, memory: &'static Static<Predictor<T>>) -> Result
             report::reals(name, x.as_slice());
         }
     }
-    report::numbers("stack", &[board::used(top)]);
-    report::numbers("size", &[size_of::<Predictor<T>>() as u32]);
     report::numbers("instructions", &[least, most]);
     Ok(())
 }

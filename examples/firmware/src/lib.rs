@@ -4,10 +4,12 @@
 #[cfg_attr(target_os = "none", path = "board/cortex_m.rs")]
 #[cfg_attr(not(target_os = "none"), path = "board/desk.rs")]
 pub mod board;
+pub mod catalyst;
 pub mod closed_loop;
 pub mod lost;
 pub mod measure;
 pub mod memory;
+pub mod modes;
 pub mod mpc;
 pub mod report;
 

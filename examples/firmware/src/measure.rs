@@ -14,22 +14,34 @@ macro_rules! measure {
         }
 
         fn run() -> Result<(), casados::Error> {
+            use $crate::{board, report};
+            let Some(integrator) = INTEGRATOR.set(Integrator::inline($crate::options(3))?) else {
+                return Err(casados::Error::NoResult);
+            };
+            let top = board::paint();
+            calls(integrator)?;
+            report::numbers("stack", &[board::used(top)]);
+            report::numbers("size", &[Integrator::SIZE as u32]);
+            // So often the whole matrix was pivoted in the last call.
+            report::numbers("dense", &[integrator.statistics().dense as u32]);
+            Ok(())
+        }
+
+        /// A function of its own: what is inlined into it counts as its stack.
+        #[inline(never)]
+        fn calls(integrator: &mut Integrator) -> Result<(), casados::Error> {
             use casados::model::{VectorU, VectorX};
             use core::hint::black_box;
             use $crate::{board, report};
             // So many calls with different inputs.
             const CALLS: usize = 200;
 
-            let Some(integrator) = INTEGRATOR.set(Integrator::inline($crate::options(3))?) else {
-                return Err(casados::Error::NoResult);
-            };
             let mut random = $crate::Random(1);
             let mut ranges = [[u32::MAX, 0]; 2];
-            let top = board::paint();
             for call in 0..CALLS {
                 let mut x = VectorX::<$model, $number>::zeros();
                 let mut u = VectorU::<$model, $number>::zeros();
-                x.iter_mut().for_each(|x| *x = random.number::<$number>() * 0.5);
+                x.iter_mut().for_each(|x| *x = random.number::<$number>() * 3.0);
                 u.iter_mut().for_each(|u| *u = random.number::<$number>() * 2.0 + 2.0);
                 let (x, u, h) = (black_box(x), black_box(u), black_box(0.02));
                 let (solve, result) = board::count(|| integrator.solve(&x, &u, h).map(|_| ()));
@@ -43,10 +55,6 @@ macro_rules! measure {
                     *range = [range[0].min(count), range[1].max(count)];
                 }
             }
-            report::numbers("stack", &[board::used(top)]);
-            report::numbers("size", &[Integrator::SIZE as u32]);
-            // So often the whole matrix was pivoted in the last call.
-            report::numbers("dense", &[integrator.statistics().dense as u32]);
             report::numbers("solve", &ranges[0]);
             report::numbers("forward", &ranges[1]);
             Ok(())

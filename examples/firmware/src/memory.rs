@@ -33,18 +33,38 @@ impl<T> Static<T> {
     }
 }
 
-impl<T: Copy, const N: usize> Static<[T; N]> {
-    /// Copies of a number, written where they are to be: they may be more than the stack holds.
-    pub fn fill(&'static self, number: T) -> Option<&'static mut [T]> {
-        let place = self.place()?.as_mut_ptr().cast::<MaybeUninit<T>>();
-        // SAFETY: an array of places is what the place of an array is, and no other reference to it is there.
-        let places = unsafe { core::slice::from_raw_parts_mut(place, N) };
-        for place in places.iter_mut() {
-            place.write(number);
-        }
-        // SAFETY: all are written.
-        Some(unsafe { core::slice::from_raw_parts_mut(places.as_mut_ptr().cast::<T>(), N) })
+/// All that a controller is made of: numbers and indices that it points to, and itself.
+pub struct Whole<T, const NUMBERS: usize, const INDICES: usize, C> {
+    numbers: [T; NUMBERS],
+    indices: [u32; INDICES],
+    controller: MaybeUninit<C>,
+}
+
+/// The parts of a [`Whole`].
+pub type Parts<T, C> = (&'static mut [T], &'static mut [u32], &'static mut MaybeUninit<C>);
+
+impl<T: Copy, const NUMBERS: usize, const INDICES: usize, C> Static<Whole<T, NUMBERS, INDICES, C>> {
+    /// Zeros, written where they are to be, for they may be more than the stack holds, and a place.
+    pub fn parts(&'static self, zero: T) -> Option<Parts<T, C>> {
+        let place = self.place()?.as_mut_ptr();
+        // SAFETY: the fields of a place are places, and no other reference to them is there.
+        let (numbers, indices, controller) = unsafe {
+            (
+                &mut *(&raw mut (*place).numbers).cast::<[MaybeUninit<T>; NUMBERS]>(),
+                &mut *(&raw mut (*place).indices).cast::<[MaybeUninit<u32>; INDICES]>(),
+                &mut *(&raw mut (*place).controller),
+            )
+        };
+        Some((fill(numbers, zero), fill(indices, 0), controller))
     }
+}
+
+fn fill<T: Copy>(places: &mut [MaybeUninit<T>], value: T) -> &mut [T] {
+    for place in places.iter_mut() {
+        place.write(value);
+    }
+    // SAFETY: all are written.
+    unsafe { core::slice::from_raw_parts_mut(places.as_mut_ptr().cast::<T>(), places.len()) }
 }
 
 impl<T> Default for Static<T> {

@@ -1,10 +1,11 @@
 //! Model predictive control: a pendulum on a cart hangs down, is swung up and kept there in spite of a kick, with force and
 //! rail bounded. One real-time iteration in each sample.
 
+use crate::memory::Parts;
 use crate::pendulum::Pendulum;
 use crate::{board, report};
 use casados::memory::fallback::Refusing;
-use casados::ocp::{Horizon, LeastSquaresCost, OcpError, Problem, RealTime};
+use casados::ocp::{GaussNewton, Horizon, LeastSquaresCost, OcpError, Problem, RealTime};
 use casados::qp::{InteriorPoint, StageDims};
 use casados::{Gauss, Inline, Irk, Real, function, mode};
 use nalgebra::{Vector1, Vector4};
@@ -35,7 +36,17 @@ type Dynamics<T> = Irk<Pendulum, Gauss<2>, T, Inline<mode::Forward, 1, Refusing>
 /// The problem: an integrator that is its own memory, and squares of deviations.
 pub type Controlled<T> = Problem<Dynamics<T>, LeastSquaresCost<Deviation, T>, LeastSquaresCost<End, T>>;
 
-/// All memory of the controller in one static of a size that is known here.
+/// The controller, which points to its numbers and indices.
+pub type Controller<T> = RealTime<
+    Controlled<T>,
+    InteriorPoint<T, &'static mut [T], &'static mut [u32]>,
+    GaussNewton,
+    T,
+    &'static [StageDims],
+    &'static mut [T],
+>;
+
+/// All memory of the controller in one static, whose size is a constant.
 #[macro_export]
 macro_rules! mpc {
     ($number:ty) => {
@@ -45,38 +56,60 @@ macro_rules! mpc {
         const PLAN: usize = casados::qp::Solution::<$number, (), ()>::memory(&DIMS);
         const SOLVER: (usize, usize) =
             casados::qp::InteriorPoint::<$number, (), ()>::memory(&DIMS, $crate::mpc::BOUNDS, 0, 0);
-        static NUMBERS: $crate::memory::Static<[$number; PROBLEM + PLAN + SOLVER.0]> =
-            $crate::memory::Static::new();
-        static INDICES: $crate::memory::Static<[u32; SOLVER.1]> = $crate::memory::Static::new();
+        type Whole = $crate::memory::Whole<
+            $number,
+            { PROBLEM + PLAN + SOLVER.0 },
+            { SOLVER.1 },
+            $crate::mpc::Controller<$number>,
+        >;
+        /// Bytes of the controller. There is nothing else: `cargo doc` prints the number.
+        pub const SIZE: usize = size_of::<Whole>();
+        static WHOLE: $crate::memory::Static<Whole> = $crate::memory::Static::new();
 
         #[cfg_attr(target_os = "none", cortex_m_rt::entry)]
         fn main() -> ! {
-            let good = match (NUMBERS.fill(0.0), INDICES.fill(0)) {
-                (Some(numbers), Some(indices)) => {
-                    let result = $crate::mpc::run(&DIMS, numbers, [PROBLEM, PLAN], indices);
+            let good = match WHOLE.parts(0.0) {
+                Some(parts) => {
+                    let result = $crate::mpc::run(&DIMS, parts, [PROBLEM, PLAN]);
                     result.map_err(|error| $crate::board::explain(&error)).is_ok()
                 }
-                _ => false,
+                None => false,
             };
+            $crate::report::numbers("memory", &[SIZE as u32]);
             $crate::board::exit(good)
         }
     };
 }
 
-/// Runs the loop, and prints every tenth state, how many instructions a sample takes and how much stack.
+/// Makes the controller and runs the loop. Prints what both take of the stack.
 ///
 /// # Errors
 /// Those of the controller.
 #[inline(never)]
 pub fn run<T: Real>(
     dims: &'static [StageDims],
-    numbers: &'static mut [T],
-    [problem, plan]: [usize; 2],
-    indices: &'static mut [u32],
+    parts: Parts<T, Controller<T>>,
+    lengths: [usize; 2],
 ) -> Result<(), OcpError> {
-    let number = T::from_f64;
     let top = board::paint();
-    report::numbers("memory", &[(size_of_val(numbers) + size_of_val(indices)) as u32]);
+    let controller = start(dims, parts, lengths)?;
+    report::numbers("start-stack", &[board::used(top)]);
+    let top = board::paint();
+    drive(controller)?;
+    report::numbers("stack", &[board::used(top)]);
+    Ok(())
+}
+
+/// Where the pendulum hangs, or nearly so: on its way up it has to choose a side.
+const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
+
+#[inline(never)]
+fn start<T: Real>(
+    dims: &'static [StageDims],
+    (numbers, indices, place): Parts<T, Controller<T>>,
+    [problem, plan]: [usize; 2],
+) -> Result<&'static mut Controller<T>, OcpError> {
+    let number = T::from_f64;
     let (problem, rest) = numbers.split_at_mut_checked(problem).unwrap_or_default();
     let (plan, solver) = rest.split_at_mut_checked(plan).unwrap_or_default();
 
@@ -86,14 +119,20 @@ pub fn run<T: Real>(
         .stage_cost(LeastSquaresCost::<Deviation, T>::diagonal(&[1.0, 10.0, 0.1, 0.1, 0.01].map(number)))
         .terminal_cost(LeastSquaresCost::<End, T>::diagonal(&[20.0, 100.0, 5.0, 5.0].map(number)))
         .on_horizon(Horizon::uniform(INTERVALS, number(SAMPLE)), dims, problem)?;
-    let mut x = [0.0, 3.14, 0.0, 0.0].map(number);
+    let x = HANGING.map(number);
     ocp.bound("u", .., number(-FORCE), number(FORCE))?.bound("x[0]", .., number(-RAIL), number(RAIL))?;
     ocp.fix_initial_state(&x)?.guess(&x, &[T::ZERO])?;
     let mut qp_solver = InteriorPoint::in_memory(solver, indices);
     // A sample takes so long at most.
     (qp_solver.options.max_iterations, qp_solver.options.locate) = (20, false);
-    let mut controller = RealTime::in_memory(ocp, qp_solver, dims, plan)?;
+    Ok(place.write(RealTime::in_memory(ocp, qp_solver, dims, plan)?))
+}
 
+/// Runs the loop, and prints every tenth state and how many instructions a sample takes.
+#[inline(never)]
+fn drive<T: Real>(controller: &mut Controller<T>) -> Result<(), OcpError> {
+    let number = T::from_f64;
+    let mut x = HANGING.map(number);
     let (mut preparation, mut feedback, mut iterations) = ([u32::MAX, 0], [u32::MAX, 0], [u32::MAX, 0]);
     for sample in 0..SAMPLES {
         if sample == KICK.0 {
@@ -117,7 +156,6 @@ pub fn run<T: Real>(
             report::reals("state", &x);
         }
     }
-    report::numbers("stack", &[board::used(top)]);
     report::numbers("prepare", &preparation);
     report::numbers("feedback", &feedback);
     report::numbers("iterations", &iterations);

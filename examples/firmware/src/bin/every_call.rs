@@ -5,6 +5,7 @@ use casados::prelude::*;
 use casados::{mode, result::Seeds};
 use core::hint::black_box;
 use firmware::board;
+use firmware::catalyst::Catalyst;
 use firmware::pendulum::Pendulum;
 use firmware::quadrotor::Quadrotor;
 use nalgebra::{SMatrix, SVector};
@@ -61,6 +62,7 @@ fn refusing() -> Result<(), Error> {
 fn main() -> ! {
     let mut good = every_call!(Irk, Pendulum, 4, 1, Gauss<2>, f64);
     good &= every_call!(Irk, Pendulum, 4, 1, RadauIIA<3>, f32);
+    good &= every_call!(Irk, Catalyst, 3, 2, RadauIIA<2>, f64);
     good &= every_call!(Irk, Quadrotor, 12, 4, Gauss<1>, f32);
     good &= refusing().is_ok();
     good &= every_call!(Erk, Pendulum, 4, 1, Rk4, f64);
