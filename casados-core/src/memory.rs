@@ -171,6 +171,17 @@ impl<V: Zeroable> Default for Inside<V> {
 
 /// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps; with what it is to fall back on
 /// ([`fallback`]), or without.
+///
+/// An integrator has the constant `SIZE`, how many bytes it takes: there are no others. For a pendulum on a cart (four states, a
+/// control) in `f64` on a 32-bit processor:
+///
+/// | integrator | [`mode::Nominal`] | [`mode::Forward`] | [`mode::Adjoint`] | [`mode::Hessian`] |
+/// |---|---|---|---|---|
+/// | `Irk`, `Gauss<2>` | 3456 | 4912 | 3776 | 9096 |
+/// | `Erk`, `Rk4` | 1344 | 2912 | 1344 | 3872 |
+///
+/// For a model of one's own `cargo doc` prints the number beside a public constant that is `SIZE`, for the target that it is
+/// asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Inline<Mode, const STEPS: usize = 1, F = fallback::Pivoting>(PhantomData<fn() -> (Mode, F)>);
 

@@ -155,6 +155,29 @@ def links(cpu, program):
     return True
 
 
+DOCUMENTED = {
+    "Pendulum-f64": "pendulum, 4 states",
+    "PlanarQuadrotor-f64": "6 states",
+    "Quadrotor-f64": "12 states",
+    "implicit": "`Irk`, `Gauss<2>`",
+    "explicit": "`Erk`, `Rk4`",
+}
+
+
+def documented():
+    """Rows of the sizes of integrators that no documentation has."""
+    files = (HERE.parents[1] / file for file in ("docs/embedded.md", "casados-core/src/memory.rs"))
+    text = "".join(file.read_text() for file in files)
+    sizes = run("cortex-m7", build("cortex-m7", ["sizes"])["sizes"])
+    for name, model in DOCUMENTED.items():
+        values = sizes[name]
+        if name.endswith("f64"):
+            values = [f"{whole}, {lean}" for whole, lean in zip(values[::2], values[1::2])]
+        row = "|" + "|".join(f" {cell} " for cell in [model, *values]) + "|"
+        if row not in text:
+            yield f"documentation: sizes are {row}"
+
+
 def check():
     budgets = tomllib.loads((HERE / "budgets.toml").read_text())
     mistakes = []
@@ -186,6 +209,7 @@ def check():
             if case.get("single"):
                 found = doubles(cpu, programs[program])
                 hold(name, "calls of double precision", sum(found.values()), 0)
+    mistakes += documented()
     if links("cortex-m7", "panics"):
         mistakes.append("panics: a program that can panic links")
     sys.exit("\n".join(mistakes) if mistakes else 0)

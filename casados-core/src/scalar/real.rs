@@ -200,7 +200,7 @@ real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = libm::sqrt, c
     sin = double::sin, cos = double::cos, tan = double::tan, asin = libm::asin, acos = libm::acos, atan = libm::atan,
     sinh = libm::sinh, cosh = libm::cosh, tanh = libm::tanh, asinh = libm::asinh, acosh = libm::acosh,
     atanh = libm::atanh; libm::pow, libm::atan2, libm::hypot, double::sin_cos);
-real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = single::sqrt, cbrt = single::cbrt, exp = libm::expf,
+real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = single::sqrt, cbrt = single::cbrt, exp = single::exp,
     exp2 = single::exp2, exp_m1 = libm::expm1f, ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f,
     log10 = libm::log10f, sin = single::sin, cos = single::cos, tan = single::tan, asin = single::asin,
     acos = libm::acosf, atan = libm::atanf, sinh = libm::sinhf, cosh = libm::coshf, tanh = libm::tanhf,

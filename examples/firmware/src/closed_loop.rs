@@ -17,8 +17,10 @@ const SAMPLES: usize = 250;
 /// The gain of a linear quadratic regulator: weights 1, 10, 0.1, 0.1 of the state, 0.01 of the force.
 const GAIN: [f64; 4] = [-8.65, 73.7, -10.88, 19.44];
 
-/// Bytes of the predictor: `cargo doc` prints the numbers.
-pub const SIZE: [usize; 2] = [Predictor::<f32>::SIZE, Predictor::<f64>::SIZE];
+/// Bytes of the predictor in `f32`: `cargo doc` prints the number.
+pub const SIZE_F32: usize = Predictor::<f32>::SIZE;
+/// Bytes of the predictor in `f64`.
+pub const SIZE_F64: usize = Predictor::<f64>::SIZE;
 
 /// Makes the predictor and runs the loop. Prints what both take of the stack.
 pub fn run<T: Real>(name: &str, memory: &'static Static<Predictor<T>>) -> Result<(), Error> {

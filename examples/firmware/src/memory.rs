@@ -24,6 +24,7 @@ impl<T> Static<T> {
         Some(self.place()?.write(value))
     }
 
+    #[allow(clippy::mut_from_ref, reason = "there is one call that gets it")]
     fn place(&'static self) -> Option<&'static mut MaybeUninit<T>> {
         if self.taken.swap(true, Ordering::Relaxed) {
             return None;
@@ -52,7 +53,7 @@ impl<T: Copy, const NUMBERS: usize, const INDICES: usize, C> Static<Whole<T, NUM
             (
                 &mut *(&raw mut (*place).numbers).cast::<[MaybeUninit<T>; NUMBERS]>(),
                 &mut *(&raw mut (*place).indices).cast::<[MaybeUninit<u32>; INDICES]>(),
-                &mut *(&raw mut (*place).controller),
+                &mut (*place).controller,
             )
         };
         Some((fill(numbers, zero), fill(indices, 0), controller))

@@ -101,6 +101,7 @@ pub fn run<T: Real>(
 }
 
 /// Where the pendulum hangs, or nearly so: on its way up it has to choose a side.
+#[allow(clippy::approx_constant, reason = "nearly is meant")]
 const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
 
 #[inline(never)]

@@ -43,9 +43,9 @@ fn errors_are_below_their_bounds() {
     }
     below!(
         0.5: sqrt = super::sqrt;
-        0.82: sin = super::sin, cos = super::cos;
+        0.82: sin = super::sin, cos = super::cos, exp = super::exp;
         1.0: tan = super::tan, exp2 = super::exp2, asin = super::asin, cbrt = super::cbrt;
-        1.0: exp = libm::expf, ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f, log10 = libm::log10f,
+        1.0: ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f, log10 = libm::log10f,
             exp_m1 = libm::expm1f, acos = libm::acosf, atan = libm::atanf;
         3.0: sinh = libm::sinhf, cosh = libm::coshf, tanh = libm::tanhf, asinh = libm::asinhf, acosh = super::acosh,
             atanh = libm::atanhf;
@@ -93,5 +93,7 @@ fn signs_and_special_values() {
         assert!(super::sin(a).is_nan() && super::cos(a).is_nan() && super::tan(a).is_nan());
     }
     assert!(super::hypot(f32::NAN, f32::INFINITY) == f32::INFINITY && super::hypot(f32::NAN, 1.0).is_nan());
+    assert!(super::exp(f32::INFINITY) == f32::INFINITY && super::exp(f32::NEG_INFINITY) == 0.0);
+    assert!(super::exp(0.0) == 1.0 && super::exp(f32::NAN).is_nan());
     assert!(super::asin(1.5).is_nan() && super::exp2(f32::NAN).is_nan() && super::cbrt(f32::NAN).is_nan());
 }

@@ -1,8 +1,8 @@
-//! Bytes of integrators with forward sensitivities: with what they fall back on, and without.
+//! Bytes of integrators: with forward sensitivities, with what they fall back on and without; and for every mode.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use casados::memory::fallback::{Pivoting, Refusing};
-use casados::{Gauss, Inline, Irk, mode};
+use casados::{Erk, Gauss, Inline, Irk, Rk4, mode};
 use firmware::pendulum::Pendulum;
 use firmware::quadrotor::{PlanarQuadrotor, Quadrotor};
 use firmware::{board, report};
@@ -20,6 +20,16 @@ macro_rules! sizes {
     };
 }
 
+/// For every mode.
+macro_rules! modes {
+    ($($name:literal: $integrator:ident<$method:ty>;)*) => { $(report::numbers($name, &[
+        $integrator::<Pendulum, $method, f64, Inline<mode::Nominal>>::SIZE as u32,
+        $integrator::<Pendulum, $method, f64, Inline<mode::Forward>>::SIZE as u32,
+        $integrator::<Pendulum, $method, f64, Inline<mode::Adjoint>>::SIZE as u32,
+        $integrator::<Pendulum, $method, f64, Inline<mode::Hessian>>::SIZE as u32,
+    ]);)* };
+}
+
 #[cfg_attr(target_os = "none", cortex_m_rt::entry)]
 fn main() -> ! {
     sizes! {
@@ -30,5 +40,6 @@ fn main() -> ! {
         "PlanarQuadrotor-f32": PlanarQuadrotor, f32;
         "Quadrotor-f32": Quadrotor, f32;
     }
+    modes! { "implicit": Irk<Gauss<2>>; "explicit": Erk<Rk4>; }
     board::exit(true)
 }
