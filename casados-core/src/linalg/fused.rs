@@ -108,8 +108,10 @@ pub trait Kernel {
 #[allow(unsafe_code)]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    // Never inlined, so that callers are small.
-    #[inline(never)]
+    // Never inlined beside others, so that callers are small. Where it is the only one, the optimiser is to see from outside
+    // that nothing in it panics.
+    #[cfg_attr(feature = "std", inline(never))]
+    #[cfg_attr(not(feature = "std"), inline(always))]
     fn base<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Separate>()
     }

@@ -279,12 +279,19 @@ pub fn limit(limit: Level) {
 /// The widest registers that this machine has and [`limit`] allows.
 #[inline(always)]
 pub fn level() -> Level {
-    match LEVEL.load(Ordering::Relaxed) {
+    let level = match LEVEL.load(Ordering::Relaxed) {
         level if level == Level::Single as u8 => Level::Single,
         level if level == Level::Base as u8 => Level::Base,
-        level if may_be(Level::Avx2) && level == Level::Avx2 as u8 => Level::Avx2,
-        level if may_be(Level::Avx512) && level == Level::Avx512 as u8 => Level::Avx512,
+        level if level == Level::Avx2 as u8 => Level::Avx2,
+        level if level == Level::Avx512 as u8 => Level::Avx512,
         _ => find(),
+    };
+    // What there cannot be the compiler leaves out.
+    match level {
+        Level::Avx512 if may_be(Level::Avx512) => Level::Avx512,
+        Level::Avx2 | Level::Avx512 if may_be(Level::Avx2) => Level::Avx2,
+        Level::Single => Level::Single,
+        _ => Level::Base,
     }
 }
 
