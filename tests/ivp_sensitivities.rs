@@ -226,10 +226,19 @@ fn derivatives_of_the_frozen_map() {
     let (u, t) = (SVector::zeros(), 20.0);
     let mut adaptive = integrator::<AkzoNobel, 9>(&p, 1e-4, 1e-8);
     let lambda = SVector::<f64, 5>::from([1.0, -2.0, 0.5, 3.0, 1.5]);
-    let hessian = *adaptive.hessian(&x0, &u, t, &lambda).expect("second derivatives");
+    let run = *adaptive.hessian(&x0, &u, t, &lambda).expect("second derivatives");
     adaptive.freeze().expect("steps are remembered");
     let times: Vec<f64> = adaptive.times().collect();
     assert!(times.len() > 5);
+    // Before, each step was taken from where the run was, which had solved its equations to a part of the tolerance.
+    let hessian = *adaptive.hessian(&x0, &u, t, &lambda).expect("second derivatives");
+    for (run, frozen) in [
+        (run.grad_x0.as_slice(), &hessian.grad_x0.as_slice()),
+        (run.grad_p.as_slice(), &hessian.grad_p.as_slice()),
+    ] {
+        let size = frozen.iter().fold(0.0_f64, |size, value| size.max(value.abs()));
+        assert!(run.iter().zip(*frozen).all(|(a, b)| (a - b).abs() <= 1e-4 * size));
+    }
 
     // Rounding of Newton's method, ε, times the condition of sums of a few dozen terms.
     let forward = *adaptive.forward(&x0, &u, t).expect("derivatives");
@@ -305,6 +314,29 @@ fn derivatives_of_frozen_explicit_steps() {
         assert!(error <= 1e-7 * hessian.dx_dx0.amax(), "{error:e}");
         let error = ((above.grad_x0 - below.grad_x0) / (2.0 * delta) - hessian.h_xx.column(w)).amax();
         assert!(error <= 1e-6 * hessian.h_xx.amax(), "{error:e}");
+    }
+}
+
+/// At any tolerance derivatives are those of the run that was made: jumps, which amplify by a million, do not lead elsewhere what is
+/// taken again.
+#[test]
+fn derivatives_of_coarse_runs() {
+    let (x0, p) = problem("van_der_pol_1e3");
+    let (x0, t) = (SVector::<f64, 2>::from_column_slice(&x0), 2000.0);
+    let references = references("first", "van_der_pol_1e3");
+    let reference = references.iter().find(|r| r.number("t").is_ok_and(|at| at == t)).expect("the end");
+    let expected = reference.matrix::<2, 1>("dx_dp").expect("derivatives")[0];
+    for rtol in [1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6] {
+        let mut adaptive = integrator::<VanDerPol, 1>(&p, rtol, rtol);
+        let solved = adaptive.solve(&x0, &SVector::zeros(), t).expect("a solution").x;
+        let forward = *adaptive.forward(&x0, &SVector::zeros(), t).expect("derivatives");
+        // The last step begins within the tolerance of where it began.
+        let apart = (forward.x[0] - solved[0]).abs();
+        let error = (forward.dx_dp[0] - expected).abs();
+        println!("{rtol:e}: {apart:e} {error:e}");
+        assert!(apart <= 3.0 * rtol * (1.0 + solved[0].abs()), "{rtol:e}: {} {}", forward.x[0], solved[0]);
+        // At the coarsest two the period itself is wrong.
+        assert!(rtol > 1e-2 || error <= 20.0 * rtol, "{rtol:e}: {error:e}");
     }
 }
 

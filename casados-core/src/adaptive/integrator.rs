@@ -213,7 +213,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             self.check_frozen(span)?;
             let Self { base, consistent, tape, state, .. } = self;
             let given = base.given;
-            Frozen { base, consistent, tape, span, given }.solve::<B>(state, x0, None)?;
+            Frozen { base, consistent, tape, span, given, chosen: false }.solve::<B>(state, x0, None)?;
         } else {
             let record = self.options.keep_steps;
             self.run(x0, u, t_end, record, |_, _| Ok(()))?;
@@ -300,7 +300,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
 
     /// The solution, and its derivatives with respect to `x₀`, `u` and `p`: of the steps that were taken, exactly.
     ///
-    /// The steps are chosen as in [`Integrator::solve`], then kept, and their stages solved to rounding.
+    /// The steps are chosen as in [`Integrator::solve`], then kept, and their stages solved to rounding, each from where the run took it.
     ///
     /// # Errors
     /// See [`Integrator`]; those of Newton's method with steps that are kept.
@@ -475,12 +475,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
 
     #[allow(clippy::type_complexity)]
     fn parts(&mut self) -> Result<(Frozen<'_, M, T>, &mut B::State, &mut Memory<M, T>, &mut Vec<T>), Error> {
-        let Self { base, consistent, tape, last, state, memory, history, .. } = self;
+        let Self { base, consistent, tape, last, state, memory, history, frozen, .. } = self;
         let span = last.ok_or(Error::NoResult)?;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
         let given = base.given;
-        Ok((Frozen { base, consistent, tape, span, given }, state, memory, history))
+        let chosen = frozen.is_none();
+        Ok((Frozen { base, consistent, tape, span, given, chosen }, state, memory, history))
     }
 
     pub(super) fn run(

@@ -46,18 +46,19 @@ impl<M: Dae, T: Real> Default for Segment<M, T> {
 }
 
 impl<M: Dae, T: Real> Segment<M, T> {
-    /// The steps of this interval, to be taken again and differentiated; `V_k`.
+    /// The steps of this interval, to be taken again and differentiated, and whether they were chosen for these inputs; `V_k`.
     #[allow(clippy::type_complexity)]
     pub fn open<'a, B: Engine<M, T>>(
         &'a mut self,
         integrator: &'a mut Integrator<M, B, T>,
+        chosen: bool,
     ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
         let Integrator { base, consistent, state, memory, .. } = integrator;
         base.u = self.u;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
         let Self { tape, span, given, v, .. } = self;
-        Ok((Frozen { base, consistent, tape, span: *span, given: *given }, state, memory, v))
+        Ok((Frozen { base, consistent, tape, span: *span, given: *given, chosen }, state, memory, v))
     }
 }
 

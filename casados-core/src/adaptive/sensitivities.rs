@@ -49,10 +49,13 @@ pub struct Frozen<'a, M: Dae, T: Real> {
     pub span: Span<T>,
     /// Start values of `(ẋ, z)`.
     pub given: ArrayK<M, T>,
+    /// Whether the steps were chosen for these inputs: then each is taken from where the run took it. Steps that are solved to rounding one
+    /// after the other lead elsewhere than those that were solved to a coarse tolerance, where errors grow by much, and do not fit there.
+    pub chosen: bool,
 }
 
 impl<M: Dae, T: Real> Frozen<'_, M, T> {
-    /// Takes all steps from `x0` again, to rounding; `each` is called to take one, and returns what it gave.
+    /// Takes all steps again, to rounding; `each` is called to take one, and returns what it gave.
     fn steps<B: Engine<M, T>>(
         &mut self,
         state: &mut B::State,
@@ -76,7 +79,10 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         for step in 0..self.tape.entries().len() {
             let Some(entry) = self.tape.entries().get(step).copied() else { break };
             let replays = B::replays(state);
-            let (_, y) = self.tape.numbers(step, M::Shape::NX);
+            let (start, y) = self.tape.numbers(step, M::Shape::NX);
+            if self.chosen {
+                crate::qp::assign(x.as_mut_slice(), start);
+            }
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let taken = Taken { at, h: entry.h, y, level: entry.level };
             let (end, z) = each(replays, &taken, step).map_err(|error| in_step(error, step))?;

@@ -102,7 +102,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         segment.tape.stretch(start, end);
         segment.span = Span { start, end };
         let x = segment.x;
-        let (mut frozen, state, ..) = segment.open(integrator)?;
+        let (mut frozen, state, ..) = segment.open(integrator, false)?;
         frozen.solve::<B>(state, &x, None)?;
         if k == 0 {
             solution.nominal.z0 = integrator.base.result.z0;
