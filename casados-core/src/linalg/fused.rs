@@ -123,8 +123,8 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     fn avx512<K: Kernel>(kernel: K) -> K::Output {
         kernel.run::<Fused>()
     }
-    // Only what lies in such registers needs AVX-512: other kernels are up to a tenth faster without.
-    if const { size_of::<K::Number>() > 32 } {
+    // Only what lies in such registers, which are aligned to themselves, needs AVX-512: other kernels are up to a tenth faster without.
+    if const { align_of::<K::Number>() > 32 } {
         match level() {
             // SAFETY: the one condition of calling a function with target features is that the machine has
             // them, which is what `level` says.
