@@ -81,7 +81,9 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let replays = B::replays(state);
             let (start, y) = self.tape.numbers(step, M::Shape::NX);
             if self.chosen {
-                crate::qp::assign(x.as_mut_slice(), start);
+                for (x, start) in x.as_mut_slice().iter_mut().zip(start) {
+                    *x = *start;
+                }
             }
             let at = At { x: &x, u, p: parameters, t: entry.t };
             let taken = Taken { at, h: entry.h, y, level: entry.level };

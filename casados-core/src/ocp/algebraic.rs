@@ -126,7 +126,8 @@ impl<'a, T: Real> Extended<'a, T> {
     }
 }
 
+/// An element; zero where there is none.
 #[inline(always)]
-fn get<T: Real>(values: &[T], index: usize) -> T {
+pub(super) fn get<T: Real>(values: &[T], index: usize) -> T {
     values.get(index).copied().unwrap_or(T::ZERO)
 }

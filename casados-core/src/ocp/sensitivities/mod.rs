@@ -4,6 +4,7 @@ mod active;
 mod parameters;
 mod recursion;
 
+use super::algebraic::get;
 use super::error::{OcpError, Part};
 use super::instance::{Initial, Ocp};
 use super::linearise::Curvature;
@@ -123,10 +124,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-#[inline(always)]
-fn get<T: Real>(values: &[T], index: usize) -> T {
-    values.get(index).copied().unwrap_or(T::ZERO)
-}
 #[inline(always)]
 fn set<T: Real>(values: &mut [T], index: usize, value: T) {
     if let Some(element) = values.get_mut(index) {
