@@ -3,7 +3,8 @@
 
 use casados::shape::Shape;
 use casados::{
-    Adaptive, AdaptiveOptions, Dae, DormandPrince5, DormandPrince8, Error, Gauss, Radau, RadauIIA,
+    Adaptive, AdaptiveOptions, Crossing, Dae, DormandPrince5, DormandPrince8, Error, Event, Gauss, Hybrid,
+    Piecewise, Radau, RadauIIA,
 };
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
@@ -337,6 +338,48 @@ fn derivatives_of_coarse_runs() {
         assert!(apart <= 3.0 * rtol * (1.0 + solved[0].abs()), "{rtol:e}: {} {}", forward.x[0], solved[0]);
         // At the coarsest two the period itself is wrong.
         assert!(rtol > 1e-2 || error <= 20.0 * rtol, "{rtol:e}: {error:e}");
+    }
+}
+
+#[casados::function]
+fn level(x: [f64; 2], _p: f64) -> f64 {
+    x[0] - 1.8
+}
+
+#[casados::function]
+fn unchanged(x: [f64; 2], _p: f64) -> [f64; 2] {
+    x
+}
+
+/// So are those over events on the slow branch, and over intervals one after the other, and both ways to a gradient give the same. Other steps
+/// have other errors, which the jumps amplify by a million: found are up to 83 tolerances.
+#[test]
+fn derivatives_of_coarse_runs_in_parts() {
+    let (x0, p) = problem("van_der_pol_1e3");
+    let (x0, t) = (SVector::<f64, 2>::from_column_slice(&x0), 2000.0);
+    let references = references("first", "van_der_pol_1e3");
+    let reference = references.iter().find(|r| r.number("t").is_ok_and(|at| at == t)).expect("the end");
+    let expected = reference.matrix::<2, 1>("dx_dp").expect("derivatives")[0];
+    let (u, lambda) = (SVector::zeros(), SVector::from([1.0, 0.0]));
+    for rtol in [3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6] {
+        let event = Event::jump::<Level, Unchanged>(Crossing::Falling);
+        let mut hybrid = Hybrid::new(integrator::<VanDerPol, 1>(&p, rtol, rtol), &[event]).expect("memory");
+        let forward = hybrid.forward(&x0, &u, t).expect("derivatives");
+        let adjoint = hybrid.adjoint(&x0, &u, t, &lambda).expect("a gradient");
+        assert_eq!(forward.solution.occurrences.len(), 2);
+        let mut piecewise = Piecewise::new(integrator::<VanDerPol, 1>(&p, rtol, rtol));
+        let (controls, ends) = ([u; 3], [500.0, 1500.0, t]);
+        let parts = piecewise.forward(&x0, &controls, &ends).expect("derivatives");
+        let backwards = piecewise.adjoint(&x0, &controls, &ends, &lambda).expect("a gradient");
+        for (found, gradient) in
+            [(forward.dx_dp[0], adjoint.grad_p[0]), (parts.dx_dp[0], backwards.grad_p[0])]
+        {
+            let error = (found - expected).abs();
+            println!("{rtol:e}: {error:e}");
+            assert!(error <= 100.0 * rtol, "{rtol:e}: {error:e}");
+            // Rounding, which the jumps amplify: 4.5e-9 of a derivative, see above.
+            assert!((gradient - found).abs() <= 4.5e-9 * found.abs(), "{rtol:e}: {found:e} {gradient:e}");
+        }
     }
 }
 

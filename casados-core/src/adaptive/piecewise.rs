@@ -237,7 +237,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         self.replay(x0, reborrow(&mut along))?;
-        let chosen = !self.frozen;
         let Self { integrator, segments, count, nominal, .. } = self;
         let mut result = PiecewiseAdjoint {
             nominal: *nominal,
@@ -246,7 +245,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             grad_p: VectorP::<M, T>::zeroed(),
         };
         for (segment, grad_u) in segments.iter_mut().zip(&mut result.grad_u).rev() {
-            let (mut frozen, state, memory, _) = segment.open(integrator, chosen)?;
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
             frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut along))?;
             result.grad_x0.as_mut_slice().copy_from_slice(memory.adjoint.grad_x0.as_slice());
             grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
@@ -281,7 +280,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         mut sum: Vec<T>,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
-        let chosen = !self.frozen;
         let Self { integrator, segments, count, nominal, .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let mut adjoint = PiecewiseAdjoint {
@@ -293,7 +291,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let mut product = filled(M::Shape::NW * at.all(), T::ZERO)?;
         for (k, segment) in segments.iter_mut().enumerate().take(*count).rev() {
             let history = core::mem::take(&mut segment.history);
-            let (mut frozen, state, memory, v) = segment.open(integrator, chosen)?;
+            let (mut frozen, state, memory, v) = segment.open(integrator)?;
             let mut part = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, dynamic(&mut part))?;
             let Memory { hessian, step, .. } = memory;
@@ -321,6 +319,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     pub fn freeze(&mut self) -> Result<(), Error> {
         if self.count == 0 {
             return Err(Error::NoResult);
+        }
+        for segment in &mut self.segments {
+            segment.chosen = false;
         }
         self.frozen = true;
         Ok(())
@@ -374,6 +375,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         for (k, ((segment, u), end)) in segments.iter_mut().zip(controls).zip(ends).enumerate() {
             let span = Span { start: integrator.start, end: *end };
             (segment.x, segment.u, segment.span, segment.given) = (x, *u, span, integrator.base.given);
+            segment.chosen = true;
             let result = integrator.run(&x, u, *end, true, |_, _| Ok(()));
             statistics.add(&integrator.statistics);
             result?;
@@ -422,7 +424,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let mut x = *x0;
         for (k, segment) in segments.iter_mut().enumerate().take(*count) {
             segment.x = x;
-            let (mut frozen, state, ..) = segment.open(integrator, false)?;
+            let (mut frozen, state, ..) = segment.open(integrator)?;
             let mut part = chain(&mut along, None, false);
             frozen.solve::<B>(state, &x, dynamic(&mut part))?;
             x = integrator.base.result.x;
@@ -440,7 +442,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         mut sums: Option<&mut Sums<M, T>>,
     ) -> Result<PiecewiseForward<M, T>, Error> {
         begin(&mut along);
-        let chosen = !self.frozen;
         let Self { integrator, segments, count, nominal, .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let (nx, width) = (M::Shape::NX, at.all());
@@ -466,7 +467,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             }
             let mut history = core::mem::take(&mut segment.history);
             history.clear();
-            let (mut frozen, state, memory, _) = segment.open(integrator, chosen)?;
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
             let mut part = chain(&mut along, None, second);
             frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
             if let (Some(sums), Some(integrand)) = (&mut sums, &mut along) {

@@ -17,6 +17,8 @@ use bytemuck::Zeroable;
 /// The steps of one interval.
 pub(super) struct Segment<M: Dae, T: Real> {
     pub tape: Tape<T>,
+    /// See [`Frozen::chosen`].
+    pub chosen: bool,
     pub span: Span<T>,
     /// That of steps that are kept, where these are stretched.
     pub kept: Span<T>,
@@ -34,6 +36,7 @@ impl<M: Dae, T: Real> Default for Segment<M, T> {
     fn default() -> Self {
         Self {
             tape: Tape::default(),
+            chosen: false,
             span: Span { start: T::ZERO, end: T::ZERO },
             kept: Span { start: T::ZERO, end: T::ZERO },
             u: Zeroable::zeroed(),
@@ -46,19 +49,18 @@ impl<M: Dae, T: Real> Default for Segment<M, T> {
 }
 
 impl<M: Dae, T: Real> Segment<M, T> {
-    /// The steps of this interval, to be taken again and differentiated, and whether they were chosen for these inputs; `V_k`.
+    /// The steps of this interval, to be taken again and differentiated; `V_k`.
     #[allow(clippy::type_complexity)]
     pub fn open<'a, B: Engine<M, T>>(
         &'a mut self,
         integrator: &'a mut Integrator<M, B, T>,
-        chosen: bool,
     ) -> Result<(Frozen<'a, M, T>, &'a mut B::State, &'a mut Memory<M, T>, &'a [T]), Error> {
         let Integrator { base, consistent, state, memory, .. } = integrator;
         base.u = self.u;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
-        let Self { tape, span, given, v, .. } = self;
-        Ok((Frozen { base, consistent, tape, span: *span, given: *given, chosen }, state, memory, v))
+        let Self { tape, chosen, span, given, v, .. } = self;
+        Ok((Frozen { base, consistent, tape, span: *span, given: *given, chosen: *chosen }, state, memory, v))
     }
 }
 

@@ -28,7 +28,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             return Err(Error::NoResult);
         }
         for segment in self.segments.iter_mut().take(self.count) {
-            segment.kept = segment.span;
+            (segment.kept, segment.chosen) = (segment.span, false);
         }
         self.frozen = Some(asked);
         Ok(())
@@ -102,7 +102,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         segment.tape.stretch(start, end);
         segment.span = Span { start, end };
         let x = segment.x;
-        let (mut frozen, state, ..) = segment.open(integrator, false)?;
+        let (mut frozen, state, ..) = segment.open(integrator)?;
         frozen.solve::<B>(state, &x, None)?;
         if k == 0 {
             solution.nominal.z0 = integrator.base.result.z0;

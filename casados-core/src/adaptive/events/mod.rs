@@ -260,7 +260,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             segment.x = x;
             let mut history = core::mem::take(&mut segment.history);
             history.clear();
-            let (mut frozen, state, memory, _) = segment.open(integrator, false)?;
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
             // Its derivatives by where a segment begins are multiplied by those of that.
             let mut part = chain(&mut along, Some(&*v), false);
             frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
@@ -376,7 +376,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let Self { integrator, segments, solution, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             segment.x = x;
-            let (mut frozen, state, ..) = segment.open(integrator, false)?;
+            let (mut frozen, state, ..) = segment.open(integrator)?;
             let mut part = chain(&mut along, None, false);
             frozen.solve::<B>(state, &x, dynamic(&mut part))?;
             if k == 0 {
@@ -423,7 +423,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             }
             let Self { integrator, segments, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
-            let (mut frozen, state, memory, _) = segment.open(integrator, false)?;
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
             frozen.adjoint::<B>(state, &result.grad_x0, memory, reborrow(&mut along))?;
             let gradient = &memory.adjoint;
             result.grad_x0.as_mut_slice().copy_from_slice(gradient.grad_x0.as_slice());

@@ -107,7 +107,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let Self { integrator, segments, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             let history = core::mem::take(&mut segment.history);
-            let (mut frozen, state, memory, v) = segment.open(integrator, false)?;
+            let (mut frozen, state, memory, v) = segment.open(integrator)?;
             let result = frozen.hessian::<B>(state, &adjoint.grad_x0, memory, &history, None);
             if result.is_ok() {
                 let Second { h, sum, product, .. } = &mut *second;

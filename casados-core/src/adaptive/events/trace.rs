@@ -116,6 +116,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let Some(segment) = segments.get_mut(k) else { return Ok(None) };
         segment.span = Span { start, end: t_end };
         (segment.x, segment.u, segment.given) = (*x, *u, integrator.base.given);
+        segment.chosen = true;
         let (parameters, mut found, mut begin) = (integrator.base.parameters, None, start);
         place_inputs::<M, T>(v.as_mut().as_mut(), u, &parameters);
         let run = integrator.run(x, u, t_end, true, |step, dense| {
