@@ -218,14 +218,14 @@ impl Case {
         Ok(self)
     }
 
-    /// What the peers are told.
+    /// What the peers are told, with so many of the inputs.
     #[must_use]
-    pub fn json(&self) -> Value {
+    pub fn json(&self, inputs: usize) -> Value {
         let scheme = if self.family == Family::Radau { "radau" } else { "legendre" };
         json!({
             "name": self.name, "model": self.model, "nx": self.nx, "T": self.t, "scheme": scheme,
             "stages": if self.family == Family::Rk4 { 0 } else { self.stages }, "steps": self.steps,
-            "inputs": self.inputs[..1], "lambda": self.lambda, "tolerance": 1e-8,
+            "inputs": self.inputs[..inputs], "lambda": self.lambda, "tolerance": 1e-8,
         })
     }
 }

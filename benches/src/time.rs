@@ -1,6 +1,7 @@
 //! CPU time of one thread: what others run meanwhile on the same core is not counted.
 
 use cpu_time::ThreadTime;
+use serde_json::Value;
 use std::time::{Duration, Instant};
 
 /// The distribution of samples, in seconds of one call.
@@ -24,6 +25,14 @@ impl Summary {
         let at = |p: f64| samples.get((p * (samples.len() as f64 - 1.0)).round() as usize).copied();
         let at = |p| at(p).unwrap_or(f64::NAN);
         Self { median: at(0.5), q1: at(0.25), q3: at(0.75), samples: samples.len() }
+    }
+
+    /// As a peer answers.
+    #[must_use]
+    pub fn read(value: &Value) -> Self {
+        let number = |key: &str| value[key].as_f64().unwrap_or(f64::NAN);
+        let samples = value["samples"].as_u64().unwrap_or(0) as usize;
+        Self { median: number("median"), q1: number("q1"), q3: number("q3"), samples }
     }
 
     /// The same for a part of what was timed.

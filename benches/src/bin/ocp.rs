@@ -1,12 +1,13 @@
 //! Optimal control of the chain of masses: whole solutions, their linearisations and QPs, beside IPOPT with direct collocation (CasADi,
-//! where `CASADOS_PYTHON` or `python3` has it) in the same run, and acados by its times on another day.
+//! where `CASADOS_PYTHON` or `python3` has it) and acados' SQP (where `ACADOS_SOURCE_DIR` lists installations) in the same run.
 //!
 //! ```text
 //! cargo run --release --manifest-path benches/Cargo.toml --bin ocp
 //! ```
 //!
 //! Times are CPU seconds of one thread, the best of five medians. All end at a residual of 1e-6, from `x = x_rest`, `u = 0`; "condensed"
-//! in blocks of five intervals. Ratios are those of the better one.
+//! in blocks of five intervals. Ratios are those of the better one. acados is measured in the same rounds, in its fastest setting; see
+//! `benches/peers/acados_ocp.py`.
 
 #[path = "../../../examples/models/chain_problem.rs"]
 mod chain_problem;
@@ -15,11 +16,10 @@ use casados::ocp::{GaussNewton, HeapSqp, Shooting};
 use casados::prelude::*;
 use casados::qp::{Condensing, HeapInteriorPoint};
 use casados_benches::models::Chain;
-use casados_benches::record::{load, numbers, repository};
+use casados_benches::peer::Peer;
+use casados_benches::record::{load, numbers};
 use casados_benches::time::{measure, pin};
 use serde_json::{Value, json};
-use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 type Failure = Box<dyn std::error::Error>;
@@ -27,55 +27,51 @@ type Failure = Box<dyn std::error::Error>;
 const ROUNDS: usize = 5;
 const BUDGET: Duration = Duration::from_millis(200);
 
-/// IPOPT in a process of its own.
-struct Ipopt {
-    child: Child,
-    input: ChildStdin,
-    output: BufReader<ChildStdout>,
+/// Those that are there.
+struct Peers {
+    ipopt: Option<Peer>,
+    /// For several targets of BLASFEO, of which the faster counts.
+    acados: Vec<Peer>,
 }
 
-impl Ipopt {
-    fn start() -> Result<Self, Failure> {
-        let python = std::env::var("CASADOS_PYTHON").unwrap_or_else(|_| "python3".into());
-        let mut child = Command::new(python)
-            .arg(repository("benches/peers/casadi_ocp.py"))
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()?;
-        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err("no pipe".into());
-        };
-        Ok(Self { child, input, output: BufReader::new(output) })
+impl Peers {
+    fn start() -> Self {
+        let ipopt = Peer::start("casadi_ocp.py", |command| command).ok();
+        let acados =
+            Peer::acados("acados_ocp.py").inspect_err(|why| println!("acados is not measured: {why}"));
+        Self { ipopt, acados: acados.unwrap_or_default().into_iter().map(|(_, peer)| peer).collect() }
     }
-    fn ask(&mut self, request: &Value) -> Result<Value, Failure> {
-        writeln!(self.input, "{request}")?;
-        loop {
-            let mut line = String::new();
-            if self.output.read_line(&mut line)? == 0 {
-                return Err("it ended".into());
+
+    /// Milliseconds of IPOPT.
+    fn ipopt(&mut self, request: &Value) -> Option<f64> {
+        // It does not solve every one.
+        let answer =
+            self.ipopt.as_mut()?.ask(request).inspect_err(|error| eprintln!("IPOPT: {error}")).ok()?;
+        Some(1e3 * answer["seconds"].as_f64()?)
+    }
+
+    /// Milliseconds of acados, whole and linearisation, where they are less than those known so far.
+    fn acados(&mut self, request: &Value, known: &mut [f64; 2], objective: f64) {
+        for acados in &mut self.acados {
+            let answer = match acados.ask(request) {
+                Ok(answer) => answer,
+                Err(error) => return eprintln!("acados: {error}"),
+            };
+            let number = |key: &str| answer[key].as_f64().unwrap_or(f64::NAN);
+            // What ends elsewhere is no solution: both stop at a residual of 1e-6.
+            if (number("objective") / objective - 1.0).abs() > 1e-5 {
+                return eprintln!("acados: objective {}", number("objective"));
             }
-            // IPOPT introduces itself first.
-            if let Ok(answer) = serde_json::from_str::<Value>(&line) {
-                return match answer["error"].as_str() {
-                    Some(error) => Err(error.into()),
-                    None => Ok(answer),
-                };
+            for (known, key) in known.iter_mut().zip(["seconds", "linear"]) {
+                *known = known.min(1e3 * number(key));
             }
         }
     }
 }
 
-impl Drop for Ipopt {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// One size with one method: casados, IPOPT if it is there, and milliseconds of acados (whole, linearisation).
+/// One size with one method: casados, and those of the peers that are there.
 macro_rules! row {
-    ($ipopt:expr, $nx:literal, $stages:literal x $steps:literal, $acados:expr) => {{
+    ($peers:expr, $nx:literal, $stages:literal x $steps:literal) => {{
         let masses = ($nx - 3) / 6 + 2;
         let record = load(&format!("tests/data/ocp/chain_{masses}.json"))?;
         let (rest, x0) = (numbers(&record["xrest"]), numbers(&record["x0"]));
@@ -88,6 +84,14 @@ macro_rules! row {
         let mut condensed = HeapSqp::with_solver(&ocp, Condensing::new(5, HeapInteriorPoint::new()))?;
         let outcome = riccati.solve(&mut ocp)?;
         let (mut whole, mut whole_condensed, mut linear) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        let mut request = json!({
+            "masses": masses, "x_rest": rest, "x0": numbers(&record["x0"]),
+            "stages": $stages, "steps": $steps, "seconds": 0.0,
+        });
+        // Generates and compiles.
+        let mut acados = [f64::INFINITY; 2];
+        $peers.acados(&request, &mut acados, outcome.objective);
+        request["seconds"] = json!(BUDGET.as_secs_f64());
         for _ in 0..ROUNDS {
             let time = measure(BUDGET, || {
                 ocp.guess(&rest, &[0.0; 3])?;
@@ -101,22 +105,16 @@ macro_rules! row {
             whole_condensed = whole_condensed.min(1e3 * time.median);
             let time = measure(BUDGET, || ocp.linearise(GaussNewton::default()))?;
             linear = linear.min(1e3 * time.median);
+            $peers.acados(&request, &mut acados, outcome.objective);
         }
         // As often as there are iterations, and once to see that it is done.
         linear *= (outcome.iterations + 1) as f64;
-        let request = json!({
-            "masses": masses, "x_rest": rest, "x0": numbers(&record["x0"]),
-            "stages": $stages, "steps": $steps, "repetitions": 3,
-        });
-        let ipopt: Option<Value> = match &mut $ipopt {
-            // It does not solve every one.
-            Some(ipopt) => ipopt.ask(&request).inspect_err(|error| eprintln!("IPOPT: {error}")).ok(),
-            None => None,
-        };
+        request["repetitions"] = json!(3);
+        let ipopt = $peers.ipopt(&request);
         let best = whole.min(whole_condensed);
-        let (acados_whole, acados_linear): (f64, Option<f64>) = $acados;
         let ratio = |theirs: Option<f64>, mine: f64| {
-            theirs.map_or("".into(), |theirs| format!("{theirs:.1} ({:.1})", theirs / mine))
+            let known = theirs.filter(|theirs| theirs.is_finite());
+            known.map_or("".into(), |theirs| format!("{theirs:.2} ({:.2})", theirs / mine))
         };
         println!(
             "| {masses} | GL{}x{} | {} | {:.8} | {whole:.2} | {whole_condensed:.2} | {linear:.2} | {} | {} | {} |",
@@ -124,26 +122,26 @@ macro_rules! row {
             $steps,
             outcome.iterations,
             outcome.objective,
-            ratio(Some(acados_whole), best),
-            ratio(acados_linear, linear),
-            ratio(ipopt.and_then(|answer| answer["seconds"].as_f64()).map(|s| 1e3 * s), best),
+            ratio(Some(acados[0]), best),
+            ratio(Some(acados[1]), linear),
+            ratio(ipopt, best),
         );
     }};
 }
 
 fn main() -> Result<(), Failure> {
     println!("pinned: {}", pin());
-    let mut ipopt = Ipopt::start().ok();
+    let mut peers = Peers::start();
     println!("Milliseconds; in brackets how many times those of casados.\n");
     println!(
         "| masses | method | iterations | objective | whole | condensed | linearisations | acados whole | acados linearisations | IPOPT |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    row!(ipopt, 9, 2 x 2, (3.9, Some(2.4)));
-    row!(ipopt, 21, 2 x 2, (12.3, Some(8.5)));
-    row!(ipopt, 33, 2 x 2, (28.6, Some(20.7)));
-    row!(ipopt, 9, 4 x 4, (10.0, None));
-    row!(ipopt, 21, 4 x 4, (46.5, None));
-    row!(ipopt, 33, 4 x 4, (119.0, None));
+    row!(peers, 9, 2 x 2);
+    row!(peers, 21, 2 x 2);
+    row!(peers, 33, 2 x 2);
+    row!(peers, 9, 4 x 4);
+    row!(peers, 21, 4 x 4);
+    row!(peers, 33, 4 x 4);
     Ok(())
 }

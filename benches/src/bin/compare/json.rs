@@ -1,12 +1,20 @@
 //! Everything as JSON.
 
 use super::Results;
-use super::rows::Measured;
+use super::rows::{Measured, Theirs};
 use casados_benches::case::Mode;
 use serde_json::{Value, json};
 
 fn measured(m: &Measured) -> Value {
     json!({ "median": m.time.median, "q1": m.time.q1, "q3": m.time.q3, "samples": m.time.samples, "error": m.error, "iterations": m.iterations, "dense": m.dense })
+}
+
+/// A measurement, or the seconds that were carried over.
+fn theirs(acados: &Theirs) -> Value {
+    match acados {
+        Theirs::Measured(m) => measured(m),
+        Theirs::Carried(seconds) => json!({ "carried": seconds }),
+    }
 }
 
 /// Times in seconds.
@@ -21,7 +29,7 @@ pub fn of(results: &Results) -> Value {
                 "warm": row.warm.as_ref().map(measured), "forty": measured(&row.forty),
                 "batch": row.batch.as_ref().map(measured),
                 "casadi": row.casadi.as_ref().map(measured),
-                "acados_irk": row.acados[0], "acados_gnsf": row.acados[1],
+                "acados_irk": row.acados[0].as_ref().map(theirs), "acados_gnsf": row.acados[1].as_ref().map(theirs),
             })
         })
         .collect();

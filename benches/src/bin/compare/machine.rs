@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// One line for each fact.
-pub fn describe(pinned: bool, peer: &str) -> Vec<String> {
+pub fn describe(pinned: bool, peers: &[String]) -> Vec<String> {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let cpuinfo = read("/proc/cpuinfo");
     let field = |name: &str| {
@@ -19,7 +19,7 @@ pub fn describe(pinned: bool, peer: &str) -> Vec<String> {
     let load = load.split(' ').next().unwrap_or("?");
     let rustc = Command::new("rustc").arg("--version").output().ok();
     let rustc = rustc.and_then(|o| String::from_utf8(o.stdout).ok()).unwrap_or_default();
-    vec![
+    let mut lines = vec![
         format!(
             "{} (family {}, model {}), {total} cores, {}",
             field("model name"),
@@ -32,11 +32,12 @@ pub fn describe(pinned: bool, peer: &str) -> Vec<String> {
             if pinned { "pinned to one core" } else { "not pinned" }
         ),
         format!("{}, plain {} build: no target-cpu", rustc.trim(), std::env::consts::ARCH),
-        peer.to_owned(),
-        if cfg!(feature = "diffsol") {
-            "diffsol 0.18".into()
-        } else {
-            "without diffsol: compiled without the feature `diffsol`".into()
-        },
-    ]
+    ];
+    lines.extend_from_slice(peers);
+    lines.push(if cfg!(feature = "diffsol") {
+        "diffsol 0.18".into()
+    } else {
+        "without diffsol: compiled without the feature `diffsol`".into()
+    });
+    lines
 }

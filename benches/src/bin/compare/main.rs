@@ -1,9 +1,10 @@
 //! casados beside its peers, in one run: times and errors of simulation, forward and adjoint sensitivities and Hessians
 //! of a pendulum, of chains of masses and of an aircraft on a tether.
 //!
-//! CasADi takes part where `python3`, or the interpreter that `CASADOS_PYTHON` names, has it; diffsol with the feature
-//! of that name. Nothing is installed.
+//! CasADi takes part where `python3`, or the interpreter that `CASADOS_PYTHON` names, has it; acados where that has
+//! `acados_template` and `ACADOS_SOURCE_DIR` lists installations; diffsol with the feature of that name. Nothing is installed.
 
+mod acados;
 mod adaptive;
 mod anchors;
 mod casadi;
@@ -16,12 +17,14 @@ mod plots;
 mod report;
 mod rows;
 
+use acados::Acados;
 use anchors::Anchors;
 use casadi::Casadi;
 use casados_benches::case::{Case, Family};
 use casados_benches::record::{insert, repository};
 use casados_benches::time::pin;
 use growth::Growth;
+use rows::Peers;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -112,25 +115,42 @@ pub struct Results {
     precision: Option<(Vec<growth::Precision>, f64)>,
 }
 
+/// Those that are there, and a line about each.
+fn peers(wanted: bool) -> (Peers, Vec<String>) {
+    let mut peers = Peers::default();
+    let mut lines = Vec::new();
+    match if wanted { Casadi::start() } else { Err("not asked for".into()) } {
+        Ok(casadi) => {
+            lines.push(casadi.versions.clone());
+            peers.casadi = Some(casadi);
+        }
+        Err(why) => lines.push(format!("without CasADi: {why}")),
+    }
+    match if wanted { Acados::start() } else { Err("not asked for".into()) } {
+        Ok(all) => {
+            lines.extend(all.iter().map(|acados| acados.version.clone()));
+            peers.acados = all;
+        }
+        Err(why) => lines.push(format!("acados is not measured: {why}")),
+    }
+    (peers, lines)
+}
+
 fn run() -> Result<(), Failure> {
     let arguments = arguments()?;
     let effort = arguments.effort;
     let pinned = pin();
     let anchors = Anchors::load()?;
-    let mut casadi = match Casadi::start() {
-        _ if !arguments.peers => Err("not asked for".into()),
-        other => other,
-    };
-    let peer = casadi.as_ref().map_or_else(|e| format!("without CasADi: {e}"), |c| c.versions.clone());
-    eprintln!("{peer}");
-    let mut results = Results { machine: machine::describe(pinned, &peer), ..Default::default() };
+    let (mut peers, versions) = peers(arguments.peers);
+    versions.iter().for_each(|version| eprintln!("{version}"));
+    let mut results = Results { machine: machine::describe(pinned, &versions), ..Default::default() };
 
     for case in cases()? {
         if arguments.only.as_ref().is_some_and(|text| !case.name.contains(text)) {
             continue;
         }
         eprintln!("{}", case.name);
-        results.rows.extend(rows::measure_case(&case, casadi.as_mut().ok(), effort)?);
+        results.rows.extend(rows::measure_case(&case, &mut peers, effort)?);
         for row in results.rows.iter().rev().take(4).rev() {
             eprintln!("    {:<11} {:10.2} µs", row.mode.name(), 1e6 * row.cold.time.median);
         }
@@ -139,7 +159,7 @@ fn run() -> Result<(), Failure> {
     results.scale = anchors.general_scale(&results.rows);
 
     if arguments.only.is_none() {
-        if let Ok(casadi) = casadi.as_mut() {
+        if let Some(casadi) = peers.casadi.as_mut() {
             eprintln!("solvers with step-size control");
             results.adaptive = adaptive::measure(casadi, effort)?;
             eprintln!("work-precision");

@@ -1,7 +1,7 @@
 //! The plots: time over the size of the chain, error over time, and how many times faster.
 
 use super::growth::Growth;
-use super::report::{label, three};
+use super::report::{label, origin, three};
 use super::{Failure, Results};
 use casados_benches::case::Mode;
 use plotters::coord::Shift;
@@ -158,12 +158,13 @@ fn draw_speedup(area: &Area, results: &Results) -> Result<(), Failure> {
     }
     let ratio = |case: &str, mode: Mode| {
         let row = results.rows.iter().find(|row| row.case == case && row.mode == mode)?;
-        Some(row.acados[0]? / row.cold.time.median)
+        Some(row.acados[0]?.seconds() / row.cold.time.median)
     };
     let all = cases.iter().flat_map(|case| Mode::ALL.map(|mode| ratio(case, mode).unwrap_or(f64::NAN)));
     let high = range(all).end;
+    let how = origin(results.rows.iter().filter_map(|row| row.acados[0].as_ref()));
     let mut chart = ChartBuilder::on(area)
-        .caption("One call: times faster than acados' IRK (carried over)", ("sans-serif", 18))
+        .caption(format!("One call: times faster than acados' IRK ({how})"), ("sans-serif", 18))
         .margin(10)
         .x_label_area_size(42)
         .y_label_area_size(50)

@@ -1,7 +1,7 @@
 //! The tables.
 
 use super::Results;
-use super::rows::{Measured, Row};
+use super::rows::{Measured, Row, Theirs};
 use casados_benches::case::Mode;
 use std::fmt::Write;
 
@@ -38,6 +38,29 @@ fn iterations(m: &Measured) -> String {
     if m.dense > 0 { format!("{} ({} dense)", m.iterations, m.dense) } else { m.iterations.to_string() }
 }
 
+/// Where times of acados are from, in a word or two.
+pub fn origin<'a>(all: impl Iterator<Item = &'a Theirs>) -> &'static str {
+    let (mut measured, mut carried) = (false, false);
+    all.for_each(|theirs| match theirs {
+        Theirs::Measured(_) => measured = true,
+        Theirs::Carried(_) => carried = true,
+    });
+    match (measured, carried) {
+        (true, false) => "measured",
+        (true, true) => "measured, ≈ carried over",
+        (false, true) => "carried over",
+        (false, false) => "none",
+    }
+}
+
+/// What was measured with its range, what was carried over with a sign.
+fn theirs(acados: &Theirs) -> String {
+    match acados {
+        Theirs::Measured(measured) => spread(measured),
+        Theirs::Carried(seconds) => format!("≈ {}", microseconds(*seconds)),
+    }
+}
+
 fn times(ratio: f64) -> String {
     format!("{}×", three(ratio))
 }
@@ -56,7 +79,8 @@ fn write(text: &mut String, results: &Results) -> std::fmt::Result {
     }
     let (implicit, explicit): (Vec<_>, Vec<_>) =
         results.rows.iter().partition(|row| !row.case.contains("erk4"));
-    if results.scale.is_finite() {
+    let carried = |row: &Row| row.acados.iter().any(|a| matches!(a, Some(Theirs::Carried(_))));
+    if results.scale.is_finite() && results.rows.iter().any(carried) {
         let s = three(results.scale);
         writeln!(
             text,
@@ -122,35 +146,43 @@ fn peers(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     writeln!(text, "\n### One call beside CasADi and acados\n")?;
     writeln!(
         text,
-        "Microseconds; cold, tolerance 1e-8 / steps. CasADi and casados in turn, in five rounds; acados' IRK and GNSF carried over by ratio."
+        "Microseconds; cold, tolerance 1e-8 / steps; all that has a range was measured in turn, in five rounds, and what has the sign ≈ was carried over by the ratio of CasADi."
     )?;
-    writeln!(text, "The last columns say how many times faster casados is.\n")?;
+    writeln!(
+        text,
+        "The last columns say how many times faster casados is. Errors stand behind the peer that they are of.\n"
+    )?;
     peers_table(text, rows)
 }
 
 fn peers_table(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
+    let from = |k: usize| origin(rows.iter().filter_map(|row| row.acados[k].as_ref()));
     writeln!(
         text,
-        "\n| case | mode | casados | CasADi | error | acados IRK | GNSF | than CasADi | than IRK | than GNSF |"
+        "\n| case | mode | casados | CasADi | error | acados IRK, {} | error | GNSF, {} | than CasADi | than IRK | than GNSF |",
+        from(0),
+        from(1)
     )?;
-    writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
+    writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")?;
     for row in rows {
         let own = row.cold.time.median;
         let ratio = |time: Option<f64>| optional(time, |t| times(t / own));
+        let irk = row.acados[0].and_then(|theirs| theirs.measured());
         writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             row.case,
             row.mode.name(),
-            microseconds(own),
+            spread(&row.cold),
             row.casadi.as_ref().map_or_else(|| "–".into(), spread),
             // Its own values are no reference for it.
             row.casadi.as_ref().filter(|_| row.reference != "CasADi").map_or_else(|| "–".into(), error),
-            optional(row.acados[0], microseconds),
-            optional(row.acados[1], microseconds),
+            row.acados[0].as_ref().map_or_else(|| "–".into(), theirs),
+            irk.as_ref().map_or_else(|| "–".into(), error),
+            row.acados[1].as_ref().map_or_else(|| "–".into(), theirs),
             ratio(row.casadi.map(|c| c.time.median)),
-            ratio(row.acados[0]),
-            ratio(row.acados[1])
+            ratio(row.acados[0].as_ref().map(Theirs::seconds)),
+            ratio(row.acados[1].as_ref().map(Theirs::seconds))
         )?;
     }
     Ok(())
@@ -168,7 +200,7 @@ fn forty(text: &mut String, rows: &[&Row]) -> std::fmt::Result {
     )?;
     writeln!(text, "| --- | --- | --- | --- | --- | --- | --- | --- |")?;
     for row in rows {
-        let than = |measured: &Measured| row.acados[0].map(|t| t / measured.time.median);
+        let than = |measured: &Measured| row.acados[0].map(|t| t.seconds() / measured.time.median);
         let batch = row.batch.as_ref();
         writeln!(
             text,

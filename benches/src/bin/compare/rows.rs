@@ -1,5 +1,6 @@
 //! What is measured, line by line.
 
+use super::acados::{self, Acados};
 use super::anchors::Anchors;
 use super::casadi::Casadi;
 use super::{Effort, Failure};
@@ -45,8 +46,43 @@ pub struct Row {
     pub batch: Option<Measured>,
     /// CasADi, in the same rounds.
     pub casadi: Option<Measured>,
-    /// acados' IRK and GNSF, carried over; seconds.
-    pub acados: [Option<f64>; 2],
+    /// acados' IRK (or ERK) and GNSF.
+    pub acados: [Option<Theirs>; 2],
+}
+
+/// What is known about acados.
+#[derive(Clone, Copy, Debug)]
+pub enum Theirs {
+    /// Measured in the same rounds.
+    Measured(Measured),
+    /// Seconds, carried over from another machine; see [`Anchors`].
+    Carried(f64),
+}
+
+impl Theirs {
+    /// None if it was carried over.
+    pub fn measured(&self) -> Option<Measured> {
+        match self {
+            Self::Measured(measured) => Some(*measured),
+            Self::Carried(_) => None,
+        }
+    }
+
+    /// Of one call.
+    pub fn seconds(&self) -> f64 {
+        match self {
+            Self::Measured(measured) => measured.time.median,
+            Self::Carried(seconds) => *seconds,
+        }
+    }
+}
+
+/// Peers in processes of their own, as many as there are.
+#[derive(Default)]
+pub struct Peers {
+    pub casadi: Option<Casadi>,
+    /// The same acados for several targets; the fastest counts.
+    pub acados: Vec<Acados>,
 }
 
 /// Jacobians of this size and Hessians of that keep CasADi busy for minutes.
@@ -59,25 +95,68 @@ fn affordable(case: &Case, mode: Mode) -> bool {
     }
 }
 
-/// All questions to one case, CasADi and casados in turn.
-pub fn measure_case(
-    case: &Case,
-    mut casadi: Option<&mut Casadi>,
-    effort: Effort,
-) -> Result<Vec<Row>, Failure> {
+/// All questions to one case, the peers and casados in turn.
+pub fn measure_case(case: &Case, peers: &mut Peers, effort: Effort) -> Result<Vec<Row>, Failure> {
     let mut case = case.clone();
     let modes: Vec<Mode> = Mode::ALL.into_iter().filter(|m| affordable(&case, *m)).collect();
     if case.reference.is_none()
-        && let Some(casadi) = casadi.as_mut()
+        && let Some(casadi) = peers.casadi.as_mut()
     {
         case.reference = casadi.values(&case, &modes).ok().map(|values| ("CasADi", values));
     }
-    Mode::ALL.into_iter().map(|mode| measure_row(&case, mode, casadi.as_deref_mut(), effort)).collect()
+    Mode::ALL.into_iter().map(|mode| measure_row(&case, mode, peers, effort)).collect()
 }
 
-fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Effort) -> Result<Row, Failure> {
-    let solver = if case.family == Family::Rk4 { "rk" } else { "collocation" };
+/// A question to a peer, given the seconds that it may take.
+type Ask<'a> = Box<dyn FnMut(f64) -> Result<Measured, String> + 'a>;
+
+/// A question to a peer, and the times of the rounds.
+struct PeerTimer<'a> {
+    /// Whose it is: zero for CasADi, one and two for acados' columns.
+    column: usize,
+    ask: Ask<'a>,
+    first: Measured,
+    rounds: Vec<Summary>,
+}
+
+impl<'a> PeerTimer<'a> {
+    /// Builds what is asked and calls it once before the clock runs; what the peer cannot do is left out.
+    fn new(column: usize, mut ask: Ask<'a>) -> Option<Self> {
+        let first = ask(0.0).inspect_err(|why| eprintln!("    without a peer: {why}")).ok()?;
+        Some(Self { column, ask, first, rounds: Vec::new() })
+    }
+
+    fn round(&mut self, effort: Effort) -> Result<(), Failure> {
+        self.rounds.push((self.ask)(effort.seconds / ROUNDS as f64)?.time);
+        Ok(())
+    }
+
+    fn finish(self) -> (usize, Measured) {
+        (self.column, Measured { time: of_rounds(&self.rounds), ..self.first })
+    }
+}
+
+fn ask_all<'a>(case: &'a Case, mode: Mode, peers: &'a mut Peers) -> Vec<PeerTimer<'a>> {
     let reference = case.reference.as_ref().map(|(_, values)| values);
+    let solver = if case.family == Family::Rk4 { "rk" } else { "collocation" };
+    let mut all = Vec::new();
+    if let Some(casadi) = peers.casadi.as_mut().filter(|_| affordable(case, mode)) {
+        let ask = move |seconds| casadi.time(case, solver, mode, seconds, reference);
+        all.extend(PeerTimer::new(0, Box::new(ask)));
+    }
+    for acados in &mut peers.acados {
+        let acados = std::rc::Rc::new(std::cell::RefCell::new(acados));
+        for (column, integrator) in (1..).zip(acados::integrators(case, mode)) {
+            let Some(integrator) = integrator else { continue };
+            let acados = acados.clone();
+            let ask = move |seconds| acados.borrow_mut().time(case, integrator, mode, seconds, reference);
+            all.extend(PeerTimer::new(column, Box::new(ask)));
+        }
+    }
+    all
+}
+
+fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: Effort) -> Result<Row, Failure> {
     let warm = case.family != Family::Rk4;
     let single = 0..case.single;
     let mut timers = vec![
@@ -89,20 +168,20 @@ fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Eff
         timers.push(Timer::new(case, 1e-8, Start::Warm, mode, 0..2)?);
     }
     let mut batch = BatchTimer::new(case, mode)?;
-    let mut ask = casadi
-        .filter(|_| affordable(case, mode))
-        .map(|casadi| move |seconds| casadi.time(case, solver, mode, seconds, reference));
-    // Built and called once before the clock runs; what CasADi cannot do is left out.
-    let first = ask.as_mut().and_then(|ask| ask(0.0).ok());
-    let mut peer = Vec::new();
+    let mut asked = ask_all(case, mode, peers);
     for _ in 0..ROUNDS {
-        if let (Some(ask), Some(_)) = (ask.as_mut(), first) {
-            peer.push(ask(effort.seconds / ROUNDS as f64)?.time);
-        }
+        asked.iter_mut().try_for_each(|timer| timer.round(effort))?;
         timers.iter_mut().try_for_each(|timer| timer.round(effort))?;
         batch.iter_mut().try_for_each(|timer| timer.round(effort))?;
     }
     let measured: Vec<_> = timers.into_iter().map(Timer::finish).collect();
+    let mut theirs = [None::<Measured>; 3];
+    for (column, measured) in asked.into_iter().map(PeerTimer::finish) {
+        let faster = theirs[column].is_none_or(|other| measured.time.median < other.time.median);
+        if faster {
+            theirs[column] = Some(measured);
+        }
+    }
     Ok(Row {
         case: case.name.clone(),
         nx: case.nx,
@@ -116,8 +195,8 @@ fn measure_row(case: &Case, mode: Mode, casadi: Option<&mut Casadi>, effort: Eff
         forty: measured[2],
         batch: batch.map(BatchTimer::finish),
         warm: measured.get(3).copied(),
-        casadi: first.map(|first| Measured { time: of_rounds(&peer), ..first }),
-        acados: [None; 2],
+        casadi: theirs[0],
+        acados: [theirs[1], theirs[2]].map(|measured| measured.map(Theirs::Measured)),
     })
 }
 
@@ -222,15 +301,16 @@ pub fn in_turn(mut timers: Vec<Timer>, effort: Effort) -> Result<Vec<Measured>, 
     Ok(timers.into_iter().map(Timer::finish).collect())
 }
 
-/// Carries acados' times over; see [`Anchors`].
+/// Carries acados' times over where they were not measured; see [`Anchors`].
 pub fn carry(rows: &mut [Row], anchors: &Anchors) {
     let general = anchors.general_scale(rows);
     let scales: Vec<_> =
         rows.iter().map(|row| anchors.scale(rows, &row.case).map(|s| s.min(general))).collect();
     for (row, scale) in rows.iter_mut().zip(scales) {
         let scale = scale.unwrap_or(general);
-        let carried =
-            |key| anchors.seconds(&row.case, key, row.mode).map(|t| t * scale).filter(|t| t.is_finite());
-        row.acados = [carried("irk"), carried("gnsf")];
+        for (theirs, key) in row.acados.iter_mut().zip(["irk", "gnsf"]) {
+            let carried = || anchors.seconds(&row.case, key, row.mode).map(|t| t * scale);
+            *theirs = theirs.or_else(|| carried().filter(|t| t.is_finite()).map(Theirs::Carried));
+        }
     }
 }
