@@ -14,21 +14,13 @@ counts: it is chosen when a question is asked for the first time. acados_driver.
 """
 
 import ctypes as c
-import json
 import os
-import subprocess
-import sys
-import warnings
 
 import casadi as ca
 import numpy as np
 
 import models
-
-# Read by acados_template when models are compiled; its own default is -O2.
-os.environ.setdefault("ACADOS_EXT_FUN_COMPILE_FLAGS", "-O3 -march=native")
-HERE, HOME = os.path.dirname(os.path.abspath(__file__)), os.path.abspath(os.environ["ACADOS_SOURCE_DIR"])
-
+from acados_common import HOME, answer_all
 
 class Question(c.Structure):
     _fields_ = [(n, c.c_int) for n in ("stages", "steps", "radau", "iterations", "reuse")]
@@ -37,16 +29,6 @@ class Question(c.Structure):
 
 class Peer(c.Structure):
     _fields_ = [(n, c.c_void_p) for n in ("solver", "into", "out", "seed")]
-
-
-def driver(folder):
-    """The C functions, compiled for this installation. To be loaded before acados' libraries."""
-    library, source = os.path.join(folder, "acados_driver.so"), os.path.join(HERE, "acados_driver.c")
-    include = [f"-I{HOME}/include{part}" for part in ("", "/acados", "/blasfeo/include", "/hpipm/include")]
-    # A run path of the old kind holds for the libraries of libraries too.
-    link = [f"-L{HOME}/lib", f"-Wl,--disable-new-dtags,-rpath,{HOME}/lib", "-lacados", "-lhpipm", "-lblasfeo", "-lm"]
-    subprocess.run(["cc", "-O2", "-shared", "-fPIC", *include, source, "-o", library, *link], check=True)
-    return c.CDLL(library, mode=c.RTLD_GLOBAL)
 
 
 def model(case, name):
@@ -130,9 +112,13 @@ class Call:
         return out
 
 
-def serve(request, driver, folder, cache):
+# What was built for earlier requests.
+cache = {}
+
+
+def serve(request, driver, folder):
     if request["do"] == "versions":
-        import acados_template
+        import acados_template  # noqa: F401: an error if it is missing
 
         commit = open(os.path.join(HOME, "lib", "git_commit_hash")).read().strip()[:9]
         return {"acados": f"acados {commit}"}
@@ -151,20 +137,4 @@ def serve(request, driver, folder, cache):
     return {"time": call.seconds(request["seconds"]), "values": call.values()}
 
 
-def main():
-    # acados prints what it does. Answers have a descriptor of their own.
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    warnings.simplefilter("ignore")
-    folder, cache = os.path.abspath(sys.argv[1]), {}
-    os.makedirs(folder, exist_ok=True)
-    functions = driver(folder)
-    for line in sys.stdin:
-        try:
-            answer = serve(json.loads(line), functions, folder, cache)
-        except Exception as error:  # What acados cannot do is left out of the table.
-            answer = {"error": (str(error).strip() or repr(error)).splitlines()[-1]}
-        print(json.dumps(answer), file=answers, flush=True)
-
-
-main()
+answer_all(serve)
