@@ -172,7 +172,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         let error = match &mut run.sensitivities {
             Some(sensitivities) if error <= 1.0 => {
                 let Base { point, u, parameters, rtol, atol, .. } = &*run.base;
-                let taken = Taken { at: At { x: &x, u, p: parameters, t }, h, y: &[], level: 0 };
+                let taken = Taken { at: At { x: &x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
                 let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
                 let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
                 // Written so that NaN stays.

@@ -26,6 +26,8 @@ pub struct Taken<'a, M: Dae, T: Real> {
     pub y: &'a [T],
     /// Which method of the family took it.
     pub level: usize,
+    /// Whether these values are those of the step but for their last digits.
+    pub near: bool,
 }
 
 /// Takes steps of given size.
@@ -105,6 +107,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Single<M, B, T, S> {
         }
         single.set_time(step.at.t)?;
         single.set_stages(step.y)?;
+        single.set_near(step.near)?;
         Ok(single)
     }
 }

@@ -86,7 +86,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
                 }
             }
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = Taken { at, h: entry.h, y, level: entry.level };
+            let taken = Taken { at, h: entry.h, y, level: entry.level, near: self.chosen };
             let (end, z) = each(replays, &taken, step).map_err(|error| in_step(error, step))?;
             self.tape.write(x.as_slice(), replays.stages(entry.level)?)?;
             (x, result.z) = (end, z);
@@ -238,7 +238,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = Taken { at, h: entry.h, y, level: entry.level };
+            let taken = Taken { at, h: entry.h, y, level: entry.level, near: true };
             let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             let local = B::replays(state).adjoint(&taken, now, dynamic(&mut backwards));
             let local = local.map_err(|error| in_step(error, step))?;
@@ -282,7 +282,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
             let mut x = VectorX::<M, T>::zeroed();
             x.as_mut_slice().copy_from_slice(states);
             let at = At { x: &x, u, p: parameters, t: entry.t };
-            let taken = Taken { at, h: entry.h, y, level: entry.level };
+            let taken = Taken { at, h: entry.h, y, level: entry.level, near: true };
             let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
             let second = B::replays(state).hessian(&taken, now, dynamic(&mut backwards));
             let second = second.map_err(|error| in_step(error, step))?;

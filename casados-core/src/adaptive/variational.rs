@@ -211,7 +211,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         self.unknowns.clear();
         stages.unknowns(&mut self.unknowns);
         let unknowns = core::mem::take(&mut self.unknowns);
-        let taken = self.take(&Taken { at, h: start.h, y: &unknowns, level });
+        let taken = self.take(&Taken { at, h: start.h, y: &unknowns, level, near: true });
         self.unknowns = unknowns;
         taken.map_err(diverges)?;
         let at_end = stages.estimates(start, &mut self.memory.point);

@@ -166,6 +166,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         &self.run.statistics
     }
 
+    /// Whether the start values of all following calls are solutions but for their last digits.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set_near(&mut self, near: bool) -> Result<(), Error> {
+        self.run.set_near(near)
+    }
+
     /// Start values of the stages of the first step, for an integrator with a warm start.
     #[cfg(feature = "alloc")]
     pub(crate) fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {

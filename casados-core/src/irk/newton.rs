@@ -140,6 +140,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         [(jacobian + updates * s * s) / iteration, (jacobian + means * 4.0) / iteration]
     };
 
+    /// Whether factors by blocks cost no more than the iterations that they save where start values are near: with mean Jacobians, which are
+    /// renewed up to three times, it took 7 to 12 of them, with blocks 4 or 5 (Robertson, Van der Pol, Oregonator, HIRES, Akzo Nobel).
+    const EXACT: bool = Self::RENEWAL[0] <= 10.0;
+
     /// Solves the stages of a step from the start values in `y`.
     pub(crate) fn newton(
         &mut self,
@@ -189,6 +193,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
         let mut renewals = 0;
+        let mut near = cfg!(feature = "alloc") && Self::EXACT && self.near && mean;
         let mut renew = if mean {
             !self.validity.mean
         } else if M::STRUCTURE.constant_matrix && self.validity.factors {
@@ -210,7 +215,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 statistics.factorizations += 1;
                 self.evaluate_jacobian();
                 // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
-                mean = basis.is_some() && (simplified || renewals < MEANS);
+                mean = basis.is_some() && !near && (simplified || renewals < MEANS);
                 renewals += 1;
                 match (basis, self.mean.get_mut()) {
                     (Some(basis), Some(factors)) if mean => factors.factor(&self.linear.jacobian, basis, h),
@@ -301,10 +306,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 // The mean of the stages does not do.
                 renewals = MEANS;
             }
+            // Those of a solution nearby do for all iterations, unless increments hardly shrink.
+            near &= !lanes.iter().any(Progress::is_stuck);
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
             // New factors take two more iterations themselves.
-            renew =
-                !rule.exact && (rule.full || adaptive && remaining > 2.0 + Self::RENEWAL[usize::from(cheap)]);
+            renew = !rule.exact
+                && (rule.full || adaptive && !near && remaining > 2.0 + Self::RENEWAL[usize::from(cheap)]);
         }
     }
 }

@@ -145,6 +145,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     pub(crate) validity: Validity,
     /// Whether the constant entries of the Jacobian are there.
     pub(crate) ready: bool,
+    /// Whether start values are solutions but for their last digits.
+    pub(crate) near: bool,
 }
 
 /// What the model is given and gives back at one stage.

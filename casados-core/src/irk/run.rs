@@ -169,6 +169,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         Ok(Parts { work, coefficients, steps, statistics })
     }
 
+    /// Whether start values are solutions but for their last digits.
+    #[cfg(feature = "alloc")]
+    pub fn set_near(&mut self, near: bool) -> Result<(), Error> {
+        W::nominal(&mut self.work)?.near = near;
+        Ok(())
+    }
+
     /// Start values of the stages of the first step, as a warm start: the unknowns `(k, z)`, stages innermost.
     #[cfg(feature = "alloc")]
     pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {

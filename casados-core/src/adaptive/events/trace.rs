@@ -256,7 +256,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (states, y) = segment.tape.numbers(step, M::Shape::NX);
         x.as_mut_slice().copy_from_slice(states);
         let at = At { x: &x, u: &segment.u, p: &integrator.base.parameters, t: entry.t };
-        let taken = Taken { at, h, y, level: entry.level };
+        let taken = Taken { at, h, y, level: entry.level, near: false };
         Ok(B::replays(&mut integrator.state).solve(&taken, None)?.x)
     }
 
