@@ -62,7 +62,9 @@ def problem(request, blocks, folder):
     options.qp_solver_cond_N = blocks
     options.tol = 1e-6
     ocp.code_gen_options.code_export_directory = os.path.join(folder, ocp.model.name)
-    solver = AcadosOcpSolver(ocp, generate=False, build=False, verbose=False)
+    # Without this a compilation that was broken off would never be taken up again.
+    new = not os.path.exists(os.path.join(folder, ocp.name, f"libacados_ocp_solver_{ocp.name}.so"))
+    solver = AcadosOcpSolver(ocp, generate=new, build=new, verbose=False)
     return solver, getattr(solver.shared_lib, ocp.name + "_acados_solve")
 
 
