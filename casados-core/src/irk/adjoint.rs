@@ -5,11 +5,11 @@
 //! ```
 
 use super::along::Along;
-use super::evaluate::entries;
+use super::evaluate::entry;
 use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::step::check;
 use crate::error::Error;
-use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::Adjoint;
@@ -17,7 +17,6 @@ use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
-use core::marker::PhantomData;
 
 /// The adjoint of `C` seeds while it goes backwards.
 #[derive(Zeroable)]
@@ -82,9 +81,9 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     /// `λ_n` from `λ_{n+1}` and `μ`.
     pub(crate) fn advance<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>) {
         let Self { lambda, gradient, mu, shift, sourced, .. } = self;
-        let (jacobian, mu) = (linear.jacobian.as_ref(), mu.as_ref());
+        let (jacobian, mu) = (&linear.jacobian, mu.as_ref());
         let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
-        dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda, gradient, model: PhantomData });
+        dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda: &mut *lambda, gradient: &mut *gradient });
         if *sourced {
             let rows = lambda.iter_mut().chain(gradient.iter_mut().skip(M::Shape::NX));
             for (row, shift) in rows.zip(shift.as_ref()) {
@@ -148,31 +147,43 @@ impl<E: Lanes, const S: usize, const C: usize> Kernel for RightHandSide<'_, E, S
 }
 
 /// `λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i`, `λ_w −= Σ_i f_w,iᵀ μ_i`
-struct Advance<'a, M, E, const S: usize, const C: usize> {
-    jacobian: &'a [[E; S]],
+struct Advance<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
     mu: &'a [[[E; C]; S]],
     lambda: &'a mut [[E; C]],
     gradient: &'a mut [[E; C]],
-    model: PhantomData<M>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for Advance<'_, M, E, S, C> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { jacobian, mu, lambda, gradient, .. } = self;
-        let (structure, nx) = (&M::STRUCTURE, M::Shape::NX);
-        let (blocks, shift) = (structure.blocks, nx + M::Shape::NZ);
-        for (r, c, values) in entries(structure, jacobian, blocks[1], blocks[2]) {
-            if let (Some(lambda), Some(mu)) = (lambda.get_mut(c - nx), mu.get(slot::<M>(r))) {
-                subtract::<A, E, S, C>(lambda, values, mu);
-            }
+    fn run<A: Arithmetic>(mut self) {
+        // Lengths that the optimiser knows need no looking at.
+        let (nx, nk, nw) = (M::Shape::NX, M::Shape::NK, M::Shape::NW);
+        if self.mu.len() == nk && self.lambda.len() == nx && self.gradient.len() == nw {
+            each_row::<A, _>(&mut self);
         }
-        for (r, c, values) in entries(structure, jacobian, blocks[3], blocks[5]) {
-            if let (Some(gradient), Some(mu)) = (gradient.get_mut(c - shift), mu.get(slot::<M>(r))) {
-                subtract::<A, E, S, C>(gradient, values, mu);
-            }
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for Advance<'_, M, E, S, C> {
+    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
+    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
+    const INSTRUCTIONS: usize = 2 + 2 * C * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let to = if c < 2 * nx {
+            self.lambda.get_mut(c - nx)
+        } else if c < 2 * nx + nz {
+            return;
+        } else {
+            self.gradient.get_mut(c - nx - nz)
+        };
+        if let (Some(to), Some(mu)) = (to, self.mu.get(slot::<M>(r))) {
+            subtract::<A, E, S, C>(to, values, mu);
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide};
-use crate::shape::{Matrix, Shape};
+use crate::shape::{Matrix, Plain, Shape};
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Writes `u` and `p`, which are the same at all points of an interval.
@@ -29,9 +29,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        let (points, x, y) = (self.points.as_mut(), x.as_ref(), y.as_ref());
         let Coefficients { a, c, .. } = coefficients;
-        dispatch(Place { points, x, y, a, c, time: self.inputs.time, step });
+        dispatch(Place::<M, E, S> { points: &mut self.points, x, y, a, c, time: self.inputs.time, step });
     }
 
     /// The residual at all stages.
@@ -133,22 +132,23 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for ResidualJacobian<'_,
 }
 
 /// See [`Work::place`].
-struct Place<'a, E, const S: usize> {
-    points: &'a mut [[E; S]],
-    x: &'a [E],
-    y: &'a [[E; S]],
+struct Place<'a, M: Dae, E: Plain, const S: usize> {
+    points: &'a mut ArrayV<M, [E; S]>,
+    x: &'a ArrayX<M, E>,
+    y: &'a ArrayK<M, [E; S]>,
     a: &'a [[E; S]; S],
     c: &'a [E; S],
     time: Times<E>,
     step: usize,
 }
 
-impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Place<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { points, x, y, a, c, time, step } = self;
+        let (points, x, y) = (points.as_mut(), x.as_ref(), y.as_ref());
         let (h, nx) = (time.step, x.len());
         if let Some(t) = points.last_mut() {
             let start = E::from_whole(step);
@@ -197,6 +197,16 @@ pub(crate) fn entries<'a, V>(
     places.zip(values).map(|((row, column), value)| (*row as usize, *column as usize, value))
 }
 
+/// An entry of a Jacobian: row, column, value.
+#[inline(always)]
+pub(crate) fn entry<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Option<(usize, usize, &V)> {
+    let Pattern { rows, columns } = M::STRUCTURE.jacobian;
+    match (rows.get(index), columns.get(index), jacobian.as_ref().get(index)) {
+        (Some(&row), Some(&column), Some(value)) => Some((row as usize, column as usize, value)),
+        _ => None,
+    }
+}
+
 /// `Σ_j a_j b_j`
 #[inline(always)]
 pub(crate) fn dot<E: Field, const S: usize>(a: &[E; S], b: &[E; S]) -> E {
@@ -210,9 +220,34 @@ pub(crate) fn dot<E: Field, const S: usize>(a: &[E; S], b: &[E; S]) -> E {
 /// The first element that is infinite or NaN.
 #[inline]
 pub(crate) fn not_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
-    // Without an early exit, so that it is a SIMD loop.
-    if values.iter().fold(true, |finite, value| finite & value.is_finite()) {
+    // A few are looked at before the function for many is entered.
+    let finite = if values.len() < 16 { are_finite(values) } else { dispatch(Finite { values }) };
+    if finite {
         return None;
     }
     values.iter().position(|value| !value.is_finite()).map(|index| (index, values[index].to_f64()))
+}
+
+/// Whether all elements are finite.
+struct Finite<'a, T> {
+    values: &'a [T],
+}
+
+impl<T: Real> Kernel for Finite<'_, T> {
+    type Number = T;
+    type Output = bool;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> bool {
+        are_finite(self.values)
+    }
+}
+
+/// Without an early exit, so that it is a SIMD loop.
+#[inline(always)]
+fn are_finite<T: Real>(values: &[T]) -> bool {
+    let mut finite = true;
+    for value in values {
+        finite &= value.is_finite();
+    }
+    finite
 }

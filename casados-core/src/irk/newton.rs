@@ -24,11 +24,12 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::record::{Coefficients, Work};
-use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::{Lanes, Scalar};
+use crate::shape::{Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
@@ -256,12 +257,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 _ => self.linear.factors.solve(&mut self.increment),
             }
             let floor = E::from_f64(rounding / rule.tolerance);
-            let sizes = dispatch(Update {
-                x: x.as_ref(),
-                y: y.as_mut(),
-                increment: self.increment.as_mut(),
-                weights: self.weights.as_mut(),
-                sizes: self.sizes.as_mut(),
+            let sizes = dispatch(Update::<M, E, S> {
+                x,
+                y,
+                increment: &mut self.increment,
+                weights: &mut self.weights,
+                sizes: &mut self.sizes,
                 active,
                 h,
                 floor,
@@ -280,9 +281,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             if some && !rule.exact && iteration > 1 {
                 // Once more, with the sizes that the unknowns have now.
-                let (x, y) = (x.as_ref(), y.as_ref());
-                let (increment, weights) = (self.increment.as_ref(), self.weights.as_mut());
-                let again = cell(dispatch(Measure { x, y, increment, weights, h, floor }));
+                let (increment, weights) = (&self.increment, &mut self.weights);
+                let again = cell(dispatch(Measure::<M, E, S> { x, y, increment, weights, h, floor }));
                 for (lane, progress) in lanes.iter_mut().enumerate() {
                     let again = E::lane(&again, lane);
                     if progress.state == State::Converged && again > 2.0 * progress.last {
@@ -356,11 +356,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// The residual in the slots of the equations.
     fn place_residual(&mut self) {
-        for (equation, f) in self.f.as_ref().iter().enumerate() {
-            if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
-                *to = f.map(|f| [f]);
-            }
-        }
+        dispatch(PlaceResidual::<M, E, S> { f: &self.f, increment: &mut self.increment });
     }
 
     /// After the last iteration: no lane is active any more.
@@ -371,6 +367,33 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let any = good.count() > 0;
         (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
         Solved { converged: mask::<E>(lanes, State::Converged), exact: false }
+    }
+}
+
+/// See [`Work::place_residual`].
+struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
+    f: &'a ArrayK<M, [E; S]>,
+    increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
+    const ROWS: usize = M::Shape::NK;
+    const INSTRUCTIONS: usize = 2 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, equation: usize) {
+        let to = self.increment.as_mut().get_mut(slot::<M>(equation));
+        if let (Some(to), Some(f)) = (to, self.f.as_ref().get(equation)) {
+            to.as_flattened_mut().copy_from_slice(f);
+        }
     }
 }
 
@@ -410,12 +433,12 @@ impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
 }
 
 /// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
-struct Update<'a, E: Lanes, const S: usize> {
-    x: &'a [E],
-    y: &'a mut [[E; S]],
-    increment: &'a mut [[[E; 1]; S]],
-    weights: &'a mut [E],
-    sizes: &'a mut [E],
+struct Update<'a, M: Dae, E: Lanes, const S: usize> {
+    x: &'a ArrayX<M, E>,
+    y: &'a mut ArrayK<M, [E; S]>,
+    increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+    weights: &'a mut ArrayK<M, E>,
+    sizes: &'a mut ArrayK<M, E>,
     active: E::Mask,
     h: E,
     floor: E,
@@ -425,42 +448,115 @@ struct Update<'a, E: Lanes, const S: usize> {
     measure: bool,
 }
 
-impl<E: Lanes, const S: usize> Kernel for Update<'_, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Number = E;
     type Output = [E; 2];
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> [E; 2] {
         let Self { x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } = self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
-        for (y, increment) in y.iter_mut().zip(increment.iter_mut()) {
-            for (y, [delta]) in y.iter_mut().zip(increment) {
+        for (y, increment) in y.as_mut().iter_mut().zip(increment.as_mut()) {
+            // In registers: the optimiser cannot know that they do not overlap.
+            let (mut new, mut deltas) = (*y, *increment);
+            for (y, [delta]) in new.iter_mut().zip(&mut deltas) {
                 *delta = E::select(active, *delta, zero);
                 *y = *y - *delta;
             }
+            (*y, *increment) = (new, deltas);
         }
         if measure {
-            let largest = Measure { x, y, increment, weights, h, floor }.run::<A>();
-            for ((size, increment), &weight) in sizes.iter_mut().zip(increment.iter()).zip(weights.iter()) {
+            let largest = Measure::<M, E, S> { x, y, increment, weights, h, floor }.run::<A>();
+            let weights = weights.as_ref();
+            for ((size, increment), &weight) in sizes.as_mut().iter_mut().zip(increment.as_ref()).zip(weights)
+            {
                 *size = largest_of(increment) * weight;
             }
             return [largest, infinite];
         }
-        // The sum of what is not a number is not a number, which a maximum may lose.
-        let (mut largest, mut next, mut sum) = (zero, zero, zero);
-        for ((increment, &weight), old) in increment.iter().zip(weights.iter()).zip(sizes) {
-            let size = largest_of(increment) * weight;
-            for [delta] in increment {
-                sum = sum + *delta;
-            }
-            largest = size.max(largest);
-            let expected =
-                if full { size * size / *old * (size / *old) } else { size * size / (*old - size) };
-            let expected = E::select(E::lt(size + size, *old), expected, infinite);
-            next = E::select(E::le(size, tolerance), zero, expected).max(next);
-            *old = size;
+        // Four unknowns side by side, and the rest one by one.
+        let (increments, last) = increment.as_ref().as_chunks::<4>();
+        let (weights, last_weights) = weights.as_ref().as_chunks::<4>();
+        let (sizes, last_sizes) = sizes.as_mut().as_chunks_mut::<4>();
+        let mut some = Increments::none(tolerance, full);
+        for ((increments, weights), sizes) in increments.iter().zip(weights).zip(sizes) {
+            some.take(increments, weights, sizes);
         }
+        let mut others = Increments::none(tolerance, full);
+        for ((increment, weight), size) in last.iter().zip(last_weights).zip(last_sizes) {
+            let (increment, weight) = (core::array::from_ref(increment), core::array::from_ref(weight));
+            others.take(increment, weight, core::array::from_mut(size));
+        }
+        let ([largest, excess, sum], others) = (some.total(), others.total());
+        let (largest, excess, sum) = (largest.max(others[0]), excess.max(others[1]), sum + others[2]);
         let number = E::le(sum.abs(), E::from_f64(f64::MAX));
-        [E::select(number, largest, sum), next]
+        [E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite)]
+    }
+}
+
+/// What is known of the increments of some unknowns, in `N` strands.
+struct Increments<E, const N: usize> {
+    largest: [E; N],
+    /// By how much one, and the one that is expected next, is too large; not positive if that is below the tolerance.
+    excess: [E; N],
+    /// The sum of what is not a number is not a number, which a maximum may lose.
+    sum: [E; N],
+    tolerance: E,
+    full: bool,
+}
+
+impl<E: Lanes, const N: usize> Increments<E, N> {
+    #[inline(always)]
+    fn none(tolerance: E, full: bool) -> Self {
+        let zero = E::from_f64(0.0);
+        Self { largest: [zero; N], excess: [-tolerance; N], sum: [zero; N], tolerance, full }
+    }
+
+    /// Takes `N` unknowns into account, whose last increments had these sizes.
+    #[inline(always)]
+    fn take<const S: usize>(&mut self, increments: &[[[E; 1]; S]; N], weights: &[E; N], sizes: &mut [E; N]) {
+        let old = *sizes;
+        let (mut new, mut excess) = ([E::from_f64(0.0); N], [E::from_f64(0.0); N]);
+        for i in 0..S {
+            for n in 0..N {
+                let [delta] = increments[n][i];
+                new[n] = delta.abs().max(new[n]);
+                self.sum[n] = self.sum[n] + delta;
+            }
+        }
+        for n in 0..N {
+            new[n] = new[n] * weights[n];
+        }
+        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only where it must be.
+        if self.full {
+            for n in 0..N {
+                let rate = new[n] / old[n];
+                excess[n] = new[n] * rate * rate - self.tolerance;
+            }
+        } else {
+            for n in 0..N {
+                excess[n] = new[n] * new[n] - self.tolerance * (old[n] - new[n]);
+            }
+        }
+        for n in 0..N {
+            // Where increments hardly shrink, nothing is expected but that the next one is as large.
+            let expected = excess[n].max(new[n] + new[n] - old[n]);
+            let own = new[n] - self.tolerance;
+            self.excess[n] = E::select(E::lt(own, expected), own, expected).max(self.excess[n]);
+            self.largest[n] = new[n].max(self.largest[n]);
+        }
+        *sizes = new;
+    }
+
+    /// The largest increment, the largest excess, the sum.
+    #[inline(always)]
+    fn total(&self) -> [E; 3] {
+        let (mut largest, mut excess, mut sum) = (E::from_f64(0.0), -self.tolerance, E::from_f64(0.0));
+        for n in 0..N {
+            largest = self.largest[n].max(largest);
+            excess = self.excess[n].max(excess);
+            sum = sum + self.sum[n];
+        }
+        [largest, excess, sum]
     }
 }
 
@@ -475,16 +571,16 @@ fn largest_of<E: Lanes, const S: usize>(increment: &[[E; 1]; S]) -> E {
 }
 
 /// The size of an increment relative to the unknowns as they are now.
-struct Measure<'a, E, const S: usize> {
-    x: &'a [E],
-    y: &'a [[E; S]],
-    increment: &'a [[[E; 1]; S]],
-    weights: &'a mut [E],
+struct Measure<'a, M: Dae, E: Plain, const S: usize> {
+    x: &'a ArrayX<M, E>,
+    y: &'a ArrayK<M, [E; S]>,
+    increment: &'a ArrayK<M, [[E; 1]; S]>,
+    weights: &'a mut ArrayK<M, E>,
     h: E,
     floor: E,
 }
 
-impl<E: Lanes, const S: usize> Kernel for Measure<'_, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
     type Number = E;
     type Output = E;
     #[inline(always)]
@@ -494,8 +590,9 @@ impl<E: Lanes, const S: usize> Kernel for Measure<'_, E, S> {
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
         let (mut largest, mut sum) = ([zero; S], [zero; S]);
-        for (unknown, ((y, increment), weight)) in y.iter().zip(increment).zip(weights).enumerate() {
-            let mut size = (x.get(unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
+        let unknowns = y.as_ref().iter().zip(increment.as_ref()).zip(weights.as_mut());
+        for (unknown, ((y, increment), weight)) in unknowns.enumerate() {
+            let mut size = (x.as_ref().get(unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
             for (y, [delta]) in y.iter().zip(increment) {
                 size = y.abs().max(delta.abs().max(size));
             }

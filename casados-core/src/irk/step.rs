@@ -6,10 +6,10 @@ use super::record::{Coefficients, Step, Validity, Work};
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, Dae};
+use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::Options;
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Matrix, Shape, assign};
+use crate::shape::{Matrix, Plain, Shape, assign};
 use crate::statistics::Statistics;
 
 /// Where the unknowns of the stages start.
@@ -65,11 +65,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         count: usize,
     ) {
         let h = self.inputs.time.step;
-        let (x, y, b) = (self.x.as_mut(), step.y.as_ref(), &coefficients.b);
+        let b = &coefficients.b;
         if compensate {
-            dispatch(compensated::Advance { x, rest: self.rest.as_mut(), y, b, h });
+            let (x, rest, y) = (self.x.as_mut(), self.rest.as_mut(), step.y.as_ref());
+            dispatch(compensated::Advance { x, rest, y, b, h });
         } else {
-            dispatch(Advance { x, y, b, h });
+            dispatch(Advance::<M, E, S> { x: &mut self.x, y: &step.y, b, h });
         }
         if n == 0 {
             algebraic::<M, E, S>(self.result.z0.as_mut_slice(), &step.y, &coefficients.start);
@@ -260,20 +261,20 @@ impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
 }
 
 /// `x ← x + h Σ_i b_i k_i`
-struct Advance<'a, E, const S: usize> {
-    x: &'a mut [E],
-    y: &'a [[E; S]],
+struct Advance<'a, M: Dae, E: Plain, const S: usize> {
+    x: &'a mut ArrayX<M, E>,
+    y: &'a ArrayK<M, [E; S]>,
     b: &'a [E; S],
     h: E,
 }
 
-impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Advance<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { x, y, b, h } = self;
-        for (x, k) in x.iter_mut().zip(y) {
+        for (x, k) in x.as_mut().iter_mut().zip(y.as_ref()) {
             *x = *x + h * dot(b, k);
         }
     }

@@ -2,9 +2,11 @@
 //! derivatives need of both.
 
 use super::directions::{Directions, panel, panel_mut, panels, weight};
-use super::evaluate::entries;
+use super::evaluate::entry;
 use super::record::{Coefficients, Work, copy};
-use crate::linalg::{Arithmetic, Kernel, Packet, Planned, dispatch, slot, solve_packets};
+use crate::linalg::{
+    Arithmetic, AtRow, Kernel, Packet, Planned, dispatch, each_row, is_short, slot, solve_packets,
+};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes};
@@ -107,7 +109,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         let (v, next) = if *end { (start, other) } else { (other, start) };
         dispatch(Step::<M, E, D, S> {
             phase,
-            jacobian: work.linear.jacobian.as_ref(),
+            jacobian: &work.linear.jacobian,
             factors: work.linear.factors.planned(),
             coefficients,
             h: work.inputs.time.step,
@@ -202,10 +204,10 @@ impl<E: Lanes, D: Directions<E>> Kernel for Start<'_, E, D> {
 }
 
 /// See [`Sweep::step`].
-struct Step<'a, M, E, D, const S: usize> {
+struct Step<'a, M: Dae, E: Plain, D, const S: usize> {
     phase: Phase,
-    jacobian: &'a [[E; S]],
-    factors: Planned<'a, E, S>,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    factors: Planned<'a, M, E, S>,
     coefficients: &'a Coefficients<E, S>,
     h: E,
     directions: &'a D,
@@ -239,22 +241,27 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
+        // Lengths that the optimiser knows need no looking at.
+        if v.len() != nx || dy.len() != nk {
+            return;
+        }
         if self.phase != Phase::After {
-            let right = RightHandSide::<M, E, D, S> {
-                jacobian: self.jacobian,
-                directions: self.directions,
-                first: self.first,
-                model: PhantomData,
-            };
-            right.panel::<A, W>(v, dy, column);
+            dy.fill([[E::from_f64(0.0); W]; S]);
+            let (jacobian, directions) = (self.jacobian, self.directions);
+            if self.first {
+                each_row::<A, _>(&mut First::<M, E, D, S, W> { jacobian, directions, dy, column });
+            } else {
+                Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
+            }
+            each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
         }
         if self.phase == Phase::Whole {
             if const { size_of::<E>() > 8 && S > 2 && W == 4 } {
                 // Four columns of all stages would not fit the registers.
-                solve_packets::<A, E, [E; W], S, 2>(self.factors, dy, 0);
-                solve_packets::<A, E, [E; W], S, 2>(self.factors, dy, 2);
+                solve_packets::<A, M, E, [E; W], S, 2>(self.factors, dy, 0);
+                solve_packets::<A, M, E, [E; W], S, 2>(self.factors, dy, 2);
             } else {
-                solve_packets::<A, E, [E; W], S, W>(self.factors, dy, 0);
+                solve_packets::<A, M, E, [E; W], S, W>(self.factors, dy, 0);
             }
         }
         if self.phase == Phase::Before {
@@ -309,55 +316,111 @@ fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     }
 }
 
-/// `−(f_x,i V_n + f_w,i)`, equations in their slots.
-struct RightHandSide<'a, M, E, D, const S: usize> {
-    jacobian: &'a [[E; S]],
+/// `−f_x,i V_0` of a panel, equations in their slots: the rows of `V_0` are the directions.
+struct First<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
     directions: &'a D,
-    first: bool,
-    model: PhantomData<M>,
+    dy: &'a mut [Packet<E, S, W>],
+    column: usize,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> RightHandSide<'_, M, E, D, S> {
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for First<'_, M, E, D, S, W> {
+    const ROWS: usize = M::STRUCTURE.blocks[2] - M::STRUCTURE.blocks[1];
+    const INSTRUCTIONS: usize = 4 + 2 * S;
     #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&self, v: &[[E; W]], dy: &mut [Packet<E, S, W>], column: usize) {
-        let Self { jacobian, directions, first, .. } = *self;
-        let (structure, nx, zero) = (&M::STRUCTURE, M::Shape::NX, E::from_f64(0.0));
-        let blocks = structure.blocks;
-        dy.fill([[zero; W]; S]);
-        if first {
-            // The rows of V_0 are the directions.
-            for (r, c, values) in entries(structure, jacobian, blocks[1], blocks[2]) {
-                let Some(packet) = dy.get_mut(slot::<M>(r)) else { continue };
-                for (row, &value) in packet.iter_mut().zip(values) {
-                    directions.add(c - nx, -value, column, row);
-                }
-            }
-        } else {
-            // Row by row, each in registers.
-            let mut packet = [[zero; W]; S];
-            let mut entries = entries(structure, jacobian, blocks[1], blocks[2]).peekable();
-            while let Some((r, c, values)) = entries.next() {
-                if let Some(v) = v.get(c - nx) {
-                    for (row, &value) in packet.iter_mut().zip(values) {
-                        A::subtract_row(row, value, v);
-                    }
-                }
-                if entries.peek().is_none_or(|next| next.0 != r) {
-                    if let Some(to) = dy.get_mut(slot::<M>(r)) {
-                        *to = packet;
-                    }
-                    packet = [[zero; W]; S];
-                }
-            }
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let entry = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row);
+        add::<M, _, _, S, W>(entry, M::Shape::NX, self.directions, self.dy, self.column);
+    }
+}
+
+/// `−f_x,i V_n` of a panel.
+struct Later<'a, M: Dae, E: Plain, const S: usize, const W: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    v: &'a [[E; W]],
+    dy: &'a mut [Packet<E, S, W>],
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
+    #[inline(always)]
+    fn all<A: Arithmetic>(mut self) {
+        if const { is_short::<Self>() } {
+            each_row::<A, _>(&mut self);
+            return;
         }
-        // Of the first variable that is a direction, `u_0`: columns of the Jacobian minus this are `w`.
-        let shift = nx + M::Shape::NZ;
-        for (r, c, values) in entries(structure, jacobian, blocks[3], blocks[5]) {
-            let Some(packet) = dy.get_mut(slot::<M>(r)) else { continue };
+        // Row by row, each in registers.
+        let (mut packet, mut last) = ([[E::from_f64(0.0); W]; S], None);
+        for row in 0..Self::ROWS {
+            let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else {
+                return;
+            };
+            if last != Some(r) {
+                self.put(last, &packet);
+                (packet, last) = ([[E::from_f64(0.0); W]; S], Some(r));
+            }
+            let Some(v) = self.v.get(c - M::Shape::NX) else { return };
             for (row, &value) in packet.iter_mut().zip(values) {
-                directions.add(c - shift, -value, column, row);
+                A::subtract_row(row, value, v);
             }
         }
+        self.put(last, &packet);
+    }
+
+    /// The row of an equation.
+    #[inline(always)]
+    fn put(&mut self, equation: Option<usize>, packet: &Packet<E, S, W>) {
+        if let Some(to) = equation.and_then(|r| self.dy.get_mut(slot::<M>(r))) {
+            *to = *packet;
+        }
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const W: usize> AtRow for Later<'_, M, E, S, W> {
+    const ROWS: usize = M::STRUCTURE.blocks[2] - M::STRUCTURE.blocks[1];
+    const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let (Some(packet), Some(v)) = (self.dy.get_mut(slot::<M>(r)), self.v.get(c - M::Shape::NX)) else {
+            return;
+        };
+        for (row, &value) in packet.iter_mut().zip(values) {
+            A::subtract_row(row, value, v);
+        }
+    }
+}
+
+/// `−f_w,i` of a panel, of controls and parameters.
+struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    directions: &'a D,
+    dy: &'a mut [Packet<E, S, W>],
+    column: usize,
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Inputs<'_, M, E, D, S, W> {
+    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[3];
+    const INSTRUCTIONS: usize = 4 + 2 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let entry = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row);
+        add::<M, _, _, S, W>(entry, M::Shape::NX + M::Shape::NZ, self.directions, self.dy, self.column);
+    }
+}
+
+/// What an entry whose variable is a direction contributes; the first such variable is `shift`.
+#[inline(always)]
+fn add<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
+    entry: Option<(usize, usize, &[E; S])>,
+    shift: usize,
+    directions: &D,
+    dy: &mut [Packet<E, S, W>],
+    column: usize,
+) {
+    let Some((r, c, values)) = entry else { return };
+    let Some(packet) = dy.get_mut(slot::<M>(r)) else { return };
+    for (row, &value) in packet.iter_mut().zip(values) {
+        directions.add(c - shift, -value, column, row);
     }
 }
 

@@ -9,14 +9,14 @@
 
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
-use super::evaluate::entries;
+use super::evaluate::{entries, entry};
 use super::record::{Coefficients, Work};
 use super::sweep::{STRANDS, Sweep, total};
-use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
 use crate::memory::Fallback;
-use crate::model::Dae;
+use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
-use crate::shape::{Array, Shape};
+use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
 
 /// Derivatives are good if they satisfy their equations to this many ε of the terms.
@@ -38,7 +38,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         second: bool,
     ) -> E::Mask {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        let [probe, sizes] = &mut self.probe;
+        // The residual has done its work.
+        let Self { probe: [probe, sizes], f, terms, linear, .. } = self;
         let (probe, sizes) = (probe.as_mut(), sizes.as_mut());
         let inputs = probe.get_mut(nx + nx + nz..).unwrap_or_default();
         for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
@@ -49,10 +50,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             stage_sums: sweep.sums.as_ref(),
             a: &coefficients.a,
             h: self.inputs.time.step,
-            jacobian: self.linear.jacobian.as_ref(),
+            jacobian: &linear.jacobian,
             probe,
             sizes,
-            model: PhantomData,
+            sums: f,
+            terms,
         })
     }
 
@@ -70,10 +72,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             a: &coefficients.a,
             b: &coefficients.b,
             h: self.inputs.time.step,
-            jacobian: self.linear.jacobian.as_ref(),
-            sums: sums.as_mut(),
-            sizes: sizes.as_mut(),
-            model: PhantomData,
+            jacobian: &self.linear.jacobian,
+            sums,
+            sizes,
         })
     }
 }
@@ -140,16 +141,18 @@ fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
     E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
 }
 
-struct VerifyForward<'a, M, E, const S: usize> {
+struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
     start_sums: &'a [[E; STRANDS]],
     stage_sums: &'a [[[E; STRANDS]; S]],
     a: &'a [[E; S]; S],
     h: E,
-    jacobian: &'a [[E; S]],
+    jacobian: &'a M::Jacobian<[E; S]>,
     /// The sum over the directions of every variable, and what it is rounded relative to.
     probe: &'a mut [[E; S]],
     sizes: &'a mut [[E; S]],
-    model: PhantomData<M>,
+    /// The same of every equation.
+    sums: &'a mut ArrayK<M, [E; S]>,
+    terms: &'a mut ArrayK<M, [E; S]>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
@@ -157,8 +160,13 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { start_sums, stage_sums, a, h, jacobian, probe, sizes, .. } = self;
-        let (nx, zero) = (start_sums.len(), E::from_f64(0.0));
+        let Self { start_sums, stage_sums, a, h, jacobian, probe, sizes, sums, terms } = self;
+        let (nx, zero) = (M::Shape::NX, E::from_f64(0.0));
+        // Lengths that the optimiser knows need no looking at.
+        let (nk, nv) = (M::Shape::NK, M::Shape::NV);
+        if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
+            return E::lt(zero, zero);
+        }
         for (probe, stages) in probe.iter_mut().skip(nx + nx).zip(stage_sums.iter().skip(nx)) {
             for (z, strands) in probe.iter_mut().zip(stages) {
                 *z = total(strands);
@@ -190,26 +198,13 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
                 }
             }
         }
-        // Equation by equation: the entries of a block of the Jacobian lie row by row.
-        let (mut good, mut begin) = (E::le(zero, zero), M::STRUCTURE.blocks);
-        for equation in 0..M::Shape::NK {
-            let (mut sums, mut terms) = ([zero; S], [zero; S]);
-            for (begin, &end) in begin.iter_mut().zip(&M::STRUCTURE.blocks[1..]) {
-                for (r, c, values) in entries(&M::STRUCTURE, jacobian, *begin, end) {
-                    if r != equation {
-                        break;
-                    }
-                    *begin += 1;
-                    let (Some(directions), Some(sizes)) = (probe.get(c), sizes.get(c)) else { continue };
-                    for ((sum, &value), &direction) in sums.iter_mut().zip(values).zip(directions) {
-                        *sum = *sum + value * direction;
-                    }
-                    for ((term, &value), &size) in terms.iter_mut().zip(values).zip(sizes) {
-                        *term = *term + value.abs() * size;
-                    }
-                }
-            }
-            for (&sum, &size) in sums.iter().zip(&terms) {
+        sums.as_mut().fill([zero; S]);
+        terms.as_mut().fill([zero; S]);
+        let mut total = Total::<M, E, S> { jacobian, probe, sizes, sums, terms };
+        each_row::<A, _>(&mut total);
+        let mut good = E::le(zero, zero);
+        for (sums, terms) in total.sums.as_ref().iter().zip(total.terms.as_ref()) {
+            for (&sum, &size) in sums.iter().zip(terms) {
                 good = E::and(good, is_small(sum, size));
             }
         }
@@ -217,7 +212,37 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
     }
 }
 
-struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {
+/// For each equation the sum over all variables, and that of the sizes of its terms.
+struct Total<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    probe: &'a [[E; S]],
+    sizes: &'a [[E; S]],
+    sums: &'a mut ArrayK<M, [E; S]>,
+    terms: &'a mut ArrayK<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
+    const INSTRUCTIONS: usize = 6 * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let Self { probe, sizes, sums, terms, .. } = self;
+        let (Some(sums), Some(terms), Some(probe), Some(sizes)) =
+            (sums.as_mut().get_mut(r), terms.as_mut().get_mut(r), probe.get(c), sizes.get(c))
+        else {
+            return;
+        };
+        for ((sum, &value), &direction) in sums.iter_mut().zip(values).zip(probe) {
+            *sum = *sum + value * direction;
+        }
+        for ((term, &value), &size) in terms.iter_mut().zip(values).zip(sizes) {
+            *term = *term + value.abs() * size;
+        }
+    }
+}
+
+struct VerifyAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
     lambda: &'a [[E; C]],
     mu: &'a [[[E; C]; S]],
     /// Right-hand sides of an integrand, the same for all seeds.
@@ -225,10 +250,38 @@ struct VerifyAdjoint<'a, M, E, const S: usize, const C: usize> {
     a: &'a [[E; S]; S],
     b: &'a [E; S],
     h: E,
-    jacobian: &'a [[E; S]],
-    sums: &'a mut [[E; S]],
-    sizes: &'a mut [[E; S]],
-    model: PhantomData<M>,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    sums: &'a mut ArrayV<M, [E; S]>,
+    sizes: &'a mut ArrayV<M, [E; S]>,
+}
+
+/// `Σ_r ∂f_r/∂v_c μ_r` of every variable at each stage, and the sizes of the terms.
+struct TotalAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    mu: &'a [[[E; C]; S]],
+    sums: &'a mut ArrayV<M, [E; S]>,
+    sizes: &'a mut ArrayV<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_, M, E, S, C> {
+    /// The entries of `f_ẋ`, `f_x` and `f_z`.
+    const ROWS: usize = M::STRUCTURE.blocks[3];
+    const INSTRUCTIONS: usize = (6 + C) * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let Self { mu, sums, sizes, .. } = self;
+        let (Some(sums), Some(sizes), Some(mu)) =
+            (sums.as_mut().get_mut(c), sizes.as_mut().get_mut(c), mu.get(slot::<M>(r)))
+        else {
+            return;
+        };
+        for (((total, size), &value), mu) in sums.iter_mut().zip(sizes).zip(values).zip(mu) {
+            let term = value * sum(mu);
+            *total = *total + term;
+            *size = *size + term.abs();
+        }
+    }
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<'_, M, E, S, C> {
@@ -236,23 +289,16 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<
     type Output = E::Mask;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { lambda, mu, source, a, b, h, jacobian, sums, sizes, .. } = self;
+        let Self { lambda, mu, source, a, b, h, jacobian, sums, sizes } = self;
         let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
-        sums.fill([zero; S]);
-        sizes.fill([zero; S]);
-        let end = M::STRUCTURE.blocks[3];
-        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, end) {
-            let (Some(sums), Some(sizes), Some(mu)) =
-                (sums.get_mut(c), sizes.get_mut(c), mu.get(slot::<M>(r)))
-            else {
-                continue;
-            };
-            for (((total, size), &value), mu) in sums.iter_mut().zip(sizes).zip(values).zip(mu) {
-                let term = value * sum(mu);
-                *total = *total + term;
-                *size = *size + term.abs();
-            }
+        if mu.len() != nk {
+            return E::lt(zero, zero);
         }
+        sums.as_mut().fill([zero; S]);
+        sizes.as_mut().fill([zero; S]);
+        let mut total = TotalAdjoint::<M, E, S, C> { jacobian, mu, sums, sizes };
+        each_row::<A, _>(&mut total);
+        let (sums, sizes) = (total.sums.as_ref(), total.sizes.as_ref());
         let mut good = E::le(zero, zero);
         for unknown in 0..nk {
             // Of `k` what multiplies it at its own stage, and through `ξ` at all.

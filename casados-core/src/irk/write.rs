@@ -18,38 +18,35 @@ pub(crate) trait Target<E> {
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// Writes `V_{n+1}`.
     pub(crate) fn write_end<D: Directions<E>>(&self, to: &mut impl Target<E>) {
-        self.write::<D, _>(Some(self.v(true)), 0..M::Shape::NX, None, to);
+        self.write::<D, _, false>(Some(self.v(true)), None, to);
     }
 
     /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`.
     pub(crate) fn write_differential<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
-        self.write::<D, _>(Some(self.v(false)), 0..M::Shape::NX, Some(weights), to);
+        self.write::<D, _, false>(Some(self.v(false)), Some(weights), to);
     }
 
     /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
     pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) {
-        self.write::<D, _>(None, M::Shape::NX..M::Shape::NK, Some(lagrange), to);
+        self.write::<D, _, true>(None, Some(lagrange), to);
     }
 
     /// Writes the derivatives of `Σ_i weight_i k_i`.
     #[cfg(feature = "alloc")]
     pub(crate) fn write_slopes<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
-        self.write::<D, _>(None, 0..M::Shape::NX, Some(weights), to);
+        self.write::<D, _, false>(None, Some(weights), to);
     }
 
-    /// Writes `V + Σ_i weight_i dy_i` for some unknowns.
-    fn write<D: Directions<E>, G: Target<E>>(
+    /// Writes `V + Σ_i weight_i dy_i`, of the states or of the algebraic ones.
+    fn write<D: Directions<E>, G: Target<E>, const ALGEBRAIC: bool>(
         &self,
         v: Option<&[E]>,
-        unknowns: core::ops::Range<usize>,
         weights: Option<&[E; S]>,
         to: &mut G,
     ) {
-        if unknowns.is_empty() {
-            return;
+        if !ALGEBRAIC || M::Shape::NZ > 0 {
+            dispatch(Write::<M, E, D, _, S, ALGEBRAIC> { v, dy: self.dy(), weights, to, of: PhantomData });
         }
-        let (dy, height) = (self.dy(), M::Shape::NK * S);
-        dispatch(Write::<E, D, _, S> { v, dy, height, unknowns, weights, to, directions: PhantomData });
     }
 }
 
@@ -136,38 +133,44 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
 }
 
 /// `V + Σ_i weight_i dy_i`, panels to matrices.
-struct Write<'a, E, D, G, const S: usize> {
+struct Write<'a, M, E, D, G, const S: usize, const ALGEBRAIC: bool> {
     v: Option<&'a [E]>,
     dy: &'a [E],
-    /// The elements of a column of `dy`.
-    height: usize,
-    unknowns: core::ops::Range<usize>,
     weights: Option<&'a [E; S]>,
     to: &'a mut G,
-    directions: PhantomData<D>,
+    of: PhantomData<(M, D)>,
 }
 
-impl<E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Write<'_, E, D, G, S> {
+impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALGEBRAIC: bool> Kernel
+    for Write<'_, M, E, D, G, S, ALGEBRAIC>
+{
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { v, dy, height, unknowns, weights, to, .. } = self;
+        let Self { v, dy, weights, to, .. } = self;
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let unknowns = if ALGEBRAIC { nx..nk } else { 0..nx };
         panels!(D::COUNT, E, column, W => {
-            let v = v.map(|v| panel::<E, W>(v, column, unknowns.len()));
-            let (packets, _) = panel::<E, W>(dy, column, height).as_chunks::<S>();
+            let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
+            let (packets, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
+            let packets = packets.get(unknowns.clone()).unwrap_or_default();
             for c in 0..W {
-                for (row, to) in to.column(column + c).iter_mut().enumerate() {
-                    let mut value = E::from_f64(0.0);
-                    if let Some(v) = v.and_then(|v| v.get(row)) {
-                        value = v[c];
-                    }
-                    if let (Some(weights), Some(packet)) = (weights, packets.get(unknowns.start + row)) {
-                        for (&weight, dy) in weights.iter().zip(packet) {
-                            value = A::subtract(value, -weight, dy[c]);
+                // As many as the optimiser knows.
+                let Some(to) = to.column(column + c).get_mut(..unknowns.len()) else { return };
+                match v {
+                    Some(v) => {
+                        for (to, v) in to.iter_mut().zip(v) {
+                            *to = v[c];
                         }
                     }
-                    *to = value;
+                    None => to.fill(E::from_f64(0.0)),
+                }
+                let Some(weights) = weights else { continue };
+                for (to, packet) in to.iter_mut().zip(packets) {
+                    for (&weight, dy) in weights.iter().zip(packet) {
+                        *to = A::subtract(*to, -weight, dy[c]);
+                    }
                 }
             }
         });

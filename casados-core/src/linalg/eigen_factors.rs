@@ -7,10 +7,11 @@ use super::dense::Dense;
 use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
-use crate::model::{ArrayK, Dae, Elimination};
+use crate::model::{ArrayK, Dae};
 use crate::scalar::Real;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// A right-hand side or a solution of the `L` systems, one row for each slot.
 pub type Rows<M, T, const L: usize> = ArrayK<M, [[Complex<T, L>; 1]; 1]>;
@@ -52,8 +53,8 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
 
     /// By the plan; whether that went well.
     fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
-        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_mut());
-        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), scale, blocks })
+        let blocks = self.blocks.as_mut();
+        dispatch(Assemble::<M, T, L> { jacobian: jacobian.as_ref(), scale, blocks, model: PhantomData })
     }
 
     /// By pivoting whole matrices.
@@ -83,8 +84,9 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
         if self.is_dense {
             self.solve_dense(rows);
         } else {
-            let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_ref());
-            sparse::solve(Planned { plan, blocks, coupling: &[[Complex::zero()]] }, rows.as_mut());
+            let blocks = self.blocks.as_ref();
+            let factors = Planned::<M, _, 1> { model: PhantomData, blocks, coupling: &[[Complex::zero()]] };
+            sparse::solve(factors, rows.as_mut());
         }
     }
 
@@ -103,19 +105,20 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
 }
 
 /// The matrices and their factors; whether these are finite.
-struct Assemble<'a, T, const L: usize> {
-    plan: &'a Elimination,
+struct Assemble<'a, M, T, const L: usize> {
     jacobian: &'a [T],
     scale: &'a Complex<T, L>,
     blocks: &'a mut [Block<Complex<T, L>, 1>],
+    model: PhantomData<M>,
 }
 
-impl<T: Real, const L: usize> Kernel for Assemble<'_, T, L> {
+impl<M: Dae, T: Real, const L: usize> Kernel for Assemble<'_, M, T, L> {
     type Number = T;
     type Output = bool;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> bool {
-        let Self { plan, jacobian, scale, blocks } = self;
+        let Self { jacobian, scale, blocks, .. } = self;
+        let plan = &M::STRUCTURE.elimination;
         blocks.fill([[Complex::zero()]]);
         for entry in plan.assembly {
             let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
@@ -127,7 +130,7 @@ impl<T: Real, const L: usize> Kernel for Assemble<'_, T, L> {
                 element.re = element.re.map(|re| re + *direct);
             }
         }
-        sparse::Factor { plan, coupling: &[[Complex::zero()]], blocks }.run::<A>();
+        sparse::Factor::<M, _, 1> { coupling: &[[Complex::zero()]], blocks, model: PhantomData }.run::<A>();
         // A pivot that vanishes leaves infinite elements or NaN.
         let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
         pivots.fold(true, |finite, [[element]]| finite & element.is_finite())

@@ -4,11 +4,13 @@ use super::block::Block;
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
+use super::straight::{AtRow, each_row};
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
-use crate::model::{ArrayK, Dae, Elimination};
+use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Array, Plain, assign};
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it is.
 #[inline(always)]
@@ -44,9 +46,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
-        let (plan, Self { coupling, blocks, .. }) = (&M::STRUCTURE.elimination, self);
-        dispatch(Assemble { plan, jacobian: jacobian.as_ref(), a, h, coupling, blocks: blocks.as_mut() });
-        sparse::factor(plan, coupling, blocks.as_mut());
+        let Self { coupling, blocks, .. } = self;
+        dispatch(Assemble::<M, E, S> { jacobian, a, h, coupling, blocks });
+        sparse::factor::<M, E, S>(coupling, blocks.as_mut());
     }
 
     /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots.
@@ -66,8 +68,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     }
 
     /// The factors by the plan.
-    pub fn planned(&self) -> Planned<'_, E, S> {
-        Planned { plan: &M::STRUCTURE.elimination, blocks: self.blocks.as_ref(), coupling: &self.coupling }
+    pub fn planned(&self) -> Planned<'_, M, E, S> {
+        Planned { model: PhantomData, blocks: self.blocks.as_ref(), coupling: &self.coupling }
     }
 
     /// Whether the factors that are there are those of the plan.
@@ -94,45 +96,53 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 }
 
 /// Blocks of the Newton matrix, fill zero.
-struct Assemble<'a, E, const S: usize> {
-    plan: &'a Elimination,
-    jacobian: &'a [[E; S]],
+struct Assemble<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
     h: E,
     /// Becomes `−hA`.
     coupling: &'a mut Block<E, S>,
-    blocks: &'a mut [Block<E, S>],
+    blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<E: Field, const S: usize> Kernel for Assemble<'_, E, S> {
+impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { plan, jacobian, a, h, coupling, blocks } = self;
+    fn run<A: Arithmetic>(mut self) {
+        let Self { a, h, coupling, blocks, .. } = &mut self;
         let zero = E::from_f64(0.0);
         for (i, row) in a.iter().enumerate() {
             for (column, &a) in coupling.iter_mut().zip(row) {
-                column[i] = -(h * a);
+                column[i] = -(*h * a);
             }
         }
-        blocks.fill([[zero; S]; S]);
-        for entry in plan.assembly {
-            let Some(block) = blocks.get_mut(entry.block as usize) else { continue };
-            if let Some(state) = jacobian.get(entry.state as usize) {
-                if (const { S > 1 }) && entry.scaled {
-                    block[0] = *state;
-                    continue;
-                }
-                for (column, ha) in block.iter_mut().zip(&*coupling) {
-                    *column = [zero; S];
-                    A::subtract_products(column, state, ha);
-                }
+        blocks.as_mut().fill([[zero; S]; S]);
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let (jacobian, coupling, blocks) = (self.jacobian.as_ref(), &*self.coupling, self.blocks.as_mut());
+        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        let Some(block) = blocks.get_mut(entry.block as usize) else { return };
+        if let Some(state) = jacobian.get(entry.state as usize) {
+            if (const { S > 1 }) && entry.scaled {
+                block[0] = *state;
+                return;
             }
-            if let Some(direct) = jacobian.get(entry.direct as usize) {
-                for (stage, (column, &direct)) in block.iter_mut().zip(direct).enumerate() {
-                    column[stage] = column[stage] + direct;
-                }
+            for (column, ha) in block.iter_mut().zip(coupling) {
+                *column = [E::from_f64(0.0); S];
+                A::subtract_products(column, state, ha);
+            }
+        }
+        if let Some(direct) = jacobian.get(entry.direct as usize) {
+            for (stage, (column, &direct)) in block.iter_mut().zip(direct).enumerate() {
+                column[stage] = column[stage] + direct;
             }
         }
     }

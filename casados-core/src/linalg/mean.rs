@@ -8,6 +8,7 @@ use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// Factors of the mean Jacobian of the stages for all `L` eigenvalues, by the plan: what an iteration takes that need
 /// not be exact.
@@ -41,14 +42,18 @@ impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
             h,
             blocks: &mut *blocks,
         });
-        sparse::factor(plan, &[[Complex::zero()]], blocks);
+        sparse::factor::<M, _, 1>(&[[Complex::zero()]], blocks);
     }
 
     /// Solves the Newton system of the stages in place, equations in their slots.
     pub fn solve<const S: usize>(&mut self, basis: &Eigenbasis<E, S, L>, b: &mut ArrayK<M, [[E; 1]; S]>) {
         dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
-        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_ref());
-        sparse::solve(Planned { plan, blocks, coupling: &[[Complex::zero()]] }, self.rows.as_mut());
+        let factors = Planned::<M, _, 1> {
+            model: PhantomData,
+            blocks: self.blocks.as_ref(),
+            coupling: &[[Complex::zero()]],
+        };
+        sparse::solve(factors, self.rows.as_mut());
         dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
     }
 }

@@ -17,19 +17,27 @@
 
 use super::block::{Block, Packet, inverse, negate, product, subtract, subtract_scaled, subtract_transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use crate::model::{Elimination, Pivot};
+use super::straight::{AtPivot, from_first, from_last};
+use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
-use crate::shape::{Array, Plain};
+use crate::shape::{Array, Plain, Shape};
+use core::marker::PhantomData;
 
 /// What a matrix is eliminated by.
-#[derive(Clone, Copy)]
-pub struct Planned<'a, E, const S: usize> {
-    pub plan: &'a Elimination,
+pub struct Planned<'a, M, E, const S: usize> {
+    pub model: PhantomData<M>,
     /// `P⁻¹`, `L`, `U`.
     pub blocks: &'a [Block<E, S>],
     /// `−hA`, which the columns of pivots that are `scaled` share. Nothing for one stage.
     pub coupling: &'a Block<E, S>,
 }
+
+impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
 
 /// Calls a function for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at
 /// a time, or the packet of all stages would not fit them.
@@ -38,89 +46,88 @@ macro_rules! packets {
         let mut column = 0;
         if const { size_of::<E>() <= 8 } {
             while column + 8 <= $columns {
-                $function::<A, E, R, S, 8>($factors, $rows, column);
+                $function::<A, M, E, R, S, 8>($factors, $rows, column);
                 column += 8;
             }
             if column + 4 <= $columns {
-                $function::<A, E, R, S, 4>($factors, $rows, column);
+                $function::<A, M, E, R, S, 4>($factors, $rows, column);
                 column += 4;
             }
         }
         while column + 2 <= $columns {
-            $function::<A, E, R, S, 2>($factors, $rows, column);
+            $function::<A, M, E, R, S, 2>($factors, $rows, column);
             column += 2;
         }
         if column < $columns {
-            $function::<A, E, R, S, 1>($factors, $rows, column);
+            $function::<A, M, E, R, S, 1>($factors, $rows, column);
         }
     }};
 }
 
 /// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`. A pivot block
 /// that is singular leaves elements that are not finite.
-pub fn factor<E: Field, const S: usize>(
-    plan: &Elimination,
-    coupling: &Block<E, S>,
-    blocks: &mut [Block<E, S>],
-) {
-    dispatch(Factor { plan, coupling, blocks });
+pub fn factor<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
+    dispatch(Factor::<M, E, S> { coupling, blocks, model: PhantomData });
 }
 
 /// See [`factor`].
-pub(super) struct Factor<'a, E, const S: usize> {
-    pub plan: &'a Elimination,
+pub(super) struct Factor<'a, M, E, const S: usize> {
     pub coupling: &'a Block<E, S>,
     pub blocks: &'a mut [Block<E, S>],
+    pub model: PhantomData<M>,
 }
 
-impl<E: Field, const S: usize> Kernel for Factor<'_, E, S> {
+impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { plan, coupling, blocks } = self;
-        let mut updates = plan.updates;
-        for pivot in plan.pivots {
-            let Some((own, rest)) = updates.split_at_checked(pivot.lower().len() * pivot.upper().len())
-            else {
-                return;
-            };
-            updates = rest;
-            if is_scaled::<S>(pivot) {
-                let width = pivot.upper().len();
-                for (index, upper) in pivot.upper().enumerate() {
-                    let Some(upper) = blocks.get(upper) else { continue };
-                    let mut product = [[E::from_f64(0.0); S]; S];
-                    A::subtract_blocks(&mut product, coupling, upper);
-                    let targets = own.get(index..).unwrap_or_default().iter().step_by(width);
-                    for (lower, &target) in pivot.lower().zip(targets) {
-                        let Some(Some(&scale)) = blocks.get(lower).map(|lower| lower.first()) else {
-                            continue;
-                        };
-                        let Some(target) = blocks.get_mut(target as usize) else { continue };
-                        for (column, product) in target.iter_mut().zip(&product) {
-                            A::subtract_products(column, &scale, product);
-                        }
+    fn run<A: Arithmetic>(mut self) {
+        if has_all::<M, _>(self.blocks) {
+            from_first::<A, M, _>(&mut self);
+        }
+    }
+}
+
+impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
+    const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
+    const UPDATES: bool = true;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [u32]) {
+        let Self { coupling, blocks, .. } = self;
+        if is_scaled::<S>(pivot) {
+            let width = pivot.upper().len();
+            for (index, upper) in pivot.upper().enumerate() {
+                let Some(upper) = blocks.get(upper) else { continue };
+                let mut product = [[E::from_f64(0.0); S]; S];
+                A::subtract_blocks(&mut product, coupling, upper);
+                let targets = updates.get(index..).unwrap_or_default().iter().step_by(width);
+                for (lower, &target) in pivot.lower().zip(targets) {
+                    let Some(Some(&scale)) = blocks.get(lower).map(|lower| lower.first()) else {
+                        continue;
+                    };
+                    let Some(target) = blocks.get_mut(target as usize) else { continue };
+                    for (column, product) in target.iter_mut().zip(&product) {
+                        A::subtract_products(column, &scale, product);
                     }
                 }
-                continue;
             }
-            if !pivot.identity {
-                let Some(block) = blocks.get_mut(pivot.block as usize) else { continue };
-                let inverse = inverse::<A, E, S>(block);
-                *block = inverse;
-                for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
-                    *block = product::<A, E, S>(block, &inverse);
-                }
+            return;
+        }
+        if !pivot.identity {
+            let Some(block) = blocks.get_mut(pivot.block as usize) else { return };
+            let inverse = inverse::<A, E, S>(block);
+            *block = inverse;
+            for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
+                *block = product::<A, E, S>(block, &inverse);
             }
-            let mut own = own.iter();
-            for lower in pivot.lower() {
-                let Some(&lower) = blocks.get(lower) else { continue };
-                for (upper, &target) in pivot.upper().zip(&mut own) {
-                    let Some(&upper) = blocks.get(upper) else { continue };
-                    let Some(target) = blocks.get_mut(target as usize) else { continue };
-                    A::subtract_blocks(target, &lower, &upper);
-                }
+        }
+        let mut updates = updates.iter();
+        for lower in pivot.lower() {
+            let Some(&lower) = blocks.get(lower) else { continue };
+            for (upper, &target) in pivot.upper().zip(&mut updates) {
+                let Some(&upper) = blocks.get(upper) else { continue };
+                let Some(target) = blocks.get_mut(target as usize) else { continue };
+                A::subtract_blocks(target, &lower, &upper);
             }
         }
     }
@@ -136,16 +143,19 @@ pub fn is_scaled<const S: usize>(pivot: &Pivot) -> bool {
 ///
 /// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
 /// rows stays in the nearest cache.
-pub fn solve<E: Field + Plain, R: Array<E>, const S: usize>(factors: Planned<'_, E, S>, rows: &mut [[R; S]]) {
+pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
     dispatch(Solve { factors, rows });
 }
 
-struct Solve<'a, E, R, const S: usize> {
-    factors: Planned<'a, E, S>,
+struct Solve<'a, M, E, R, const S: usize> {
+    factors: Planned<'a, M, E, S>,
     rows: &'a mut [[R; S]],
 }
 
-impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S> {
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -156,16 +166,16 @@ impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, E, R, S
 }
 
 /// Solves `Mᵀ X = R` in place.
-pub fn solve_transposed<E: Field + Plain, R: Array<E>, const S: usize>(
-    factors: Planned<'_, E, S>,
+pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
     dispatch(SolveTransposed(Solve { factors, rows }));
 }
 
-struct SolveTransposed<'a, E, R, const S: usize>(Solve<'a, E, R, S>);
+struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
 
-impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, E, R, S> {
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -177,40 +187,109 @@ impl<E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'
 
 /// The part of [`solve`] for `W` columns, inside of a kernel.
 #[inline(always)]
-pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    factors: Planned<'_, E, S>,
+pub fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
     column: usize,
 ) {
-    let Planned { plan, blocks, coupling } = factors;
-    for pivot in plan.pivots {
-        let packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
+        return;
+    }
+    let mut down = Sweep::<M, E, R, S, W, DOWN> { factors, rows, column };
+    from_first::<A, M, _>(&mut down);
+    let mut up = Sweep::<M, E, R, S, W, UP> { factors, rows: down.rows, column };
+    from_last::<A, M, _>(&mut up);
+}
+
+#[inline(always)]
+fn solve_packet_transposed<
+    A: Arithmetic,
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    const S: usize,
+    const W: usize,
+>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+    column: usize,
+) {
+    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
+        return;
+    }
+    let mut down = Sweep::<M, E, R, S, W, TRANSPOSED_DOWN> { factors, rows, column };
+    from_first::<A, M, _>(&mut down);
+    let mut up = Sweep::<M, E, R, S, W, TRANSPOSED_UP> { factors, rows: down.rows, column };
+    from_last::<A, M, _>(&mut up);
+}
+
+/// The triangular systems: `I + L`, `P + U`, and both transposed.
+const DOWN: usize = 0;
+const UP: usize = 1;
+const TRANSPOSED_DOWN: usize = 2;
+const TRANSPOSED_UP: usize = 3;
+
+/// One of them, for `W` columns.
+struct Sweep<'a, M, E, R, const S: usize, const W: usize, const SYSTEM: usize> {
+    factors: Planned<'a, M, E, S>,
+    rows: &'a mut [[R; S]],
+    column: usize,
+}
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize> AtPivot
+    for Sweep<'_, M, E, R, S, W, SYSTEM>
+{
+    const INSTRUCTIONS: usize = {
+        let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
+        4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
+    };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [u32]) {
+        match SYSTEM {
+            DOWN => self.down::<A>(pivot),
+            UP => self.up::<A>(pivot),
+            TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
+            _ => self.transposed_up::<A>(pivot),
+        }
+    }
+}
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize>
+    Sweep<'_, M, E, R, S, W, SYSTEM>
+{
+    #[inline(always)]
+    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         // Directions that have not reached this unknown, as at the start of an interval.
         if W > 1 && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0)) {
-            continue;
+            return;
         }
         if is_scaled::<S>(pivot) {
             let mut product = [[E::from_f64(0.0); W]; S];
-            subtract::<A, E, S, W>(&mut product, coupling, &packet);
-            for (block, other) in beside(factors, pivot.lower()) {
-                let mut target = load(rows, other, column);
+            subtract::<A, E, S, W>(&mut product, factors.coupling, &packet);
+            for (block, other) in beside(*factors, pivot.lower()) {
+                let mut target = load(rows, other, *column);
                 subtract_scaled::<A, E, S, W>(&mut target, block, &product);
-                store(rows, other, column, &target);
+                store(rows, other, *column, &target);
             }
-            continue;
+            return;
         }
-        for (block, other) in beside(factors, pivot.lower()) {
-            let mut target = load(rows, other, column);
+        for (block, other) in beside(*factors, pivot.lower()) {
+            let mut target = load(rows, other, *column);
             subtract::<A, E, S, W>(&mut target, block, &packet);
-            store(rows, other, column, &target);
+            store(rows, other, *column, &target);
         }
     }
-    for pivot in plan.pivots.iter().rev() {
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
-        for (block, other) in beside(factors, pivot.upper()) {
-            subtract::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
+
+    #[inline(always)]
+    fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        for (block, other) in beside(*factors, pivot.upper()) {
+            subtract::<A, E, S, W>(&mut packet, block, &load(rows, other, *column));
         }
-        if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
             // Of one number the inverse: the packet then stays in its registers.
             if const { S == 1 } {
@@ -223,56 +302,59 @@ pub fn solve_packets<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usiz
             }
             packet = solution;
         }
-        store(rows, pivot.slot as usize, column, &packet);
+        store(rows, pivot.slot as usize, *column, &packet);
     }
-}
 
-#[inline(always)]
-fn solve_packet_transposed<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    factors: Planned<'_, E, S>,
-    rows: &mut [[R; S]],
-    column: usize,
-) {
-    let Planned { plan, blocks, coupling } = factors;
-    for pivot in plan.pivots {
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
-        if let (false, Some(inverse)) = (pivot.identity, blocks.get(pivot.block as usize)) {
+    #[inline(always)]
+    fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
             negate(&mut packet);
             subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
             packet = solution;
-            store(rows, pivot.slot as usize, column, &packet);
+            store(rows, pivot.slot as usize, *column, &packet);
         }
-        for (block, other) in beside(factors, pivot.upper()) {
-            let mut target = load(rows, other, column);
+        for (block, other) in beside(*factors, pivot.upper()) {
+            let mut target = load(rows, other, *column);
             subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
-            store(rows, other, column, &target);
+            store(rows, other, *column, &target);
         }
     }
-    for pivot in plan.pivots.iter().rev() {
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, column);
+
+    #[inline(always)]
+    fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         if is_scaled::<S>(pivot) {
             let mut sum = [[E::from_f64(0.0); W]; S];
-            for (block, other) in beside(factors, pivot.lower()) {
-                subtract_scaled::<A, E, S, W>(&mut sum, block, &load(rows, other, column));
+            for (block, other) in beside(*factors, pivot.lower()) {
+                subtract_scaled::<A, E, S, W>(&mut sum, block, &load(rows, other, *column));
             }
-            subtract_transposed::<A, E, S, W>(&mut packet, coupling, &sum);
+            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
         } else {
-            for (block, other) in beside(factors, pivot.lower()) {
-                subtract_transposed::<A, E, S, W>(&mut packet, block, &load(rows, other, column));
+            for (block, other) in beside(*factors, pivot.lower()) {
+                subtract_transposed::<A, E, S, W>(&mut packet, block, &load(rows, other, *column));
             }
         }
-        store(rows, pivot.slot as usize, column, &packet);
+        store(rows, pivot.slot as usize, *column, &packet);
     }
+}
+
+/// Always; but the optimiser then knows their number, and with it how often loops over constant tables go round.
+#[inline(always)]
+fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
+    blocks.len() == M::STRUCTURE.elimination.slots.len()
 }
 
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
-fn beside<'a, E, const S: usize>(
-    factors: Planned<'a, E, S>,
+fn beside<'a, M: Dae, E, const S: usize>(
+    factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
-    let slots = factors.plan.slots.get(range.clone()).unwrap_or_default();
+    let slots = M::STRUCTURE.elimination.slots.get(range.clone()).unwrap_or_default();
     factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
 }
 

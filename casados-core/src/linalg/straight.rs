@@ -1,0 +1,143 @@
+//! Loops over the constant tables of a model, as straight lines where they are short.
+//!
+//! The optimiser sees through constant tables only where indices are constants too. In a straight line addresses of blocks and
+//! rows are part of the instructions; in a loop most instructions of a small block are spent on finding it: a solve with the blocks of
+//! two stages takes a fifth of the instructions.
+
+use super::fused::Arithmetic;
+use crate::model::{Dae, Elimination, Pivot};
+
+/// Straight lines are not longer than so many instructions: they share the nearest cache.
+const MOST_INSTRUCTIONS: usize = 4000;
+
+/// What is done with each row of a table.
+pub trait AtRow {
+    /// The rows of the table.
+    const ROWS: usize;
+    /// About how many instructions each takes.
+    const INSTRUCTIONS: usize;
+    /// To be `#[inline(always)]`.
+    fn at<A: Arithmetic>(&mut self, row: usize);
+}
+
+/// So many rows are left to the optimiser to unroll.
+const CHUNK: usize = 8;
+
+/// So many chunks, and so many pivots, can be written one after the other.
+const MOST: usize = 48;
+
+/// One expression for each number from zero on, or down to zero.
+macro_rules! forwards {
+    ($each:ident!($($arguments:tt)*)) => {
+        $each!($($arguments)*: 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23
+            24 25 26 27 28 29 30 31 32 33 34 35 36 37 38 39 40 41 42 43 44 45 46 47)
+    };
+}
+macro_rules! backwards {
+    ($each:ident!($($arguments:tt)*)) => {
+        $each!($($arguments)*: 47 46 45 44 43 42 41 40 39 38 37 36 35 34 33 32 31 30 29 28 27 26 25 24
+            23 22 21 20 19 18 17 16 15 14 13 12 11 10 9 8 7 6 5 4 3 2 1 0)
+    };
+}
+
+/// A chunk of rows.
+macro_rules! chunk {
+    ($A:ty, $V:ty, $visit:ident: $($n:literal)*) => {
+        $(if const { $n * CHUNK < <$V>::ROWS } {
+            for row in $n * CHUNK..const { smaller(($n + 1) * CHUNK, <$V>::ROWS) } {
+                $visit.at::<$A>(row);
+            }
+        })*
+    };
+}
+
+const fn smaller(a: usize, b: usize) -> usize {
+    if a < b { a } else { b }
+}
+
+/// Whether the rows of a table are a straight line.
+pub const fn is_short<V: AtRow>() -> bool {
+    V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
+}
+
+/// All rows of a table.
+#[inline(always)]
+pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
+    if const { is_short::<V>() } {
+        forwards!(chunk!(A, V, visit));
+        return;
+    }
+    for row in 0..V::ROWS {
+        visit.at::<A>(row);
+    }
+}
+
+/// What is done at each pivot of a plan.
+pub trait AtPivot {
+    /// About how many instructions that takes for each block of the factors, or for each update of one.
+    const INSTRUCTIONS: usize;
+    /// Whether it is done for each update, or for each block.
+    const UPDATES: bool = false;
+    /// To be `#[inline(always)]`.
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [u32]);
+}
+
+/// A pivot.
+macro_rules! pivot {
+    ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
+        $(if const { $n < <$M>::STRUCTURE.elimination.pivots.len() } {
+            let (pivot, updates) = const { nth(&<$M>::STRUCTURE.elimination, $n) };
+            $visit.at::<$A>(pivot, updates);
+        })*
+    };
+}
+
+/// From the first pivot to the last.
+#[inline(always)]
+pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    if const { is_short_plan::<M, V>() } {
+        forwards!(pivot!(A, M, visit));
+        return;
+    }
+    let mut rest = M::STRUCTURE.elimination.updates;
+    for pivot in M::STRUCTURE.elimination.pivots {
+        let Some((own, others)) = rest.split_at_checked(updates_of(pivot)) else { return };
+        rest = others;
+        visit.at::<A>(pivot, own);
+    }
+}
+
+/// From the last pivot to the first, without updates.
+#[inline(always)]
+pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    if const { is_short_plan::<M, V>() } {
+        backwards!(pivot!(A, M, visit));
+        return;
+    }
+    for pivot in M::STRUCTURE.elimination.pivots.iter().rev() {
+        visit.at::<A>(pivot, &[]);
+    }
+}
+
+const fn is_short_plan<M: Dae, V: AtPivot>() -> bool {
+    let plan = &M::STRUCTURE.elimination;
+    let count = if V::UPDATES { plan.updates.len() } else { plan.slots.len() };
+    plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
+}
+
+/// A pivot and its updates; beyond the last the last.
+const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [u32]) {
+    let n = smaller(n, plan.pivots.len() - 1);
+    let (mut begin, mut index) = (0, 0);
+    while index < n {
+        begin += updates_of(&plan.pivots[index]);
+        index += 1;
+    }
+    let pivot = &plan.pivots[n];
+    (pivot, plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0)
+}
+
+/// How many blocks a pivot updates.
+const fn updates_of(pivot: &Pivot) -> usize {
+    ((pivot.upper - pivot.block - 1) * (pivot.end - pivot.upper)) as usize
+}
