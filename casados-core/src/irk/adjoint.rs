@@ -195,11 +195,13 @@ fn subtract<A: Arithmetic, E: Lanes, const S: usize, const C: usize>(
     values: &[E; S],
     mu: &[[E; C]; S],
 ) {
+    let mut sum = *to;
     for (&value, mu) in values.iter().zip(mu) {
-        for (to, &mu) in to.iter_mut().zip(mu) {
-            *to = A::subtract(*to, value, mu);
+        for (sum, &mu) in sum.iter_mut().zip(mu) {
+            *sum = A::subtract(*sum, value, mu);
         }
     }
+    *to = sum;
 }
 
 /// Memory of the adjoint of `C` seeds.

@@ -15,7 +15,7 @@ use super::forward::ForwardMemory;
 use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::linalg::{Arithmetic, Kernel, dispatch, is_long, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
@@ -275,6 +275,7 @@ struct Subtract<'a, M, E, R, const S: usize> {
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
+    const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         panels!(M::STRUCTURE.directions.len(), E, column, W => self.panel::<A, W>(column));

@@ -39,6 +39,8 @@ const ROUNDING: f64 = 1.0;
 /// in every step.
 const LITTLE: f64 = 1.0 / 64.0;
 
+/// The first mean Jacobian is that of start values, which may be far away: that increments grow with it is not its fault.
+const FAR: usize = 1;
 /// So often the mean Jacobian is renewed in a step before the stages' own are taken.
 const MEANS: usize = 3;
 
@@ -302,7 +304,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 (self.validity.factors, self.validity.mean) = (false, false);
                 return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
             }
-            if iteration > 1 && lanes.iter().any(Progress::grows) {
+            if iteration > 1 && renewals > FAR && lanes.iter().any(Progress::grows) {
                 // The mean of the stages does not do.
                 renewals = MEANS;
             }

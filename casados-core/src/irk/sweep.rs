@@ -5,7 +5,7 @@ use super::directions::{Directions, panel, panel_mut, panels, weight};
 use super::evaluate::entry;
 use super::record::{Coefficients, Work, copy};
 use crate::linalg::{
-    Arithmetic, AtRow, Kernel, Packet, Planned, dispatch, each_row, is_short, slot, solve_packets,
+    Arithmetic, AtRow, Kernel, Packet, Planned, dispatch, each_row, is_long, is_short, slot, solve_packets,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -225,6 +225,7 @@ struct Step<'a, M: Dae, E: Plain, D, const S: usize> {
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, E, D, S> {
     type Number = E;
     type Output = ();
+    const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         if self.phase != Phase::Before {

@@ -233,12 +233,13 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
         else {
             return;
         };
-        for ((sum, &value), &direction) in sums.iter_mut().zip(values).zip(probe) {
-            *sum = *sum + value * direction;
+        // In registers: the optimiser cannot know that nothing here overlaps.
+        let (mut sum, mut term) = (*sums, *terms);
+        for i in 0..S {
+            sum[i] = sum[i] + values[i] * probe[i];
+            term[i] = term[i] + values[i].abs() * sizes[i];
         }
-        for ((term, &value), &size) in terms.iter_mut().zip(values).zip(sizes) {
-            *term = *term + value.abs() * size;
-        }
+        (*sums, *terms) = (sum, term);
     }
 }
 
@@ -276,11 +277,14 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_
         else {
             return;
         };
-        for (((total, size), &value), mu) in sums.iter_mut().zip(sizes).zip(values).zip(mu) {
-            let term = value * sum(mu);
-            *total = *total + term;
-            *size = *size + term.abs();
+        // In registers: the optimiser cannot know that nothing here overlaps.
+        let (mut total, mut size) = (*sums, *sizes);
+        for i in 0..S {
+            let term = values[i] * sum(&mu[i]);
+            total[i] = total[i] + term;
+            size[i] = size[i] + term.abs();
         }
+        (*sums, *sizes) = (total, size);
     }
 }
 

@@ -34,5 +34,5 @@ pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;
 pub(crate) use mean::MeanFactors;
 pub(crate) use sparse::{Planned, solve_packets};
-pub(crate) use straight::{AtRow, each_row, is_short};
+pub(crate) use straight::{AtRow, each_row, is_long, is_short};
 pub(crate) use twice::{dot_compensated, moved, two_product};

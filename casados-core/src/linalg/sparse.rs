@@ -17,7 +17,7 @@
 
 use super::block::{Block, Packet, inverse, negate, product, subtract, subtract_scaled, subtract_transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::straight::{AtPivot, from_first, from_last};
+use super::straight::{AtPivot, from_first, from_last, is_long};
 use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
@@ -80,6 +80,7 @@ pub(super) struct Factor<'a, M, E, const S: usize> {
 impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     type Number = E;
     type Output = ();
+    const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         if has_all::<M, _>(self.blocks) {
@@ -158,6 +159,7 @@ struct Solve<'a, M, E, R, const S: usize> {
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
+    const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { factors, rows } = self;
@@ -178,6 +180,7 @@ struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
+    const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Solve { factors, rows } = self.0;

@@ -119,15 +119,23 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     }
 }
 
+/// Whether kernels that go through all blocks of a plan are long.
+pub const fn is_long<M: Dae, const S: usize>() -> bool {
+    M::STRUCTURE.elimination.slots.len() * S * S > 250
+}
+
 const fn is_short_plan<M: Dae, V: AtPivot>() -> bool {
     let plan = &M::STRUCTURE.elimination;
     let count = if V::UPDATES { plan.updates.len() } else { plan.slots.len() };
     plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
-/// A pivot and its updates; beyond the last the last.
+/// A pivot and its updates; beyond the last, where nobody looks, any.
 const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [u32]) {
-    let n = smaller(n, plan.pivots.len() - 1);
+    if n >= plan.pivots.len() {
+        const NONE: Pivot = Pivot { slot: 0, block: 0, upper: 1, end: 1, identity: true, scaled: false };
+        return (&NONE, &[]);
+    }
     let (mut begin, mut index) = (0, 0);
     while index < n {
         begin += updates_of(&plan.pivots[index]);
