@@ -12,6 +12,7 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae};
 use crate::options::{Options, Start};
+use crate::scalar::lanes::second_level_cache;
 use crate::scalar::{Lanes, Real, Widest};
 use crate::shape::{Shape, assign};
 use crate::tableau::Tableau;
@@ -21,12 +22,12 @@ use alloc::vec::Vec;
 use core::any::Any;
 use core::marker::PhantomData;
 
-/// Groups whose factors and right-hand sides need more bytes are computed one interval after the other: what does not
-/// lie in the second-level cache, which has half a megabyte or more and other things to hold, is fetched from afar again
-/// and again. Measured (AVX2, chains of masses, s = 4): faster side by side with 290 kB, slower with 480 kB.
-const WORKING_SET: usize = 3 << 17;
+/// Groups whose factors and right-hand sides need more of the second-level cache are smaller, or computed one interval after the other:
+/// what does not lie in it is fetched from afar again and again. Measured: of half a megabyte (AVX2, chains of masses, s = 4) 290 kB
+/// were faster side by side, 480 kB slower; of one megabyte (AVX-512) 0.9 MB still were, by a third (the aircraft, 7 masses).
+const WORKING_SET: f64 = 7.0 / 8.0;
 
-/// How many intervals are computed together: as many as the widest register has whose group fits into [`WORKING_SET`].
+/// How many intervals are computed together: as many as the widest register has whose group fits into the cache.
 pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>() -> usize {
     let mut most = MOST_LANES;
     loop {
@@ -45,8 +46,9 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Fits<M, R, 
     type Output = (usize, bool);
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> (usize, bool) {
         let bytes = size_of::<M::Factors<[[E; S]; S]>>() + R::columns::<E, S>();
+        let fits = bytes as f64 <= WORKING_SET * second_level_cache() as f64;
         // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
-        (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && bytes <= WORKING_SET)
+        (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && fits)
     }
 }
 

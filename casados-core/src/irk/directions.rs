@@ -39,6 +39,19 @@ macro_rules! panels {
 }
 pub(super) use panels;
 
+/// Where the panel of a column begins, and how many columns it has.
+#[inline(always)]
+pub(super) const fn panel_of<E>(column: usize, count: usize) -> (usize, usize) {
+    let (mut begin, mut width) = (0, if size_of::<E>() <= 8 { 8 } else { 4 });
+    loop {
+        let whole = begin + (count - begin) / width * width;
+        if column < whole || width == 1 {
+            return (begin + (column - begin) / width * width, width);
+        }
+        (begin, width) = (whole, width / 2);
+    }
+}
+
 /// The rows of a panel that begins with a column, of a matrix with so many rows.
 #[inline(always)]
 pub(super) fn panel<E, const W: usize>(panels: &[E], column: usize, rows: usize) -> &[[E; W]] {
@@ -55,6 +68,12 @@ pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows
 pub(crate) trait Directions<E> {
     /// How many there are.
     const COUNT: usize;
+    /// Whether each is an element of `w`.
+    const SPARSE: bool = false;
+    /// The column of an element of `w`, if that is a direction.
+    fn column(_index: usize) -> Option<usize> {
+        None
+    }
     /// `row += factor · dw_index`, in the columns from `column` on.
     fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]);
     /// `Σ_c weight_c dw_index,c` over all columns, with the weights of the first sum or the second.
@@ -79,6 +98,12 @@ impl<M: Dae> Identity<M> {
 
 impl<M: Dae, E: Lanes> Directions<E> for Identity<M> {
     const COUNT: usize = M::STRUCTURE.directions.len();
+    const SPARSE: bool = true;
+
+    #[inline(always)]
+    fn column(index: usize) -> Option<usize> {
+        Self::column(index)
+    }
 
     #[inline(always)]
     fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {

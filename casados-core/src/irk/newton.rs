@@ -518,6 +518,8 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
     fn take<const S: usize>(&mut self, increments: &[[[E; 1]; S]; N], weights: &[E; N], sizes: &mut [E; N]) {
         let old = *sizes;
         let (mut new, mut excess) = ([E::from_f64(0.0); N], [E::from_f64(0.0); N]);
+        // Stage by stage, so that what is done to unknowns is done to vectors.
+        #[allow(clippy::needless_range_loop)]
         for i in 0..S {
             for n in 0..N {
                 let [delta] = increments[n][i];

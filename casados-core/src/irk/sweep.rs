@@ -1,7 +1,7 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to `V_{n+1}`, and to what second
 //! derivatives need of both.
 
-use super::directions::{Directions, panel, panel_mut, panels, weight};
+use super::directions::{Directions, panel, panel_mut, panel_of, panels, weight};
 use super::evaluate::entry;
 use super::record::{Coefficients, Work, copy};
 use crate::linalg::{
@@ -232,6 +232,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
             self.sums.fill([[E::from_f64(0.0); STRANDS]; S]);
             self.start_sums.fill([E::from_f64(0.0); STRANDS]);
         }
+        if self.phase != Phase::After && self.first && D::SPARSE {
+            self.dy.fill(E::from_f64(0.0));
+            let (jacobian, dy) = (self.jacobian, &mut *self.dy);
+            each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, dy, directions: PhantomData });
+        }
         panels!(D::COUNT, E, column, W => self.panel::<A, W>(column));
     }
 }
@@ -247,14 +252,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             return;
         }
         if self.phase != Phase::After {
-            dy.fill([[E::from_f64(0.0); W]; S]);
             let (jacobian, directions) = (self.jacobian, self.directions);
-            if self.first {
-                each_row::<A, _>(&mut First::<M, E, D, S, W> { jacobian, directions, dy, column });
-            } else {
+            if !(self.first && D::SPARSE) {
+                dy.fill([[E::from_f64(0.0); W]; S]);
                 Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
+                each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
             }
-            each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
         }
         if self.phase == Phase::Whole {
             if const { size_of::<E>() > 8 && S > 2 && W == 4 } {
@@ -317,21 +320,36 @@ fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     }
 }
 
-/// `−f_x,i V_0` of a panel, equations in their slots: the rows of `V_0` are the directions.
-struct First<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+/// `−(f_x,i V_0 + f_w,i)`, where every direction is an element of `w`: entries of the Jacobian go to their places in all panels.
+struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
-    directions: &'a D,
-    dy: &'a mut [Packet<E, S, W>],
-    column: usize,
+    dy: &'a mut [E],
+    directions: PhantomData<D>,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for First<'_, M, E, D, S, W> {
-    const ROWS: usize = M::STRUCTURE.blocks[2] - M::STRUCTURE.blocks[1];
-    const INSTRUCTIONS: usize = 4 + 2 * S;
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
+    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
+    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
+    const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let entry = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row);
-        add::<M, _, _, S, W>(entry, M::Shape::NX, self.directions, self.dy, self.column);
+        let (nx, nz, nk) = (M::Shape::NX, M::Shape::NZ, M::Shape::NK);
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let index = if c < 2 * nx {
+            c - nx
+        } else if c < 2 * nx + nz {
+            return;
+        } else {
+            c - nx - nz
+        };
+        let Some(column) = D::column(index) else { return };
+        let (begin, width) = panel_of::<E>(column, D::COUNT);
+        let place = begin * nk * S + slot::<M>(r) * S * width + (column - begin);
+        for (stage, &value) in values.iter().enumerate() {
+            if let Some(to) = self.dy.get_mut(place + stage * width) {
+                *to = *to - value;
+            }
+        }
     }
 }
 
@@ -404,24 +422,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
     const INSTRUCTIONS: usize = 4 + 2 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let entry = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row);
-        add::<M, _, _, S, W>(entry, M::Shape::NX + M::Shape::NZ, self.directions, self.dy, self.column);
-    }
-}
-
-/// What an entry whose variable is a direction contributes; the first such variable is `shift`.
-#[inline(always)]
-fn add<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
-    entry: Option<(usize, usize, &[E; S])>,
-    shift: usize,
-    directions: &D,
-    dy: &mut [Packet<E, S, W>],
-    column: usize,
-) {
-    let Some((r, c, values)) = entry else { return };
-    let Some(packet) = dy.get_mut(slot::<M>(r)) else { return };
-    for (row, &value) in packet.iter_mut().zip(values) {
-        directions.add(c - shift, -value, column, row);
+        let shift = M::Shape::NX + M::Shape::NZ;
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row) else { return };
+        let Some(packet) = self.dy.get_mut(slot::<M>(r)) else { return };
+        for (row, &value) in packet.iter_mut().zip(values) {
+            self.directions.add(c - shift, -value, self.column, row);
+        }
     }
 }
 

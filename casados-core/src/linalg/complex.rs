@@ -14,6 +14,10 @@ pub struct Complex<T, const L: usize> {
 }
 
 impl<T: Lanes, const L: usize> Complex<T, L> {
+    /// So many of them are computed. Where a number is a register by itself nothing is gained by filling one: systems that repeat
+    /// another, the second half of those of a tableau, are left out.
+    pub(super) const USED: usize = if size_of::<T>() <= 8 { L } else { L.div_ceil(2) };
+
     /// `L` times zero.
     #[inline(always)]
     pub fn zero() -> Self {
@@ -30,7 +34,7 @@ impl<T: Lanes, const L: usize> Complex<T, L> {
     #[inline(always)]
     pub fn scaled(self, a: T) -> Self {
         let Self { mut re, mut im } = self;
-        for l in 0..L {
+        for l in 0..Self::USED {
             (re[l], im[l]) = (a * re[l], a * im[l]);
         }
         Self { re, im }
@@ -40,7 +44,7 @@ impl<T: Lanes, const L: usize> Complex<T, L> {
     #[inline(always)]
     pub fn is_finite(&self) -> bool {
         let mut finite = true;
-        for part in self.re.iter().chain(&self.im) {
+        for part in self.re.iter().take(Self::USED).chain(self.im.iter().take(Self::USED)) {
             finite &= T::all(part.is_finite());
         }
         finite
@@ -50,7 +54,7 @@ impl<T: Lanes, const L: usize> Complex<T, L> {
     #[inline(always)]
     fn reciprocal(self) -> Self {
         let (mut re, mut im) = (self.re, self.im);
-        for l in 0..L {
+        for l in 0..Self::USED {
             let size = self.re[l].abs().max(self.im[l].abs());
             let scale = T::from_f64(1.0) / size;
             let (r, i) = (self.re[l] * scale, self.im[l] * scale);
@@ -65,7 +69,7 @@ impl<T: Lanes, const L: usize> Add for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
-        for l in 0..L {
+        for l in 0..Self::USED {
             (self.re[l], self.im[l]) = (self.re[l] + other.re[l], self.im[l] + other.im[l]);
         }
         self
@@ -76,7 +80,7 @@ impl<T: Lanes, const L: usize> Sub for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
-        for l in 0..L {
+        for l in 0..Self::USED {
             (self.re[l], self.im[l]) = (self.re[l] - other.re[l], self.im[l] - other.im[l]);
         }
         self
@@ -87,7 +91,7 @@ impl<T: Lanes, const L: usize> Mul for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
     fn mul(mut self, other: Self) -> Self {
-        for l in 0..L {
+        for l in 0..Self::USED {
             let re = self.re[l] * other.re[l] - self.im[l] * other.im[l];
             (self.re[l], self.im[l]) = (re, self.re[l] * other.im[l] + self.im[l] * other.re[l]);
         }
@@ -108,7 +112,7 @@ impl<T: Lanes, const L: usize> Neg for Complex<T, L> {
     type Output = Self;
     #[inline(always)]
     fn neg(mut self) -> Self {
-        for l in 0..L {
+        for l in 0..Self::USED {
             (self.re[l], self.im[l]) = (-self.re[l], -self.im[l]);
         }
         self
@@ -126,6 +130,13 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
     #[inline(always)]
     fn subtract_product(self, a: Self, b: Self) -> Self {
         let (Self { mut re, mut im }, negative) = (self, -a);
+        if const { Self::USED < L } {
+            for l in 0..Self::USED {
+                re[l] = re[l].subtract_product(a.re[l], b.re[l]).subtract_product(negative.im[l], b.im[l]);
+                im[l] = im[l].subtract_product(a.re[l], b.im[l]).subtract_product(a.im[l], b.re[l]);
+            }
+            return Self { re, im };
+        }
         T::subtract_products(&mut re, &a.re, &b.re);
         T::subtract_products(&mut re, &negative.im, &b.im);
         T::subtract_products(&mut im, &a.re, &b.im);
@@ -138,7 +149,7 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
     fn is_smaller(self, other: Self) -> Self::Mask {
         let zero = T::from_f64(0.0);
         let mut mask = [T::lt(zero, zero); L];
-        for (l, mask) in mask.iter_mut().enumerate() {
+        for (l, mask) in mask.iter_mut().enumerate().take(Self::USED) {
             *mask = T::lt(self.re[l].abs() + self.im[l].abs(), other.re[l].abs() + other.im[l].abs());
         }
         mask
@@ -146,7 +157,7 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
 
     #[inline(always)]
     fn select(mask: Self::Mask, a: Self, mut b: Self) -> Self {
-        for (l, &mask) in mask.iter().enumerate() {
+        for (l, &mask) in mask.iter().enumerate().take(Self::USED) {
             (b.re[l], b.im[l]) = (T::select(mask, a.re[l], b.re[l]), T::select(mask, a.im[l], b.im[l]));
         }
         b

@@ -66,7 +66,16 @@ impl<T: Lanes, const S: usize, const L: usize> Eigenbasis<T, S, L> {
     /// `b̂ = V⁻¹ b`
     #[inline(always)]
     pub fn split<A: Arithmetic>(&self, b: &[T; S]) -> Complex<T, L> {
-        let mut sum = Complex::zero();
+        let mut sum = Complex::<T, L>::zero();
+        if const { Complex::<T, L>::USED < L } {
+            for (left, &b) in self.left.iter().zip(b) {
+                for l in 0..Complex::<T, L>::USED {
+                    sum.re[l] = A::subtract(sum.re[l], -b, left.re[l]);
+                    sum.im[l] = A::subtract(sum.im[l], -b, left.im[l]);
+                }
+            }
+            return sum;
+        }
         for (left, &b) in self.left.iter().zip(b) {
             A::subtract_row(&mut sum.re, -b, &left.re);
             A::subtract_row(&mut sum.im, -b, &left.im);
@@ -78,7 +87,7 @@ impl<T: Lanes, const S: usize, const L: usize> Eigenbasis<T, S, L> {
     #[inline(always)]
     pub fn join<A: Arithmetic>(&self, y: &Complex<T, L>) -> [T; S] {
         let mut sum = [T::from_f64(0.0); S];
-        for (l, column) in self.right.iter().enumerate() {
+        for (l, column) in self.right.iter().enumerate().take(Complex::<T, L>::USED) {
             A::subtract_row(&mut sum, -y.re[l], &column[0]);
             A::subtract_row(&mut sum, y.im[l], &column[1]);
         }

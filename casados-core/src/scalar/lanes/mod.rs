@@ -19,6 +19,8 @@
 //! functions are those of [`functions`], with the bounds that are listed there.
 #![allow(dead_code)]
 
+#[cfg(feature = "alloc")]
+mod cache;
 #[cfg(any(
     not(feature = "std"),
     target_arch = "x86_64",
@@ -265,6 +267,9 @@ macro_rules! blocks {
     ($($register:tt)*) => {};
 }
 pub(crate) use blocks;
+
+#[cfg(feature = "alloc")]
+pub(crate) use cache::second_level_cache;
 
 /// The level that is used; [`UNKNOWN`] until somebody asks.
 static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);

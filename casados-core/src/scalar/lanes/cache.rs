@@ -1,0 +1,45 @@
+//! The size of the second-level cache: how much may lie in it decides how many intervals are computed side by side.
+
+#[cfg(target_arch = "x86_64")]
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+/// What machines have that do not tell: half a megabyte or more.
+const USUAL: usize = 1 << 19;
+
+/// Bytes of the second-level cache.
+#[cfg(target_arch = "x86_64")]
+pub fn second_level_cache() -> usize {
+    // Asking takes long, above all in a virtual machine.
+    static BYTES: AtomicUsize = AtomicUsize::new(0);
+    match BYTES.load(Ordering::Relaxed) {
+        0 => {
+            let bytes = if cfg!(miri) { USUAL } else { ask().unwrap_or(USUAL) };
+            BYTES.store(bytes, Ordering::Relaxed);
+            bytes
+        }
+        bytes => bytes,
+    }
+}
+
+/// Bytes of the second-level cache.
+#[cfg(not(target_arch = "x86_64"))]
+pub fn second_level_cache() -> usize {
+    USUAL
+}
+
+/// What the processor says, in kilobytes in the upper half of a register: AMD64 Architecture Programmer's Manual 3, Intel 64 Software
+/// Developer's Manual 2A, both under CPUID, function 8000_0006h.
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, unused_unsafe)]
+fn ask() -> Option<usize> {
+    use core::arch::x86_64::__cpuid;
+    const FUNCTION: u32 = 0x8000_0006;
+    // SAFETY: every processor of this architecture has the instruction, and functions that it does not know are not asked for.
+    let kilobytes = unsafe {
+        if __cpuid(0x8000_0000).eax < FUNCTION {
+            return None;
+        }
+        __cpuid(FUNCTION).ecx >> 16
+    };
+    (kilobytes > 0).then_some(kilobytes as usize * 1024)
+}
