@@ -12,8 +12,8 @@
 //! indexed by *slots*: a slot is an unknown, and also the equation that determines it in the plan. So right-hand side
 //! and solution share one array, and no permutation is ever applied.
 //!
-//! The compiler does not look into the tables of the plan; elements are fetched with `get`, whose
-//! never-taken exit costs nothing beside a block and leaves no panic in the program.
+//! Where the plan is short its loops are straight lines (`straight`). In longer ones the compiler does not look into the tables of the
+//! plan; elements are fetched with `get`, whose never-taken exit costs nothing beside a block and leaves no panic in the program.
 
 use super::block::{Block, Packet, inverse, negate, product, subtract, subtract_scaled, subtract_transposed};
 use super::fused::{Arithmetic, Kernel, dispatch};
