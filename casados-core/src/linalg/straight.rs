@@ -7,7 +7,10 @@
 use super::fused::Arithmetic;
 use crate::model::{Dae, Elimination, Pivot};
 
-/// Straight lines are not longer than so many instructions: they share the nearest cache.
+/// Where nothing is optimised straight lines would only be long, and in firmware memory is dearer than time.
+const WANTED: bool = cfg!(all(feature = "std", not(debug_assertions)));
+
+/// They are not longer than so many instructions: they share the nearest cache.
 const MOST_INSTRUCTIONS: usize = 4000;
 
 /// What is done with each row of a table.
@@ -57,19 +60,24 @@ const fn smaller(a: usize, b: usize) -> usize {
 
 /// Whether the rows of a table are a straight line.
 pub const fn is_short<V: AtRow>() -> bool {
-    V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
+    WANTED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
 /// All rows of a table.
 #[inline(always)]
 pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
     if const { is_short::<V>() } {
-        forwards!(chunk!(A, V, visit));
+        rows_in_line::<A, V>(visit);
         return;
     }
     for row in 0..V::ROWS {
         visit.at::<A>(row);
     }
+}
+
+#[inline(always)]
+fn rows_in_line<A: Arithmetic, V: AtRow>(visit: &mut V) {
+    forwards!(chunk!(A, V, visit));
 }
 
 /// What is done at each pivot of a plan.
@@ -96,7 +104,7 @@ macro_rules! pivot {
 #[inline(always)]
 pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     if const { is_short_plan::<M, V>() } {
-        forwards!(pivot!(A, M, visit));
+        pivots_in_line::<A, M, V>(visit);
         return;
     }
     let mut rest = M::STRUCTURE.elimination.updates;
@@ -111,12 +119,22 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     if const { is_short_plan::<M, V>() } {
-        backwards!(pivot!(A, M, visit));
+        pivots_in_line_backwards::<A, M, V>(visit);
         return;
     }
     for pivot in M::STRUCTURE.elimination.pivots.iter().rev() {
         visit.at::<A>(pivot, &[]);
     }
+}
+
+#[inline(always)]
+fn pivots_in_line<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    forwards!(pivot!(A, M, visit));
+}
+
+#[inline(always)]
+fn pivots_in_line_backwards<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    backwards!(pivot!(A, M, visit));
 }
 
 /// Whether kernels that go through all blocks of a plan are long.
@@ -127,7 +145,7 @@ pub const fn is_long<M: Dae, const S: usize>() -> bool {
 const fn is_short_plan<M: Dae, V: AtPivot>() -> bool {
     let plan = &M::STRUCTURE.elimination;
     let count = if V::UPDATES { plan.updates.len() } else { plan.slots.len() };
-    plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
+    WANTED && plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
 /// A pivot and its updates; beyond the last, where nobody looks, any.
@@ -148,4 +166,38 @@ const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [u32]) {
 /// How many blocks a pivot updates.
 const fn updates_of(pivot: &Pivot) -> usize {
     ((pivot.upper - pivot.block - 1) * (pivot.end - pivot.upper)) as usize
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::super::fused::Separate;
+    use super::*;
+    use alloc::vec::Vec;
+
+    /// Writes down where it comes by.
+    struct Path<const ROWS: usize>(Vec<usize>);
+
+    impl<const ROWS: usize> AtRow for Path<ROWS> {
+        const ROWS: usize = ROWS;
+        const INSTRUCTIONS: usize = 1;
+        fn at<A: Arithmetic>(&mut self, row: usize) {
+            self.0.push(row);
+        }
+    }
+
+    fn rows<const ROWS: usize>() {
+        let mut path = Path::<ROWS>(Vec::new());
+        rows_in_line::<Separate, _>(&mut path);
+        assert_eq!(path.0, (0..ROWS).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_line_has_every_row_once() {
+        rows::<0>();
+        rows::<1>();
+        rows::<8>();
+        rows::<9>();
+        rows::<{ MOST * CHUNK - 1 }>();
+        rows::<{ MOST * CHUNK }>();
+    }
 }
