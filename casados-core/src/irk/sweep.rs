@@ -363,7 +363,7 @@ struct Later<'a, M: Dae, E: Plain, const S: usize, const W: usize> {
 impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
     #[inline(always)]
     fn all<A: Arithmetic>(mut self) {
-        if const { is_short::<Self>() } {
+        if const { is_short::<A, Self>() } {
             each_row::<A, _>(&mut self);
             return;
         }

@@ -11,6 +11,8 @@ use crate::scalar::lanes::{Level, level};
 
 /// How `t − a b` is computed.
 pub trait Arithmetic {
+    /// Whether it rounds once: it is that of machines that matter, which loops become straight lines for.
+    const FUSED: bool = false;
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
     /// `target − left · right`
@@ -67,6 +69,7 @@ pub struct Fused;
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 impl Arithmetic for Fused {
+    const FUSED: bool = true;
     #[inline(always)]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t.subtract_product(a, b)

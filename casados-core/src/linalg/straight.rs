@@ -10,8 +10,8 @@ use crate::model::{Dae, Elimination, Pivot};
 /// Where nothing is optimised straight lines would only be long, and in firmware memory is dearer than time.
 const WANTED: bool = cfg!(all(feature = "std", not(debug_assertions)));
 
-/// They are not longer than so many instructions: they share the nearest cache.
-const MOST_INSTRUCTIONS: usize = 4000;
+/// They are not longer than so many instructions: they share the nearest cache, and take long to compile.
+const MOST_INSTRUCTIONS: usize = 2000;
 
 /// What is done with each row of a table.
 pub trait AtRow {
@@ -59,14 +59,14 @@ const fn smaller(a: usize, b: usize) -> usize {
 }
 
 /// Whether the rows of a table are a straight line.
-pub const fn is_short<V: AtRow>() -> bool {
-    WANTED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
+pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
+    WANTED && A::FUSED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
 /// All rows of a table.
 #[inline(always)]
 pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
-    if const { is_short::<V>() } {
+    if const { is_short::<A, V>() } {
         rows_in_line::<A, V>(visit);
         return;
     }
@@ -103,7 +103,7 @@ macro_rules! pivot {
 /// From the first pivot to the last.
 #[inline(always)]
 pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
-    if const { is_short_plan::<M, V>() } {
+    if const { is_short_plan::<A, M, V>() } {
         pivots_in_line::<A, M, V>(visit);
         return;
     }
@@ -118,7 +118,7 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 /// From the last pivot to the first, without updates.
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
-    if const { is_short_plan::<M, V>() } {
+    if const { is_short_plan::<A, M, V>() } {
         pivots_in_line_backwards::<A, M, V>(visit);
         return;
     }
@@ -142,10 +142,10 @@ pub const fn is_long<M: Dae, const S: usize>() -> bool {
     M::STRUCTURE.elimination.slots.len() * S * S > 250
 }
 
-const fn is_short_plan<M: Dae, V: AtPivot>() -> bool {
+const fn is_short_plan<A: Arithmetic, M: Dae, V: AtPivot>() -> bool {
     let plan = &M::STRUCTURE.elimination;
     let count = if V::UPDATES { plan.updates.len() } else { plan.slots.len() };
-    WANTED && plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
+    WANTED && A::FUSED && plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
 /// A pivot and its updates; beyond the last, where nobody looks, any.
