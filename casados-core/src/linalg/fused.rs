@@ -103,6 +103,7 @@ pub trait Kernel {
     /// Its result.
     type Output;
     /// Whether it is long: AVX-512 then takes fewer instructions, as it multiplies by numbers that are still in memory.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
     const WIDE: bool = false;
     /// To be `#[inline(always)]`, with everything that it calls.
     fn run<A: Arithmetic>(self) -> Self::Output;

@@ -138,6 +138,7 @@ fn pivots_in_line_backwards<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 }
 
 /// Whether kernels that go through all blocks of a plan are long.
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
 pub const fn is_long<M: Dae, const S: usize>() -> bool {
     M::STRUCTURE.elimination.slots.len() * S * S > 250
 }
