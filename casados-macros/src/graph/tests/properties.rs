@@ -120,6 +120,17 @@ fn into_domain(graph: &mut Graph, function: Unary, a: Node) -> Node {
 
 /// Values of nodes in any arithmetic.
 fn evaluate<S: Scalar>(graph: &Graph, nodes: &[Node], variables: &[S], seed: S) -> Vec<S> {
+    evaluate_with(unary, graph, nodes, variables, seed)
+}
+
+/// The same with other functions of one argument.
+fn evaluate_with<S: Scalar>(
+    unary: fn(Unary, S) -> S,
+    graph: &Graph,
+    nodes: &[Node],
+    variables: &[S],
+    seed: S,
+) -> Vec<S> {
     let mut values = vec![S::from_f64(f64::NAN); graph.len()];
     let mut masks: Vec<Option<S::Mask>> = vec![None; graph.len()];
     for node in graph.reachable(nodes) {
@@ -171,6 +182,15 @@ fn unary<S: Scalar>(function: Unary, a: S) -> S {
         Unary::Atanh => a.atanh(),
         Unary::Abs => a.abs(),
         Unary::Signum => a.signum(),
+    }
+}
+
+/// `num-dual` differentiates quotients in place of these functions, which rounds more.
+fn unary_of_reference<S: Scalar>(function: Unary, a: S) -> S {
+    match function {
+        Unary::Tan => a.sin() / a.cos(),
+        Unary::Tanh => a.sinh() / a.cosh(),
+        _ => unary(function, a),
     }
 }
 
@@ -230,7 +250,7 @@ proptest! {
 
         for i in 0..VARIABLES {
             let seeded = |k: usize| Forward { re: exact(point[k]), d: exact(is(k, i)) };
-            let bound = evaluate(&graph, &[f], &[0, 1, 2].map(seeded), seeded(0))[0].d;
+            let bound = evaluate_with(unary_of_reference, &graph, &[f], &[0, 1, 2].map(seeded), seeded(0))[0].d;
             let dual = [0, 1, 2].map(|k| Dual64::new(point[k], is(k, i)));
             let dual = evaluate(&graph, &[f], &dual, Dual64::from(mu))[0].eps;
             let complex = [0, 1, 2].map(|k| Complex64::new(point[k], STEP * is(k, i)));
@@ -245,7 +265,7 @@ proptest! {
                     re: Forward { re: exact(point[k]), d: exact(is(k, i)) },
                     d: Forward { re: exact(is(k, j)), d: exact(0.0) },
                 };
-                let bound = evaluate(&graph, &[f], &[0, 1, 2].map(nested), nested(0))[0].d.d;
+                let bound = evaluate_with(unary_of_reference, &graph, &[f], &[0, 1, 2].map(nested), nested(0))[0].d.d;
                 let hyper = [0, 1, 2].map(|k| HyperDual64::new(point[k], is(k, i), is(k, j), 0.0));
                 let hyper = evaluate(&graph, &[f], &hyper, HyperDual64::from(mu))[0].eps1eps2;
                 let product = exact(mu) * Bounded { value: hyper, error: REFERENCE * bound.error };
