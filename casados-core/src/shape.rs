@@ -5,7 +5,7 @@
 
 use bytemuck::Zeroable;
 use core::fmt::Debug;
-use core::ops::{Index, IndexMut};
+use core::ops::{Deref, DerefMut, Index, IndexMut};
 use nalgebra::{SMatrix, SVector};
 
 /// An element of static memory: copied freely, and valid when all its bytes are zero.
@@ -60,6 +60,27 @@ macro_rules! compared {
     };
 }
 pub(crate) use compared;
+
+/// What begins where a line of the cache does on machines with wide registers: they are loaded in halves where they cross into the
+/// next line.
+#[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
+#[cfg_attr(target_arch = "x86_64", repr(C, align(64)))]
+pub struct Aligned<V>(pub V);
+
+impl<V> Deref for Aligned<V> {
+    type Target = V;
+    #[inline(always)]
+    fn deref(&self) -> &V {
+        &self.0
+    }
+}
+
+impl<V> DerefMut for Aligned<V> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut V {
+        &mut self.0
+    }
+}
 
 /// `to = from` without a copy on the stack, which an assignment makes where nothing is optimised.
 #[inline(always)]

@@ -14,7 +14,7 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Aligned, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 
@@ -27,7 +27,7 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     /// `λ_w`; the first `NX` rows stay zero.
     pub(crate) gradient: ArrayW<M, [T; C]>,
     /// `μ`, one row per slot and stage.
-    pub(crate) mu: ArrayK<M, [[T; C]; S]>,
+    pub(crate) mu: Aligned<ArrayK<M, [[T; C]; S]>>,
     /// What an integrand adds to the right-hand side of the unknowns at the stages,
     pub(crate) source: ArrayK<M, [T; S]>,
     /// and to `(λ_n, λ_w)`.

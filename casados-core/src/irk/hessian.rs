@@ -20,7 +20,7 @@ use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide};
-use crate::shape::assign;
+use crate::shape::{Aligned, assign};
 use crate::shape::{Array, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
@@ -36,13 +36,13 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: Hessian<M, T>,
     pub(crate) backward: Backward<M, T, S, 1>,
     /// `−H D` of a panel at all stages.
-    g: ArrayV<M, [[T; PANEL]; S]>,
+    g: Aligned<ArrayV<M, [[T; PANEL]; S]>>,
     /// The Hessian over the directions that have any influence, its lower triangle.
     sum: ArrayW<M, ArrayW<M, T>>,
     /// `μ` at all stages, in the order of the equations.
-    mu: ArrayK<M, [T; S]>,
+    mu: Aligned<ArrayK<M, [T; S]>>,
     /// Entries of `∇²(μᵀ f)` at all stages.
-    entries: M::Hessian<[T; S]>,
+    entries: Aligned<M::Hessian<[T; S]>>,
 }
 copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 
@@ -52,7 +52,7 @@ copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     linear: Linearization<M, T, S, F>,
     /// The rows of `D` at all stages that enter second derivatives, in panels.
-    d: ArrayV<M, [ArrayW<M, T>; S]>,
+    d: Aligned<ArrayV<M, [ArrayW<M, T>; S]>>,
 }
 copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
@@ -289,7 +289,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         let (d, _) = panel::<E, W>(self.d, column, rows).as_chunks::<S>();
         let g = self.g.as_flattened_mut().as_flattened_mut();
         let (g, _) = panel_mut::<E, W>(g, 0, rows).as_chunks_mut::<S>();
-        // G = H D, row by row; all stages in registers, or two of them where numbers are registers themselves.
+        // G = −H D, row by row; all stages in registers, or two of them where numbers are registers themselves.
         if const { size_of::<E>() <= 8 || S <= 2 } {
             multiply::<A, M, E, S, S, W>(self.entries, d, g, 0);
         } else {
@@ -301,19 +301,25 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         panels!(M::STRUCTURE.directions.len(), E, row, V => {
             if row >= column {
                 let d = panel::<E, V>(self.d, row, rows);
-                if const { V > 4 } {
-                    tiles::<A, E, R, V, 4, W>(d, g, self.sum, row, column);
-                } else if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, R, V, 2, W>(d, g, self.sum, row, column);
+                if const { size_of::<E>() > 8 && V > 2 } {
+                    tiles::<A, E, R, V, 2, 1, W>(d, g, self.sum, row, column);
+                } else if const { size_of::<E>() > 8 } {
+                    tiles::<A, E, R, V, V, 1, W>(d, g, self.sum, row, column);
+                } else if const { V > 4 && A::WIDE } {
+                    tiles::<A, E, R, V, 8, 1, W>(d, g, self.sum, row, column);
+                } else if const { V > 4 } {
+                    tiles::<A, E, R, V, 4, 1, W>(d, g, self.sum, row, column);
+                } else if const { V > 2 } {
+                    tiles::<A, E, R, V, 4, 2, W>(d, g, self.sum, row, column);
                 } else {
-                    tiles::<A, E, R, V, V, W>(d, g, self.sum, row, column);
+                    tiles::<A, E, R, V, V, 4, W>(d, g, self.sum, row, column);
                 }
             }
         });
     }
 }
 
-/// `G = H D` at `N` stages, from a stage on.
+/// `G = −H D` at `N` stages, from a stage on.
 #[inline(always)]
 fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, const W: usize>(
     entries: &[[E; S]],
@@ -325,9 +331,7 @@ fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, con
     let mut terms = M::STRUCTURE.symmetric.iter().peekable();
     while let Some(term) = terms.next() {
         if let (Some(values), Some(d)) = (entries.get(term.entry as usize), d.get(term.column as usize)) {
-            for ((packet, &value), d) in packet.iter_mut().zip(from(values, stage)).zip(from(d, stage)) {
-                A::subtract_row(packet, -value, d);
-            }
+            subtract_stages::<A, E, N, W>(&mut packet, from(values, stage), from(d, stage));
         }
         if terms.peek().is_none_or(|next| next.row != term.row) {
             let rows = g.get_mut(term.row as usize).and_then(|rows| rows.get_mut(stage..));
@@ -338,16 +342,45 @@ fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, con
     }
 }
 
+/// `packet − values d` at `N` stages.
+#[inline(always)]
+fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize>(
+    packet: &mut [[E; W]; N],
+    values: &[E],
+    d: &[[E; W]],
+) {
+    if const { W == 1 }
+        && let Some(packet) = packet.as_flattened_mut().first_chunk_mut::<N>()
+        && let (Some(values), Some(d)) = (values.first_chunk(), d.as_flattened().first_chunk())
+    {
+        // The stages of one column side by side.
+        A::subtract_products(packet, values, d);
+        return;
+    }
+    for ((packet, &value), d) in packet.iter_mut().zip(values).zip(d) {
+        A::subtract_row(packet, value, d);
+    }
+}
+
 /// The stages from one of them on.
 #[inline(always)]
 fn from<V>(stages: &[V], first: usize) -> &[V] {
     stages.get(first..).unwrap_or_default()
 }
 
-/// `sum −= Dᵀ G` for the panels of `D` and `G` that begin with a row and a column; each tile is in registers while it goes
-/// through all variables at all stages. Above the diagonal it writes what nobody reads.
+/// `sum −= Dᵀ G` for the panels of `D` and of `−G` that begin with a row and a column; each tile is in registers while it goes
+/// through all variables at all stages, in as many strands as hide how long an addition takes. Above the diagonal it writes
+/// what nobody reads.
 #[inline(always)]
-fn tiles<A: Arithmetic, E: Lanes, R: Array<E>, const V: usize, const ROWS: usize, const W: usize>(
+fn tiles<
+    A: Arithmetic,
+    E: Lanes,
+    R: Array<E>,
+    const V: usize,
+    const ROWS: usize,
+    const STRANDS: usize,
+    const W: usize,
+>(
     d: &[[E; V]],
     g: &[[E; W]],
     sum: &mut [R],
@@ -355,18 +388,41 @@ fn tiles<A: Arithmetic, E: Lanes, R: Array<E>, const V: usize, const ROWS: usize
     column: usize,
 ) {
     for t in 0..V / ROWS {
-        let mut tile = [[E::from_f64(0.0); W]; ROWS];
+        let mut tiles = [[[E::from_f64(0.0); W]; ROWS]; STRANDS];
+        let ((d, last_d), (g, last_g)) = (d.as_chunks::<STRANDS>(), g.as_chunks::<STRANDS>());
         for (d, g) in d.iter().zip(g) {
-            let Some(d) = d.as_chunks::<ROWS>().0.get(t) else { continue };
-            for (tile, &d) in tile.iter_mut().zip(d) {
-                A::subtract_row(tile, d, g);
+            for ((tile, d), g) in tiles.iter_mut().zip(d).zip(g) {
+                subtract_outer::<A, E, V, ROWS, W>(tile, d, g, t);
+            }
+        }
+        let Some((tile, others)) = tiles.split_first_mut() else { return };
+        for (d, g) in last_d.iter().zip(last_g) {
+            subtract_outer::<A, E, V, ROWS, W>(tile, d, g, t);
+        }
+        for other in others {
+            for (to, from) in tile.as_flattened_mut().iter_mut().zip(other.as_flattened()) {
+                *to = *to + *from;
             }
         }
         for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row + t * ROWS)) {
             let columns = sum.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut::<W>());
             for (sum, &tile) in columns.into_iter().flatten().zip(tile) {
-                *sum = *sum + tile;
+                *sum = *sum - tile;
             }
         }
+    }
+}
+
+/// `tile − d gᵀ`, of `ROWS` elements of `d`.
+#[inline(always)]
+fn subtract_outer<A: Arithmetic, E: Lanes, const V: usize, const ROWS: usize, const W: usize>(
+    tile: &mut [[E; W]; ROWS],
+    d: &[E; V],
+    g: &[E; W],
+    t: usize,
+) {
+    let Some(d) = d.as_chunks::<ROWS>().0.get(t) else { return };
+    for (tile, &d) in tile.iter_mut().zip(d) {
+        A::subtract_row(tile, d, g);
     }
 }

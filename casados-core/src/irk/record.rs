@@ -5,7 +5,7 @@ use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Lanes;
-use crate::shape::{Plain, assign};
+use crate::shape::{Aligned, Plain, assign};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
@@ -69,7 +69,7 @@ pub struct Step<M: Dae, T: Plain, const S: usize> {
     /// The state at its start.
     pub(crate) x: ArrayX<M, T>,
     /// The unknowns `(k, z)` at its stages.
-    pub(crate) y: ArrayK<M, [T; S]>,
+    pub(crate) y: Aligned<ArrayK<M, [T; S]>>,
 }
 
 /// What a call was given, besides the state at its start.
@@ -97,7 +97,7 @@ pub(crate) struct Times<T> {
 #[zeroable(bound = "")]
 pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     /// Entries of the Jacobian of the model, each at all stages.
-    pub jacobian: M::Jacobian<[T; S]>,
+    pub jacobian: Aligned<M::Jacobian<[T; S]>>,
     /// Factors of the Newton matrix.
     pub factors: Factors<M, T, S, F>,
 }
@@ -123,11 +123,11 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// What was rounded off from it, if sums are compensated.
     pub(crate) rest: ArrayX<M, T>,
     /// Variables of the model, each at all stages.
-    pub(crate) points: ArrayV<M, [T; S]>,
+    pub(crate) points: Aligned<ArrayV<M, [T; S]>>,
     /// The residual at all stages.
-    pub(crate) f: ArrayK<M, [T; S]>,
+    pub(crate) f: Aligned<ArrayK<M, [T; S]>>,
     /// The residual in the slots of the equations, then the increment.
-    pub(crate) increment: ArrayK<M, [[T; 1]; S]>,
+    pub(crate) increment: Aligned<ArrayK<M, [[T; 1]; S]>>,
     /// Reciprocals of the sizes of the unknowns, which increments are measured by.
     pub(crate) weights: ArrayK<M, T>,
     /// The sizes of the last increments.
@@ -137,8 +137,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     pub(crate) mean: F::Place<MeanFactors<M, T, S>>,
     /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While stages are solved with
     /// compensated sums, what they are beyond their digits.
-    pub(crate) probe: [ArrayV<M, [T; S]>; 2],
-    pub(crate) terms: ArrayK<M, [T; S]>,
+    pub(crate) probe: [Aligned<ArrayV<M, [T; S]>>; 2],
+    pub(crate) terms: Aligned<ArrayK<M, [T; S]>>,
     /// One stage, for machines whose registers do not hold all of them.
     pub(crate) stage: Stage<M, T::Cell>,
     /// What the factors that are there are good for.

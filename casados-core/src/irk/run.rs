@@ -202,7 +202,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         let [first, second] = &mut self.tapes;
         let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
         for (step, y) in steps.iter_mut().zip(record) {
-            crate::shape::assign(&mut step.y, y);
+            crate::shape::assign(&mut *step.y, y);
         }
         self.warm = true;
         Ok(())

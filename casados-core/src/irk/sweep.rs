@@ -10,7 +10,7 @@ use crate::linalg::{
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes};
-use crate::shape::{Array, Plain, Shape};
+use crate::shape::{Aligned, Array, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -22,14 +22,14 @@ pub(super) const STRANDS: usize = 4;
 #[zeroable(bound = "")]
 pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     /// `dx_n/dw` at the start of the step, and at its end.
-    v: [ArrayX<M, R>; 2],
+    v: [Aligned<ArrayX<M, R>>; 2],
     /// Which of them is at the end.
     end: bool,
     /// `d(k, z)/dw` at its stages.
-    dy: ArrayK<M, [R; S]>,
+    dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in strands.
-    pub(super) sums: ArrayK<M, [[T; STRANDS]; S]>,
-    pub(super) start_sums: ArrayX<M, [T; STRANDS]>,
+    pub(super) sums: Aligned<ArrayK<M, [[T; STRANDS]; S]>>,
+    pub(super) start_sums: Aligned<ArrayX<M, [T; STRANDS]>>,
 }
 copy!([M: Dae, T: Plain, R: Plain, const S: usize] Sweep<M, T, R, S>);
 
@@ -297,8 +297,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         if let Some(curved) = &mut self.curved {
             let count = M::STRUCTURE.curved.len();
             let (d, _) = panel_mut::<E, W>(curved, column, count * S).as_chunks_mut::<S>();
-            let (a, h) = (&self.coefficients.a, self.h);
-            Curved::<M, E, D, S> { a, h, directions: self.directions, model: PhantomData }
+            let mut minus_ha = self.coefficients.a;
+            for a in minus_ha.as_flattened_mut() {
+                *a = -(self.h * *a);
+            }
+            Curved::<M, E, D, S> { minus_ha, directions: self.directions, model: PhantomData }
                 .panel::<A, W>(v, dy, d, column);
         }
     }
@@ -433,8 +436,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
 
 /// The rows of `D` at all stages that enter second derivatives.
 struct Curved<'a, M, E, D, const S: usize> {
-    a: &'a [[E; S]; S],
-    h: E,
+    /// `−hA`
+    minus_ha: [[E; S]; S],
     directions: &'a D,
     model: PhantomData<M>,
 }
@@ -457,10 +460,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Curved<'_, M, E, D, S> 
                 }
             } else if variable < 2 * nx {
                 let (Some(dk), Some(v)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
-                for (d, a) in d.iter_mut().zip(self.a) {
+                for (d, minus_ha) in d.iter_mut().zip(&self.minus_ha) {
                     let mut row = *v;
-                    for (&a, dk) in a.iter().zip(dk) {
-                        A::subtract_row(&mut row, -(self.h * a), dk);
+                    for (&minus_ha, dk) in minus_ha.iter().zip(dk) {
+                        A::subtract_row(&mut row, minus_ha, dk);
                     }
                     *d = row;
                 }

@@ -6,6 +6,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `L` complex numbers side by side: what elimination computes with where it solves `L` systems of one pattern at once.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
+#[repr(C)] // Both parts beside each other, so that they may be one register.
 pub struct Complex<T, const L: usize> {
     /// Real parts.
     pub re: [T; L],
@@ -38,6 +39,20 @@ impl<T: Lanes, const L: usize> Complex<T, L> {
             (re[l], im[l]) = (a * re[l], a * im[l]);
         }
         Self { re, im }
+    }
+
+    /// `self − a b`, fused.
+    #[inline(always)]
+    fn subtract<const WIDE: bool>(&mut self, a: &Self, b: &Self) {
+        if const { Self::USED == L } {
+            T::subtract_complex::<L, WIDE>([&mut self.re, &mut self.im], [&a.re, &a.im], [&b.re, &b.im]);
+            return;
+        }
+        let Self { re, im } = self;
+        for l in 0..Self::USED {
+            re[l] = re[l].subtract_product(a.re[l], b.re[l]).subtract_product(-a.im[l], b.im[l]);
+            im[l] = im[l].subtract_product(a.re[l], b.im[l]).subtract_product(a.im[l], b.re[l]);
+        }
     }
 
     /// Whether all parts are neither infinite nor NaN.
@@ -128,20 +143,22 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
     }
 
     #[inline(always)]
-    fn subtract_product(self, a: Self, b: Self) -> Self {
-        let (Self { mut re, mut im }, negative) = (self, -a);
-        if const { Self::USED < L } {
-            for l in 0..Self::USED {
-                re[l] = re[l].subtract_product(a.re[l], b.re[l]).subtract_product(negative.im[l], b.im[l]);
-                im[l] = im[l].subtract_product(a.re[l], b.im[l]).subtract_product(a.im[l], b.re[l]);
+    fn subtract_product(mut self, a: Self, b: Self) -> Self {
+        self.subtract::<false>(&a, &b);
+        self
+    }
+
+    #[inline(always)]
+    fn subtract_columns<const S: usize, const WIDE: bool>(
+        target: &mut [Self; S],
+        block: &[[Self; S]; S],
+        x: &[Self; S],
+    ) {
+        for (column, x) in block.iter().zip(x) {
+            for (target, element) in target.iter_mut().zip(column) {
+                target.subtract::<WIDE>(element, x);
             }
-            return Self { re, im };
         }
-        T::subtract_products(&mut re, &a.re, &b.re);
-        T::subtract_products(&mut re, &negative.im, &b.im);
-        T::subtract_products(&mut im, &a.re, &b.im);
-        T::subtract_products(&mut im, &a.im, &b.re);
-        Self { re, im }
     }
 
     /// By `|re| + |im|`.

@@ -9,7 +9,7 @@ use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Real;
-use crate::shape::Plain;
+use crate::shape::{Aligned, Plain};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -20,7 +20,7 @@ pub type Rows<M, T, const L: usize> = ArrayK<M, [[Complex<T, L>; 1]; 1]>;
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
 pub struct EigenFactors<M: Dae, T: Plain, const L: usize> {
-    blocks: M::Factors<[[Complex<T, L>; 1]; 1]>,
+    blocks: Aligned<M::Factors<[[Complex<T, L>; 1]; 1]>>,
     /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
     dense: [Dense<M, T, 2>; L],
     is_dense: bool,

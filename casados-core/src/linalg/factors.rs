@@ -8,7 +8,7 @@ use super::straight::{AtRow, each_row};
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Array, Plain, assign};
+use crate::shape::{Aligned, Array, Plain, assign};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -25,7 +25,7 @@ pub fn slot<M: Dae>(equation: usize) -> usize {
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
-    blocks: M::Factors<Block<T, S>>,
+    blocks: Aligned<M::Factors<Block<T, S>>>,
     /// `−hA` of the blocks.
     coupling: Block<T, S>,
     /// Memory that is touched only where the plan is not good enough.

@@ -13,6 +13,8 @@ use crate::scalar::lanes::{Level, level};
 pub trait Arithmetic {
     /// Whether it rounds once: it is that of machines that matter, which loops become straight lines for.
     const FUSED: bool = false;
+    /// Whether numbers side by side fill the registers of AVX-512.
+    const WIDE: bool = false;
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
     /// `target − left · right`
@@ -63,13 +65,14 @@ impl Arithmetic for Separate {
     }
 }
 
-/// Rounded once, in one instruction.
+/// Rounded once, in one instruction; on numbers side by side in registers as `WIDE` as those of AVX-512 are, or half as wide.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-pub struct Fused;
+pub struct Fused<const WIDE: bool>;
 
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
-impl Arithmetic for Fused {
+impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
     const FUSED: bool = true;
+    const WIDE: bool = WIDE;
     #[inline(always)]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t.subtract_product(a, b)
@@ -80,19 +83,19 @@ impl Arithmetic for Fused {
         left: &Block<E, S>,
         right: &Block<E, S>,
     ) {
-        E::subtract_blocks(target, left, right);
+        E::subtract_blocks::<_, WIDE>(target, left, right);
     }
     #[inline(always)]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
-        E::subtract_columns(target, block, x);
+        E::subtract_columns::<_, WIDE>(target, block, x);
     }
     #[inline(always)]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
-        E::subtract_row(target, factor, row);
+        E::subtract_row::<_, WIDE>(target, factor, row);
     }
     #[inline(always)]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
-        E::subtract_products(target, a, b);
+        E::subtract_products::<_, WIDE>(target, a, b);
     }
 }
 
@@ -123,11 +126,11 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     }
     #[target_feature(enable = "avx2,fma")]
     fn avx2<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run::<Fused>()
+        kernel.run::<Fused<false>>()
     }
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
     fn avx512<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run::<Fused>()
+        kernel.run::<Fused<true>>()
     }
     // Numbers that are registers, which are aligned to themselves, need what these are made of, and nothing else. Of other kernels short
     // ones are up to a tenth faster without AVX-512; and unoptimised programs, where each copy of a kernel is much to compile and
@@ -162,7 +165,7 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 #[cfg(target_arch = "aarch64")]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    kernel.run::<Fused>()
+    kernel.run::<Fused<false>>()
 }
 
 /// Runs a kernel in the way that every machine has.

@@ -6,7 +6,7 @@ use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
 use crate::model::{ArrayK, Dae, Elimination};
 use crate::scalar::Lanes;
-use crate::shape::Plain;
+use crate::shape::{Aligned, Plain};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -15,8 +15,8 @@ use core::marker::PhantomData;
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct MeanFactors<M: Dae, E: Plain, const L: usize> {
-    blocks: M::Factors<[[Complex<E, L>; 1]; 1]>,
-    rows: ArrayK<M, [[Complex<E, L>; 1]; 1]>,
+    blocks: Aligned<M::Factors<[[Complex<E, L>; 1]; 1]>>,
+    rows: Aligned<ArrayK<M, [[Complex<E, L>; 1]; 1]>>,
 }
 
 impl<M: Dae, E: Plain, const L: usize> Clone for MeanFactors<M, E, L> {

@@ -263,7 +263,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let Some(packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         // Directions that have not reached this unknown, as at the start of an interval.
         if W > 1 && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0)) {
             return;
@@ -272,14 +272,14 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             let mut product = [[E::from_f64(0.0); W]; S];
             subtract::<A, E, S, W>(&mut product, factors.coupling, &packet);
             for (block, other) in beside(*factors, pivot.lower()) {
-                let mut target = load(rows, other, *column);
+                let Some(mut target) = load(rows, other, *column) else { continue };
                 subtract_scaled::<A, E, S, W>(&mut target, block, &product);
                 store(rows, other, *column, &target);
             }
             return;
         }
         for (block, other) in beside(*factors, pivot.lower()) {
-            let mut target = load(rows, other, *column);
+            let Some(mut target) = load(rows, other, *column) else { continue };
             subtract::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, *column, &target);
         }
@@ -288,9 +288,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         for (block, other) in beside(*factors, pivot.upper()) {
-            subtract::<A, E, S, W>(&mut packet, block, &load(rows, other, *column));
+            let Some(other) = load(rows, other, *column) else { continue };
+            subtract::<A, E, S, W>(&mut packet, block, &other);
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
@@ -311,7 +312,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
             negate(&mut packet);
@@ -320,7 +321,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             store(rows, pivot.slot as usize, *column, &packet);
         }
         for (block, other) in beside(*factors, pivot.upper()) {
-            let mut target = load(rows, other, *column);
+            let Some(mut target) = load(rows, other, *column) else { continue };
             subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, *column, &target);
         }
@@ -329,16 +330,18 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         if is_scaled::<S>(pivot) {
             let mut sum = [[E::from_f64(0.0); W]; S];
             for (block, other) in beside(*factors, pivot.lower()) {
-                subtract_scaled::<A, E, S, W>(&mut sum, block, &load(rows, other, *column));
+                let Some(other) = load(rows, other, *column) else { continue };
+                subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
             }
             subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
         } else {
             for (block, other) in beside(*factors, pivot.lower()) {
-                subtract_transposed::<A, E, S, W>(&mut packet, block, &load(rows, other, *column));
+                let Some(other) = load(rows, other, *column) else { continue };
+                subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
             }
         }
         store(rows, pivot.slot as usize, *column, &packet);
@@ -366,16 +369,12 @@ fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
     column: usize,
-) -> Packet<E, S, W> {
+) -> Option<Packet<E, S, W>> {
     let mut packet = [[E::from_f64(0.0); W]; S];
-    if let Some(row) = rows.get(slot) {
-        for (packet, row) in packet.iter_mut().zip(row) {
-            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
-                *packet = *columns;
-            }
-        }
+    for (packet, row) in packet.iter_mut().zip(rows.get(slot)?) {
+        *packet = *row.as_ref().get(column..)?.first_chunk()?;
     }
-    packet
+    Some(packet)
 }
 
 #[inline(always)]

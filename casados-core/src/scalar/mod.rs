@@ -82,22 +82,27 @@ pub trait Field:
     }
 
     /// `target − left · right` of s×s blocks that lie column after column, fused. As
-    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine, and whether it has the `WIDE`
+    /// registers of AVX-512.
     #[inline(always)]
-    fn subtract_blocks<const S: usize>(
+    fn subtract_blocks<const S: usize, const WIDE: bool>(
         target: &mut [[Self; S]; S],
         left: &[[Self; S]; S],
         right: &[[Self; S]; S],
     ) {
         for (target, right) in target.iter_mut().zip(right) {
-            Self::subtract_columns(target, left, right);
+            Self::subtract_columns::<S, WIDE>(target, left, right);
         }
     }
 
     /// `target − block · x` of an s×s block that lies column after column, fused. As
     /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
     #[inline(always)]
-    fn subtract_columns<const S: usize>(target: &mut [Self; S], block: &[[Self; S]; S], x: &[Self; S]) {
+    fn subtract_columns<const S: usize, const WIDE: bool>(
+        target: &mut [Self; S],
+        block: &[[Self; S]; S],
+        x: &[Self; S],
+    ) {
         for (column, &x) in block.iter().zip(x) {
             for (target, &element) in target.iter_mut().zip(column) {
                 *target = target.subtract_product(element, x);
@@ -108,7 +113,11 @@ pub trait Field:
     /// `target − a b`, element by element, fused. As [`subtract_product`](Field::subtract_product), only for code that
     /// knows the machine.
     #[inline(always)]
-    fn subtract_products<const W: usize>(target: &mut [Self; W], a: &[Self; W], b: &[Self; W]) {
+    fn subtract_products<const W: usize, const WIDE: bool>(
+        target: &mut [Self; W],
+        a: &[Self; W],
+        b: &[Self; W],
+    ) {
         for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
             *target = target.subtract_product(a, b);
         }
@@ -117,10 +126,24 @@ pub trait Field:
     /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the
     /// machine.
     #[inline(always)]
-    fn subtract_row<const W: usize>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
+    fn subtract_row<const W: usize, const WIDE: bool>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
         for (target, &element) in target.iter_mut().zip(row) {
             *target = target.subtract_product(factor, element);
         }
+    }
+
+    /// `target − a b` of `L` complex numbers side by side, each their real parts and their imaginary ones, fused. As
+    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    #[inline(always)]
+    fn subtract_complex<const L: usize, const WIDE: bool>(
+        [re, im]: [&mut [Self; L]; 2],
+        a: [&[Self; L]; 2],
+        b: [&[Self; L]; 2],
+    ) {
+        Self::subtract_products::<L, WIDE>(re, a[0], b[0]);
+        Self::subtract_products::<L, WIDE>(re, &a[1].map(|a| -a), b[1]);
+        Self::subtract_products::<L, WIDE>(im, a[0], b[1]);
+        Self::subtract_products::<L, WIDE>(im, a[1], b[0]);
     }
 
     /// `|a| < |b|`

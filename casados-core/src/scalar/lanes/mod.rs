@@ -187,7 +187,7 @@ impl<T, E: crate::scalar::Packed<T>, C: crate::scalar::Registers<T>> crate::scal
 macro_rules! blocks {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
         #[inline(always)]
-        fn subtract_blocks<const S: usize>(
+        fn subtract_blocks<const S: usize, const WIDE: bool>(
             target: &mut [[Self; S]; S],
             left: &[[Self; S]; S],
             right: &[[Self; S]; S],
@@ -212,13 +212,47 @@ macro_rules! blocks {
                 target.as_flattened_mut().copy_from_slice(&block);
                 return;
             }
+            if const { WIDE && S == 4 } {
+                use crate::scalar::lanes::$avx512 as Wide;
+                // Some columns are a register: in all places of each the numbers of its row on the right, one after the other.
+                let mut columns = [Wide::<$most>::splat(0.0); S];
+                for (column, left) in columns.iter_mut().zip(left) {
+                    if let Some(left) = left.first_chunk() {
+                        *column = Wide::repeat_four(left);
+                    }
+                }
+                let (targets, _) = target.as_flattened_mut().as_chunks_mut::<$most>();
+                let (rights, _) = right.as_flattened().as_chunks::<$most>();
+                for (target, right) in targets.iter_mut().zip(rights) {
+                    let mut sum = Wide::<$most>::load(target);
+                    let factors = Wide::<$most>::load(right).each_of_four();
+                    for (&column, &factor) in columns.iter().zip(&factors) {
+                        sum = sum.subtract_product(column, factor);
+                    }
+                    sum.store(target);
+                }
+                return;
+            }
             for (target, right) in target.iter_mut().zip(right) {
-                Self::subtract_columns(target, left, right);
+                Self::subtract_columns::<S, WIDE>(target, left, right);
             }
         }
         #[inline(always)]
-        fn subtract_columns<const S: usize>(target: &mut [Self; S], block: &[[Self; S]; S], x: &[Self; S]) {
+        fn subtract_columns<const S: usize, const WIDE: bool>(
+            target: &mut [Self; S],
+            block: &[[Self; S]; S],
+            x: &[Self; S],
+        ) {
             use crate::scalar::lanes::$avx2 as Register;
+            if const { WIDE && S == $most } {
+                use crate::scalar::lanes::$avx512 as Wide;
+                let mut sum = Wide::<S>::load(target);
+                for (column, &x) in block.iter().zip(x) {
+                    sum = sum.subtract_product(Wide::<S>::load(column), Wide::<S>::splat(x));
+                }
+                sum.store(target);
+                return;
+            }
             if const { S > 1 && S <= $more } {
                 let mut sum = Register::<S>::load(target);
                 for (column, &x) in block.iter().zip(x) {
@@ -234,8 +268,22 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
-        fn subtract_products<const W: usize>(target: &mut [Self; W], a: &[Self; W], b: &[Self; W]) {
-            use crate::scalar::lanes::$avx2 as Register;
+        fn subtract_products<const W: usize, const WIDE: bool>(
+            target: &mut [Self; W],
+            a: &[Self; W],
+            b: &[Self; W],
+        ) {
+            use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
+            if const { WIDE && W.is_multiple_of($most) } {
+                let (target, _) = target.as_chunks_mut::<$most>();
+                let ((a, _), (b, _)) = (a.as_chunks::<$most>(), b.as_chunks::<$most>());
+                for ((target, a), b) in target.iter_mut().zip(a).zip(b) {
+                    let (t, a, b) =
+                        (Wide::<$most>::load(target), Wide::<$most>::load(a), Wide::<$most>::load(b));
+                    t.subtract_product(a, b).store(target);
+                }
+                return;
+            }
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<$more>(), b.as_chunks::<$more>());
             for ((target, a), b) in target.iter_mut().zip(a).zip(b) {
@@ -248,8 +296,21 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
-        fn subtract_row<const W: usize>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
-            use crate::scalar::lanes::$avx2 as Register;
+        fn subtract_row<const W: usize, const WIDE: bool>(
+            target: &mut [Self; W],
+            factor: Self,
+            row: &[Self; W],
+        ) {
+            use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
+            if const { WIDE && W.is_multiple_of($most) } {
+                let (target, _) = target.as_chunks_mut::<$most>();
+                let (row, _) = row.as_chunks::<$most>();
+                for (target, row) in target.iter_mut().zip(row) {
+                    let (t, r) = (Wide::<$most>::load(target), Wide::<$most>::load(row));
+                    t.subtract_product(Wide::<$most>::splat(factor), r).store(target);
+                }
+                return;
+            }
             let (target, target_rest) = target.as_chunks_mut::<$more>();
             let (row, row_rest) = row.as_chunks::<$more>();
             for (target, row) in target.iter_mut().zip(row) {
@@ -259,6 +320,26 @@ macro_rules! blocks {
             for (target, &element) in target_rest.iter_mut().zip(row_rest) {
                 *target = target.subtract_product(factor, element);
             }
+        }
+        #[inline(always)]
+        fn subtract_complex<const L: usize, const WIDE: bool>(
+            [re, im]: [&mut [Self; L]; 2],
+            a: [&[Self; L]; 2],
+            b: [&[Self; L]; 2],
+        ) {
+            use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
+            if const { WIDE && 2 * L == $most } {
+                Wide::<$most>::subtract_complex([re, im], a, b);
+                return;
+            }
+            if const { 2 * L == $more } {
+                Register::<$more>::subtract_complex([re, im], a, b);
+                return;
+            }
+            Self::subtract_products::<L, WIDE>(re, a[0], b[0]);
+            Self::subtract_products::<L, WIDE>(re, &a[1].map(|a| -a), b[1]);
+            Self::subtract_products::<L, WIDE>(im, a[0], b[1]);
+            Self::subtract_products::<L, WIDE>(im, a[1], b[0]);
         }
     };
 }

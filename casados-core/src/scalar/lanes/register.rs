@@ -348,6 +348,61 @@ macro_rules! single {
     };
 }
 
+/// Complex numbers, real parts in the lower half of a register and imaginary ones in the upper.
+#[cfg(target_arch = "x86_64")]
+macro_rules! complex {
+    ($name:ident, $element:ident, $ops:ident) => {
+        impl $name<{ $ops::WIDTH }> {
+            /// From its halves.
+            #[inline(always)]
+            fn halves<const L: usize>(low: &[$element; L], high: &[$element; L]) -> Self {
+                let mut all = [0.0; $ops::WIDTH];
+                let (to_low, to_high) = all.split_at_mut($ops::WIDTH / 2);
+                to_low.copy_from_slice(low);
+                to_high.copy_from_slice(high);
+                Self::load(&all)
+            }
+            /// `target − a b`, of half as many numbers as the register holds.
+            #[inline(always)]
+            pub fn subtract_complex<const L: usize>(
+                [re, im]: [&mut [$element; L]; 2],
+                a: [&[$element; L]; 2],
+                b: [&[$element; L]; 2],
+            ) {
+                let (target, numbers) = (Self::halves(re, im), Self::halves(b[0], b[1]));
+                let imaginary = $ops::xor(Self::halves(a[1], a[1]).0, $ops::signs_below());
+                let target = target.subtract_product(Self::halves(a[0], a[0]), numbers);
+                let target = target.subtract_product(Self(imaginary), Self($ops::swap_halves(numbers.0)));
+                let mut all = [0.0; $ops::WIDTH];
+                target.store(&mut all);
+                let (low, high) = all.split_at($ops::WIDTH / 2);
+                re.copy_from_slice(low);
+                im.copy_from_slice(high);
+            }
+        }
+    };
+}
+
+/// What blocks of four stages are multiplied with.
+#[cfg(target_arch = "x86_64")]
+macro_rules! fours {
+    ($name:ident, $element:ident, $ops:ident) => {
+        impl $name<{ $ops::WIDTH }> {
+            /// The same four numbers again and again.
+            #[inline(always)]
+            pub fn repeat_four(numbers: &[$element; 4]) -> Self {
+                Self($ops::repeat_four(numbers))
+            }
+            /// Of each four numbers the first in all four places, the second, the third, the fourth.
+            #[inline(always)]
+            pub fn each_of_four(self) -> [Self; 4] {
+                let [a, b, c, d] = $ops::each_of_four(self.0);
+                [Self(a), Self(b), Self(c), Self(d)]
+            }
+        }
+    };
+}
+
 register! {
     /// Up to two `f64`, in a register that every machine of the kind has.
     F64x2, f64, base_f64, of_doubles
@@ -386,5 +441,17 @@ register! {
 }
 #[cfg(target_arch = "x86_64")]
 double!(F64x8, avx512_f64);
+#[cfg(target_arch = "x86_64")]
+complex!(F64x4, f64, avx2_f64);
+#[cfg(target_arch = "x86_64")]
+complex!(F64x8, f64, avx512_f64);
+#[cfg(target_arch = "x86_64")]
+complex!(F32x8, f32, avx2_f32);
+#[cfg(target_arch = "x86_64")]
+complex!(F32x16, f32, avx512_f32);
+#[cfg(target_arch = "x86_64")]
+fours!(F64x8, f64, avx512_f64);
+#[cfg(target_arch = "x86_64")]
+fours!(F32x16, f32, avx512_f32);
 #[cfg(target_arch = "x86_64")]
 single!(F32x16, avx512_f32, F64x8);

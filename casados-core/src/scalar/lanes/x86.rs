@@ -218,6 +218,8 @@ pub mod avx2_f64 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm256_or_pd;
     }
     define! {
+        swap_halves(a: Register) -> Register { _mm256_permute2f128_pd::<1>(a, a) }
+        signs_below() -> Register { _mm256_setr_pd(-0.0, -0.0, 0.0, 0.0) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_pd(a, b, c) }
         mask_not(a: Mask) -> Mask { _mm256_xor_pd(a, _mm256_castsi256_pd(_mm256_set1_epi64x(-1))) }
         select(m: Mask, a: Register, b: Register) -> Register { _mm256_blendv_pd(b, a, m) }
@@ -265,6 +267,8 @@ pub mod avx2_f32 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm256_or_ps;
     }
     define! {
+        swap_halves(a: Register) -> Register { _mm256_permute2f128_ps::<1>(a, a) }
+        signs_below() -> Register { _mm256_setr_ps(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_ps(a, b, c) }
         mask_not(a: Mask) -> Mask { _mm256_xor_ps(a, _mm256_castsi256_ps(_mm256_set1_epi32(-1))) }
         select(m: Mask, a: Register, b: Register) -> Register { _mm256_blendv_ps(b, a, m) }
@@ -331,6 +335,17 @@ pub mod avx512_f64 {
         eq(a: Register, b: Register) -> Mask = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>;
     }
     define! {
+        swap_halves(a: Register) -> Register { _mm512_shuffle_f64x2::<0x4e>(a, a) }
+        signs_below() -> Register { _mm512_setr_pd(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0) }
+        repeat_four(a: &[f64; 4]) -> Register { _mm512_broadcast_f64x4(_mm256_loadu_pd(a.as_ptr())) }
+        each_of_four(a: Register) -> [Register; 4] {
+            [
+                _mm512_permutex_pd::<0x00>(a),
+                _mm512_permutex_pd::<0x55>(a),
+                _mm512_permutex_pd::<0xaa>(a),
+                _mm512_permutex_pd::<0xff>(a),
+            ]
+        }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm512_fnmadd_pd(a, b, c) }
         add_bits(a: Register, b: Register) -> Register {
             _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)))
@@ -373,6 +388,21 @@ pub mod avx512_f32 {
         eq(a: Register, b: Register) -> Mask = _mm512_cmp_ps_mask::<_CMP_EQ_OQ>;
     }
     define! {
+        swap_halves(a: Register) -> Register { _mm512_shuffle_f32x4::<0x4e>(a, a) }
+        signs_below() -> Register {
+            _mm512_setr_ps(
+                -0.0, -0.0, -0.0, -0.0, -0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+            )
+        }
+        repeat_four(a: &[f32; 4]) -> Register { _mm512_broadcast_f32x4(_mm_loadu_ps(a.as_ptr())) }
+        each_of_four(a: Register) -> [Register; 4] {
+            [
+                _mm512_permute_ps::<0x00>(a),
+                _mm512_permute_ps::<0x55>(a),
+                _mm512_permute_ps::<0xaa>(a),
+                _mm512_permute_ps::<0xff>(a),
+            ]
+        }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm512_fnmadd_ps(a, b, c) }
         widen(a: Register) -> [__m512d; 2] {
             [_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a))]
