@@ -327,18 +327,25 @@ fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, con
     g: &mut [[[E; W]; S]],
     stage: usize,
 ) {
-    let mut packet = [[E::from_f64(0.0); W]; N];
-    let mut terms = M::STRUCTURE.symmetric.iter().peekable();
-    while let Some(term) = terms.next() {
+    // Without a slice for each row, which would have to be found.
+    let (mut packet, mut terms) = ([[E::from_f64(0.0); W]; N], M::STRUCTURE.symmetric.iter());
+    let mut next = terms.next();
+    while let Some(term) = next {
         if let (Some(values), Some(d)) = (entries.get(term.entry as usize), d.get(term.column as usize)) {
             subtract_stages::<A, E, N, W>(&mut packet, from(values, stage), from(d, stage));
         }
-        if terms.peek().is_none_or(|next| next.row != term.row) {
-            let rows = g.get_mut(term.row as usize).and_then(|rows| rows.get_mut(stage..));
-            for (to, packet) in rows.unwrap_or_default().iter_mut().zip(&mut packet) {
-                *to = core::mem::replace(packet, [E::from_f64(0.0); W]);
+        next = terms.next();
+        if let Some(next) = next
+            && next.row == term.row
+        {
+            continue;
+        }
+        if let Some(rows) = g.get_mut(term.row as usize).and_then(|rows| rows.get_mut(stage..)) {
+            for (to, packet) in rows.iter_mut().zip(&packet) {
+                *to = *packet;
             }
         }
+        packet = [[E::from_f64(0.0); W]; N];
     }
 }
 

@@ -97,6 +97,13 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
 #[inline(always)]
 pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
+    if const { S == 1 } {
+        let mut inverse = *block;
+        for element in inverse.as_flattened_mut() {
+            *element = element.reciprocal();
+        }
+        return inverse;
+    }
     // On the transposed matrix, so that what is done to rows is done to vectors of the memory.
     let mut a = *block;
     let mut inverse = [[zero; S]; S];
@@ -117,7 +124,7 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
                 }
             }
         }
-        let scale = one / a[k][k];
+        let scale = a[k][k].reciprocal();
         for j in 0..S {
             a[k][j] = a[k][j] * scale;
             inverse[k][j] = inverse[k][j] * scale;

@@ -64,20 +64,6 @@ impl<T: Lanes, const L: usize> Complex<T, L> {
         }
         finite
     }
-
-    /// `1/z`. Divided by its larger part first, so that no square of a part overflows.
-    #[inline(always)]
-    fn reciprocal(self) -> Self {
-        let (mut re, mut im) = (self.re, self.im);
-        for l in 0..Self::USED {
-            let size = self.re[l].abs().max(self.im[l].abs());
-            let scale = T::from_f64(1.0) / size;
-            let (r, i) = (self.re[l] * scale, self.im[l] * scale);
-            let square = T::from_f64(1.0) / (self.re[l] * r + self.im[l] * i);
-            (re[l], im[l]) = (r * square, -i * square);
-        }
-        Self { re, im }
-    }
 }
 
 impl<T: Lanes, const L: usize> Add for Complex<T, L> {
@@ -140,6 +126,20 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
         Self::real([T::from_f64(value); L])
+    }
+
+    /// Divided by its larger part first, so that no square of a part overflows.
+    #[inline(always)]
+    fn reciprocal(self) -> Self {
+        let (mut re, mut im) = (self.re, self.im);
+        for l in 0..Self::USED {
+            let size = self.re[l].abs().max(self.im[l].abs());
+            let scale = T::from_f64(1.0) / size;
+            let (r, i) = (self.re[l] * scale, self.im[l] * scale);
+            let square = T::from_f64(1.0) / (self.re[l] * r + self.im[l] * i);
+            (re[l], im[l]) = (r * square, -i * square);
+        }
+        Self { re, im }
     }
 
     #[inline(always)]

@@ -4,7 +4,8 @@ use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
-use crate::model::{ArrayK, Dae, Elimination};
+use super::straight::{AtRow, each_row};
+use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Plain};
 use bytemuck::Zeroable;
@@ -34,15 +35,9 @@ impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
         basis: &Eigenbasis<E, S, L>,
         h: E,
     ) {
-        let (plan, blocks) = (&M::STRUCTURE.elimination, self.blocks.as_mut());
-        dispatch(AssembleMean {
-            plan,
-            jacobian: jacobian.as_ref(),
-            values: &basis.values,
-            h,
-            blocks: &mut *blocks,
-        });
-        sparse::factor::<M, _, 1>(&[[Complex::zero()]], blocks);
+        let scale = basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 }));
+        dispatch(AssembleMean::<M, E, S, L> { jacobian, scale, blocks: &mut self.blocks });
+        sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
 
     /// Solves the Newton system of the stages in place, equations in their slots.
@@ -59,34 +54,38 @@ impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
 }
 
 /// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian; fill zero.
-struct AssembleMean<'a, E, const S: usize, const L: usize> {
-    plan: &'a Elimination,
-    jacobian: &'a [[E; S]],
-    values: &'a Complex<E, L>,
-    h: E,
-    blocks: &'a mut [[[Complex<E, L>; 1]; 1]],
+struct AssembleMean<'a, M: Dae, E: Plain, const S: usize, const L: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// `hμ/s`
+    scale: Complex<E, L>,
+    blocks: &'a mut M::Factors<[[Complex<E, L>; 1]; 1]>,
 }
 
-impl<E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, E, S, L> {
+impl<M: Dae, E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, M, E, S, L> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { plan, jacobian, values, h, blocks } = self;
-        let share = E::from_f64(1.0 / S as f64);
-        let scale = values.scaled(h * share);
-        let zero = Complex::zero();
-        blocks.fill([[zero]]);
-        for entry in plan.assembly {
-            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
-            if let Some(state) = jacobian.get(entry.state as usize) {
-                *element = scale.scaled(total(state));
-            }
-            if let Some(direct) = jacobian.get(entry.direct as usize) {
-                let direct = share * total(direct);
-                for re in &mut element.re {
-                    *re = *re + direct;
-                }
+    fn run<A: Arithmetic>(mut self) {
+        self.blocks.as_mut().fill([[Complex::zero()]]);
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_, M, E, S, L> {
+    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { L } else { L.div_ceil(4) };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
+        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        let Some([[element]]) = blocks.get_mut(entry.block as usize) else { return };
+        if let Some(state) = jacobian.get(entry.state as usize) {
+            *element = self.scale.scaled(total(state));
+        }
+        if let Some(direct) = jacobian.get(entry.direct as usize) {
+            let direct = E::from_f64(const { 1.0 / S as f64 }) * total(direct);
+            for re in &mut element.re {
+                *re = *re + direct;
             }
         }
     }

@@ -289,7 +289,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
         let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
-        for (block, other) in beside(*factors, pivot.upper()) {
+        // What was found last comes last: the rest of the sum does not wait for it.
+        for (block, other) in beside(*factors, pivot.upper()).rev() {
             let Some(other) = load(rows, other, *column) else { continue };
             subtract::<A, E, S, W>(&mut packet, block, &other);
         }
@@ -333,13 +334,13 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         if is_scaled::<S>(pivot) {
             let mut sum = [[E::from_f64(0.0); W]; S];
-            for (block, other) in beside(*factors, pivot.lower()) {
+            for (block, other) in beside(*factors, pivot.lower()).rev() {
                 let Some(other) = load(rows, other, *column) else { continue };
                 subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
             }
             subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
         } else {
-            for (block, other) in beside(*factors, pivot.lower()) {
+            for (block, other) in beside(*factors, pivot.lower()).rev() {
                 let Some(other) = load(rows, other, *column) else { continue };
                 subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
             }
@@ -359,7 +360,7 @@ fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
 fn beside<'a, M: Dae, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
-) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
+) -> impl DoubleEndedIterator<Item = (&'a Block<E, S>, usize)> + ExactSizeIterator {
     let slots = M::STRUCTURE.elimination.slots.get(range.clone()).unwrap_or_default();
     factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
 }

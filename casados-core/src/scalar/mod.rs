@@ -74,6 +74,12 @@ pub trait Field:
         Self::from_f64(value as f64)
     }
 
+    /// `1/self`
+    #[inline(always)]
+    fn reciprocal(self) -> Self {
+        Self::from_f64(1.0) / self
+    }
+
     /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
     /// machine has an instruction for it: elsewhere it is slow.
     #[inline(always)]

@@ -188,10 +188,22 @@ pub fn plan(size: usize, entries: &[Entry]) -> Plan {
         let (lower, upper) = active.eliminate(row, column);
         steps.push((row, column, lower, upper));
     }
+    in_order(&mut steps);
     schedule(&steps)
 }
 
 type Step = (u32, u32, Vec<u32>, Vec<u32>);
+
+/// Rows and columns of every step in the order in which they are eliminated. What the next pivot waits for is then updated
+/// first, and what a substitution waits for is met last on its way back.
+fn in_order(steps: &mut [Step]) {
+    let rows: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.0, k)).collect();
+    let columns: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.1, k)).collect();
+    for (_, _, lower, upper) in steps {
+        lower.sort_by_key(|row| rows.get(row));
+        upper.sort_by_key(|column| columns.get(column));
+    }
+}
 
 /// Numbers the blocks pivot by pivot, and looks up every update.
 fn schedule(steps: &[Step]) -> Plan {

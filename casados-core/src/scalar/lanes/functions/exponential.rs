@@ -181,7 +181,7 @@ pub fn copy_sign<D: Double>(magnitude: D, a: D) -> D {
     magnitude.or_bits(a.and_bits(c(-0.0)))
 }
 
-/// `aᵇ = exp(b ln a)`, the logarithm to about 70 bits. Unusual arguments are left to the function of one number.
+/// `aᵇ = exp(b ln a)`, the logarithm to about 65 bits. Unusual arguments are left to the function of one number.
 #[inline(always)]
 pub fn powf<D: Double>((a, b): (D, D)) -> D {
     let usual = D::and(c::<D>(f64::MIN_POSITIVE).le(a), a.le(c(f64::MAX)));

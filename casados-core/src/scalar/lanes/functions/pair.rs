@@ -119,10 +119,12 @@ impl<D: Double> Pair<D> {
     /// The quotient.
     #[inline(always)]
     pub fn div(self, other: Self) -> Self {
-        let quotient = self.high / other.high;
+        // One division: the quotient may be off by two units, of which the rest knows.
+        let reciprocal = c::<D>(1.0) / other.high;
+        let quotient = self.high * reciprocal;
         let p = product(quotient, other.high);
         let rest = ((self.high - p.high) - p.low) + (self.low - quotient * other.low);
-        Self { high: quotient, low: rest / other.high }
+        Self { high: quotient, low: rest * reciprocal }
     }
     /// The square root; of zero it is zero.
     #[inline(always)]
