@@ -8,10 +8,13 @@ use crate::scalar::{Field, Lanes};
 use core::marker::PhantomData;
 
 /// Evaluates an expression for each panel: from `$column` on, `$W` columns, eight, four, two or one; of numbers that
-/// are registers themselves four at most.
+/// are registers themselves four at most. It may begin with a later panel.
 macro_rules! panels {
-    ($count:expr, $E:ty, $column:ident, $W:ident => $panel:expr) => {{
-        let mut $column = 0;
+    ($count:expr, $E:ty, $column:ident, $W:ident => $panel:expr) => {
+        panels!($count, $E, $column from 0, $W => $panel)
+    };
+    ($count:expr, $E:ty, $column:ident from $start:expr, $W:ident => $panel:expr) => {{
+        let mut $column = $start;
         if const { size_of::<$E>() <= 8 && $count >= 8 } {
             while $column + 8 <= const { $count } {
                 const $W: usize = 8;

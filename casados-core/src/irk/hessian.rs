@@ -9,13 +9,14 @@
 
 use super::adjoint::Backward;
 use super::along::Along;
-use super::directions::{Identity, panel, panel_mut, panels};
+use super::curvature::{COLUMNS, Subtract};
+use super::directions::Identity;
 use super::evaluate::{Give, Take, not_finite};
 use super::forward::ForwardMemory;
 use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, dispatch, is_long, slot};
+use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
@@ -26,17 +27,14 @@ use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// The columns of the widest panel.
-const PANEL: usize = 8;
-
 /// Memory of second-order sensitivities.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: Hessian<M, T>,
     pub(crate) backward: Backward<M, T, S, 1>,
-    /// `−H D` of a panel at all stages.
-    g: Aligned<ArrayV<M, [[T; PANEL]; S]>>,
+    /// `−H D` of a few columns at all stages.
+    g: Aligned<ArrayV<M, [[T; COLUMNS]; S]>>,
     /// The Hessian over the directions that have any influence, its lower triangle.
     sum: ArrayW<M, ArrayW<M, T>>,
     /// `μ` at all stages, in the order of the equations.
@@ -190,7 +188,8 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         for (to, [from]) in result.first.grad_p.as_mut_slice().iter_mut().zip(gradient) {
             *to = *from;
         }
-        let sum = Lower::<M, E> { sum, more };
+        mirror::<E, _>(sum.as_mut());
+        let sum = Symmetric::<M, E> { sum: sum.as_ref(), more };
         let (u, p) = (nx, nx + nu);
         sum.write(&mut result.h_xx, 0, 0);
         sum.write(&mut result.h_uu, u, u);
@@ -201,33 +200,53 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     }
 }
 
-/// A symmetric matrix over the directions that have any influence, of which the lower triangle is known.
-struct Lower<'a, M: Dae, E: Plain> {
-    sum: &'a ArrayW<M, ArrayW<M, E>>,
-    /// What an integrand adds, over all directions.
+/// A symmetric matrix over the directions that have any influence.
+struct Symmetric<'a, M: Dae, E: Plain> {
+    sum: &'a [ArrayW<M, E>],
+    /// What an integrand adds, over all directions: a lower triangle.
     more: Option<&'a [ArrayW<M, E>]>,
 }
 
-/// An element of a symmetric matrix of which the lower triangle is known.
-#[inline(always)]
-fn element<M: Dae, E: Lanes>(rows: &[ArrayW<M, E>], r: usize, c: usize) -> Option<E> {
-    rows.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))).copied()
+/// Writes the lower triangle to the upper one: a few columns of it at a time, which are next to each other.
+fn mirror<V: Copy, R: Array<V>>(rows: &mut [R]) {
+    const FEW: usize = 8;
+    for begin in (0..rows.len()).step_by(FEW) {
+        let (before, rest) = rows.split_at_mut(begin);
+        let rest = rest.get_mut(..rest.len().min(FEW)).unwrap_or_default();
+        for (c, to) in before.iter_mut().enumerate() {
+            for (to, from) in to.as_mut().get_mut(begin..).unwrap_or_default().iter_mut().zip(rest.iter()) {
+                *to = from[c];
+            }
+        }
+        for r in 1..rest.len() {
+            for c in 0..r {
+                rest[c][begin + r] = rest[r][begin + c];
+            }
+        }
+    }
 }
 
-impl<M: Dae, E: Lanes> Lower<'_, M, E> {
+impl<M: Dae, E: Lanes> Symmetric<'_, M, E> {
     /// Its part over the directions from `row` on and those from `column` on, which are not before them.
     fn write<B: Matrix<E>>(&self, to: &mut B, row: usize, column: usize) {
         for (c, to) in to.as_mut_slice().chunks_exact_mut(B::ROWS.max(1)).enumerate() {
-            let c = column + c;
-            let of_c = Identity::<M>::column(c);
+            let of_c = Identity::<M>::column(column + c).and_then(|c| self.sum.get(c));
+            let of_c = of_c.map_or(&[][..], |of_c| of_c.as_ref());
+            let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
+            match of_c.get(row..row + B::ROWS) {
+                // Every direction has an influence.
+                Some(of_c) if all => to.copy_from_slice(of_c),
+                _ => {
+                    for (r, to) in to.iter_mut().enumerate() {
+                        let element = Identity::<M>::column(row + r).and_then(|r| of_c.get(r));
+                        *to = element.copied().unwrap_or(E::from_f64(0.0));
+                    }
+                }
+            }
+            let Some(more) = self.more else { continue };
             for (r, to) in to.iter_mut().enumerate() {
-                let r = row + r;
-                let sum = match (Identity::<M>::column(r), of_c) {
-                    (Some(r), Some(c)) => element::<M, E>(self.sum.as_ref(), r, c),
-                    _ => None,
-                };
-                *to = sum.unwrap_or(E::from_f64(0.0));
-                if let Some(more) = self.more.and_then(|more| element::<M, E>(more, r, c)) {
+                let (r, c) = (row + r, column + c);
+                if let Some(&more) = more.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))) {
                     *to = *to + more;
                 }
             }
@@ -260,176 +279,5 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
             check(values, 0)?;
         }
         Ok(())
-    }
-}
-
-/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own.
-struct Subtract<'a, M, E, R, const S: usize> {
-    entries: &'a [[E; S]],
-    d: &'a [E],
-    g: &'a mut [[[E; PANEL]; S]],
-    sum: &'a mut [R],
-    model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
-    type Number = E;
-    type Output = ();
-    const WIDE: bool = is_long::<M, S>();
-    #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
-        panels!(M::STRUCTURE.directions.len(), E, column, W => self.panel::<A, W>(column));
-    }
-}
-
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
-    #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
-        let rows = M::STRUCTURE.curved.len() * S;
-        let (d, _) = panel::<E, W>(self.d, column, rows).as_chunks::<S>();
-        let g = self.g.as_flattened_mut().as_flattened_mut();
-        let (g, _) = panel_mut::<E, W>(g, 0, rows).as_chunks_mut::<S>();
-        // G = −H D, row by row; all stages in registers, or two of them where numbers are registers themselves.
-        if const { size_of::<E>() <= 8 || S <= 2 } {
-            multiply::<A, M, E, S, S, W>(self.entries, d, g, 0);
-        } else {
-            for stage in (0..S).step_by(2) {
-                multiply::<A, M, E, S, 2, W>(self.entries, d, g, stage);
-            }
-        }
-        let g = g.as_flattened();
-        panels!(M::STRUCTURE.directions.len(), E, row, V => {
-            if row >= column {
-                let d = panel::<E, V>(self.d, row, rows);
-                if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, R, V, 2, 1, W>(d, g, self.sum, row, column);
-                } else if const { size_of::<E>() > 8 } {
-                    tiles::<A, E, R, V, V, 1, W>(d, g, self.sum, row, column);
-                } else if const { V > 4 && A::WIDE } {
-                    tiles::<A, E, R, V, 8, 1, W>(d, g, self.sum, row, column);
-                } else if const { V > 4 } {
-                    tiles::<A, E, R, V, 4, 1, W>(d, g, self.sum, row, column);
-                } else if const { V > 2 } {
-                    tiles::<A, E, R, V, 4, 2, W>(d, g, self.sum, row, column);
-                } else {
-                    tiles::<A, E, R, V, V, 4, W>(d, g, self.sum, row, column);
-                }
-            }
-        });
-    }
-}
-
-/// `G = −H D` at `N` stages, from a stage on.
-#[inline(always)]
-fn multiply<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const N: usize, const W: usize>(
-    entries: &[[E; S]],
-    d: &[[[E; W]; S]],
-    g: &mut [[[E; W]; S]],
-    stage: usize,
-) {
-    // Without a slice for each row, which would have to be found.
-    let (mut packet, mut terms) = ([[E::from_f64(0.0); W]; N], M::STRUCTURE.symmetric.iter());
-    let mut next = terms.next();
-    while let Some(term) = next {
-        if let (Some(values), Some(d)) = (entries.get(term.entry as usize), d.get(term.column as usize)) {
-            subtract_stages::<A, E, N, W>(&mut packet, from(values, stage), from(d, stage));
-        }
-        next = terms.next();
-        if let Some(next) = next
-            && next.row == term.row
-        {
-            continue;
-        }
-        if let Some(rows) = g.get_mut(term.row as usize).and_then(|rows| rows.get_mut(stage..)) {
-            for (to, packet) in rows.iter_mut().zip(&packet) {
-                *to = *packet;
-            }
-        }
-        packet = [[E::from_f64(0.0); W]; N];
-    }
-}
-
-/// `packet − values d` at `N` stages.
-#[inline(always)]
-fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize>(
-    packet: &mut [[E; W]; N],
-    values: &[E],
-    d: &[[E; W]],
-) {
-    if const { W == 1 }
-        && let Some(packet) = packet.as_flattened_mut().first_chunk_mut::<N>()
-        && let (Some(values), Some(d)) = (values.first_chunk(), d.as_flattened().first_chunk())
-    {
-        // The stages of one column side by side.
-        A::subtract_products(packet, values, d);
-        return;
-    }
-    for ((packet, &value), d) in packet.iter_mut().zip(values).zip(d) {
-        A::subtract_row(packet, value, d);
-    }
-}
-
-/// The stages from one of them on.
-#[inline(always)]
-fn from<V>(stages: &[V], first: usize) -> &[V] {
-    stages.get(first..).unwrap_or_default()
-}
-
-/// `sum −= Dᵀ G` for the panels of `D` and of `−G` that begin with a row and a column; each tile is in registers while it goes
-/// through all variables at all stages, in as many strands as hide how long an addition takes. Above the diagonal it writes
-/// what nobody reads.
-#[inline(always)]
-fn tiles<
-    A: Arithmetic,
-    E: Lanes,
-    R: Array<E>,
-    const V: usize,
-    const ROWS: usize,
-    const STRANDS: usize,
-    const W: usize,
->(
-    d: &[[E; V]],
-    g: &[[E; W]],
-    sum: &mut [R],
-    row: usize,
-    column: usize,
-) {
-    for t in 0..V / ROWS {
-        let mut tiles = [[[E::from_f64(0.0); W]; ROWS]; STRANDS];
-        let ((d, last_d), (g, last_g)) = (d.as_chunks::<STRANDS>(), g.as_chunks::<STRANDS>());
-        for (d, g) in d.iter().zip(g) {
-            for ((tile, d), g) in tiles.iter_mut().zip(d).zip(g) {
-                subtract_outer::<A, E, V, ROWS, W>(tile, d, g, t);
-            }
-        }
-        let Some((tile, others)) = tiles.split_first_mut() else { return };
-        for (d, g) in last_d.iter().zip(last_g) {
-            subtract_outer::<A, E, V, ROWS, W>(tile, d, g, t);
-        }
-        for other in others {
-            for (to, from) in tile.as_flattened_mut().iter_mut().zip(other.as_flattened()) {
-                *to = *to + *from;
-            }
-        }
-        for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row + t * ROWS)) {
-            let columns = sum.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut::<W>());
-            for (sum, &tile) in columns.into_iter().flatten().zip(tile) {
-                *sum = *sum - tile;
-            }
-        }
-    }
-}
-
-/// `tile − d gᵀ`, of `ROWS` elements of `d`.
-#[inline(always)]
-fn subtract_outer<A: Arithmetic, E: Lanes, const V: usize, const ROWS: usize, const W: usize>(
-    tile: &mut [[E; W]; ROWS],
-    d: &[E; V],
-    g: &[E; W],
-    t: usize,
-) {
-    let Some(d) = d.as_chunks::<ROWS>().0.get(t) else { return };
-    for (tile, &d) in tile.iter_mut().zip(d) {
-        A::subtract_row(tile, d, g);
     }
 }

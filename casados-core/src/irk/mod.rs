@@ -20,6 +20,7 @@
 mod adjoint;
 mod along;
 mod compensated;
+mod curvature;
 mod dense;
 mod directions;
 mod evaluate;

@@ -290,7 +290,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         let Self { factors, rows, column } = self;
         let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         // What was found last comes last: the rest of the sum does not wait for it.
-        for (block, other) in beside(*factors, pivot.upper()).rev() {
+        for index in pivot.upper().rev() {
+            let Some((block, other)) = one(*factors, index) else { continue };
             let Some(other) = load(rows, other, *column) else { continue };
             subtract::<A, E, S, W>(&mut packet, block, &other);
         }
@@ -334,13 +335,15 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
         if is_scaled::<S>(pivot) {
             let mut sum = [[E::from_f64(0.0); W]; S];
-            for (block, other) in beside(*factors, pivot.lower()).rev() {
+            for index in pivot.lower().rev() {
+                let Some((block, other)) = one(*factors, index) else { continue };
                 let Some(other) = load(rows, other, *column) else { continue };
                 subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
             }
             subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
         } else {
-            for (block, other) in beside(*factors, pivot.lower()).rev() {
+            for index in pivot.lower().rev() {
+                let Some((block, other)) = one(*factors, index) else { continue };
                 let Some(other) = load(rows, other, *column) else { continue };
                 subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
             }
@@ -360,9 +363,19 @@ fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
 fn beside<'a, M: Dae, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
-) -> impl DoubleEndedIterator<Item = (&'a Block<E, S>, usize)> + ExactSizeIterator {
+) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
     let slots = M::STRUCTURE.elimination.slots.get(range.clone()).unwrap_or_default();
     factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
+}
+
+/// One block, with the slot at its other end.
+#[inline(always)]
+fn one<'a, M: Dae, E, const S: usize>(
+    factors: Planned<'a, M, E, S>,
+    index: usize,
+) -> Option<(&'a Block<E, S>, usize)> {
+    let &slot = M::STRUCTURE.elimination.slots.get(index)?;
+    Some((factors.blocks.get(index)?, slot as usize))
 }
 
 #[inline(always)]
