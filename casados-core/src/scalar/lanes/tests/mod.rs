@@ -1,6 +1,7 @@
 //! Registers against single numbers, lane by lane, on all kinds of registers that the machine has.
 
 mod elementary;
+mod products;
 mod reference;
 
 use super::*;

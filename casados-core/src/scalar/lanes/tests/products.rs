@@ -1,0 +1,83 @@
+//! Products of numbers side by side have the bits that one number after the other gives, in registers of any width.
+
+use super::super::*;
+use super::inside;
+use crate::scalar::Real;
+use core::array::from_fn;
+
+/// Numbers of all signs and several magnitudes, the same ones every time.
+fn number<T: Real>(seed: &mut u64) -> T {
+    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    let fraction = (*seed >> 33) as f64 / (1u64 << 31) as f64 - 0.5;
+    T::from_f64(fraction * [1e-3, 1.0, 30.0][(*seed >> 20) as usize % 3])
+}
+
+/// `target − left right`, of blocks that lie column after column, of columns, of rows, element by element.
+fn blocks<T: Real, const S: usize, const WIDE: bool>() {
+    let seed = &mut (S as u64);
+    let [target, left, right]: [[[T; S]; S]; 3] = from_fn(|_| from_fn(|_| from_fn(|_| number(seed))));
+    let subtract = |t: T, a: T, b: T| t.subtract_product(a, b);
+    let columns: [[T; S]; S] =
+        from_fn(|c| from_fn(|r| (0..S).fold(target[c][r], |t, k| subtract(t, left[k][r], right[c][k]))));
+
+    let mut found = target;
+    T::subtract_blocks::<S, WIDE>(&mut found, &left, &right);
+    assert_eq!(found, columns, "blocks of {S}, {WIDE}");
+    for (c, column) in columns.iter().enumerate() {
+        let mut found = target[c];
+        T::subtract_columns::<S, WIDE>(&mut found, &left, &right[c]);
+        assert_eq!(found, *column, "columns of {S}, {WIDE}");
+
+        let mut found = target[c];
+        T::subtract_row::<S, WIDE>(&mut found, left[c][0], &right[c]);
+        assert_eq!(found, from_fn(|k| subtract(target[c][k], left[c][0], right[c][k])), "rows of {S}");
+
+        let mut found = target[c];
+        T::subtract_products::<S, WIDE>(&mut found, &left[c], &right[c]);
+        assert_eq!(found, from_fn(|k| subtract(target[c][k], left[c][k], right[c][k])), "products of {S}");
+    }
+    if S == 1 {
+        return;
+    }
+    let ([mut re, mut im], a, b) = ([target[0], target[1]], [&left[0], &left[1]], [&right[0], &right[1]]);
+    T::subtract_complex::<S, WIDE>([&mut re, &mut im], a, b);
+    for k in 0..S {
+        let (a, b) = ([a[0][k], a[1][k]], [b[0][k], b[1][k]]);
+        assert_eq!(
+            re[k],
+            subtract(subtract(target[0][k], a[0], b[0]), -a[1], b[1]),
+            "real parts of {S}, {WIDE}"
+        );
+        assert_eq!(
+            im[k],
+            subtract(subtract(target[1][k], a[0], b[1]), a[1], b[0]),
+            "imaginary parts of {S}, {WIDE}"
+        );
+    }
+}
+
+fn all<T: Real, const WIDE: bool>() {
+    macro_rules! sizes {
+        ($($size:literal)*) => { $( blocks::<T, $size, WIDE>(); )* };
+    }
+    sizes!(1 2 3 4 5 6 7 8 12 16);
+}
+
+#[test]
+fn they_are() {
+    #[cfg(target_arch = "x86_64")]
+    if is_there(Level::Avx2) {
+        inside::<F64x4<4>>(all::<f64, false>);
+        inside::<F64x4<4>>(all::<f32, false>);
+    }
+    #[cfg(target_arch = "x86_64")]
+    if is_there(Level::Avx512) {
+        inside::<F64x8<8>>(all::<f64, true>);
+        inside::<F64x8<8>>(all::<f32, true>);
+    }
+    #[cfg(target_arch = "aarch64")]
+    {
+        all::<f64, false>();
+        all::<f32, false>();
+    }
+}
