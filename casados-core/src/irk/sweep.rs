@@ -334,8 +334,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
     /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
     const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
     const INSTRUCTIONS: usize = 3 * S;
-    // Places are worth more: each takes as many instructions to find as there are in its line.
-    const MOST: usize = 4000;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (nx, nz, nk) = (M::Shape::NX, M::Shape::NZ, M::Shape::NK);

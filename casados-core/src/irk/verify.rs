@@ -9,7 +9,7 @@
 
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
-use super::evaluate::{entries, entry};
+use super::evaluate::entry;
 use super::record::{Coefficients, Work};
 use super::sweep::{STRANDS, Sweep, total};
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
@@ -17,7 +17,6 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Plain, Shape};
-use core::marker::PhantomData;
 
 /// Derivatives are good if they satisfy their equations to this many ε of the terms.
 const ROUNDING: f64 = 4096.0;
@@ -85,43 +84,54 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     pub(crate) fn is_satisfied(&mut self) -> E::Mask {
         dispatch(Satisfied::<M, E, S> {
             f: self.f.as_ref(),
-            points: self.points.as_ref(),
-            jacobian: self.linear.jacobian.as_ref(),
-            sizes: self.terms.as_mut(),
-            model: PhantomData,
+            points: &self.points,
+            jacobian: &self.linear.jacobian,
+            sizes: &mut self.terms,
         })
     }
 }
 
-struct Satisfied<'a, M, E, const S: usize> {
+struct Satisfied<'a, M: Dae, E: Plain, const S: usize> {
     f: &'a [[E; S]],
-    points: &'a [[E; S]],
-    jacobian: &'a [[E; S]],
-    sizes: &'a mut [[E; S]],
-    model: PhantomData<M>,
+    points: &'a ArrayV<M, [E; S]>,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    sizes: &'a mut ArrayK<M, [E; S]>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
     type Number = E;
     type Output = E::Mask;
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> E::Mask {
-        let Self { f, points, jacobian, sizes, .. } = self;
+    fn run<A: Arithmetic>(mut self) -> E::Mask {
         let (zero, bound) = (E::from_f64(0.0), E::from_f64(RESIDUAL * E::EPSILON));
-        sizes.fill([E::from_f64(E::SMALLEST); S]);
-        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, jacobian.len()) {
-            let (Some(sizes), Some(points)) = (sizes.get_mut(r), points.get(c)) else { continue };
-            for ((size, &value), &point) in sizes.iter_mut().zip(values).zip(points) {
-                *size = *size + (value * point).abs();
-            }
-        }
+        self.sizes.as_mut().fill([E::from_f64(E::SMALLEST); S]);
+        each_row::<A, _>(&mut self);
         let mut good = E::le(zero, zero);
-        for (f, sizes) in f.iter().zip(sizes.iter()) {
+        for (f, sizes) in self.f.iter().zip(self.sizes.as_ref()) {
             for (&f, &size) in f.iter().zip(sizes) {
                 good = E::and(good, E::le(f.abs(), bound * size));
             }
         }
         good
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
+    const INSTRUCTIONS: usize = 4 * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let (Some(sizes), Some(points)) = (self.sizes.as_mut().get_mut(r), self.points.as_ref().get(c))
+        else {
+            return;
+        };
+        // In registers: the optimiser cannot know that nothing here overlaps.
+        let mut size = *sizes;
+        for i in 0..S {
+            size[i] = size[i] + (values[i] * points[i]).abs();
+        }
+        *sizes = size;
     }
 }
 

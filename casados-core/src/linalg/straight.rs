@@ -19,8 +19,6 @@ pub trait AtRow {
     const ROWS: usize;
     /// About how many instructions each takes.
     const INSTRUCTIONS: usize;
-    /// The longest straight line, in instructions.
-    const MOST: usize = MOST_INSTRUCTIONS;
     /// To be `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, row: usize);
 }
@@ -62,7 +60,7 @@ const fn smaller(a: usize, b: usize) -> usize {
 
 /// Whether the rows of a table are a straight line.
 pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
-    WANTED && A::FUSED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= V::MOST
+    WANTED && A::FUSED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
 /// All rows of a table.
