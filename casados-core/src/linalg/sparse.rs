@@ -263,7 +263,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let Some(packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         // Directions that have not reached this unknown, as at the start of an interval.
         if W > 1 && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0)) {
             return;
@@ -272,14 +275,20 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             let mut product = [[E::from_f64(0.0); W]; S];
             subtract::<A, E, S, W>(&mut product, factors.coupling, &packet);
             for (block, other) in beside(*factors, pivot.lower()) {
-                let Some(mut target) = load(rows, other, *column) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let mut target = load(rows, other, *column);
                 subtract_scaled::<A, E, S, W>(&mut target, block, &product);
                 store(rows, other, *column, &target);
             }
             return;
         }
         for (block, other) in beside(*factors, pivot.lower()) {
-            let Some(mut target) = load(rows, other, *column) else { continue };
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
             subtract::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, *column, &target);
         }
@@ -288,11 +297,15 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
-        // What was found last comes last: the rest of the sum does not wait for it.
-        for index in pivot.upper().rev() {
-            let Some((block, other)) = one(*factors, index) else { continue };
-            let Some(other) = load(rows, other, *column) else { continue };
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        for (block, other) in beside(*factors, pivot.upper()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let other = load(rows, other, *column);
             subtract::<A, E, S, W>(&mut packet, block, &other);
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
@@ -314,7 +327,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
             negate(&mut packet);
@@ -323,7 +339,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             store(rows, pivot.slot as usize, *column, &packet);
         }
         for (block, other) in beside(*factors, pivot.upper()) {
-            let Some(mut target) = load(rows, other, *column) else { continue };
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
             subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
             store(rows, other, *column, &target);
         }
@@ -332,19 +351,28 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        let Some(mut packet) = load::<E, R, S, W>(rows, pivot.slot as usize, *column) else { return };
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
         if is_scaled::<S>(pivot) {
             let mut sum = [[E::from_f64(0.0); W]; S];
             for index in pivot.lower().rev() {
                 let Some((block, other)) = one(*factors, index) else { continue };
-                let Some(other) = load(rows, other, *column) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let other = load(rows, other, *column);
                 subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
             }
             subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
         } else {
             for index in pivot.lower().rev() {
                 let Some((block, other)) = one(*factors, index) else { continue };
-                let Some(other) = load(rows, other, *column) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let other = load(rows, other, *column);
                 subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
             }
         }
@@ -378,17 +406,22 @@ fn one<'a, M: Dae, E, const S: usize>(
     Some((factors.blocks.get(index)?, slot as usize))
 }
 
+/// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
 #[inline(always)]
 fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
     column: usize,
-) -> Option<Packet<E, S, W>> {
+) -> Packet<E, S, W> {
     let mut packet = [[E::from_f64(0.0); W]; S];
-    for (packet, row) in packet.iter_mut().zip(rows.get(slot)?) {
-        *packet = *row.as_ref().get(column..)?.first_chunk()?;
+    if let Some(row) = rows.get(slot) {
+        for (packet, row) in packet.iter_mut().zip(row) {
+            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
+                *packet = *columns;
+            }
+        }
     }
-    Some(packet)
+    packet
 }
 
 #[inline(always)]

@@ -6,6 +6,7 @@
 //! complex matrices, at many points of the model and many `hμ` at once: a pivot is taken only if it is
 //! acceptable at all of them. Among the acceptable ones the Markowitz cost decides.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
 
 /// A structural non-zero of the Newton matrix with its values at the samples.
@@ -194,14 +195,14 @@ pub fn plan(size: usize, entries: &[Entry]) -> Plan {
 
 type Step = (u32, u32, Vec<u32>, Vec<u32>);
 
-/// Rows and columns of every step in the order in which they are eliminated. What the next pivot waits for is then updated
-/// first, and what a substitution waits for is met last on its way back.
+/// Rows of every step in the order in which they are eliminated: what the next pivot waits for is updated first. Columns in
+/// the opposite order: on the way back what was found last is met last, and the rest of the sum does not wait for it.
 fn in_order(steps: &mut [Step]) {
     let rows: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.0, k)).collect();
     let columns: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.1, k)).collect();
     for (_, _, lower, upper) in steps {
         lower.sort_by_key(|row| rows.get(row));
-        upper.sort_by_key(|column| columns.get(column));
+        upper.sort_by_key(|column| Reverse(columns.get(column)));
     }
 }
 
