@@ -86,7 +86,7 @@ enum State {
 impl Progress {
     /// After an increment, and what is expected of the next one: with factors that are `new` or older ones, the first
     /// in this step or a later one.
-    fn judge(&mut self, rule: &Rule, [increment, next]: [f64; 2], new: bool, first: bool) {
+    fn judge(&mut self, rule: &Rule, increment: f64, next: f64, new: bool, first: bool) {
         if !increment.is_finite() {
             self.state = State::Failed;
             return;
@@ -188,8 +188,15 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         };
         let h = self.inputs.time.step;
         let rate = Some(self.validity.rate).filter(|rate| *rate > 0.0);
-        let mut lanes = [Progress { state: State::Active, last: 0.0, rate }; MOST_LANES];
-        let lanes = lanes.get_mut(..E::LANES).unwrap_or_default();
+        let start = Progress { state: State::Active, last: 0.0, rate };
+        let (mut one, mut many);
+        let lanes: &mut [Progress] = if const { E::LANES == 1 } {
+            one = [start];
+            &mut one
+        } else {
+            many = [start; MOST_LANES];
+            many.get_mut(..E::LANES).unwrap_or_default()
+        };
         let simplified = options.jacobian == Jacobian::Simplified;
         let adaptive = simplified || options.jacobian == Jacobian::Auto;
         let basis = coefficients.basis.as_ref().filter(|_| F::KEPT && adaptive && !rule.exact);
@@ -259,7 +266,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 _ => self.linear.factors.solve(&mut self.increment),
             }
             let floor = E::from_f64(rounding / rule.tolerance);
-            let sizes = dispatch(Update::<M, E, S> {
+            let (size, next) = dispatch(Update::<M, E, S> {
                 x,
                 y,
                 increment: &mut self.increment,
@@ -271,13 +278,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 tolerance: E::from_f64(rule.tolerance),
                 full: rule.full,
                 measure: iteration == 1,
-            })
-            .map(cell);
+            });
+            let (size, next) = (cell(size), cell(next));
             let mut some = false;
             for (lane, progress) in lanes.iter_mut().enumerate() {
                 if progress.state == State::Active {
-                    let [size, next] = &sizes;
-                    progress.judge(&rule, [E::lane(size, lane), E::lane(next, lane)], renew, iteration == 1);
+                    let (size, next) = (E::lane(&size, lane), E::lane(&next, lane));
+                    progress.judge(&rule, size, next, renew, iteration == 1);
                     some |= progress.state != State::Active;
                 }
             }
@@ -452,9 +459,9 @@ struct Update<'a, M: Dae, E: Lanes, const S: usize> {
 
 impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Number = E;
-    type Output = [E; 2];
+    type Output = (E, E);
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> [E; 2] {
+    fn run<A: Arithmetic>(self) -> (E, E) {
         let Self { x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } = self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
         for (y, increment) in y.as_mut().iter_mut().zip(increment.as_mut()) {
@@ -473,7 +480,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             {
                 *size = largest_of(increment) * weight;
             }
-            return [largest, infinite];
+            return (largest, infinite);
         }
         // Four unknowns side by side, and the rest one by one.
         let (increments, last) = increment.as_ref().as_chunks::<4>();
@@ -491,7 +498,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
         let ([largest, excess, sum], others) = (some.total(), others.total());
         let (largest, excess, sum) = (largest.max(others[0]), excess.max(others[1]), sum + others[2]);
         let number = E::le(sum.abs(), E::from_f64(f64::MAX));
-        [E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite)]
+        (E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite))
     }
 }
 
