@@ -4,8 +4,7 @@
 //! d²(λᵀ x_N)/dw² = − Σ_n Σ_i D_iᵀ [∇²(μ_iᵀ f)_i] D_i
 //! ```
 //!
-//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep. The product with the sparse matrix in
-//! the middle comes first, `G = H D`, then the lower triangle of `Dᵀ G`.
+//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of `curvature`.
 
 use super::adjoint::Backward;
 use super::along::Along;
@@ -21,8 +20,7 @@ use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide};
-use crate::shape::{Aligned, assign};
-use crate::shape::{Array, Matrix, Plain, Shape};
+use crate::shape::{Aligned, Array, Matrix, Plain, Shape, assign};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
