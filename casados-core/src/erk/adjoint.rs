@@ -101,8 +101,18 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
             }
         }
         for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
+            let lambda = lambda.as_mut();
+            if columns == 1 {
+                // One number: no loop over columns.
+                let mut sum = lambda[0];
+                for xibar in &self.forward.dk {
+                    sum = sum + xibar[x][0];
+                }
+                lambda[0] = sum;
+                continue;
+            }
             for xibar in &self.forward.dk {
-                add(T::ONE, &xibar[x].as_ref()[..columns], lambda.as_mut());
+                add(T::ONE, &xibar[x].as_ref()[..columns], lambda);
             }
         }
         Ok(())
@@ -111,6 +121,17 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// `k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)`
     fn stage_seed(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
         for (x, kbar) in self.forward.dxi.as_mut().iter_mut().enumerate() {
+            if columns == 1 {
+                // One number: no loop over columns.
+                let mut sum = scheme.b[stage] * self.lambda[x][0];
+                for (a, xibar) in scheme.a.iter().zip(&self.forward.dk).skip(stage + 1) {
+                    if a[stage] != T::ZERO {
+                        sum = sum + a[stage] * xibar[x][0];
+                    }
+                }
+                kbar[0] = h * sum;
+                continue;
+            }
             let kbar = &mut kbar.as_mut()[..columns];
             kbar.fill(T::ZERO);
             add(scheme.b[stage], self.lambda[x].as_ref(), kbar);
