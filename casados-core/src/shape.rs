@@ -62,9 +62,9 @@ macro_rules! compared {
 pub(crate) use compared;
 
 /// What begins where a line of the cache does on machines with wide registers: they are loaded in halves where they cross into the
-/// next line.
+/// next line. Without `std` programs have what they were compiled for, and memory is laid out by others.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-#[cfg_attr(target_arch = "x86_64", repr(C, align(64)))]
+#[cfg_attr(all(target_arch = "x86_64", feature = "std"), repr(C, align(64)))]
 pub struct Aligned<V>(pub V);
 
 impl<V> Deref for Aligned<V> {

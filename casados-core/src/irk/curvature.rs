@@ -9,7 +9,7 @@ use crate::shape::Array;
 use core::marker::PhantomData;
 
 /// So many columns of `G` are there at a time: two panels where registers are enough for their products.
-pub const COLUMNS: usize = if cfg!(target_arch = "x86_64") { 16 } else { 8 };
+pub const COLUMNS: usize = if cfg!(all(target_arch = "x86_64", feature = "std")) { 16 } else { 8 };
 
 /// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own.
 pub struct Subtract<'a, M, E, R, const S: usize> {
