@@ -26,6 +26,7 @@ mod directions;
 mod evaluate;
 mod forward;
 mod hessian;
+mod increment;
 mod integrator;
 mod newton;
 mod pivoted;

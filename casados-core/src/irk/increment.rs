@@ -1,0 +1,240 @@
+//! What an iteration of Newton's method does to the unknowns, and how far it went.
+
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, slot};
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::scalar::{Lanes, Scalar};
+use crate::shape::{Plain, Shape};
+
+/// The residual in the slots of the equations.
+pub(super) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
+    pub f: &'a ArrayK<M, [E; S]>,
+    pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
+    const ROWS: usize = M::Shape::NK;
+    const INSTRUCTIONS: usize = 2 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, equation: usize) {
+        let to = self.increment.as_mut().get_mut(slot::<M>(equation));
+        if let (Some(to), Some(f)) = (to, self.f.as_ref().get(equation)) {
+            to.as_flattened_mut().copy_from_slice(f);
+        }
+    }
+}
+
+/// `y ← y − Δ`
+pub(super) struct Subtract<'a, E, const S: usize> {
+    pub y: &'a mut [[E; S]],
+    pub increment: &'a [[[E; 1]; S]],
+}
+
+impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (y, increment) in self.y.iter_mut().zip(self.increment) {
+            for (y, [delta]) in y.iter_mut().zip(increment) {
+                *y = *y - *delta;
+            }
+        }
+    }
+}
+
+/// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
+pub(super) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
+    pub x: &'a ArrayX<M, E>,
+    pub y: &'a mut ArrayK<M, [E; S]>,
+    pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+    pub weights: &'a mut ArrayK<M, E>,
+    pub sizes: &'a mut ArrayK<M, E>,
+    pub active: E::Mask,
+    pub h: E,
+    pub floor: E,
+    pub tolerance: E,
+    pub full: bool,
+    /// Whether weights are to be found, and nothing is known of the increment before.
+    pub measure: bool,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
+    type Number = E;
+    type Output = (E, E);
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> (E, E) {
+        let Self { x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } = self;
+        let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
+        for (y, increment) in y.as_mut().iter_mut().zip(increment.as_mut()) {
+            // In registers: the optimiser cannot know that they do not overlap.
+            let (mut new, mut deltas) = (*y, *increment);
+            for (y, [delta]) in new.iter_mut().zip(&mut deltas) {
+                *delta = E::select(active, *delta, zero);
+                *y = *y - *delta;
+            }
+            (*y, *increment) = (new, deltas);
+        }
+        if measure {
+            let largest = Measure::<M, E, S> { x, y, increment, weights, h, floor }.run::<A>();
+            let weights = weights.as_ref();
+            for ((size, increment), &weight) in sizes.as_mut().iter_mut().zip(increment.as_ref()).zip(weights)
+            {
+                *size = largest_of(increment) * weight;
+            }
+            return (largest, infinite);
+        }
+        // Four unknowns side by side, and the rest one by one.
+        let (increments, last) = increment.as_ref().as_chunks::<4>();
+        let (weights, last_weights) = weights.as_ref().as_chunks::<4>();
+        let (sizes, last_sizes) = sizes.as_mut().as_chunks_mut::<4>();
+        let mut some = Increments::none(tolerance, full);
+        for ((increments, weights), sizes) in increments.iter().zip(weights).zip(sizes) {
+            some.take(increments, weights, sizes);
+        }
+        let mut others = Increments::none(tolerance, full);
+        for ((increment, weight), size) in last.iter().zip(last_weights).zip(last_sizes) {
+            let (increment, weight) = (core::array::from_ref(increment), core::array::from_ref(weight));
+            others.take(increment, weight, core::array::from_mut(size));
+        }
+        let ([largest, excess, sum], others) = (some.total(), others.total());
+        let (largest, excess, sum) = (largest.max(others[0]), excess.max(others[1]), sum + others[2]);
+        let number = E::le(sum.abs(), E::from_f64(f64::MAX));
+        (E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite))
+    }
+}
+
+/// What is known of the increments of some unknowns, in `N` strands.
+struct Increments<E, const N: usize> {
+    largest: [E; N],
+    /// By how much one, and the one that is expected next, is too large; not positive if that is below the tolerance.
+    excess: [E; N],
+    /// The sum of what is not a number is not a number, which a maximum may lose.
+    sum: [E; N],
+    tolerance: E,
+    full: bool,
+}
+
+impl<E: Lanes, const N: usize> Increments<E, N> {
+    #[inline(always)]
+    fn none(tolerance: E, full: bool) -> Self {
+        let zero = E::from_f64(0.0);
+        Self { largest: [zero; N], excess: [-tolerance; N], sum: [zero; N], tolerance, full }
+    }
+
+    /// Takes `N` unknowns into account, whose last increments had these sizes.
+    #[inline(always)]
+    fn take<const S: usize>(&mut self, increments: &[[[E; 1]; S]; N], weights: &[E; N], sizes: &mut [E; N]) {
+        let old = *sizes;
+        let (mut new, mut excess) = ([E::from_f64(0.0); N], [E::from_f64(0.0); N]);
+        // Stage by stage, so that what is done to unknowns is done to vectors.
+        #[allow(clippy::needless_range_loop)]
+        for i in 0..S {
+            for n in 0..N {
+                let [delta] = increments[n][i];
+                new[n] = delta.abs().max(new[n]);
+                self.sum[n] = self.sum[n] + delta;
+            }
+        }
+        for n in 0..N {
+            new[n] = new[n] * weights[n];
+        }
+        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only where it must be.
+        if self.full {
+            for n in 0..N {
+                let rate = new[n] / old[n];
+                excess[n] = new[n] * rate * rate - self.tolerance;
+            }
+        } else {
+            for n in 0..N {
+                excess[n] = new[n] * new[n] - self.tolerance * (old[n] - new[n]);
+            }
+        }
+        for n in 0..N {
+            // Where increments hardly shrink, nothing is expected but that the next one is as large.
+            let expected = excess[n].max(new[n] + new[n] - old[n]);
+            let own = new[n] - self.tolerance;
+            self.excess[n] = E::select(E::lt(own, expected), own, expected).max(self.excess[n]);
+            self.largest[n] = new[n].max(self.largest[n]);
+        }
+        *sizes = new;
+    }
+
+    /// The largest increment, the largest excess, the sum.
+    #[inline(always)]
+    fn total(&self) -> [E; 3] {
+        let (mut largest, mut excess, mut sum) = (E::from_f64(0.0), -self.tolerance, E::from_f64(0.0));
+        for n in 0..N {
+            largest = self.largest[n].max(largest);
+            excess = self.excess[n].max(excess);
+            sum = sum + self.sum[n];
+        }
+        [largest, excess, sum]
+    }
+}
+
+/// The largest of all stages.
+#[inline(always)]
+fn largest_of<E: Lanes, const S: usize>(increment: &[[E; 1]; S]) -> E {
+    let mut largest = E::from_f64(0.0);
+    for [delta] in increment {
+        largest = delta.abs().max(largest);
+    }
+    largest
+}
+
+/// The size of an increment relative to the unknowns as they are now.
+pub(super) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
+    pub x: &'a ArrayX<M, E>,
+    pub y: &'a ArrayK<M, [E; S]>,
+    pub increment: &'a ArrayK<M, [[E; 1]; S]>,
+    pub weights: &'a mut ArrayK<M, E>,
+    pub h: E,
+    pub floor: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
+    type Number = E;
+    type Output = E;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E {
+        let Self { x, y, increment, weights, h, floor } = self;
+        let (zero, one, smallest) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(E::SMALLEST));
+        // A change of ẋ below this much of x/h rounds to none in x.
+        let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
+        let (mut largest, mut sum) = ([zero; S], [zero; S]);
+        let unknowns = y.as_ref().iter().zip(increment.as_ref()).zip(weights.as_mut());
+        for (unknown, ((y, increment), weight)) in unknowns.enumerate() {
+            let mut size = (x.as_ref().get(unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
+            for (y, [delta]) in y.iter().zip(increment) {
+                size = y.abs().max(delta.abs().max(size));
+            }
+            *weight = one / size;
+            for ((largest, sum), [delta]) in largest.iter_mut().zip(&mut sum).zip(increment) {
+                let size = delta.abs() * *weight;
+                *largest = size.max(*largest);
+                *sum = *sum + size;
+            }
+        }
+        size_of(largest, sum)
+    }
+}
+
+/// The largest of all stages, or what is not a number.
+#[inline(always)]
+fn size_of<E: Lanes, const S: usize>(largest: [E; S], sum: [E; S]) -> E {
+    let zero = E::from_f64(0.0);
+    let (mut total, mut most) = (zero, zero);
+    for (&largest, &sum) in largest.iter().zip(&sum) {
+        (total, most) = (total + sum, largest.max(most));
+    }
+    E::select(E::le(total, E::from_f64(f64::MAX)), most, total)
+}
