@@ -121,7 +121,7 @@ fn draw_jacobian(structure: &Structure, widths: [usize; 5], panel: &Panel) -> Dr
 fn draw_factors(structure: &Structure, panel: &Panel) -> Drawn {
     let plan = &structure.elimination;
     let size = plan.pivots.len();
-    let fill = plan.slots.len() - plan.assembly.len();
+    let fill = plan.assembly.iter().filter(|block| block.is_fill()).count();
     let title =
         format!("Factors in the order of elimination, {} blocks, {fill} of them fill", plan.slots.len());
     panel.area.draw(&Text::new(title, (panel.left, 8), text(18)))?;
@@ -131,8 +131,7 @@ fn draw_factors(structure: &Structure, panel: &Panel) -> Drawn {
     for (order, pivot) in plan.pivots.iter().enumerate() {
         position[pivot.slot as usize] = order;
     }
-    let is_original = |block: usize| plan.assembly.iter().any(|entry| entry.block as usize == block);
-    let colour = |block: usize| if is_original(block) { ORIGINAL.1 } else { FILL.1 };
+    let colour = |block: usize| if plan.assembly[block].is_fill() { FILL.1 } else { ORIGINAL.1 };
     for (order, pivot) in plan.pivots.iter().enumerate() {
         panel.fill(order, order, if pivot.identity { IDENTITY.1 } else { PIVOT.1 })?;
         for block in pivot.lower() {

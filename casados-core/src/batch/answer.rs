@@ -75,11 +75,25 @@ fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
 /// The elements of each lane in a slice of their own, which may be empty.
 #[inline(always)]
 pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], to: &mut [&mut [T]; MOST_LANES]) {
+    let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
+    let Some(tile) = tile.get_mut(..E::LANES) else { return };
+    let mut begin = 0;
+    let mut whole = from.chunks_exact(E::LANES);
+    for from in &mut whole {
+        E::transpose(from, tile);
+        for (to, cell) in to.iter_mut().zip(&*tile) {
+            // As many as the optimiser knows.
+            if let Some(to) = to.get_mut(begin..begin + E::LANES) {
+                to.copy_from_slice(cell.as_ref());
+            }
+        }
+        begin += E::LANES;
+    }
     let mut cell: E::Cell = Zeroable::zeroed();
-    for (index, &from) in from.iter().enumerate() {
+    for (index, from) in whole.remainder().iter().enumerate() {
         from.store(&mut cell);
         for (to, &element) in to.iter_mut().zip(cell.as_ref()) {
-            if let Some(to) = to.get_mut(index) {
+            if let Some(to) = to.get_mut(begin + index) {
                 *to = element;
             }
         }

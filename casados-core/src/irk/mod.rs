@@ -30,6 +30,7 @@ mod increment;
 mod integrator;
 mod newton;
 mod pivoted;
+mod progress;
 mod record;
 mod refine;
 mod run;

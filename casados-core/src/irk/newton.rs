@@ -24,6 +24,7 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::increment::{Measure, PlaceResidual, Subtract, Update};
+use super::progress::{Look, Progress, Verdict};
 use super::record::{Coefficients, Work};
 use crate::linalg::dispatch;
 use crate::memory::{Fallback, Kept};
@@ -31,7 +32,6 @@ use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::Lanes;
 use crate::statistics::Statistics;
-use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 1.0;
@@ -54,81 +54,6 @@ pub(crate) struct Solved<E: Lanes> {
     /// Whether the factors that are there are those of the solution.
     pub exact: bool,
 }
-
-/// What every lane is judged by.
-struct Rule {
-    tolerance: f64,
-    /// Increments that no longer shrink are rounding errors below this.
-    stagnation: f64,
-    /// Every Jacobian is the current one.
-    full: bool,
-    /// The equations are linear, and the factors are theirs.
-    exact: bool,
-}
-
-/// How far one lane is.
-#[derive(Clone, Copy)]
-struct Progress {
-    state: State,
-    /// The increment before.
-    last: f64,
-    /// How fast increments shrink, if that is known.
-    rate: Option<f64>,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum State {
-    Active,
-    Converged,
-    Failed,
-}
-
-impl Progress {
-    /// After an increment, and what is expected of the next one: with factors that are `new` or older ones, the first
-    /// in this step or a later one.
-    fn judge(&mut self, rule: &Rule, increment: f64, next: f64, new: bool, first: bool) {
-        if !increment.is_finite() {
-            self.state = State::Failed;
-            return;
-        }
-        let mut expected = increment;
-        if first {
-            // What the last step found out holds for its factors only; and too roughly to stop by it.
-            self.rate = self.rate.filter(|_| !new);
-        } else {
-            self.rate = Some(increment / self.last);
-            expected = if increment <= rule.stagnation && 2.0 * increment >= self.last { 0.0 } else { next };
-        }
-        self.last = increment;
-        // Of linear equations the residual will tell.
-        if expected <= rule.tolerance && !rule.exact {
-            self.state = State::Converged;
-        }
-    }
-
-    /// Whether increments grow.
-    fn grows(&self) -> bool {
-        self.state == State::Active && self.rate.is_some_and(|rate| rate > 1.0)
-    }
-
-    /// Whether increments no longer shrink.
-    fn is_stuck(&self) -> bool {
-        self.state == State::Active && self.rate.is_some_and(|rate| rate >= 0.5)
-    }
-
-    /// How many more increments are expected until the tolerance.
-    fn remaining(&self, rule: &Rule) -> f64 {
-        let (mut increment, mut count) = (self.last, 0.0);
-        let rate = self.rate.unwrap_or(0.0);
-        while increment > rule.tolerance && count < 64.0 {
-            (increment, count) = (increment * rate, count + 1.0);
-        }
-        count
-    }
-}
-
-/// More lanes than any register has.
-const MOST_LANES: usize = 16;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis.
@@ -179,27 +104,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let Options { newton: options, compensated, .. } = options;
         let most = options.max_iterations;
         let rounding = if *compensated { LITTLE } else { ROUNDING } * E::EPSILON;
-        let rule = Rule {
-            tolerance: options.tolerance.max(rounding),
-            stagnation: E::STAGNATION,
-            full: options.jacobian == Jacobian::Full,
-            // Of linear equations every step has one matrix, which may be that of all steps.
-            exact: M::STRUCTURE.linear_in_state,
-        };
+        let tolerance = options.tolerance.max(rounding);
+        let (full, exact) = (options.jacobian == Jacobian::Full, M::STRUCTURE.linear_in_state);
         let h = self.inputs.time.step;
-        let rate = Some(self.validity.rate).filter(|rate| *rate > 0.0);
-        let start = Progress { state: State::Active, last: 0.0, rate };
-        let (mut one, mut many);
-        let lanes: &mut [Progress] = if const { E::LANES == 1 } {
-            one = [start];
-            &mut one
-        } else {
-            many = [start; MOST_LANES];
-            many.get_mut(..E::LANES).unwrap_or_default()
-        };
+        let mut progress = Progress::<E>::start(tolerance, self.validity.rate, exact);
+        let mut verdict = Verdict::default();
         let simplified = options.jacobian == Jacobian::Simplified;
         let adaptive = simplified || options.jacobian == Jacobian::Auto;
-        let basis = coefficients.basis.as_ref().filter(|_| F::KEPT && adaptive && !rule.exact);
+        let basis = coefficients.basis.as_ref().filter(|_| F::KEPT && adaptive && !exact);
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
         let mut renewals = 0;
@@ -209,14 +121,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         } else if M::STRUCTURE.constant_matrix && self.validity.factors {
             false
         } else {
-            rule.full || rule.exact || !(adaptive && self.validity.factors)
+            // Of linear equations every step has one matrix, which may be that of all steps.
+            full || exact || !(adaptive && self.validity.factors)
         };
         let mut iteration = 0;
-        let mut active = mask::<E>(lanes, State::Active);
         loop {
             self.place(coefficients, step, x, y);
             // The first iteration of nonlinear equations is far away in any case.
-            let compensate = *compensated && (iteration > 0 || rule.exact);
+            let compensate = *compensated && (iteration > 0 || exact);
             if compensate {
                 self.place_compensated(coefficients, x, y);
             }
@@ -238,25 +150,18 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             if compensate {
                 self.correct_residual();
             }
-            if rule.exact && iteration > 0 {
+            if exact && iteration > 0 {
                 self.validity.factors = true;
                 let satisfied = self.is_satisfied();
                 if E::all(satisfied) || iteration == REFINEMENTS {
                     return Solved { converged: satisfied, exact: true };
                 }
             }
-            if !rule.exact && iteration > 1 && lanes.iter().any(Progress::is_stuck) {
-                let satisfied = self.is_satisfied();
-                let satisfied = cell(E::select(satisfied, E::from_f64(1.0), E::from_f64(0.0)));
-                for (lane, progress) in lanes.iter_mut().enumerate() {
-                    if progress.is_stuck() && E::lane(&satisfied, lane) > 0.0 {
-                        progress.state = State::Converged;
-                    }
+            if !exact && iteration > 1 && verdict.stuck {
+                progress.accept(self.is_satisfied());
+                if !E::any(progress.active) {
+                    return self.solved(&progress, mean);
                 }
-                if lanes.iter().all(|lane| lane.state != State::Active) {
-                    return self.solved(lanes, mean);
-                }
-                active = mask::<E>(lanes, State::Active);
             }
             iteration += 1;
             statistics.iterations += 1;
@@ -265,62 +170,44 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 (Some(basis), Some(factors)) if mean => factors.solve(basis, &mut self.increment),
                 _ => self.linear.factors.solve(&mut self.increment),
             }
-            let floor = E::from_f64(rounding / rule.tolerance);
+            let floor = E::from_f64(rounding / tolerance);
             let (size, next) = dispatch(Update::<M, E, S> {
                 x,
                 y,
                 increment: &mut self.increment,
                 weights: &mut self.weights,
                 sizes: &mut self.sizes,
-                active,
+                active: progress.active,
                 h,
                 floor,
-                tolerance: E::from_f64(rule.tolerance),
-                full: rule.full,
+                tolerance: E::from_f64(tolerance),
+                full,
                 measure: iteration == 1,
             });
-            let (size, next) = (cell(size), cell(next));
-            let mut some = false;
-            for (lane, progress) in lanes.iter_mut().enumerate() {
-                if progress.state == State::Active {
-                    let (size, next) = (E::lane(&size, lane), E::lane(&next, lane));
-                    progress.judge(&rule, size, next, renew, iteration == 1);
-                    some |= progress.state != State::Active;
-                }
-            }
-            if some && !rule.exact && iteration > 1 {
-                // Once more, with the sizes that the unknowns have now.
+            let look = if iteration == 1 { Look::First { new: renew } } else { Look::Later };
+            verdict = progress.judge(look, size, next);
+            if verdict.changed && !exact && iteration > 1 {
                 let (increment, weights) = (&self.increment, &mut self.weights);
-                let again = cell(dispatch(Measure::<M, E, S> { x, y, increment, weights, h, floor }));
-                for (lane, progress) in lanes.iter_mut().enumerate() {
-                    let again = E::lane(&again, lane);
-                    if progress.state == State::Converged && again > 2.0 * progress.last {
-                        (progress.state, progress.last) = (State::Active, again);
-                    }
-                }
+                let again = dispatch(Measure::<M, E, S> { x, y, increment, weights, h, floor });
+                verdict = progress.judge(Look::Again, again, again);
             }
-            if some {
-                active = mask::<E>(lanes, State::Active);
+            if !verdict.active {
+                return self.solved(&progress, mean);
             }
-            let slowest = lanes.iter().filter(|lane| lane.state == State::Active);
-            let slowest = slowest.fold(None, |slowest: Option<f64>, lane| {
-                Some(slowest.unwrap_or(0.0).max(lane.remaining(&rule)))
-            });
-            let Some(remaining) = slowest else { return self.solved(lanes, mean) };
             if iteration == most {
                 (self.validity.factors, self.validity.mean) = (false, false);
-                return Solved { converged: mask::<E>(lanes, State::Converged), exact: false };
+                return Solved { converged: progress.converged, exact: false };
             }
-            if iteration > 1 && renewals > FAR && lanes.iter().any(Progress::grows) {
+            if iteration > 1 && renewals > FAR && verdict.grows {
                 // The mean of the stages does not do.
                 renewals = MEANS;
             }
             // Those of a solution nearby do for all iterations, unless increments hardly shrink.
-            near &= !lanes.iter().any(Progress::is_stuck);
+            near &= !verdict.stuck;
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
             // New factors take two more iterations themselves.
-            renew = !rule.exact
-                && (rule.full || adaptive && !near && remaining > 2.0 + Self::RENEWAL[usize::from(cheap)]);
+            let expensive = 2.0 + Self::RENEWAL[usize::from(cheap)];
+            renew = !exact && (full || adaptive && !near && verdict.remaining > expensive);
         }
     }
 }
@@ -369,28 +256,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 
     /// After the last iteration: no lane is active any more.
-    fn solved(&mut self, lanes: &[Progress], mean: bool) -> Solved<E> {
-        // Lanes that failed have no say in what the others do next.
-        let good = lanes.iter().filter(|lane| lane.state == State::Converged);
-        self.validity.rate = good.clone().fold(0.0, |rate, lane| lane.rate.unwrap_or(0.0).max(rate));
-        let any = good.count() > 0;
+    fn solved(&mut self, progress: &Progress<E>, mean: bool) -> Solved<E> {
+        self.validity.rate = progress.slowest_rate();
+        let any = E::any(progress.converged);
         (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
-        Solved { converged: mask::<E>(lanes, State::Converged), exact: false }
+        Solved { converged: progress.converged, exact: false }
     }
-}
-
-/// The lanes that are in a state.
-fn mask<E: Lanes>(lanes: &[Progress], state: State) -> E::Mask {
-    let mut cell: E::Cell = Zeroable::zeroed();
-    for (lane, progress) in lanes.iter().enumerate() {
-        E::set_lane(&mut cell, lane, f64::from(u8::from(progress.state == state)));
-    }
-    E::lt(E::from_f64(0.0), E::load(&cell))
-}
-
-/// A number as it lies in memory.
-fn cell<E: Lanes>(value: E) -> E::Cell {
-    let mut cell: E::Cell = Zeroable::zeroed();
-    value.store(&mut cell);
-    cell
 }

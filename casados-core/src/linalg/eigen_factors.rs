@@ -119,16 +119,14 @@ impl<M: Dae, T: Real, const L: usize> Kernel for Assemble<'_, M, T, L> {
     fn run<A: Arithmetic>(self) -> bool {
         let Self { jacobian, scale, blocks, .. } = self;
         let plan = &M::STRUCTURE.elimination;
-        blocks.fill([[Complex::zero()]]);
-        for entry in plan.assembly {
-            let Some([[element]]) = blocks.get_mut(entry.block as usize) else { continue };
+        for (entry, [[to]]) in plan.assembly.iter().zip(blocks.iter_mut()) {
             // An index that marks what is not there lies outside of the Jacobian.
-            if let Some(state) = jacobian.get(entry.state as usize) {
-                *element = scale.scaled(*state);
-            }
+            let state = jacobian.get(entry.state as usize);
+            let mut element = state.map_or_else(Complex::zero, |state| scale.scaled(*state));
             if let Some(direct) = jacobian.get(entry.direct as usize) {
                 element.re = element.re.map(|re| re + *direct);
             }
+            *to = element;
         }
         sparse::Factor::<M, _, 1> { coupling: &[[Complex::zero()]], blocks, model: PhantomData }.run::<A>();
         // A pivot that vanishes leaves infinite elements or NaN.

@@ -95,7 +95,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     }
 }
 
-/// Blocks of the Newton matrix, fill zero.
+/// All blocks of the Newton matrix, each written once.
 struct Assemble<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
@@ -110,14 +110,12 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        let Self { a, h, coupling, blocks, .. } = &mut self;
-        let zero = E::from_f64(0.0);
+        let Self { a, h, coupling, .. } = &mut self;
         for (i, row) in a.iter().enumerate() {
             for (column, &a) in coupling.iter_mut().zip(row) {
                 column[i] = -(*h * a);
             }
         }
-        blocks.as_mut().fill([[zero; S]; S]);
         each_row::<A, _>(&mut self);
     }
 }
@@ -127,24 +125,29 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let (jacobian, coupling, blocks) = (self.jacobian.as_ref(), &*self.coupling, self.blocks.as_mut());
-        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        let Some(block) = blocks.get_mut(entry.block as usize) else { return };
-        if let Some(state) = jacobian.get(entry.state as usize) {
+        let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
+        let (Some(entry), Some(to)) = (M::STRUCTURE.elimination.assembly.get(row), blocks.get_mut(row))
+        else {
+            return;
+        };
+        // An index that marks what is not there lies outside of the Jacobian.
+        let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
+        let mut block = [[E::from_f64(0.0); S]; S];
+        if let Some(state) = state {
             if (const { S > 1 }) && entry.scaled {
-                block[0] = *state;
+                to[0] = *state;
                 return;
             }
-            for (column, ha) in block.iter_mut().zip(coupling) {
-                *column = [E::from_f64(0.0); S];
+            for (column, ha) in block.iter_mut().zip(&*self.coupling) {
                 A::subtract_products(column, state, ha);
             }
         }
-        if let Some(direct) = jacobian.get(entry.direct as usize) {
+        if let Some(direct) = direct {
             for (stage, (column, &direct)) in block.iter_mut().zip(direct).enumerate() {
                 column[stage] = column[stage] + direct;
             }
         }
+        *to = block;
     }
 }
 

@@ -53,7 +53,7 @@ impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
     }
 }
 
-/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian; fill zero.
+/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, each block written once.
 struct AssembleMean<'a, M: Dae, E: Plain, const S: usize, const L: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `hμ/s`
@@ -66,7 +66,6 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        self.blocks.as_mut().fill([[Complex::zero()]]);
         each_row::<A, _>(&mut self);
     }
 }
@@ -77,17 +76,22 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        let Some([[element]]) = blocks.get_mut(entry.block as usize) else { return };
-        if let Some(state) = jacobian.get(entry.state as usize) {
-            *element = self.scale.scaled(total(state));
-        }
-        if let Some(direct) = jacobian.get(entry.direct as usize) {
+        let (Some(entry), Some([[to]])) = (M::STRUCTURE.elimination.assembly.get(row), blocks.get_mut(row))
+        else {
+            return;
+        };
+        let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
+        let mut element = match state {
+            Some(state) => self.scale.scaled(total(state)),
+            None => Complex::zero(),
+        };
+        if let Some(direct) = direct {
             let direct = E::from_f64(const { 1.0 / S as f64 }) * total(direct);
             for re in &mut element.re {
                 *re = *re + direct;
             }
         }
+        *to = element;
     }
 }
 

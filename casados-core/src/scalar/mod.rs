@@ -23,6 +23,7 @@ pub use float::Float;
 pub use tangent::Tangent;
 
 use crate::shape::Plain;
+use bytemuck::Zeroable;
 use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -284,6 +285,17 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     fn max(self, other: Self) -> Self;
     /// Whether a mask is true in every lane.
     fn all(mask: Self::Mask) -> bool;
+    /// The numbers of each lane beside each other, of at most as many registers as there are lanes: `to[lane][i] = from[i][lane]`.
+    #[inline(always)]
+    fn transpose(from: &[Self], to: &mut [Self::Cell]) {
+        for (i, from) in from.iter().enumerate() {
+            let mut cell: Self::Cell = Zeroable::zeroed();
+            from.store(&mut cell);
+            for (lane, to) in to.iter_mut().enumerate() {
+                Self::set_lane(to, i, Self::lane(&cell, lane));
+            }
+        }
+    }
 
     /// Runs a computation on `S` numbers like this one in one register.
     ///

@@ -165,12 +165,12 @@ impl Structure {
             return writeln!(f, "no plan: the whole matrix is pivoted");
         }
         let identities = pivots.iter().filter(|pivot| pivot.identity).count();
+        let fill = assembly.iter().filter(|block| block.is_fill()).count();
         writeln!(
             f,
-            "{} blocks = {} non-zeros + {} fill; {identities} of {} pivots are identities",
+            "{} blocks = {} non-zeros + {fill} fill; {identities} of {} pivots are identities",
             slots.len(),
-            assembly.len(),
-            slots.len().saturating_sub(assembly.len()),
+            slots.len().saturating_sub(fill),
             pivots.len(),
         )?;
         let order = pivots.iter().map(|pivot| {

@@ -12,7 +12,7 @@ pub struct Elimination {
     pub slots: &'static [u32],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
     pub updates: &'static [u32],
-    /// For each structural non-zero of the Newton matrix: where it goes and what it is made of.
+    /// For each block what it is made of before elimination.
     pub assembly: &'static [Assembly],
     /// For each equation its slot.
     pub slot_of_equation: &'static [u32],
@@ -70,11 +70,9 @@ impl Pivot {
     }
 }
 
-/// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`.
+/// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`; zero where there is only fill.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assembly {
-    /// The block.
-    pub block: u32,
     /// The entry of the Jacobian that multiplies the unknown itself (`f_ẋ` or `f_z`), or [`Assembly::NONE`].
     pub direct: u32,
     /// The entry of `f_x`, or [`Assembly::NONE`].
@@ -86,4 +84,10 @@ pub struct Assembly {
 impl Assembly {
     /// No entry.
     pub const NONE: u32 = u32::MAX;
+
+    /// Whether elimination alone puts anything there.
+    #[must_use]
+    pub const fn is_fill(&self) -> bool {
+        self.direct == Self::NONE && self.state == Self::NONE
+    }
 }

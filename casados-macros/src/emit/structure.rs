@@ -106,7 +106,6 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     for &(row, column) in &plan.pivots {
         slot_of_equation[row as usize] = column;
     }
-    let number: HashMap<_, _> = plan.blocks.iter().zip(0u32..).collect();
     let slots: Vec<u32> = plan
         .ranges
         .iter()
@@ -130,13 +129,15 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         .filter(|(_, scaled)| **scaled)
         .flat_map(|(&[block, upper, _], _)| block + 1..upper)
         .collect();
-    let assembly = positions.iter().map(|position| {
+    let positions: HashMap<_, _> =
+        positions.iter().map(|position| ((position.row, position.column), position)).collect();
+    let assembly = plan.blocks.iter().zip(0u32..).map(|(place, block)| {
+        let position = positions.get(place);
         let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
-        let block = number[&(position.row, position.column)];
-        let (direct, state, scaled) =
-            (entry(position.direct), entry(position.state), scaled.contains(&block));
-        let block = Literal::u32_unsuffixed(block);
-        quote!(assembly(#block, #direct, #state, #scaled))
+        let direct = entry(position.and_then(|position| position.direct));
+        let state = entry(position.and_then(|position| position.state));
+        let scaled = scaled.contains(&block);
+        quote!(assembly(#direct, #state, #scaled))
     });
     let [slots, updates, slot_of_equation] =
         [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
@@ -145,8 +146,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool, scaled: bool) -> Pivot {
             Pivot { slot, block, upper, end, identity, scaled }
         }
-        const fn assembly(block: u32, direct: u32, state: u32, scaled: bool) -> Assembly {
-            Assembly { block, direct, state, scaled }
+        const fn assembly(direct: u32, state: u32, scaled: bool) -> Assembly {
+            Assembly { direct, state, scaled }
         }
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },

@@ -59,6 +59,28 @@ pub enum Level {
     Avx512,
 }
 
+/// The numbers of each lane beside each other, where no instructions do it.
+#[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
+#[inline(always)]
+fn transpose_in_memory<T: Copy + Default, R: Copy, const W: usize>(
+    mut rows: [R; W],
+    store: fn(R, &mut [T; W]),
+    load: fn(&[T; W]) -> R,
+) -> [R; W] {
+    let mut cells = [[T::default(); W]; W];
+    for (row, cell) in rows.iter().zip(&mut cells) {
+        store(*row, cell);
+    }
+    for (lane, row) in rows.iter_mut().enumerate() {
+        let mut column = [T::default(); W];
+        for (to, cell) in column.iter_mut().zip(&cells) {
+            *to = cell[lane];
+        }
+        *row = load(&column);
+    }
+    rows
+}
+
 /// Runs a computation on `S` numbers side by side in the narrowest register that holds them.
 #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
 macro_rules! side_by_side {

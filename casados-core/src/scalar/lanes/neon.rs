@@ -40,6 +40,11 @@ macro_rules! shared {
             unsafe { $store(all.as_mut_ptr(), a) };
             cell.copy_from_slice(&all[..N]);
         }
+        /// The numbers of each lane beside each other.
+        #[inline(always)]
+        pub fn transpose(rows: [Register; WIDTH]) -> [Register; WIDTH] {
+            super::super::transpose_in_memory::<$element, Register, WIDTH>(rows, store, load)
+        }
         /// Calls `F`; not inlined.
         #[inline(never)]
         pub fn enter<F: Call<A>, A>(argument: A) -> F::Output {

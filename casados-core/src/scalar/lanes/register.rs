@@ -282,6 +282,16 @@ macro_rules! register {
             fn all(mask: Self::Mask) -> bool {
                 $ops::bits(mask) & Self::USED == Self::USED
             }
+            #[inline(always)]
+            fn transpose(from: &[Self], to: &mut [Self::Cell]) {
+                let mut rows = [$ops::splat(0.0); $ops::WIDTH];
+                for (row, from) in rows.iter_mut().zip(from) {
+                    *row = from.0;
+                }
+                for (to, column) in to.iter_mut().zip($ops::transpose(rows)) {
+                    $ops::store(column, to);
+                }
+            }
         }
     };
 }

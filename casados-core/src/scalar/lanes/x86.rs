@@ -64,6 +64,16 @@ macro_rules! memory {
     };
 }
 
+/// The numbers of each lane beside each other.
+macro_rules! transpose_in_memory {
+    ($element:ty) => {
+        #[inline(always)]
+        pub fn transpose(rows: [Register; WIDTH]) -> [Register; WIDTH] {
+            super::super::transpose_in_memory::<$element, Register, WIDTH>(rows, store, load)
+        }
+    };
+}
+
 /// A function that is compiled for given instructions.
 macro_rules! enter {
     ($features:literal) => {
@@ -108,6 +118,7 @@ pub mod sse2_f64 {
 
     enter!("sse2");
     memory!(f64, 2, _mm_loadu_pd, _mm_storeu_pd, _mm_setr_pd; 0 1);
+    transpose_in_memory!(f64);
     wrap! {
         splat(a: f64) -> Register = _mm_set1_pd;
         add(a: Register, b: Register) -> Register = _mm_add_pd;
@@ -154,6 +165,7 @@ pub mod sse_f32 {
 
     enter!("sse2");
     memory!(f32, 4, _mm_loadu_ps, _mm_storeu_ps, _mm_setr_ps; 0 1 2 3);
+    transpose_in_memory!(f32);
     wrap! {
         splat(a: f32) -> Register = _mm_set1_ps;
         add(a: Register, b: Register) -> Register = _mm_add_ps;
@@ -218,6 +230,19 @@ pub mod avx2_f64 {
         mask_or(a: Mask, b: Mask) -> Mask = _mm256_or_pd;
     }
     define! {
+        transpose(rows: [Register; 4]) -> [Register; 4] {{
+            let [a, b, c, d] = rows;
+            let (even, odd) = (
+                [_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d)],
+                [_mm256_unpackhi_pd(a, b), _mm256_unpackhi_pd(c, d)],
+            );
+            [
+                _mm256_permute2f128_pd::<0x20>(even[0], even[1]),
+                _mm256_permute2f128_pd::<0x20>(odd[0], odd[1]),
+                _mm256_permute2f128_pd::<0x31>(even[0], even[1]),
+                _mm256_permute2f128_pd::<0x31>(odd[0], odd[1]),
+            ]
+        }}
         swap_halves(a: Register) -> Register { _mm256_permute2f128_pd::<1>(a, a) }
         signs_below() -> Register { _mm256_setr_pd(-0.0, -0.0, 0.0, 0.0) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_pd(a, b, c) }
@@ -249,6 +274,7 @@ pub mod avx2_f32 {
     enter!("avx2,fma");
     halves!(f32, sse_f32, _mm256_castps256_ps128, _mm256_extractf128_ps);
     memory!(f32, 8, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_setr_ps; 0 1 2 3 4 5 6 7);
+    transpose_in_memory!(f32);
     wrap! {
         splat(a: f32) -> Register = _mm256_set1_ps;
         add(a: Register, b: Register) -> Register = _mm256_add_ps;
@@ -335,6 +361,33 @@ pub mod avx512_f64 {
         eq(a: Register, b: Register) -> Mask = _mm512_cmp_pd_mask::<_CMP_EQ_OQ>;
     }
     define! {
+        transpose(rows: [Register; 8]) -> [Register; 8] {{
+            let [a, b, c, d, e, f, g, h] = rows;
+            // Pairs of rows; of two of these the quarters that are even and those that are odd, twice.
+            let even = [
+                _mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d), _mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h),
+            ];
+            let odd = [
+                _mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d), _mm512_unpackhi_pd(e, f), _mm512_unpackhi_pd(g, h),
+            ];
+            let [a, c, e, g] = quarters(even);
+            let [b, d, f, h] = quarters(odd);
+            [a, b, c, d, e, f, g, h]
+        }}
+        /// The first quarters of all, the second, the third, the fourth.
+        quarters(rows: [Register; 4]) -> [Register; 4] {{
+            let [a, b, c, d] = rows;
+            let (even, odd) = (
+                [_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0x88>(c, d)],
+                [_mm512_shuffle_f64x2::<0xdd>(a, b), _mm512_shuffle_f64x2::<0xdd>(c, d)],
+            );
+            [
+                _mm512_shuffle_f64x2::<0x88>(even[0], even[1]),
+                _mm512_shuffle_f64x2::<0x88>(odd[0], odd[1]),
+                _mm512_shuffle_f64x2::<0xdd>(even[0], even[1]),
+                _mm512_shuffle_f64x2::<0xdd>(odd[0], odd[1]),
+            ]
+        }}
         swap_halves(a: Register) -> Register { _mm512_shuffle_f64x2::<0x4e>(a, a) }
         signs_below() -> Register { _mm512_setr_pd(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0) }
         repeat_four(a: &[f64; 4]) -> Register { _mm512_broadcast_f64x4(_mm256_loadu_pd(a.as_ptr())) }
@@ -372,6 +425,7 @@ pub mod avx512_f32 {
     enter!("avx512f,avx512dq,avx512vl");
     halves!(f32, avx2_f32, _mm512_castps512_ps256, _mm512_extractf32x8_ps);
     masked!(f32, 16, u16, _mm512_mask_loadu_ps, _mm512_mask_storeu_ps, _mm512_mask_blend_ps);
+    transpose_in_memory!(f32);
     wrap! {
         splat(a: f32) -> Register = _mm512_set1_ps;
         add(a: Register, b: Register) -> Register = _mm512_add_ps;

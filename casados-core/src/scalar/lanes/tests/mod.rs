@@ -126,6 +126,33 @@ fn products<L: Lanes>(fused: bool) {
     });
 }
 
+/// Numbers of each lane beside each other are the same numbers, of any number of registers.
+fn transposed<L: Lanes>() {
+    inside::<L>(|| {
+        let number = |register: usize, lane: usize| (10 * register + lane) as f64;
+        let rows: Vec<L> = (0..L::LANES)
+            .map(|register| {
+                let mut row = cell::<L>(&[0.0], 0, 1);
+                (0..L::LANES).for_each(|lane| L::set_lane(&mut row, lane, number(register, lane)));
+                L::load(&row)
+            })
+            .collect();
+        for count in 0..=L::LANES {
+            let mut columns = std::vec![cell::<L>(&[0.0], 0, 1); L::LANES];
+            L::transpose(&rows[..count], &mut columns);
+            for (lane, column) in columns.iter().enumerate() {
+                for register in 0..count {
+                    assert_eq!(
+                        L::lane(column, register),
+                        number(register, lane),
+                        "{register} of {count}, lane {lane}"
+                    );
+                }
+            }
+        }
+    });
+}
+
 /// Checks each kind of register that the machine has, with the numbers of lanes that are listed.
 macro_rules! on_every_register {
     ($check:ident) => {
@@ -179,4 +206,14 @@ fn the_level_is_one_that_the_machine_has_and_the_limit_allows() {
     }
     limit(Level::Avx512);
     assert_eq!(level(), widest);
+}
+
+#[test]
+fn transposes() {
+    macro_rules! check {
+        ($name:ident, $element:ident, $($n:literal),*) => { $(transposed::<$name<$n>>();)* };
+    }
+    on_every_register!(check);
+    transposed::<f64>();
+    transposed::<f32>();
 }
