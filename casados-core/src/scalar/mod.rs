@@ -20,6 +20,8 @@ mod tangent;
 
 #[doc(hidden)]
 pub use float::Float;
+#[doc(hidden)]
+pub use lanes::functions as elementary;
 pub use tangent::Tangent;
 
 use crate::shape::Plain;
@@ -239,6 +241,15 @@ pub trait Scalar: Field {
     fn powi(self, n: i32) -> Self;
     /// `aᵇ`
     fn powf(self, other: Self) -> Self;
+    /// An elementary function of two arguments that do not wait for each other: in one register, where there is one that is twice as wide.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn both<F: elementary::Elementary<K, R>, const K: usize, const R: usize>(
+        a: [Self; K],
+        b: [Self; K],
+    ) -> [[Self; R]; 2] {
+        [F::of(a), F::of(b)]
+    }
     /// `|a|`
     fn abs(self) -> Self;
     /// `±1`, with the sign of `a`

@@ -57,9 +57,9 @@ pub fn module(
     }
     let code: TokenStream = text.parse()?;
     Ok(quote! {
-        #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_variables)]
+        #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_imports, unused_variables)]
         mod code {
-            use #krate::scalar::{Piece, Scalar};
+            use #krate::scalar::{Piece, Scalar, elementary};
             #code
         }
     })

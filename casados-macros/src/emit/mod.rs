@@ -6,6 +6,7 @@ mod documentation;
 mod dual;
 mod function;
 mod model;
+mod pairs;
 mod routine;
 mod schedule;
 mod structure;

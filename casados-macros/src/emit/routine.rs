@@ -1,6 +1,7 @@
 //! A list of expressions as Rust functions: straight-line code, generic over the scalar.
 
 use super::chunk::{self, Chunk, Plan};
+use super::pairs::{self, Function};
 use super::schedule::{self, Step};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 use crate::language::Variables;
@@ -31,7 +32,7 @@ impl Routine<'_> {
     /// Writes the routine. `S: Scalar` must be in scope.
     pub fn write(&self, graph: &Graph, variables: &Variables, opaque: usize) -> String {
         let outputs: Vec<Node> = self.stores.iter().map(|store| store.2).collect();
-        let steps = schedule::schedule(graph, &outputs);
+        let steps = pairs::in_pairs(graph, &schedule::schedule(graph, &outputs));
         let operations = steps.iter().copied().flat_map(chunk::computed).count();
         let plan = chunk::plan(graph, &outputs, &steps, LIMIT);
         let mut names = vec![u32::MAX; graph.len()];
@@ -148,6 +149,26 @@ impl Writer<'_> {
                         argument.unwrap_or_default()
                     );
                 }
+                Step::Both(both) => {
+                    let Some(function) = pairs::function_of(self.graph, both[0]) else { continue };
+                    let list = |nodes: &mut dyn Iterator<Item = Node>| {
+                        let atoms: Vec<String> = nodes.map(|node| self.atom(node)).collect();
+                        format!("[{}]", atoms.join(", "))
+                    };
+                    let results = both.map(|(node, other)| list(&mut [node].into_iter().chain(other)));
+                    let arguments = both.map(|(node, _)| list(&mut self.graph.op(node).operands()));
+                    let function = match function {
+                        Function::Unary(function) => unary(function),
+                        Function::Binary(function) => binary(function),
+                        Function::SinCos => "sin_cos",
+                    };
+                    let _ = writeln!(
+                        text,
+                        "let [{}] = S::both::<elementary::{function}, _, _>({});",
+                        results.join(", "),
+                        arguments.join(", ")
+                    );
+                }
                 Step::Store(output) => {
                     let (array, index, node) = &self.routine.stores[output];
                     let _ = writeln!(text, "S::store({}, &mut {array}[{index}]);", self.atom(*node));
@@ -204,13 +225,10 @@ impl Writer<'_> {
             Op::Binary(function, a, b) => {
                 let (a, b) = (atom(a), atom(b));
                 match function {
-                    Binary::Add => format!("{a} + {b}"),
-                    Binary::Sub => format!("{a} - {b}"),
-                    Binary::Mul => format!("{a} * {b}"),
-                    Binary::Div => format!("{a} / {b}"),
-                    Binary::Powf => format!("{a}.powf({b})"),
-                    Binary::Atan2 => format!("{a}.atan2({b})"),
-                    Binary::Hypot => format!("{a}.hypot({b})"),
+                    Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => {
+                        format!("{a} {} {b}", binary(function))
+                    }
+                    Binary::Powf | Binary::Atan2 | Binary::Hypot => format!("{a}.{}({b})", binary(function)),
                 }
             }
             Op::Powi(a, n) => format!("{}.powi({n})", atom(a)),
@@ -243,6 +261,18 @@ pub fn number(value: f64) -> String {
         String::from("f64::INFINITY")
     } else {
         String::from("f64::NEG_INFINITY")
+    }
+}
+
+fn binary(function: Binary) -> &'static str {
+    match function {
+        Binary::Add => "+",
+        Binary::Sub => "-",
+        Binary::Mul => "*",
+        Binary::Div => "/",
+        Binary::Powf => "powf",
+        Binary::Atan2 => "atan2",
+        Binary::Hypot => "hypot",
     }
 }
 

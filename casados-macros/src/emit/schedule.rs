@@ -11,9 +11,14 @@ pub enum Step {
     Compute(Node),
     /// Compute the sine and the cosine of the same argument.
     SinCos(Node, Node),
+    /// Compute the same elementary function of two arguments that do not depend on it.
+    Both([Values; 2]),
     /// Store an output, by its index in the list of outputs.
     Store(usize),
 }
+
+/// The values of an elementary function of one argument: of most one node, of sine and cosine together two.
+pub type Values = (Node, Option<Node>);
 
 /// Whether a node is there before anything is computed.
 pub fn is_leaf(op: Op) -> bool {
@@ -81,36 +86,32 @@ pub fn schedule(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
+    use crate::emit::chunk::read;
     use crate::graph::Binary;
 
-    /// Every operand is computed before its use, every value once, every output stored once.
     fn check(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
         let steps = schedule(graph, outputs);
+        assert_complete(graph, outputs, &steps);
+        steps
+    }
+
+    /// Every operand is computed before its use, every value once, every output stored once.
+    pub fn assert_complete(graph: &Graph, outputs: &[Node], steps: &[Step]) {
         let mut computed = std::collections::HashSet::new();
         let mut stored = vec![false; outputs.len()];
         let ready = |computed: &std::collections::HashSet<Node>, node| {
             is_leaf(graph.op(node)) || computed.contains(&node)
         };
-        for &step in &steps {
-            match step {
-                Step::Compute(node) => {
-                    assert!(graph.op(node).operands().all(|operand| ready(&computed, operand)));
-                    assert!(computed.insert(node));
-                }
-                Step::SinCos(sin, cos) => {
-                    assert!(graph.op(sin).operands().all(|operand| ready(&computed, operand)));
-                    assert!(computed.insert(sin) && computed.insert(cos));
-                }
-                Step::Store(output) => {
-                    assert!(ready(&computed, outputs[output]));
-                    assert!(!std::mem::replace(&mut stored[output], true));
-                }
+        for &step in steps {
+            assert!(read(graph, outputs, step).all(|node| ready(&computed, node)));
+            assert!(crate::emit::chunk::computed(step).all(|node| computed.insert(node)));
+            if let Step::Store(output) = step {
+                assert!(!std::mem::replace(&mut stored[output], true));
             }
         }
         assert!(stored.iter().all(|&stored| stored));
-        steps
     }
 
     #[test]

@@ -21,11 +21,6 @@
 
 #[cfg(feature = "alloc")]
 mod cache;
-#[cfg(any(
-    not(feature = "std"),
-    target_arch = "x86_64",
-    all(target_arch = "aarch64", target_feature = "neon")
-))]
 pub mod functions;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 mod neon;

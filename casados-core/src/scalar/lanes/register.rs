@@ -1,10 +1,12 @@
 //! The types: one number type over each kind of register.
 
-use super::functions::{self, Double, Single};
+use super::functions::{self, Double, Elementary, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
+#[cfg(target_arch = "x86_64")]
+use super::{Level, level};
 use crate::scalar::{Field, Lanes, Packed, Piece, Scalar};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
@@ -51,6 +53,69 @@ macro_rules! of_doubles {
             (Self(sin.0), Self(cos.0))
         }
     };
+}
+
+/// The elementary functions of doubles, and two of them at once: in one register where each takes half of one, or where
+/// there are registers twice as wide.
+#[cfg(target_arch = "x86_64")]
+macro_rules! of_fours {
+    ($name:ident, $ops:ident: $($functions:tt)*) => {
+        of_doubles!($name, $ops: $($functions)*);
+        #[inline(always)]
+        fn both<F: Elementary<K, R>, const K: usize, const R: usize>(a: [Self; K], b: [Self; K]) -> [[Self; R]; 2] {
+            if const { 2 * N <= $ops::WIDTH } {
+                let mut joined = a.map(|a| whole!($name, $ops, a));
+                for (a, b) in joined.iter_mut().zip(b) {
+                    *a = $name($ops::low_halves(a.0, b.0));
+                }
+                let joined = F::of(joined);
+                let mut results = [[Self($ops::splat(0.0)); R]; 2];
+                for (r, joined) in joined.iter().enumerate() {
+                    results[0][r] = Self($ops::low_halves(joined.0, joined.0));
+                    results[1][r] = Self($ops::high_halves(joined.0, joined.0));
+                }
+                results
+            } else if level() == Level::Avx512 {
+                let (mut wholes, mut others) = ([whole!($name, $ops, a[0]); K], [whole!($name, $ops, b[0]); K]);
+                for k in 0..K {
+                    (wholes[k], others[k]) = (whole!($name, $ops, a[k]), whole!($name, $ops, b[k]));
+                }
+                let [first, second] = avx512_f64::enter::<Wider<F, R>, _>([wholes, others]);
+                let mut results = [[Self($ops::splat(0.0)); R]; 2];
+                for r in 0..R {
+                    (results[0][r], results[1][r]) = (Self(first[r].0), Self(second[r].0));
+                }
+                results
+            } else {
+                [F::of(a), F::of(b)]
+            }
+        }
+    };
+}
+
+/// A function of two registers in one that is twice as wide.
+#[cfg(target_arch = "x86_64")]
+struct Wider<F, const R: usize>(core::marker::PhantomData<F>);
+
+#[cfg(target_arch = "x86_64")]
+impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::Call<[[F64x4<4>; K]; 2]>
+    for Wider<F, R>
+{
+    type Output = [[F64x4<4>; R]; 2];
+    #[inline(always)]
+    fn call([a, b]: [[F64x4<4>; K]; 2]) -> Self::Output {
+        let mut joined = [F64x8::<8>::splat(0.0); K];
+        for k in 0..K {
+            joined[k] = F64x8(avx512_f64::join(a[k].0, b[k].0));
+        }
+        let joined = F::inside(joined);
+        let mut results = [[F64x4::splat(0.0); R]; 2];
+        for r in 0..R {
+            let [low, high] = avx512_f64::halves(joined[r].0);
+            (results[0][r], results[1][r]) = (F64x4(low), F64x4(high));
+        }
+        results
+    }
 }
 
 /// The elementary functions of `f32`: those of doubles, rounded.
@@ -427,7 +492,7 @@ single!(F32x4, base_f32, F64x2);
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to four `f64`, AVX2 and FMA.
-    F64x4, f64, avx2_f64, of_doubles
+    F64x4, f64, avx2_f64, of_fours
 }
 #[cfg(target_arch = "x86_64")]
 register! {

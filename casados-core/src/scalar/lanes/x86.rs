@@ -243,6 +243,8 @@ pub mod avx2_f64 {
                 _mm256_permute2f128_pd::<0x31>(odd[0], odd[1]),
             ]
         }}
+        low_halves(a: Register, b: Register) -> Register { _mm256_permute2f128_pd::<0x20>(a, b) }
+        high_halves(a: Register, b: Register) -> Register { _mm256_permute2f128_pd::<0x31>(a, b) }
         swap_halves(a: Register) -> Register { _mm256_permute2f128_pd::<1>(a, a) }
         signs_below() -> Register { _mm256_setr_pd(-0.0, -0.0, 0.0, 0.0) }
         subtract_product(c: Register, a: Register, b: Register) -> Register { _mm256_fnmadd_pd(a, b, c) }
@@ -388,6 +390,8 @@ pub mod avx512_f64 {
                 _mm512_shuffle_f64x2::<0xdd>(odd[0], odd[1]),
             ]
         }}
+        join(low: __m256d, high: __m256d) -> Register { _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high) }
+        halves(a: Register) -> [__m256d; 2] { [_mm512_castpd512_pd256(a), _mm512_extractf64x4_pd::<1>(a)] }
         swap_halves(a: Register) -> Register { _mm512_shuffle_f64x2::<0x4e>(a, a) }
         signs_below() -> Register { _mm512_setr_pd(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0) }
         repeat_four(a: &[f64; 4]) -> Register { _mm512_broadcast_f64x4(_mm256_loadu_pd(a.as_ptr())) }

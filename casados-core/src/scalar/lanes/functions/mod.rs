@@ -39,7 +39,7 @@ mod pair;
 mod root;
 mod trigonometric;
 
-use crate::scalar::{Lanes, Piece};
+use crate::scalar::{Lanes, Piece, Scalar};
 use bytemuck::Zeroable;
 
 /// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are written as
@@ -133,6 +133,14 @@ pub trait Call<A> {
     fn call(argument: A) -> Self::Output;
 }
 
+/// An elementary function of `K` numbers with `R` results.
+pub trait Elementary<const K: usize, const R: usize> {
+    /// As the method of a scalar.
+    fn of<S: Scalar>(arguments: [S; K]) -> [S; R];
+    /// In a register of doubles. `#[inline(always)]`
+    fn inside<D: Double>(arguments: [D; K]) -> [D; R];
+}
+
 /// A piece of code as a function.
 pub struct Run;
 impl<P: Piece> Call<P> for Run {
@@ -143,28 +151,65 @@ impl<P: Piece> Call<P> for Run {
     }
 }
 
-/// Elementary functions under the names of their methods.
+/// Elementary functions under the names of their methods, with how many arguments and results they have.
 macro_rules! calls {
-    ($($module:ident { $($name:ident($argument:ty) -> $result:ty),* })*) => { $( $(
+    ($($module:ident::$name:ident[$K:literal, $R:literal]($($argument:ident),*) -> ($($result:ident),*);)*) => { $(
+        #[doc = concat!("[`Scalar::", stringify!($name), "`]")]
         #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, Debug)]
         pub struct $name;
-        impl<D: Double> Call<$argument> for $name {
-            type Output = $result;
+        #[allow(unused_parens)] // One number is no tuple.
+        impl<D: Double> Call<($(one_of!(D $argument)),*)> for $name {
+            type Output = ($(one_of!(D $result)),*);
             #[inline(always)]
-            fn call(argument: $argument) -> $result {
+            fn call(argument: ($(one_of!(D $argument)),*)) -> Self::Output {
                 $module::$name(argument)
             }
         }
-    )* )* };
+        #[allow(unused_parens)]
+        impl Elementary<$K, $R> for $name {
+            #[inline(always)]
+            fn of<S: Scalar>([$($argument),*]: [S; $K]) -> [S; $R] {
+                let ($($result),*) = S::$name($($argument),*);
+                [$($result),*]
+            }
+            #[inline(always)]
+            fn inside<D: Double>([$($argument),*]: [D; $K]) -> [D; $R] {
+                let ($($result),*) = $module::$name(($($argument),*));
+                [$($result),*]
+            }
+        }
+    )* };
+}
+/// A type for each name.
+macro_rules! one_of {
+    ($type:ident $name:ident) => {
+        $type
+    };
 }
 calls! {
-    exponential {
-        exp(D) -> D, exp2(D) -> D, exp_m1(D) -> D, sinh(D) -> D, cosh(D) -> D, tanh(D) -> D, powf((D, D)) -> D
-    }
-    logarithm { ln(D) -> D, ln_1p(D) -> D, log2(D) -> D, log10(D) -> D, asinh(D) -> D, acosh(D) -> D, atanh(D) -> D }
-    trigonometric {
-        sin(D) -> D, cos(D) -> D, tan(D) -> D, asin(D) -> D, acos(D) -> D, atan(D) -> D, sin_cos(D) -> (D, D),
-        atan2((D, D)) -> D
-    }
-    root { cbrt(D) -> D, hypot((D, D)) -> D }
+    exponential::exp[1, 1](a) -> (b);
+    exponential::exp2[1, 1](a) -> (b);
+    exponential::exp_m1[1, 1](a) -> (b);
+    exponential::sinh[1, 1](a) -> (b);
+    exponential::cosh[1, 1](a) -> (b);
+    exponential::tanh[1, 1](a) -> (b);
+    exponential::powf[2, 1](a, exponent) -> (b);
+    logarithm::ln[1, 1](a) -> (b);
+    logarithm::ln_1p[1, 1](a) -> (b);
+    logarithm::log2[1, 1](a) -> (b);
+    logarithm::log10[1, 1](a) -> (b);
+    logarithm::asinh[1, 1](a) -> (b);
+    logarithm::acosh[1, 1](a) -> (b);
+    logarithm::atanh[1, 1](a) -> (b);
+    trigonometric::sin[1, 1](a) -> (b);
+    trigonometric::cos[1, 1](a) -> (b);
+    trigonometric::tan[1, 1](a) -> (b);
+    trigonometric::asin[1, 1](a) -> (b);
+    trigonometric::acos[1, 1](a) -> (b);
+    trigonometric::atan[1, 1](a) -> (b);
+    trigonometric::atan2[2, 1](y, x) -> (b);
+    trigonometric::sin_cos[1, 2](a) -> (s, c);
+    root::cbrt[1, 1](a) -> (b);
+    root::hypot[2, 1](x, y) -> (b);
 }
