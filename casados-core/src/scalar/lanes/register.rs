@@ -76,11 +76,8 @@ macro_rules! of_fours {
                 }
                 results
             } else if level() == Level::Avx512 {
-                let (mut wholes, mut others) = ([whole!($name, $ops, a[0]); K], [whole!($name, $ops, b[0]); K]);
-                for k in 0..K {
-                    (wholes[k], others[k]) = (whole!($name, $ops, a[k]), whole!($name, $ops, b[k]));
-                }
-                let [first, second] = avx512_f64::enter::<Wider<F, R>, _>([wholes, others]);
+                let four = [a[0], a[K - 1], b[0], b[K - 1]].map(|a| whole!($name, $ops, a));
+                let [first, second] = avx512_f64::enter_with_four::<Wider<F, K, R>, _>(four);
                 let mut results = [[Self($ops::splat(0.0)); R]; 2];
                 for r in 0..R {
                     (results[0][r], results[1][r]) = (Self(first[r].0), Self(second[r].0));
@@ -93,23 +90,23 @@ macro_rules! of_fours {
     };
 }
 
-/// A function of two registers in one that is twice as wide.
+/// A function of two registers in one that is twice as wide: its first and last argument of the one, then of the other.
 #[cfg(target_arch = "x86_64")]
-struct Wider<F, const R: usize>(core::marker::PhantomData<F>);
+struct Wider<F, const K: usize, const R: usize>(core::marker::PhantomData<F>);
 
 #[cfg(target_arch = "x86_64")]
-impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::Call<[[F64x4<4>; K]; 2]>
-    for Wider<F, R>
+impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithFour<F64x4<4>>
+    for Wider<F, K, R>
 {
     type Output = [[F64x4<4>; R]; 2];
     #[inline(always)]
-    fn call([a, b]: [[F64x4<4>; K]; 2]) -> Self::Output {
-        let mut joined = [F64x8::<8>::splat(0.0); K];
-        for k in 0..K {
-            joined[k] = F64x8(avx512_f64::join(a[k].0, b[k].0));
+    fn call(first: F64x4<4>, last: F64x4<4>, other_first: F64x4<4>, other_last: F64x4<4>) -> Self::Output {
+        let mut joined = [F64x8(avx512_f64::join(first.0, other_first.0)); K];
+        if K > 1 {
+            joined[K - 1] = F64x8(avx512_f64::join(last.0, other_last.0));
         }
         let joined = F::inside(joined);
-        let mut results = [[F64x4::splat(0.0); R]; 2];
+        let mut results = [[first; R]; 2];
         for r in 0..R {
             let [low, high] = avx512_f64::halves(joined[r].0);
             (results[0][r], results[1][r]) = (F64x4(low), F64x4(high));

@@ -3,7 +3,7 @@
 //! One module for each kind of register, all with the same functions.
 #![allow(unsafe_code)]
 
-use super::functions::Call;
+use super::functions::{Call, CallWithFour};
 use core::arch::x86_64::*;
 
 // SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine
@@ -87,6 +87,24 @@ macro_rules! enter {
             }
             // SAFETY: see the head of the file.
             unsafe { inside::<F, A>(argument) }
+        }
+    };
+}
+
+/// A function that is compiled for given instructions, of four arguments. Each has a place of its own: from an array registers
+/// would be loaded with parts of two of them, for which the processor waits until both are in the cache.
+macro_rules! enter_with_four {
+    ($features:literal) => {
+        /// Calls `F` where the instructions of this register may be used; not inlined.
+        #[inline(always)]
+        pub fn enter_with_four<F: CallWithFour<A>, A>([a, b, c, d]: [A; 4]) -> F::Output {
+            #[target_feature(enable = $features)]
+            #[inline(never)]
+            fn inside<F: CallWithFour<A>, A>(a: A, b: A, c: A, d: A) -> F::Output {
+                F::call(a, b, c, d)
+            }
+            // SAFETY: see the head of the file.
+            unsafe { inside::<F, A>(a, b, c, d) }
         }
     };
 }
@@ -344,6 +362,7 @@ pub mod avx512_f64 {
     pub const FUSED: bool = true;
 
     enter!("avx512f,avx512dq,avx512vl");
+    enter_with_four!("avx512f,avx512dq,avx512vl");
     halves!(f64, avx2_f64, _mm512_castpd512_pd256, _mm512_extractf64x4_pd);
     masked!(f64, 8, u8, _mm512_mask_loadu_pd, _mm512_mask_storeu_pd, _mm512_mask_blend_pd);
     wrap! {

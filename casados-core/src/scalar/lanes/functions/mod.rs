@@ -133,6 +133,14 @@ pub trait Call<A> {
     fn call(argument: A) -> Self::Output;
 }
 
+/// The same of four arguments.
+pub trait CallWithFour<A> {
+    /// Its result.
+    type Output;
+    /// `#[inline(always)]`
+    fn call(a: A, b: A, c: A, d: A) -> Self::Output;
+}
+
 /// An elementary function of `K` numbers with `R` results.
 pub trait Elementary<const K: usize, const R: usize> {
     /// As the method of a scalar.

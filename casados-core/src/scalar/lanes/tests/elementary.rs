@@ -2,7 +2,7 @@
 
 use super::reference::{self, Function};
 use super::{cell, inside, on_every_register, same, specials};
-use crate::scalar::lanes::functions::{self, Call};
+use crate::scalar::lanes::functions::{self, Call, Elementary};
 use crate::scalar::lanes::*;
 use crate::scalar::{Lanes, Scalar};
 use std::vec::Vec;
@@ -315,6 +315,44 @@ fn sine_and_cosine_together_are_what_they_are_alone() {
                 }
             });
         } )* };
+    }
+    on_every_register!(check);
+}
+
+/// Two arguments at once have the values that one after the other has.
+fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize>(_: F) {
+    let values = specials();
+    inside::<L>(|| {
+        for i in 0..values.len() {
+            let argument = |shift: usize| L::load(&cell::<L>(&values, i + shift, 1));
+            let (a, b) =
+                (core::array::from_fn(|k| argument(7 * k)), core::array::from_fn(|k| argument(3 + 5 * k)));
+            let (both, each) = (L::both::<F, K, R>(a, b), [F::of(a), F::of(b)]);
+            for (both, each) in both.as_flattened().iter().zip(each.as_flattened()) {
+                let [mut found, mut expected] = [cell::<L>(&[0.0], 0, 1); 2];
+                both.store(&mut found);
+                each.store(&mut expected);
+                for lane in 0..L::LANES {
+                    let (found, expected) = (L::lane(&found, lane), L::lane(&expected, lane));
+                    assert!(same(found, expected), "{found:e}, not {expected:e}, of {a:?} and {b:?}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+fn two_at_once_are_what_each_is() {
+    macro_rules! all {
+        ($register:ty: $($function:ident)*) => {
+            $( at_once::<$register, _, _, _>(functions::$function); )*
+        };
+    }
+    macro_rules! check {
+        ($name:ident, $element:ident, $($n:literal),*) => { $(
+            all!($name<$n>: exp exp2 exp_m1 sinh cosh tanh powf ln ln_1p log2 log10 asinh acosh atanh sin cos tan asin acos
+                atan atan2 sin_cos cbrt hypot);
+        )* };
     }
     on_every_register!(check);
 }
