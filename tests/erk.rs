@@ -29,6 +29,7 @@ impl Dae for Oscillator {
         p: &["p"],
         jacobian: Pattern { rows: &[0, 1, 0, 0, 1, 0, 1, 0], columns: &[1, 0, 2, 3, 3, 4, 4, 5] },
         blocks: [0, 2, 5, 5, 7, 8],
+        by_column: &[2, 3, 4, 5, 6, 7],
         constant: &[true, true, false, false, true, false, false, false],
         hessian: Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
         linear: &[false, true],

@@ -132,7 +132,7 @@ macro_rules! system {
         $(#[$doc])*
         struct $name;
         const _: () = {
-            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, symmetric};
+            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, by_column, symmetric};
             const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
             const JACOBIAN: usize = ($nx + $nz) * (NV - 1);
             const HESSIAN: usize = NV * (NV - 1) / 2;
@@ -152,6 +152,12 @@ macro_rules! system {
                     p: &["p"; $np],
                     jacobian: Pattern { rows: &DENSE[0], columns: &DENSE[1] },
                     blocks: $crate::systems::blocks::<D>(),
+                    by_column: &const {
+                        by_column::<NV, { ($nx + $nz) * (NV - 1 - $nx) }>(
+                            &Pattern { rows: &DENSE[0], columns: &DENSE[1] },
+                            ($nx + $nz) * $nx,
+                        )
+                    },
                     constant: &[false; JACOBIAN],
                     hessian: Pattern { rows: &TRIANGLE[0], columns: &TRIANGLE[1] },
                     linear: &[false; $nx + $nz],

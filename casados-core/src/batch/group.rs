@@ -181,7 +181,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let count = pass.steps.len();
         let good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
-            pass.forward(forward, n, count, None)
+            pass.forward(forward, n, count, None, None)
         });
         forward.result.forward.nominal = pass.work.result;
         if adjoint {
@@ -225,14 +225,15 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let mut good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
             let Some(record) = records.get_mut(n) else { return yes::<E>() };
-            let good = pass.forward(forward, n, count, Some(record.curved()));
+            let first = Some(&mut hessian.result.first.forward);
+            let good = pass.forward(forward, n, count, Some(record.curved()), first);
             // That of the last step is still there on the way back.
             if n + 1 < count {
                 record.record(pass.work);
             }
             good
         });
-        forward.result.forward.nominal = pass.work.result;
+        hessian.result.first.forward.nominal = pass.work.result;
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref());
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
@@ -242,9 +243,9 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             good = E::and(good, hessian.backward.stages(work, coefficients));
             hessian.backward.advance(&work.linear);
             hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(record);
+            hessian.subtract(record, n + 1 == count);
         }
-        hessian.collect(forward, None);
+        hessian.collect(None);
         Ok((good, &hessian.result))
     }
 }
@@ -284,9 +285,10 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
         n: usize,
         count: usize,
         curved: Option<&mut [E]>,
+        elsewhere: Option<&mut Forward<M, E>>,
     ) -> E::Mask {
         let good = forward.advance(self.work, self.coefficients, n, curved);
-        forward.collect(self.coefficients, n, count);
+        forward.collect(self.coefficients, n, count, elsewhere);
         good
     }
 }

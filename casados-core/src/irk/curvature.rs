@@ -11,12 +11,13 @@ use core::marker::PhantomData;
 /// So many columns of `G` are there at a time: two panels where registers are enough for their products.
 pub const COLUMNS: usize = if cfg!(all(target_arch = "x86_64", feature = "std")) { 16 } else { 8 };
 
-/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own.
+/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins with zero.
 pub struct Subtract<'a, M, E, R, const S: usize> {
     pub entries: &'a [[E; S]],
     pub d: &'a [E],
     pub g: &'a mut [[[E; COLUMNS]; S]],
     pub sum: &'a mut [R],
+    pub fresh: bool,
     pub model: PhantomData<M>,
 }
 
@@ -55,19 +56,19 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         panels!(M::STRUCTURE.directions.len(), E, row, V => {
             if row >= column {
                 let d = panel::<E, V>(self.d, row, rows);
-                let sum = &mut *self.sum;
+                let (sum, fresh) = (&mut *self.sum, self.fresh);
                 if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, fresh, row, column);
                 } else if const { size_of::<E>() > 8 } {
-                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, fresh, row, column);
                 } else if const { V > 4 && A::WIDE } {
-                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, fresh, row, column);
                 } else if const { V > 4 } {
-                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, row, column);
                 } else if const { V > 2 } {
-                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, fresh, row, column);
                 } else {
-                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, fresh, row, column);
                 }
             }
         });
@@ -165,6 +166,7 @@ fn tiles<
     d: &[[E; V]],
     g: &[[[E; W]; P]],
     sum: &mut [R],
+    fresh: bool,
     row: usize,
     column: usize,
 ) {
@@ -189,8 +191,10 @@ fn tiles<
         for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row + t * ROWS)) {
             let (columns, _) = sum.as_mut().get_mut(column..).unwrap_or_default().as_chunks_mut::<W>();
             let Some(columns) = columns.first_chunk_mut::<P>() else { continue };
-            for (sum, &tile) in columns.as_flattened_mut().iter_mut().zip(tile.as_flattened()) {
-                *sum = *sum - tile;
+            let (columns, tile) = (columns.as_flattened_mut().iter_mut(), tile.as_flattened());
+            for (sum, &tile) in columns.zip(tile) {
+                let before = if fresh { E::from_f64(0.0) } else { *sum };
+                *sum = before - tile;
             }
         }
     }

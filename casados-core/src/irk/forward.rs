@@ -31,6 +31,8 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: ForwardAdjoint<M, T>,
     pub(crate) dense: DenseForward<M, T>,
     pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
+    /// Zero if all derivatives that were written are finite, else NaN.
+    finite: T,
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
@@ -50,19 +52,26 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
         self.sweep.step(work, coefficients, directions, n == 0, curved)
     }
 
-    /// What a step contributes to the result.
-    pub(crate) fn collect(&mut self, coefficients: &Coefficients<E, S>, n: usize, count: usize) {
-        let Self { result: ForwardAdjoint { forward, .. }, sweep, .. } = self;
+    /// What a step contributes to the result: to that of this memory, or to one `elsewhere`.
+    pub(crate) fn collect(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        n: usize,
+        count: usize,
+        elsewhere: Option<&mut Forward<M, E>>,
+    ) {
+        let Self { result: ForwardAdjoint { forward, .. }, sweep, finite, .. } = self;
+        let forward = elsewhere.unwrap_or(forward);
         if n == 0 {
             let to = &mut Split::<M, _>::new(&mut forward.dz0_dx0, &mut forward.dz0_du, &mut forward.dz0_dp);
-            sweep.write_algebraic::<Identity<M>>(&coefficients.start, to);
+            *finite = sweep.write_algebraic::<Identity<M>>(&coefficients.start, to);
         }
         if n + 1 == count {
             let to = &mut Split::<M, _>::new(&mut forward.dz_dx0, &mut forward.dz_du, &mut forward.dz_dp);
-            sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
+            let of_z = sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
             let to = &mut Split::<M, _>::new(&mut forward.dx_dx0, &mut forward.dx_du, &mut forward.dx_dp);
             to.fill_others();
-            sweep.write_end::<Identity<M>>(to);
+            *finite = *finite + of_z + sweep.write_end::<Identity<M>>(to);
         }
     }
 }
@@ -80,6 +89,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         count: usize,
         statistics: &mut Statistics,
         mut curved: Option<&mut [T]>,
+        elsewhere: Option<&mut Forward<M, T>>,
     ) -> Result<(), Error> {
         let good = self.advance(work, coefficients, n, curved.as_deref_mut());
         if !good && work.linear.factors.is_planned() {
@@ -89,7 +99,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         if const { REFINED } {
             self.sweep.refine(work, coefficients, &Identity::<M>::ALL, n == 0);
         }
-        self.collect(coefficients, n, count);
+        self.collect(coefficients, n, count, elsewhere);
         Ok(())
     }
 
@@ -114,9 +124,16 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
 
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>, step: usize) -> Result<(), Error> {
-        self.result.forward.nominal = work.result;
-        check_result(&self.result.forward, step)
+    pub(crate) fn finish<F: Fallback>(
+        &mut self,
+        work: &Work<M, T, S, F>,
+        step: usize,
+        elsewhere: Option<&mut Forward<M, T>>,
+    ) -> Result<(), Error> {
+        let forward = elsewhere.unwrap_or(&mut self.result.forward);
+        forward.nominal = work.result;
+        // Only where one is not finite it is looked for.
+        if self.finite.is_finite() { Ok(()) } else { check_result(forward, step) }
     }
 }
 

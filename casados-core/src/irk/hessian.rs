@@ -11,16 +11,15 @@ use super::along::Along;
 use super::curvature::{COLUMNS, Subtract};
 use super::directions::Identity;
 use super::evaluate::{Give, Take, not_finite};
-use super::forward::ForwardMemory;
 use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{dispatch, slot};
+use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide};
-use crate::shape::{Aligned, Array, Matrix, Plain, Shape, assign};
+use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
@@ -100,7 +99,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(record);
+            self.subtract(record, n + 1 == steps.len());
         }
         Ok(())
     }
@@ -110,9 +109,6 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     /// Before the last step.
     pub(crate) fn begin(&mut self, seed: &[E]) {
         self.backward.start(seed);
-        for row in self.sum.as_mut() {
-            row.as_mut().fill(E::from_f64(0.0));
-        }
     }
 
     /// `∇²(μ_iᵀ f)` at all stages of a step.
@@ -142,14 +138,15 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`
-    pub(crate) fn subtract<F: Fallback>(&mut self, record: &HessianStep<M, E, S, F>) {
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the `last` step.
+    pub(crate) fn subtract<F: Fallback>(&mut self, record: &HessianStep<M, E, S, F>, last: bool) {
         let Self { g, sum, entries, .. } = self;
         dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
             entries: entries.as_ref(),
             d: Array::flat(record.d.as_ref().as_flattened()),
             g: g.as_mut(),
             sum: sum.as_mut(),
+            fresh: last,
             model: PhantomData,
         });
     }
@@ -171,11 +168,11 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, 
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
-    /// The result, after the first step, and `more`: second derivatives of an integrand.
-    pub(crate) fn collect(&mut self, forward: &ForwardMemory<M, E, S>, more: Option<&[ArrayW<M, E>]>) {
+    /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if all of these are finite, else
+    /// NaN.
+    pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>) -> E {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         let Self { result, backward, sum, .. } = self;
-        assign(&mut result.first.forward, &forward.result.forward);
         for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
             *to = *from;
         }
@@ -189,12 +186,12 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         mirror::<E, _>(sum.as_mut());
         let sum = Symmetric::<M, E> { sum: sum.as_ref(), more };
         let (u, p) = (nx, nx + nu);
-        sum.write(&mut result.h_xx, 0, 0);
-        sum.write(&mut result.h_uu, u, u);
-        sum.write(&mut result.h_pp, p, p);
-        sum.write(&mut result.h_xu, 0, u);
-        sum.write(&mut result.h_xp, 0, p);
-        sum.write(&mut result.h_up, u, p);
+        sum.write(&mut result.h_xx, 0, 0)
+            + sum.write(&mut result.h_uu, u, u)
+            + sum.write(&mut result.h_pp, p, p)
+            + sum.write(&mut result.h_xu, 0, u)
+            + sum.write(&mut result.h_xp, 0, p)
+            + sum.write(&mut result.h_up, u, p)
     }
 }
 
@@ -226,47 +223,87 @@ fn mirror<V: Copy, R: Array<V>>(rows: &mut [R]) {
 
 impl<M: Dae, E: Lanes> Symmetric<'_, M, E> {
     /// Its part over the directions from `row` on and those from `column` on, which are not before them.
-    fn write<B: Matrix<E>>(&self, to: &mut B, row: usize, column: usize) {
-        for (c, to) in to.as_mut_slice().chunks_exact_mut(B::ROWS.max(1)).enumerate() {
-            let of_c = Identity::<M>::column(column + c).and_then(|c| self.sum.get(c));
+    fn write<B: Matrix<E>>(&self, to: &mut B, row: usize, column: usize) -> E {
+        let columns = to.as_mut_slice();
+        if columns.is_empty() {
+            return E::from_f64(0.0);
+        }
+        dispatch(Part::<M, E, B> { of: self, columns, row, column, model: PhantomData })
+    }
+}
+
+/// See [`Symmetric::write`].
+struct Part<'a, M: Dae, E: Plain, B> {
+    of: &'a Symmetric<'a, M, E>,
+    columns: &'a mut [E],
+    row: usize,
+    column: usize,
+    model: PhantomData<B>,
+}
+
+impl<M: Dae, E: Lanes, B: Matrix<E>> Kernel for Part<'_, M, E, B> {
+    type Number = E;
+    type Output = E;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E {
+        let Self { of: Symmetric { sum, more }, columns, row, column, .. } = self;
+        let zero = E::from_f64(0.0);
+        // Nothing times a number that is not finite is not a number.
+        let (mut strands, mut finite) = ([zero; 8], zero);
+        for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {
+            let of_c = Identity::<M>::column(column + c).and_then(|c| sum.get(c));
             let of_c = of_c.map_or(&[][..], |of_c| of_c.as_ref());
             let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
             match of_c.get(row..row + B::ROWS) {
                 // Every direction has an influence.
-                Some(of_c) if all => to.copy_from_slice(of_c),
+                Some(of_c) if all && more.is_none() => {
+                    let ((to, last_to), (from, last_from)) = (to.as_chunks_mut::<8>(), of_c.as_chunks::<8>());
+                    for (to, from) in to.iter_mut().zip(from) {
+                        *to = *from;
+                        A::subtract_row(&mut strands, zero, from);
+                    }
+                    for (to, &from) in last_to.iter_mut().zip(last_from) {
+                        *to = from;
+                        finite = A::subtract(finite, zero, from);
+                    }
+                }
                 _ => {
                     for (r, to) in to.iter_mut().enumerate() {
                         let element = Identity::<M>::column(row + r).and_then(|r| of_c.get(r));
-                        *to = element.copied().unwrap_or(E::from_f64(0.0));
+                        let mut value = element.copied().unwrap_or(zero);
+                        let (r, c) = (row + r, column + c);
+                        let of_more = more.and_then(|more| more.get(r.max(c)));
+                        if let Some(&more) = of_more.and_then(|row| row.as_ref().get(r.min(c))) {
+                            value = value + more;
+                        }
+                        *to = value;
+                        finite = A::subtract(finite, zero, value);
                     }
                 }
             }
-            let Some(more) = self.more else { continue };
-            for (r, to) in to.iter_mut().enumerate() {
-                let (r, c) = (row + r, column + c);
-                if let Some(&more) = more.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))) {
-                    *to = *to + more;
-                }
-            }
         }
+        for strand in strands {
+            finite = finite + strand;
+        }
+        finite
     }
 }
 
 impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(
-        &mut self,
-        forward: &ForwardMemory<M, T, S>,
-        more: Option<&[ArrayW<M, T>]>,
-    ) -> Result<(), Error> {
-        self.collect(forward, more);
+    pub(crate) fn finish(&mut self, more: Option<&[ArrayW<M, T>]>) -> Result<(), Error> {
+        let finite = self.collect(more).is_finite();
         let result = &self.result;
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
+        for values in [grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice()] {
+            check(values, 0)?;
+        }
+        if finite {
+            return Ok(());
+        }
+        // Where one is not finite it is looked for.
         for values in [
-            grad_x0.as_slice(),
-            grad_u.as_slice(),
-            grad_p.as_slice(),
             result.h_xx.as_slice(),
             result.h_xu.as_slice(),
             result.h_uu.as_slice(),

@@ -343,13 +343,21 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            forward.step::<_, REFINED>(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
+            forward.step::<_, REFINED>(
+                parts.work,
+                parts.coefficients,
+                n,
+                count,
+                parts.statistics,
+                None,
+                None,
+            )?;
             match &mut along {
                 Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
                 None => Ok(()),
             }
         })?;
-        forward.finish(parts.work, count - 1)?;
+        forward.finish(parts.work, count - 1, None)?;
         finish(&mut along)?;
         if let Some(lambda) = lambda {
             forward.gradient(lambda)?;
@@ -405,6 +413,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
                 n,
                 usize::MAX,
                 parts.statistics,
+                None,
                 None,
             )?;
         }
@@ -611,7 +620,16 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };
             let curved = Some(record.curved());
-            forward.step::<_, false>(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
+            let first = Some(&mut memory.result.first.forward);
+            forward.step::<_, false>(
+                parts.work,
+                parts.coefficients,
+                n,
+                count,
+                parts.statistics,
+                curved,
+                first,
+            )?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
@@ -621,7 +639,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             }
             Ok(())
         })?;
-        forward.finish(parts.work, count - 1)?;
+        forward.finish(parts.work, count - 1, Some(&mut memory.result.first.forward))?;
         finish(&mut along)?;
         memory.run(
             parts.work,
@@ -632,7 +650,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.statistics,
             reborrow(&mut along),
         )?;
-        memory.finish(forward, along.as_ref().and_then(|integrand| integrand.second()))?;
+        memory.finish(along.as_ref().and_then(|integrand| integrand.second()))?;
         self.run.keep()?;
         self.sweep = Some(count - 1);
         Ok(&memory.result)

@@ -122,6 +122,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             start_sums: start_sums.as_mut(),
             curved,
             second,
+            placed: 0,
             model: PhantomData,
         });
     }
@@ -219,6 +220,8 @@ struct Step<'a, M: Dae, E: Plain, D, const S: usize> {
     start_sums: &'a mut [[E; STRANDS]],
     curved: Option<&'a mut [E]>,
     second: bool,
+    /// How many entries of the Jacobian, column by column, are in their panels.
+    placed: usize,
     model: PhantomData<M>,
 }
 
@@ -232,7 +235,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
             self.sums.fill([[E::from_f64(0.0); STRANDS]; S]);
             self.start_sums.fill([E::from_f64(0.0); STRANDS]);
         }
-        if self.phase != Phase::After && self.first && D::SPARSE {
+        // Of a large model each panel by itself, which then is in the nearest cache.
+        if const { D::SPARSE && is_short::<A, Scatter<'_, M, E, D, S>>() }
+            && self.phase != Phase::After
+            && self.first
+        {
             self.dy.fill(E::from_f64(0.0));
             let (jacobian, dy) = (self.jacobian, &mut *self.dy);
             each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, dy, directions: PhantomData });
@@ -253,7 +260,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         }
         if self.phase != Phase::After {
             let (jacobian, directions) = (self.jacobian, self.directions);
-            if !(self.first && D::SPARSE) {
+            if self.first && D::SPARSE {
+                if const { !is_short::<A, Scatter<'_, M, E, D, S>>() } {
+                    dy.fill([[E::from_f64(0.0); W]; S]);
+                    self.placed = place::<M, E, D, S, W>(jacobian, self.placed, dy, column);
+                }
+            } else {
                 dy.fill([[E::from_f64(0.0); W]; S]);
                 Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
                 each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
@@ -336,16 +348,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let (nx, nz, nk) = (M::Shape::NX, M::Shape::NZ, M::Shape::NK);
+        let nk = M::Shape::NK;
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let index = if c < 2 * nx {
-            c - nx
-        } else if c < 2 * nx + nz {
-            return;
-        } else {
-            c - nx - nz
-        };
-        let Some(column) = D::column(index) else { return };
+        let Some(column) = direction::<M, E, D>(c) else { return };
         let (begin, width) = panel_of::<E>(column, D::COUNT);
         let place = begin * nk * S + slot::<M>(r) * S * width + (column - begin);
         for (stage, &value) in values.iter().enumerate() {
@@ -353,6 +358,46 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
                 *to = *to - value;
             }
         }
+    }
+}
+
+/// The same of a panel that begins with a column: entries column by column, from one of them on. Where the next panel begins.
+#[inline(always)]
+fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
+    jacobian: &M::Jacobian<[E; S]>,
+    mut placed: usize,
+    dy: &mut [Packet<E, S, W>],
+    begin: usize,
+) -> usize {
+    while let Some(&index) = M::STRUCTURE.by_column.get(placed) {
+        let Some((r, c, values)) = entry::<M, _>(jacobian, index as usize) else { break };
+        if let Some(column) = direction::<M, E, D>(c) {
+            if column >= begin + W {
+                break;
+            }
+            if let Some(packet) = dy.get_mut(slot::<M>(r)) {
+                for (row, &value) in packet.iter_mut().zip(values) {
+                    if let Some(to) = row.get_mut(column - begin) {
+                        *to = *to - value;
+                    }
+                }
+            }
+        }
+        placed += 1;
+    }
+    placed
+}
+
+/// The direction that a variable other than `ẋ` is, if it is one.
+#[inline(always)]
+fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
+    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+    if variable < 2 * nx {
+        D::column(variable - nx)
+    } else if variable < 2 * nx + nz {
+        None
+    } else {
+        D::column(variable - nx - nz)
     }
 }
 

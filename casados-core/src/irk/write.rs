@@ -16,25 +16,29 @@ pub(crate) trait Target<E> {
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
-    /// Writes `V_{n+1}`.
-    pub(crate) fn write_end<D: Directions<E>>(&self, to: &mut impl Target<E>) {
-        self.write::<D, _, false>(Some(self.v(true)), None, to);
+    /// Writes `V_{n+1}`. All of these say zero if all that is written is finite, else NaN.
+    pub(crate) fn write_end<D: Directions<E>>(&self, to: &mut impl Target<E>) -> E {
+        self.write::<D, _, false>(Some(self.v(true)), None, to)
     }
 
     /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`.
-    pub(crate) fn write_differential<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
-        self.write::<D, _, false>(Some(self.v(false)), Some(weights), to);
+    pub(crate) fn write_differential<D: Directions<E>>(
+        &self,
+        weights: &[E; S],
+        to: &mut impl Target<E>,
+    ) -> E {
+        self.write::<D, _, false>(Some(self.v(false)), Some(weights), to)
     }
 
     /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
-    pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) {
-        self.write::<D, _, true>(None, Some(lagrange), to);
+    pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) -> E {
+        self.write::<D, _, true>(None, Some(lagrange), to)
     }
 
     /// Writes the derivatives of `Σ_i weight_i k_i`.
     #[cfg(feature = "alloc")]
-    pub(crate) fn write_slopes<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) {
-        self.write::<D, _, false>(None, Some(weights), to);
+    pub(crate) fn write_slopes<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) -> E {
+        self.write::<D, _, false>(None, Some(weights), to)
     }
 
     /// Writes `V + Σ_i weight_i dy_i`, of the states or of the algebraic ones.
@@ -43,10 +47,11 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         v: Option<&[E]>,
         weights: Option<&[E; S]>,
         to: &mut G,
-    ) {
-        if !ALGEBRAIC || M::Shape::NZ > 0 {
-            dispatch(Write::<M, E, D, _, S, ALGEBRAIC> { v, dy: self.dy(), weights, to, of: PhantomData });
+    ) -> E {
+        if ALGEBRAIC && M::Shape::NZ == 0 {
+            return E::from_f64(0.0);
         }
+        dispatch(Write::<M, E, D, _, S, ALGEBRAIC> { v, dy: self.dy(), weights, to, of: PhantomData })
     }
 }
 
@@ -145,34 +150,47 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
     for Write<'_, M, E, D, G, S, ALGEBRAIC>
 {
     type Number = E;
-    type Output = ();
+    type Output = E;
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(self) -> E {
         let Self { v, dy, weights, to, .. } = self;
-        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
         let unknowns = if ALGEBRAIC { nx..nk } else { 0..nx };
+        let mut finite = zero;
         panels!(D::COUNT, E, column, W => {
             let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
             let (packets, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
             let packets = packets.get(unknowns.clone()).unwrap_or_default();
+            // Nothing times a number that is not finite is not a number.
+            let mut nothing = [zero; W];
+            if weights.is_none() {
+                for row in v.unwrap_or_default() {
+                    A::subtract_row(&mut nothing, zero, row);
+                }
+            }
+            for nothing in nothing {
+                finite = finite + nothing;
+            }
             for c in 0..W {
                 // As many as the optimiser knows.
-                let Some(to) = to.column(column + c).get_mut(..unknowns.len()) else { return };
+                let Some(to) = to.column(column + c).get_mut(..unknowns.len()) else { return finite };
                 match v {
                     Some(v) => {
                         for (to, v) in to.iter_mut().zip(v) {
                             *to = v[c];
                         }
                     }
-                    None => to.fill(E::from_f64(0.0)),
+                    None => to.fill(zero),
                 }
                 let Some(weights) = weights else { continue };
                 for (to, packet) in to.iter_mut().zip(packets) {
                     for (&weight, dy) in weights.iter().zip(packet) {
                         *to = A::subtract(*to, -weight, dy[c]);
                     }
+                    finite = A::subtract(finite, zero, *to);
                 }
             }
         });
+        finite
     }
 }

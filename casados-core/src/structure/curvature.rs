@@ -55,6 +55,30 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     terms
 }
 
+/// The `N` entries of a Jacobian from one on, by columns, of which there are `V`, and within each as they are.
+#[must_use]
+pub const fn by_column<const V: usize, const N: usize>(jacobian: &Pattern, begin: usize) -> [u32; N] {
+    let (mut entries, mut next) = ([0; N], [0; V]);
+    let mut entry = begin;
+    while entry < begin + N {
+        next[jacobian.at(entry).1] += 1;
+        entry += 1;
+    }
+    let (mut column, mut sum) = (0, 0);
+    while column < V {
+        (next[column], sum) = (sum, sum + next[column]);
+        column += 1;
+    }
+    let mut entry = begin;
+    while entry < begin + N {
+        let column = jacobian.at(entry).1;
+        entries[next[column]] = entry as u32;
+        next[column] += 1;
+        entry += 1;
+    }
+    entries
+}
+
 /// For each of `N` directions its position among those that count, or [`NO_COLUMN`].
 #[must_use]
 pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {

@@ -6,7 +6,7 @@ mod describe;
 mod elimination;
 
 pub use cost::Cost;
-pub use curvature::{NO_COLUMN, Term, columns, symmetric};
+pub use curvature::{NO_COLUMN, Term, by_column, columns, symmetric};
 pub use elimination::{Assembly, Elimination, Pivot};
 
 /// What is known about a model before it runs.
@@ -27,6 +27,8 @@ pub struct Structure {
     pub jacobian: Pattern,
     /// Where each of the five blocks begins in `jacobian`, and its end.
     pub blocks: [usize; 6],
+    /// The entries of `f_x, f_z, f_u, f_p`, column by column: what [`by_column`] makes of them.
+    pub by_column: &'static [u32],
     /// Entries of the Jacobian that are constant.
     pub constant: &'static [bool],
     /// Non-zeros of the lower triangle of `∇²(μᵀ f)`: variable ≥ variable.

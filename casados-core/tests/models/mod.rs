@@ -3,7 +3,9 @@
 
 pub mod pendulum;
 
-use casados_core::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, symmetric};
+use casados_core::model::{
+    ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, by_column, symmetric,
+};
 use casados_core::shape::Plain;
 use casados_core::{Dae, Dims, Lanes};
 
@@ -68,6 +70,7 @@ impl Dae for Nonlinear {
             columns: &[0, 1, 1, 2, 3, 2, 2, 3, 4, 4, 4, 5, 5, 6, 6],
         },
         blocks: [0, 3, 8, 11, 13, 15],
+        by_column: &[3, 5, 6, 4, 7, 8, 9, 10, 11, 12, 13, 14],
         constant: &[false; 15],
         hessian: Pattern { rows: &[2, 2, 2, 3, 4, 4, 5, 6], columns: &[0, 1, 2, 2, 3, 4, 5, 2] },
         linear: &[false; 3],
@@ -169,6 +172,7 @@ impl Dae for Linear {
         p: &["p"],
         jacobian: Pattern { rows: &[0, 0, 1, 1, 0, 0], columns: &[0, 1, 1, 2, 3, 4] },
         blocks: [0, 1, 3, 4, 5, 6],
+        by_column: &[1, 2, 3, 4, 5],
         constant: &[true, false, true, true, true, false],
         hessian: Pattern { rows: &[4], columns: &[1] },
         linear: &[false, true],
@@ -237,6 +241,7 @@ impl Dae for Fragile {
         p: &[],
         jacobian: Pattern { rows: &[0, 0, 1, 1, 0, 1], columns: &[0, 1, 1, 2, 3, 3] },
         blocks: [0, 1, 3, 4, 6, 6],
+        by_column: &[1, 2, 3, 4, 5],
         constant: &[false; 6],
         hessian: Pattern { rows: &[1, 3], columns: &[1, 2] },
         linear: &[false; 2],
@@ -302,6 +307,7 @@ impl Dae for Algebraic {
         p: &[],
         jacobian: Pattern { rows: &[0, 0], columns: &[0, 1] },
         blocks: [0, 0, 0, 1, 2, 2],
+        by_column: &[0, 1],
         constant: &[false, true],
         hessian: Pattern { rows: &[0], columns: &[0] },
         linear: &[false],
@@ -402,6 +408,10 @@ impl Dae for Rod {
         p: &[],
         jacobian: Pattern { rows: &ROD.0, columns: &ROD.1 },
         blocks: [0, N, ENTRIES - 1, ENTRIES - 1, ENTRIES, ENTRIES],
+        by_column: &by_column::<{ 2 * N + 2 }, { ENTRIES - N }>(
+            &Pattern { rows: &ROD.0, columns: &ROD.1 },
+            N,
+        ),
         constant: &[false; ENTRIES],
         hessian: Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN },
         linear: &[false; N],

@@ -101,6 +101,7 @@ impl Dae for Pendulum {
             columns: &[0, 1, 2, 3, 6, 7, 5, 7, 5, 7, 8, 8],
         },
         blocks: [0, 4, 10, 10, 12, 12],
+        by_column: &[6, 8, 4, 5, 7, 9, 10, 11],
         constant: &[false; 12],
         hessian: HESSIAN,
         linear: &[true, true, false, false],

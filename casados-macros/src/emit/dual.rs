@@ -43,6 +43,7 @@ pub fn write(model: &Model) -> TokenStream {
     let arguments = model.arguments.iter().map(|argument| self::argument(argument, starts));
     let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lcurved, lterms] =
         [nx, nz, nu, np, nk, nv, nw, nj, nh, nv - 1, (nv - 1) * (nv - 1)].map(Literal::usize_unsuffixed);
+    let [first, linputs] = [nk * nx, nk * (nx + nz + nu + np)].map(Literal::usize_unsuffixed);
     let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
     let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
     let text = name.to_string();
@@ -107,6 +108,12 @@ pub fn write(model: &Model) -> TokenStream {
                         p: &[#(#p),*],
                         jacobian: #krate::model::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
                         blocks: [#(#blocks),*],
+                        by_column: &const {
+                            #krate::model::by_column::<#lcurved, #linputs>(
+                                &#krate::model::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
+                                #first,
+                            )
+                        },
                         constant: &[false; #lj],
                         hessian: #krate::model::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
                         linear: &[false; #lk],

@@ -17,6 +17,8 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let width = Literal::usize_unsuffixed(x.len() + u.len() + p.len());
     let terms = hessian.iter().map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum::<usize>();
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
+    let variables = Literal::usize_unsuffixed(2 * x.len() + z.len() + u.len() + p.len());
+    let [begin, inputs] = [blocks[1], blocks[5] - blocks[1]].map(Literal::usize_unsuffixed);
     let blocks = blocks.map(Literal::usize_unsuffixed);
     let operations = self::operations(krate, operations);
     let Facts { linear_in_state, constant_matrix, constant_rows, .. } = facts;
@@ -25,6 +27,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let [count, terms] = [curved.len(), terms].map(Literal::usize_unsuffixed);
     let elimination = elimination(analysis);
     quote! {{
+        const JACOBIAN: #krate::model::Pattern = #jacobian;
         const HESSIAN: #krate::model::Pattern = #hessian;
         const DIRECTIONS: &[u32] = &[#(#directions),*];
         const CURVED: &[u32; #count] = &[#(#curved),*];
@@ -34,8 +37,9 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             z: &[#(#z),*],
             u: &[#(#u),*],
             p: &[#(#p),*],
-            jacobian: #jacobian,
+            jacobian: JACOBIAN,
             blocks: [#(#blocks),*],
+            by_column: &const { #krate::model::by_column::<#variables, #inputs>(&JACOBIAN, #begin) },
             constant: &[#(#constant),*],
             hessian: HESSIAN,
             linear: &[#(#linear),*],

@@ -54,6 +54,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         p: &["level"],
         jacobian: Pattern { rows: &[0, 0, 1, 0, 1, 0, 1], columns: &[0, 1, 1, 2, 2, 3, 4] },
         blocks: [0, 1, 3, 5, 6, 7],
+        by_column: &[1, 2, 3, 4, 5, 6],
         constant: &[true, false, false, true, false, false, true],
         hessian: Pattern {
             rows: &[1, 2, 3],

@@ -200,6 +200,7 @@ mod logistic {
             p: &["limit"],
             jacobian: Pattern { rows: &[0, 0, 0, 0], columns: &[0, 1, 2, 3] },
             blocks: [0, 1, 2, 2, 3, 4],
+            by_column: &[1, 2, 3],
             constant: &[true, false, false, false],
             hessian: Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] },
             linear: &[false],
