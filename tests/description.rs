@@ -150,8 +150,8 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let coupling: Matrix =
         (0..s).map(|_| (0..s).map(|_| Counted(0.1 * random.symmetric())).collect()).collect();
     let scaled = |pivot: &Pivot| s > 1 && pivot.scaled;
-    for (entry, block) in plan.assembly.iter().zip(&mut blocks).filter(|(entry, _)| !entry.is_fill()) {
-        for (i, row) in block.iter_mut().enumerate() {
+    for entry in plan.assembly.iter().filter(|entry| !entry.is_fill()) {
+        for (i, row) in blocks[entry.block as usize].iter_mut().enumerate() {
             for (j, element) in row.iter_mut().enumerate() {
                 let is_diagonal = entry.state == Assembly::NONE && i != j;
                 *element = Counted(if is_diagonal { 0.0 } else { 0.1 * random.symmetric() });

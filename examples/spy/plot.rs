@@ -131,7 +131,9 @@ fn draw_factors(structure: &Structure, panel: &Panel) -> Drawn {
     for (order, pivot) in plan.pivots.iter().enumerate() {
         position[pivot.slot as usize] = order;
     }
-    let colour = |block: usize| if plan.assembly[block].is_fill() { FILL.1 } else { ORIGINAL.1 };
+    let is_fill =
+        |block: usize| plan.assembly.iter().any(|entry| entry.block as usize == block && entry.is_fill());
+    let colour = |block: usize| if is_fill(block) { FILL.1 } else { ORIGINAL.1 };
     for (order, pivot) in plan.pivots.iter().enumerate() {
         panel.fill(order, order, if pivot.identity { IDENTITY.1 } else { PIVOT.1 })?;
         for block in pivot.lower() {

@@ -14,14 +14,27 @@ use bytemuck::Zeroable;
 /// A result of several intervals, with a number for each of them in the lanes of its registers. All of it is inlined
 /// into kernels.
 pub trait Wide<E: Lanes, R> {
-    /// Whether all numbers are finite, lane by lane.
+    /// Whether all numbers are finite, lane by lane, but for those that were looked at when they were written: matrices.
     fn is_finite(&self) -> E::Mask;
     /// The results of the lanes that are good, each in its element of a slice that has it somewhere inside.
     fn unpack<Q>(&self, good: &[bool], results: &mut [Q], get: impl Fn(&mut Q) -> &mut R + Copy);
 }
 
+/// The elements of a field, for each lane that is good in its result.
+macro_rules! unpack_field {
+    ($self:ident, $field:ident, $good:ident, $results:ident, $get:ident) => {{
+        let mut to: [&mut [T]; MOST_LANES] = Default::default();
+        for ((to, result), &good) in to.iter_mut().zip($results.iter_mut()).zip($good) {
+            if good {
+                *to = $get(result).$field.as_mut_slice();
+            }
+        }
+        unpack($self.$field.as_slice(), &mut to);
+    }};
+}
+
 macro_rules! wide {
-    ($type:ident $(: $inner:ident)?; $($field:ident),*) => {
+    ($type:ident $(: $inner:ident)?; $($field:ident),*; $($matrix:ident),*) => {
         impl<M: Dae, T: Plain, E: Lanes<Cell: AsRef<[T]>>> Wide<E, $type<M, T>> for $type<M, E> {
             #[inline(always)]
             fn is_finite(&self) -> E::Mask {
@@ -38,24 +51,17 @@ macro_rules! wide {
                 get: impl Fn(&mut Q) -> &mut $type<M, T> + Copy,
             ) {
                 $(self.$inner.unpack(good, results, move |result| &mut get(result).$inner);)?
-                $(
-                    let mut to: [&mut [T]; MOST_LANES] = Default::default();
-                    for ((to, result), &good) in to.iter_mut().zip(results.iter_mut()).zip(good) {
-                        if good {
-                            *to = get(result).$field.as_mut_slice();
-                        }
-                    }
-                    unpack(self.$field.as_slice(), &mut to);
-                )*
+                $(unpack_field!(self, $field, good, results, get);)*
+                $(unpack_field!(self, $matrix, good, results, get);)*
             }
         }
     };
 }
-wide!(Nominal; x, z, z0);
-wide!(Forward: nominal; dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp, dz0_dx0, dz0_du, dz0_dp);
-wide!(Adjoint: nominal; grad_x0, grad_u, grad_p);
-wide!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p);
-wide!(Hessian: first; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
+wide!(Nominal; x, z, z0;);
+wide!(Forward: nominal;; dx_dx0, dx_du, dx_dp, dz_dx0, dz_du, dz_dp, dz0_dx0, dz0_du, dz0_dp);
+wide!(Adjoint: nominal; grad_x0, grad_u, grad_p;);
+wide!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p;);
+wide!(Hessian: first;; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
 
 /// True in every lane.
 #[inline(always)]

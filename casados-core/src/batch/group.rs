@@ -184,6 +184,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             pass.forward(forward, n, count, None, None)
         });
         forward.result.forward.nominal = pass.work.result;
+        let good = E::and(good, forward.finite.is_finite());
         if adjoint {
             forward.multiply(Heap::nominal(&mut self.lambda)?.as_ref());
         }
@@ -245,8 +246,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             hessian.curvature(work, coefficients, n, step);
             hessian.subtract(record, n + 1 == count);
         }
-        hessian.collect(None);
-        Ok((good, &hessian.result))
+        let finite = hessian.collect(None) + forward.finite;
+        Ok((E::and(good, finite.is_finite()), &hessian.result))
     }
 }
 

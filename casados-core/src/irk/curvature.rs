@@ -56,19 +56,27 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         panels!(M::STRUCTURE.directions.len(), E, row, V => {
             if row >= column {
                 let d = panel::<E, V>(self.d, row, rows);
-                let (sum, fresh) = (&mut *self.sum, self.fresh);
+                let sum = &mut *self.sum;
+                if self.fresh {
+                    for sum in sum.iter_mut().skip(row).take(V) {
+                        let to = sum.as_mut().get_mut(column..).and_then(|sum| sum.as_chunks_mut::<W>().0.first_chunk_mut());
+                        if let Some(to) = to {
+                            *to = [[E::from_f64(0.0); W]; P];
+                        }
+                    }
+                }
                 if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, fresh, row, column);
+                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, row, column);
                 } else if const { size_of::<E>() > 8 } {
-                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, fresh, row, column);
+                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, row, column);
                 } else if const { V > 4 && A::WIDE } {
-                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, fresh, row, column);
+                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, row, column);
                 } else if const { V > 4 } {
-                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, row, column);
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, row, column);
                 } else if const { V > 2 } {
-                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, fresh, row, column);
+                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, row, column);
                 } else {
-                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, fresh, row, column);
+                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, row, column);
                 }
             }
         });
@@ -166,7 +174,6 @@ fn tiles<
     d: &[[E; V]],
     g: &[[[E; W]; P]],
     sum: &mut [R],
-    fresh: bool,
     row: usize,
     column: usize,
 ) {
@@ -193,8 +200,7 @@ fn tiles<
             let Some(columns) = columns.first_chunk_mut::<P>() else { continue };
             let (columns, tile) = (columns.as_flattened_mut().iter_mut(), tile.as_flattened());
             for (sum, &tile) in columns.zip(tile) {
-                let before = if fresh { E::from_f64(0.0) } else { *sum };
-                *sum = before - tile;
+                *sum = *sum - tile;
             }
         }
     }

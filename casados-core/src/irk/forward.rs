@@ -32,7 +32,7 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) dense: DenseForward<M, T>,
     pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
     /// Zero if all derivatives that were written are finite, else NaN.
-    finite: T,
+    pub(crate) finite: T,
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 

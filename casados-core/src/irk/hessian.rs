@@ -247,45 +247,50 @@ impl<M: Dae, E: Lanes, B: Matrix<E>> Kernel for Part<'_, M, E, B> {
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
         let Self { of: Symmetric { sum, more }, columns, row, column, .. } = self;
-        let zero = E::from_f64(0.0);
+        let (zero, end) = (E::from_f64(0.0), row + B::ROWS);
+        let directions = M::STRUCTURE.directions;
+        let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
+        // The directions of these rows that have any influence.
+        let before =
+            |row: usize| if all { row } else { directions.partition_point(|&to| (to as usize) < row) };
+        let range = before(row)..before(end);
+        let directions = directions.get(range.clone()).unwrap_or_default();
         // Nothing times a number that is not finite is not a number.
-        let (mut strands, mut finite) = ([zero; 8], zero);
+        let mut nothing = [zero; 4];
         for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {
-            let of_c = Identity::<M>::column(column + c).and_then(|c| sum.get(c));
-            let of_c = of_c.map_or(&[][..], |of_c| of_c.as_ref());
-            let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
-            match of_c.get(row..row + B::ROWS) {
-                // Every direction has an influence.
-                Some(of_c) if all && more.is_none() => {
-                    let ((to, last_to), (from, last_from)) = (to.as_chunks_mut::<8>(), of_c.as_chunks::<8>());
-                    for (to, from) in to.iter_mut().zip(from) {
-                        *to = *from;
-                        A::subtract_row(&mut strands, zero, from);
-                    }
-                    for (to, &from) in last_to.iter_mut().zip(last_from) {
-                        *to = from;
-                        finite = A::subtract(finite, zero, from);
-                    }
-                }
+            let of_c =
+                Identity::<M>::column(column + c).and_then(|c| sum.get(c)?.as_ref().get(range.clone()));
+            let of_c = of_c.unwrap_or_default();
+            let (whole, rest) = of_c.as_chunks::<4>();
+            for few in whole {
+                A::subtract_row(&mut nothing, zero, few);
+            }
+            for (nothing, &value) in nothing.iter_mut().zip(rest) {
+                *nothing = A::subtract(*nothing, zero, value);
+            }
+            // As many as the optimiser knows.
+            match of_c.get(..B::ROWS) {
+                Some(of_c) if all => to.copy_from_slice(of_c),
                 _ => {
-                    for (r, to) in to.iter_mut().enumerate() {
-                        let element = Identity::<M>::column(row + r).and_then(|r| of_c.get(r));
-                        let mut value = element.copied().unwrap_or(zero);
-                        let (r, c) = (row + r, column + c);
-                        let of_more = more.and_then(|more| more.get(r.max(c)));
-                        if let Some(&more) = of_more.and_then(|row| row.as_ref().get(r.min(c))) {
-                            value = value + more;
+                    to.fill(zero);
+                    for (&direction, &value) in directions.iter().zip(of_c) {
+                        if let Some(to) = to.get_mut((direction as usize).wrapping_sub(row)) {
+                            *to = value;
                         }
-                        *to = value;
-                        finite = A::subtract(finite, zero, value);
                     }
                 }
             }
+            let Some(more) = more else { continue };
+            for (r, to) in to.iter_mut().enumerate() {
+                let (r, c) = (row + r, column + c);
+                if let Some(&more) = more.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))) {
+                    *to = *to + more;
+                    nothing[0] = A::subtract(nothing[0], zero, *to);
+                }
+            }
         }
-        for strand in strands {
-            finite = finite + strand;
-        }
-        finite
+        let [a, b, c, d] = nothing;
+        (a + b) + (c + d)
     }
 }
 

@@ -6,6 +6,7 @@ use super::evaluate::entry;
 use super::record::{Coefficients, Work, copy};
 use crate::linalg::{
     Arithmetic, AtRow, Kernel, Packet, Planned, dispatch, each_row, is_long, is_short, slot, solve_packets,
+    solve_two,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -25,6 +26,8 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     v: [Aligned<ArrayX<M, R>>; 2],
     /// Which of them is at the end.
     end: bool,
+    /// The first of them is what it is at the start of an interval, where that is always the same.
+    begun: bool,
     /// `d(k, z)/dw` at its stages.
     dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in strands.
@@ -48,8 +51,11 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     /// `V_0`
     pub(crate) fn start<D: Directions<E>>(&mut self, directions: &D) {
         self.end = false;
-        let end = R::flat_mut(self.v[0].as_mut());
-        dispatch(Start { v: end, rows: M::Shape::NX, directions });
+        if !(D::SPARSE && self.begun) {
+            let end = R::flat_mut(self.v[0].as_mut());
+            dispatch(Start { v: end, rows: M::Shape::NX, directions });
+        }
+        self.begun = D::SPARSE;
     }
 
     /// The step that follows, which is linearised; the `first` of the interval or a later one. Whether the derivatives
@@ -104,7 +110,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         phase: Phase,
         second: bool,
     ) {
-        let Self { v, end, dy, sums, start_sums } = self;
+        self.begun &= self.end;
+        let Self { v, end, dy, sums, start_sums, .. } = self;
         let [start, other] = v;
         let (v, next) = if *end { (start, other) } else { (other, start) };
         dispatch(Step::<M, E, D, S> {
@@ -234,6 +241,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
         if self.phase != Phase::Before {
             self.sums.fill([[E::from_f64(0.0); STRANDS]; S]);
             self.start_sums.fill([E::from_f64(0.0); STRANDS]);
+            if D::SPARSE && self.first {
+                for (state, [sum, ..]) in self.start_sums.iter_mut().enumerate() {
+                    *sum = self.directions.total(state, self.second);
+                }
+            }
         }
         // Of a large model each panel by itself, which then is in the nearest cache.
         if const { D::SPARSE && is_short::<A, Scatter<'_, M, E, D, S>>() }
@@ -244,33 +256,24 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
             let (jacobian, dy) = (self.jacobian, &mut *self.dy);
             each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, dy, directions: PhantomData });
         }
-        panels!(D::COUNT, E, column, W => self.panel::<A, W>(column));
+        let mut start = 0;
+        if const { A::WIDE && size_of::<E>() <= 8 && S <= 2 && !is_short::<A, Scatter<'_, M, E, D, S>>() }
+            && self.phase == Phase::Whole
+        {
+            while start + 16 <= const { D::COUNT } {
+                self.two_panels::<A>(start);
+                start += 16;
+            }
+        }
+        panels!(D::COUNT, E, column from start, W => self.panel::<A, W>(column));
     }
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
     #[inline(always)]
     fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
-        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
-        let v = panel::<E, W>(self.v, column, nx);
-        let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
-        // Lengths that the optimiser knows need no looking at.
-        if v.len() != nx || dy.len() != nk {
-            return;
-        }
-        if self.phase != Phase::After {
-            let (jacobian, directions) = (self.jacobian, self.directions);
-            if self.first && D::SPARSE {
-                if const { !is_short::<A, Scatter<'_, M, E, D, S>>() } {
-                    dy.fill([[E::from_f64(0.0); W]; S]);
-                    self.placed = place::<M, E, D, S, W>(jacobian, self.placed, dy, column);
-                }
-            } else {
-                dy.fill([[E::from_f64(0.0); W]; S]);
-                Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
-                each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
-            }
-        }
+        self.before::<A, W>(column);
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         if self.phase == Phase::Whole {
             if const { size_of::<E>() > 8 && S > 2 && W == 4 } {
                 // Four columns of all stages would not fit the registers.
@@ -280,7 +283,52 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
                 solve_packets::<A, M, E, [E; W], S, W>(self.factors, dy, 0);
             }
         }
-        if self.phase == Phase::Before {
+        self.after::<A, W>(column);
+    }
+
+    /// Two panels of a long plan at a time: most of its instructions find blocks and rows.
+    #[inline(always)]
+    fn two_panels<A: Arithmetic>(&mut self, column: usize) {
+        const W: usize = 8;
+        self.before::<A, W>(column);
+        self.before::<A, W>(column + W);
+        let rows = M::Shape::NK * S;
+        let (first, second) = self.dy.split_at_mut((column + W) * rows);
+        let first = panel_mut::<E, W>(first, column, rows).as_chunks_mut::<S>().0;
+        let second = panel_mut::<E, W>(second, 0, rows).as_chunks_mut::<S>().0;
+        solve_two::<A, M, E, S, W>(self.factors, [first, second]);
+        self.after::<A, W>(column);
+        self.after::<A, W>(column + W);
+    }
+
+    /// The right-hand side of a panel.
+    #[inline(always)]
+    fn before<A: Arithmetic, const W: usize>(&mut self, column: usize) {
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let v = panel::<E, W>(self.v, column, nx);
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
+        // Lengths that the optimiser knows need no looking at.
+        if self.phase == Phase::After || v.len() != nx || dy.len() != nk {
+            return;
+        }
+        let (jacobian, directions) = (self.jacobian, self.directions);
+        if !(self.first && D::SPARSE) {
+            dy.fill([[E::from_f64(0.0); W]; S]);
+            Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
+            each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
+        } else if const { !is_short::<A, Scatter<'_, M, E, D, S>>() } {
+            dy.fill([[E::from_f64(0.0); W]; S]);
+            self.placed = place::<M, E, D, S, W>(jacobian, self.placed, dy, column);
+        }
+    }
+
+    /// What follows from the solution of a panel.
+    #[inline(always)]
+    fn after<A: Arithmetic, const W: usize>(&mut self, column: usize) {
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let v = panel::<E, W>(self.v, column, nx);
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
+        if self.phase == Phase::Before || v.len() != nx || dy.len() != nk {
             return;
         }
         let mut weights = [E::from_f64(0.0); W];
@@ -292,19 +340,39 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
                 accumulate::<A, E, W>(strands, &weights, row);
             }
         }
-        for (strands, row) in self.start_sums.iter_mut().zip(v) {
-            accumulate::<A, E, W>(strands, &weights, row);
+        let unit = self.first && D::SPARSE;
+        if !unit {
+            for (strands, row) in self.start_sums.iter_mut().zip(v) {
+                accumulate::<A, E, W>(strands, &weights, row);
+            }
         }
         let mut b = self.coefficients.b;
         for b in &mut b {
             *b = -(self.h * *b);
         }
-        for ((to, from), dk) in panel_mut::<E, W>(self.next, column, nx).iter_mut().zip(v).zip(dy.iter()) {
-            let mut row = *from;
-            for (&b, dk) in b.iter().zip(dk) {
-                A::subtract_row(&mut row, b, dk);
+        // The unit matrix need not be read.
+        let next = panel_mut::<E, W>(self.next, column, nx);
+        if unit {
+            for (to, dk) in next.iter_mut().zip(dy.iter()) {
+                *to = [E::from_f64(0.0); W];
+                for (&b, dk) in b.iter().zip(dk) {
+                    A::subtract_row(to, b, dk);
+                }
             }
-            *to = row;
+            for c in 0..W {
+                let direction = M::STRUCTURE.directions.get(column + c);
+                if let Some(row) = direction.and_then(|&state| next.get_mut(state as usize)) {
+                    row[c] = row[c] + E::from_f64(1.0);
+                }
+            }
+        } else {
+            for ((to, from), dk) in next.iter_mut().zip(v).zip(dy.iter()) {
+                let mut row = *from;
+                for (&b, dk) in b.iter().zip(dk) {
+                    A::subtract_row(&mut row, b, dk);
+                }
+                *to = row;
+            }
         }
         if let Some(curved) = &mut self.curved {
             let count = M::STRUCTURE.curved.len();

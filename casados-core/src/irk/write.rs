@@ -156,20 +156,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
         let Self { v, dy, weights, to, .. } = self;
         let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
         let unknowns = if ALGEBRAIC { nx..nk } else { 0..nx };
-        let mut finite = zero;
+        // Nothing times a number that is not finite is not a number.
+        let (mut nothing, mut finite) = ([zero; 8], zero);
         panels!(D::COUNT, E, column, W => {
             let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
             let (packets, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
             let packets = packets.get(unknowns.clone()).unwrap_or_default();
-            // Nothing times a number that is not finite is not a number.
-            let mut nothing = [zero; W];
-            if weights.is_none() {
+            if let (None, Some(nothing)) = (weights, nothing.first_chunk_mut::<W>()) {
                 for row in v.unwrap_or_default() {
-                    A::subtract_row(&mut nothing, zero, row);
+                    A::subtract_row(nothing, zero, row);
                 }
-            }
-            for nothing in nothing {
-                finite = finite + nothing;
             }
             for c in 0..W {
                 // As many as the optimiser knows.
@@ -191,6 +187,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
                 }
             }
         });
+        for nothing in nothing {
+            finite = finite + nothing;
+        }
         finite
     }
 }

@@ -119,7 +119,8 @@ impl<M: Dae, T: Real, const L: usize> Kernel for Assemble<'_, M, T, L> {
     fn run<A: Arithmetic>(self) -> bool {
         let Self { jacobian, scale, blocks, .. } = self;
         let plan = &M::STRUCTURE.elimination;
-        for (entry, [[to]]) in plan.assembly.iter().zip(blocks.iter_mut()) {
+        for entry in plan.assembly {
+            let Some([[to]]) = blocks.get_mut(entry.block as usize) else { continue };
             // An index that marks what is not there lies outside of the Jacobian.
             let state = jacobian.get(entry.state as usize);
             let mut element = state.map_or_else(Complex::zero, |state| scale.scaled(*state));

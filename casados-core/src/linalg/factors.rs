@@ -126,10 +126,8 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let (Some(entry), Some(to)) = (M::STRUCTURE.elimination.assembly.get(row), blocks.get_mut(row))
-        else {
-            return;
-        };
+        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        let Some(to) = blocks.get_mut(entry.block as usize) else { return };
         // An index that marks what is not there lies outside of the Jacobian.
         let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
         let mut block = [[E::from_f64(0.0); S]; S];

@@ -76,10 +76,8 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let (Some(entry), Some([[to]])) = (M::STRUCTURE.elimination.assembly.get(row), blocks.get_mut(row))
-        else {
-            return;
-        };
+        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
         let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
         let mut element = match state {
             Some(state) => self.scale.scaled(total(state)),

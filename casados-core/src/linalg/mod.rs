@@ -22,6 +22,7 @@ mod mean;
 mod sparse;
 mod straight;
 mod twice;
+mod two_panels;
 
 pub(crate) use block::Packet;
 #[cfg(feature = "alloc")]
@@ -36,3 +37,4 @@ pub(crate) use mean::MeanFactors;
 pub(crate) use sparse::{Planned, solve_packets};
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};
 pub(crate) use twice::{dot_compensated, moved, two_product};
+pub(crate) use two_panels::solve_two;

@@ -382,13 +382,13 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
 
 /// Always; but the optimiser then knows their number, and with it how often loops over constant tables go round.
 #[inline(always)]
-fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
+pub fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
     blocks.len() == M::STRUCTURE.elimination.slots.len()
 }
 
 /// The blocks of a range, each with the slot at its other end.
 #[inline(always)]
-fn beside<'a, M: Dae, E, const S: usize>(
+pub fn beside<'a, M: Dae, E, const S: usize>(
     factors: Planned<'a, M, E, S>,
     range: core::ops::Range<usize>,
 ) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {

@@ -12,7 +12,7 @@ pub struct Elimination {
     pub slots: &'static [u32],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
     pub updates: &'static [u32],
-    /// For each block what it is made of before elimination.
+    /// For each block what it is made of before elimination, those of a kind one after the other.
     pub assembly: &'static [Assembly],
     /// For each equation its slot.
     pub slot_of_equation: &'static [u32],
@@ -73,6 +73,8 @@ impl Pivot {
 /// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`; zero where there is only fill.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assembly {
+    /// The block.
+    pub block: u32,
     /// The entry of the Jacobian that multiplies the unknown itself (`f_ẋ` or `f_z`), or [`Assembly::NONE`].
     pub direct: u32,
     /// The entry of `f_x`, or [`Assembly::NONE`].

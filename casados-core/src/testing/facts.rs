@@ -42,6 +42,14 @@ pub(super) fn compare<M: Dae>(
     let constant = |&e: &usize| structure.constant_rows.get(structure.jacobian.at(e).0) == Some(&true);
     unchanged("constant rows", &all.iter().copied().filter(constant).collect::<Vec<_>>(), &|_| true);
 
+    let mut sorted: Vec<usize> = (structure.blocks[1]..structure.blocks[5]).collect();
+    sorted.sort_by_key(|&e| structure.jacobian.at(e).1);
+    let found = sorted.iter().enumerate().map(|(i, &e)| {
+        let value = structure.by_column.get(i).map_or(f64::NAN, |&entry| f64::from(entry));
+        (i, Entry { value, expected: e as f64, tolerance: 0.0 })
+    });
+    report.compare("entries by column", "pattern", number, 0.0, found, |i| format!("number {i}"));
+
     // What is left out must not be felt: no entry in the columns of the others.
     let mut absent = |what: &'static str, count: usize, listed: &[u32], entries: &dyn Fn(usize) -> usize| {
         let others = (0..count).filter(|&i| !listed.contains(&(i as u32)));

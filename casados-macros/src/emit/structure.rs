@@ -135,13 +135,23 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         .collect();
     let positions: HashMap<_, _> =
         positions.iter().map(|position| ((position.row, position.column), position)).collect();
-    let assembly = plan.blocks.iter().zip(0u32..).map(|(place, block)| {
-        let position = positions.get(place);
+    let mut assembly: Vec<_> = plan
+        .blocks
+        .iter()
+        .zip(0u32..)
+        .map(|(place, block)| {
+            let position = positions.get(place);
+            let direct = position.and_then(|position| position.direct);
+            (scaled.contains(&block), direct, position.and_then(|position| position.state), block)
+        })
+        .collect();
+    // Those of a kind one after the other: what is done to them then has no branches that nobody can foresee.
+    assembly
+        .sort_by_key(|(scaled, direct, state, block)| (*scaled, direct.is_some(), state.is_some(), *block));
+    let assembly = assembly.into_iter().map(|(scaled, direct, state, block)| {
         let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
-        let direct = entry(position.and_then(|position| position.direct));
-        let state = entry(position.and_then(|position| position.state));
-        let scaled = scaled.contains(&block);
-        quote!(assembly(#direct, #state, #scaled))
+        let (direct, state, block) = (entry(direct), entry(state), Literal::u32_unsuffixed(block));
+        quote!(assembly(#block, #direct, #state, #scaled))
     });
     let [slots, updates, slot_of_equation] =
         [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
@@ -150,8 +160,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool, scaled: bool) -> Pivot {
             Pivot { slot, block, upper, end, identity, scaled }
         }
-        const fn assembly(direct: u32, state: u32, scaled: bool) -> Assembly {
-            Assembly { direct, state, scaled }
+        const fn assembly(block: u32, direct: u32, state: u32, scaled: bool) -> Assembly {
+            Assembly { block, direct, state, scaled }
         }
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },
