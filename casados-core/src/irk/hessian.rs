@@ -256,7 +256,7 @@ impl<M: Dae, E: Lanes, B: Matrix<E>> Kernel for Part<'_, M, E, B> {
         let range = before(row)..before(end);
         let directions = directions.get(range.clone()).unwrap_or_default();
         // Nothing times a number that is not finite is not a number.
-        let mut nothing = [zero; 4];
+        let (mut nothing, mut others) = ([zero; 4], [zero; 4]);
         for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {
             let of_c =
                 Identity::<M>::column(column + c).and_then(|c| sum.get(c)?.as_ref().get(range.clone()));
@@ -265,8 +265,8 @@ impl<M: Dae, E: Lanes, B: Matrix<E>> Kernel for Part<'_, M, E, B> {
             for few in whole {
                 A::subtract_row(&mut nothing, zero, few);
             }
-            for (nothing, &value) in nothing.iter_mut().zip(rest) {
-                *nothing = A::subtract(*nothing, zero, value);
+            for (other, &value) in others.iter_mut().zip(rest) {
+                *other = A::subtract(*other, zero, value);
             }
             // As many as the optimiser knows.
             match of_c.get(..B::ROWS) {
@@ -285,9 +285,12 @@ impl<M: Dae, E: Lanes, B: Matrix<E>> Kernel for Part<'_, M, E, B> {
                 let (r, c) = (row + r, column + c);
                 if let Some(&more) = more.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))) {
                     *to = *to + more;
-                    nothing[0] = A::subtract(nothing[0], zero, *to);
+                    others[3] = A::subtract(others[3], zero, *to);
                 }
             }
+        }
+        for (nothing, other) in nothing.iter_mut().zip(others) {
+            *nothing = *nothing + other;
         }
         let [a, b, c, d] = nothing;
         (a + b) + (c + d)

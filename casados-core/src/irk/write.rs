@@ -163,9 +163,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
             let (packets, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
             let packets = packets.get(unknowns.clone()).unwrap_or_default();
             if let (None, Some(nothing)) = (weights, nothing.first_chunk_mut::<W>()) {
+                // In registers.
+                let mut own = *nothing;
                 for row in v.unwrap_or_default() {
-                    A::subtract_row(nothing, zero, row);
+                    A::subtract_row(&mut own, zero, row);
                 }
+                *nothing = own;
             }
             for c in 0..W {
                 // As many as the optimiser knows.
