@@ -121,7 +121,7 @@ fn draw_jacobian(structure: &Structure, widths: [usize; 5], panel: &Panel) -> Dr
 fn draw_factors(structure: &Structure, panel: &Panel) -> Drawn {
     let plan = &structure.elimination;
     let size = plan.pivots.len();
-    let fill = plan.assembly.iter().filter(|block| block.is_fill()).count();
+    let fill = plan.fill();
     let title =
         format!("Factors in the order of elimination, {} blocks, {fill} of them fill", plan.slots.len());
     panel.area.draw(&Text::new(title, (panel.left, 8), text(18)))?;

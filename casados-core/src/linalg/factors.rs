@@ -4,7 +4,7 @@ use super::block::Block;
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
-use super::straight::{AtRow, each_row};
+use super::straight::{AtRow, each_row, is_short};
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes, Real};
@@ -116,7 +116,19 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
                 column[i] = -(*h * a);
             }
         }
-        each_row::<A, _>(&mut self);
+        if const { is_short::<A, Self>() } {
+            each_row::<A, _>(&mut self);
+            return;
+        }
+        let fill = const { M::STRUCTURE.elimination.fill() };
+        for entry in M::STRUCTURE.elimination.assembly.iter().take(fill) {
+            if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
+                *block = [[E::from_f64(0.0); S]; S];
+            }
+        }
+        for row in fill..Self::ROWS {
+            self.at::<A>(row);
+        }
     }
 }
 

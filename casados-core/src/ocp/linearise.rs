@@ -10,6 +10,7 @@ use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 use super::point::{Terms, read};
 use super::problem::{Formulation, Problem};
+use super::transfer::Transfer;
 use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, pad, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -94,15 +95,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
-            let Arrays { n, ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
+            let Arrays { ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
             hessian.fill(T::ZERO);
             gradient.fill(T::ZERO);
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
-            write_dynamics(matrix, ld, nx, step);
-            let here = part(v, k * ld, n);
-            for ((offset, &x), column) in offset.iter_mut().zip(step.x).zip(matrix.chunks_exact(ld.max(1))) {
-                *offset = x - dot(column, here);
-            }
+            let (columns, point) = ([step.dx, step.du], part(v, k * ld, ld));
+            Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
             watch(k, step);
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             objective = objective + value;
@@ -325,18 +323,6 @@ pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     let [a0, a1, a2, a3] = sums;
     let sum = (a0 + a1) + (a2 + a3);
     rest.iter().zip(more).fold(sum, |sum, (&a, &b)| sum + a * b)
-}
-
-/// `[A B]ᵀ`: a column for each next state.
-#[inline(always)]
-fn write_dynamics<T: Real>(matrix: &mut [T], ld: usize, nx: usize, step: &Step<'_, T>) {
-    let columns = step.dx.chunks_exact(nx.max(1)).chain(step.du.chunks_exact(nx.max(1)));
-    for (j, column) in columns.enumerate() {
-        let targets = matrix.get_mut(j..).unwrap_or_default().iter_mut().step_by(ld.max(1));
-        for (target, &value) in targets.zip(column) {
-            *target = value;
-        }
-    }
 }
 
 /// Adds blocks `xx`, `xu`, `uu`, column after column, to the lower triangle.

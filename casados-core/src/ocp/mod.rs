@@ -55,6 +55,7 @@ mod sensitivities;
 mod shooting;
 mod single;
 mod sqp;
+mod transfer;
 
 pub use constraint::{Constraint, Constraints};
 pub use convexify::Convexification;

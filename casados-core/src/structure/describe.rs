@@ -159,13 +159,13 @@ impl Structure {
     }
 
     fn elimination(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Elimination { pivots, slots, assembly, slot_of_equation, .. } = self.elimination;
+        let Elimination { pivots, slots, slot_of_equation, .. } = self.elimination;
         title(f, "elimination")?;
         if pivots.is_empty() {
             return writeln!(f, "no plan: the whole matrix is pivoted");
         }
         let identities = pivots.iter().filter(|pivot| pivot.identity).count();
-        let fill = assembly.iter().filter(|block| block.is_fill()).count();
+        let fill = self.elimination.fill();
         writeln!(
             f,
             "{} blocks = {} non-zeros + {fill} fill; {identities} of {} pivots are identities",

@@ -12,7 +12,7 @@ pub struct Elimination {
     pub slots: &'static [u32],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
     pub updates: &'static [u32],
-    /// For each block what it is made of before elimination, those of a kind one after the other.
+    /// For each block what it is made of before elimination, those of a kind one after the other, fill first.
     pub assembly: &'static [Assembly],
     /// For each equation its slot.
     pub slot_of_equation: &'static [u32],
@@ -22,6 +22,16 @@ impl Elimination {
     /// No plan: the matrix is eliminated as a dense one.
     pub const NONE: Self =
         Self { pivots: &[], slots: &[], updates: &[], assembly: &[], slot_of_equation: &[] };
+
+    /// How many blocks are fill.
+    #[must_use]
+    pub const fn fill(&self) -> usize {
+        let mut count = 0;
+        while count < self.assembly.len() && self.assembly[count].is_fill() {
+            count += 1;
+        }
+        count
+    }
 
     /// How many products of `s×s` blocks the updates of a factorisation cost; a block with scaled rows is a fraction of one.
     pub(crate) const fn products(&self, s: f64) -> f64 {
