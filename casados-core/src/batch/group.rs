@@ -184,7 +184,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             pass.forward(forward, n, count, None, None)
         });
         forward.result.forward.nominal = pass.work.result;
-        let good = E::and(good, forward.finite.is_finite());
+        let good = E::and(good, forward.finite[0].is_finite());
         if adjoint {
             forward.multiply(Heap::nominal(&mut self.lambda)?.as_ref());
         }
@@ -246,7 +246,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             hessian.curvature(work, coefficients, n, step);
             hessian.subtract(record, n + 1 == count);
         }
-        let finite = hessian.collect(None) + forward.finite;
+        let finite = hessian.collect(None) + forward.finite[0];
         Ok((E::and(good, finite.is_finite()), &hessian.result))
     }
 }

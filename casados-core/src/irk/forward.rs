@@ -32,7 +32,7 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) dense: DenseForward<M, T>,
     pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
     /// Zero if all derivatives that were written are finite, else NaN.
-    pub(crate) finite: T,
+    pub(crate) finite: [T; 1],
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
@@ -60,7 +60,7 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
         count: usize,
         elsewhere: Option<&mut Forward<M, E>>,
     ) {
-        let Self { result: ForwardAdjoint { forward, .. }, sweep, finite, .. } = self;
+        let Self { result: ForwardAdjoint { forward, .. }, sweep, finite: [finite], .. } = self;
         let forward = elsewhere.unwrap_or(forward);
         if n == 0 {
             let to = &mut Split::<M, _>::new(&mut forward.dz0_dx0, &mut forward.dz0_du, &mut forward.dz0_dp);
@@ -81,6 +81,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
     ///
     /// # Errors
     /// [`Error::Singular`]
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn step<F: Fallback, const REFINED: bool>(
         &mut self,
         work: &mut Work<M, T, S, F>,
@@ -133,7 +134,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         let forward = elsewhere.unwrap_or(&mut self.result.forward);
         forward.nominal = work.result;
         // Only where one is not finite it is looked for.
-        if self.finite.is_finite() { Ok(()) } else { check_result(forward, step) }
+        if self.finite[0].is_finite() { Ok(()) } else { check_result(forward, step) }
     }
 }
 
