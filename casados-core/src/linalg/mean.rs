@@ -4,7 +4,7 @@ use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
-use super::straight::{AtRow, each_row};
+use super::straight::{AtRow, each_row, is_short};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Plain};
@@ -66,7 +66,19 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        each_row::<A, _>(&mut self);
+        if const { is_short::<A, Self>() } {
+            each_row::<A, _>(&mut self);
+            return;
+        }
+        let fill = const { M::STRUCTURE.elimination.fill() };
+        for entry in M::STRUCTURE.elimination.assembly.iter().take(fill) {
+            if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
+                *block = [[Complex::zero()]];
+            }
+        }
+        for row in fill..Self::ROWS {
+            self.at::<A>(row);
+        }
     }
 }
 
