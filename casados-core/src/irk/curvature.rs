@@ -198,8 +198,7 @@ fn tiles<
         for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row + t * ROWS)) {
             let (columns, _) = sum.as_mut().get_mut(column..).unwrap_or_default().as_chunks_mut::<W>();
             let Some(columns) = columns.first_chunk_mut::<P>() else { continue };
-            let (columns, tile) = (columns.as_flattened_mut().iter_mut(), tile.as_flattened());
-            for (sum, &tile) in columns.zip(tile) {
+            for (sum, &tile) in columns.as_flattened_mut().iter_mut().zip(tile.as_flattened()) {
                 *sum = *sum - tile;
             }
         }

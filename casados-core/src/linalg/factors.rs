@@ -4,7 +4,7 @@ use super::block::Block;
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
-use super::straight::{AtRow, each_row, is_short};
+use super::straight::{AtRow, each_row};
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes, Real};
@@ -116,24 +116,13 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
                 column[i] = -(*h * a);
             }
         }
-        if const { is_short::<A, Self>() } {
-            each_row::<A, _>(&mut self);
-            return;
-        }
-        let fill = const { M::STRUCTURE.elimination.fill() };
-        for entry in M::STRUCTURE.elimination.assembly.iter().take(fill) {
-            if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
-                *block = [[E::from_f64(0.0); S]; S];
-            }
-        }
-        for row in fill..Self::ROWS {
-            self.at::<A>(row);
-        }
+        each_row::<A, _>(&mut self);
     }
 }
 
 impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
@@ -158,6 +147,14 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
             }
         }
         *to = block;
+    }
+    /// Fill.
+    #[inline(always)]
+    fn simple(&mut self, row: usize) {
+        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
+            *block = [[E::from_f64(0.0); S]; S];
+        }
     }
 }
 

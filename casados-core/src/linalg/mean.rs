@@ -4,7 +4,7 @@ use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
-use super::straight::{AtRow, each_row, is_short};
+use super::straight::{AtRow, each_row};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Plain};
@@ -66,24 +66,13 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        if const { is_short::<A, Self>() } {
-            each_row::<A, _>(&mut self);
-            return;
-        }
-        let fill = const { M::STRUCTURE.elimination.fill() };
-        for entry in M::STRUCTURE.elimination.assembly.iter().take(fill) {
-            if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
-                *block = [[Complex::zero()]];
-            }
-        }
-        for row in fill..Self::ROWS {
-            self.at::<A>(row);
-        }
+        each_row::<A, _>(&mut self);
     }
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_, M, E, S, L> {
     const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { L } else { L.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
@@ -102,6 +91,14 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_
             }
         }
         *to = element;
+    }
+    /// Fill.
+    #[inline(always)]
+    fn simple(&mut self, row: usize) {
+        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
+            *block = [[Complex::zero()]];
+        }
     }
 }
 

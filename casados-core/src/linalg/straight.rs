@@ -21,6 +21,11 @@ pub trait AtRow {
     const INSTRUCTIONS: usize;
     /// To be `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, row: usize);
+    /// So many of the first rows need only what [`simple`](Self::simple) does.
+    const SIMPLE: usize = 0;
+    /// What a loop does with these instead, without branches. To be `#[inline(always)]`.
+    #[inline(always)]
+    fn simple(&mut self, _row: usize) {}
 }
 
 /// So many rows are left to the optimiser to unroll.
@@ -70,7 +75,10 @@ pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
         rows_in_line::<A, V>(visit);
         return;
     }
-    for row in 0..V::ROWS {
+    for row in 0..V::SIMPLE {
+        visit.simple(row);
+    }
+    for row in V::SIMPLE..V::ROWS {
         visit.at::<A>(row);
     }
 }
