@@ -1,16 +1,16 @@
 //! Elementary functions in pairs: two arguments at once take hardly longer than one in registers that have room for both.
 
-use super::chunk::{computed, read};
+use super::chunk::computed;
 use super::schedule::{Step, Values};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, VecDeque};
 
 /// So many statements a function may come earlier than it would, to be one of a pair: what waits for its use in the
 /// meantime takes registers.
 const REACH: usize = 500;
 
 /// An elementary function that is worth being one of a pair.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Function {
     /// Of one argument.
     Unary(Unary),
@@ -45,11 +45,20 @@ pub fn function_of(graph: &Graph, (node, other): Values) -> Option<Function> {
     function(graph, step).map(|(function, _)| function)
 }
 
-/// The same statements, elementary functions with the next one of their kind that does not wait for them: what that one
-/// waits for comes before both.
+/// The same statements, elementary functions with the next one of their kind and level: what that one waits for comes before
+/// both. The level of a value is the most elementary functions that are one within the other in it, so that none of a level waits
+/// for another.
 pub fn in_pairs(graph: &Graph, steps: &[Step]) -> Vec<Step> {
     let mut position = HashMap::new();
+    let mut levels = vec![0u32; steps.len()];
+    let mut waiting: HashMap<(Function, u32), VecDeque<usize>> = HashMap::new();
     for (index, &step) in steps.iter().enumerate() {
+        let operands = operands(graph, step).filter_map(|node| position.get(&node).copied());
+        levels[index] = operands.map(|at: usize| levels[at]).max().unwrap_or(0);
+        if let Some((kind, _)) = function(graph, step) {
+            levels[index] += 1;
+            waiting.entry((kind, levels[index])).or_default().push_back(index);
+        }
         position.extend(computed(step).map(|node| (node, index)));
     }
     let mut list = Vec::with_capacity(steps.len());
@@ -59,53 +68,38 @@ pub fn in_pairs(graph: &Graph, steps: &[Step]) -> Vec<Step> {
             continue;
         }
         done[index] = true;
-        let Some((kind, values)) = function(graph, step) else {
+        let others = function(graph, step).and_then(|(kind, _)| waiting.get_mut(&(kind, levels[index])));
+        let partner = others.and_then(|others| {
+            while others.front().is_some_and(|&other| done[other]) {
+                others.pop_front();
+            }
+            let is_near = others.front().is_some_and(|&other| other - index < REACH);
+            if is_near { others.pop_front() } else { None }
+        });
+        let (Some(other), Some((_, values))) = (partner, function(graph, step)) else {
             list.push(step);
             continue;
         };
-        let partner =
-            (index + 1..steps.len().min(index + REACH)).filter(|&other| !done[other]).find_map(|other| {
-                let (_, others) = function(graph, steps[other]).filter(|(other, _)| *other == kind)?;
-                let first = first_of(graph, steps, &position, &done, index, other)?;
-                Some((other, others, first))
-            });
-        let Some((other, others, first)) = partner else {
-            list.push(step);
-            continue;
-        };
-        for index in first {
-            done[index] = true;
-            list.push(steps[index]);
+        // What the other one waits for.
+        let mut first = BTreeSet::new();
+        let mut stack = vec![other];
+        while let Some(at) = stack.pop() {
+            let before = operands(graph, steps[at]).filter_map(|node| position.get(&node).copied());
+            stack.extend(before.filter(|&at| !done[at] && first.insert(at)));
+        }
+        for at in first {
+            done[at] = true;
+            list.push(steps[at]);
         }
         done[other] = true;
-        list.push(Step::Both([values, others]));
+        list.extend(function(graph, steps[other]).map(|(_, others)| Step::Both([values, others])));
     }
     list
 }
 
-/// The statements that another one waits for; none if that is the one at `index`.
-fn first_of(
-    graph: &Graph,
-    steps: &[Step],
-    position: &HashMap<Node, usize>,
-    done: &[bool],
-    index: usize,
-    other: usize,
-) -> Option<BTreeSet<usize>> {
-    let mut first = BTreeSet::new();
-    let mut stack = vec![other];
-    while let Some(step) = stack.pop() {
-        for node in read(graph, &[], steps[step]) {
-            let Some(&at) = position.get(&node) else { continue };
-            if at == index {
-                return None;
-            }
-            if !done[at] && first.insert(at) {
-                stack.push(at);
-            }
-        }
-    }
-    Some(first)
+/// What a statement that computes something reads.
+fn operands(graph: &Graph, step: Step) -> impl Iterator<Item = Node> {
+    computed(step).take(1).flat_map(|node| graph.op(node).operands())
 }
 
 #[cfg(test)]
@@ -144,5 +138,17 @@ mod tests {
         let sums = [0, 1].map(|k| g.binary(Binary::Add, s[k], c[k]));
         let pair = Step::Both([(s[0], Some(c[0])), (s[1], Some(c[1]))]);
         assert_eq!(check(&g, &sums)[0], pair);
+    }
+
+    #[test]
+    fn long_chains_take_no_longer_than_short_ones() {
+        let mut g = Graph::default();
+        let mut nodes = [g.variable(0), g.variable(1)];
+        for _ in 0..20_000 {
+            nodes = nodes.map(|node| g.unary(Unary::Atan, node));
+        }
+        let sum = g.binary(Binary::Add, nodes[0], nodes[1]);
+        // Depth first the second chain begins where the first one ends, out of reach.
+        assert!(!check(&g, &[sum]).iter().any(|step| matches!(step, Step::Both(_))));
     }
 }
