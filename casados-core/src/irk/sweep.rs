@@ -1,12 +1,11 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to `V_{n+1}`, and to what second
 //! derivatives need of both.
 
-use super::directions::{Directions, panel, panel_mut, panel_of, panels, weight};
-use super::evaluate::entry;
+use super::directions::{Directions, panel, panel_mut, panels, weight};
 use super::record::{Coefficients, Work, copy};
+use super::right_side::{Inputs, Later, Scatter, place};
 use crate::linalg::{
-    Arithmetic, AtRow, Kernel, Packet, Planned, dispatch, each_row, is_long, is_short, slot, solve_packets,
-    solve_two,
+    Arithmetic, Kernel, Packet, Planned, dispatch, each_row, is_long, is_short, solve_packets, solve_two,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -401,150 +400,6 @@ fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     }
     for ((strand, &weight), &element) in strands.iter_mut().zip(last_weights).zip(last) {
         *strand = A::subtract(*strand, weight, element);
-    }
-}
-
-/// `−(f_x,i V_0 + f_w,i)`, where every direction is an element of `w`: entries of the Jacobian go to their places in all panels.
-struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    dy: &'a mut [E],
-    directions: PhantomData<D>,
-}
-
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
-    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
-    const INSTRUCTIONS: usize = 3 * S;
-    #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, row: usize) {
-        let nk = M::Shape::NK;
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let Some(column) = direction::<M, E, D>(c) else { return };
-        let (begin, width) = panel_of::<E>(column, D::COUNT);
-        let place = begin * nk * S + slot::<M>(r) * S * width + (column - begin);
-        for (stage, &value) in values.iter().enumerate() {
-            if let Some(to) = self.dy.get_mut(place + stage * width) {
-                *to = *to - value;
-            }
-        }
-    }
-}
-
-/// The same of a panel that begins with a column: entries column by column, from one of them on. Where the next panel begins.
-#[inline(always)]
-fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
-    jacobian: &M::Jacobian<[E; S]>,
-    mut placed: usize,
-    dy: &mut [Packet<E, S, W>],
-    begin: usize,
-) -> usize {
-    while let Some(&index) = M::STRUCTURE.by_column.get(placed) {
-        let Some((r, c, values)) = entry::<M, _>(jacobian, index as usize) else { break };
-        if let Some(column) = direction::<M, E, D>(c) {
-            if column >= begin + W {
-                break;
-            }
-            if let Some(packet) = dy.get_mut(slot::<M>(r)) {
-                for (row, &value) in packet.iter_mut().zip(values) {
-                    if let Some(to) = row.get_mut(column - begin) {
-                        *to = *to - value;
-                    }
-                }
-            }
-        }
-        placed += 1;
-    }
-    placed
-}
-
-/// The direction that a variable other than `ẋ` is, if it is one.
-#[inline(always)]
-fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
-    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-    if variable < 2 * nx {
-        D::column(variable - nx)
-    } else if variable < 2 * nx + nz {
-        None
-    } else {
-        D::column(variable - nx - nz)
-    }
-}
-
-/// `−f_x,i V_n` of a panel.
-struct Later<'a, M: Dae, E: Plain, const S: usize, const W: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    v: &'a [[E; W]],
-    dy: &'a mut [Packet<E, S, W>],
-}
-
-impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
-    #[inline(always)]
-    fn all<A: Arithmetic>(mut self) {
-        if const { is_short::<A, Self>() } {
-            each_row::<A, _>(&mut self);
-            return;
-        }
-        // Row by row, each in registers.
-        let (mut packet, mut last) = ([[E::from_f64(0.0); W]; S], None);
-        for row in 0..Self::ROWS {
-            let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else {
-                return;
-            };
-            if last != Some(r) {
-                self.put(last, &packet);
-                (packet, last) = ([[E::from_f64(0.0); W]; S], Some(r));
-            }
-            let Some(v) = self.v.get(c - M::Shape::NX) else { return };
-            for (row, &value) in packet.iter_mut().zip(values) {
-                A::subtract_row(row, value, v);
-            }
-        }
-        self.put(last, &packet);
-    }
-
-    /// The row of an equation.
-    #[inline(always)]
-    fn put(&mut self, equation: Option<usize>, packet: &Packet<E, S, W>) {
-        if let Some(to) = equation.and_then(|r| self.dy.get_mut(slot::<M>(r))) {
-            *to = *packet;
-        }
-    }
-}
-
-impl<M: Dae, E: Lanes, const S: usize, const W: usize> AtRow for Later<'_, M, E, S, W> {
-    const ROWS: usize = M::STRUCTURE.blocks[2] - M::STRUCTURE.blocks[1];
-    const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
-    #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let (Some(packet), Some(v)) = (self.dy.get_mut(slot::<M>(r)), self.v.get(c - M::Shape::NX)) else {
-            return;
-        };
-        for (row, &value) in packet.iter_mut().zip(values) {
-            A::subtract_row(row, value, v);
-        }
-    }
-}
-
-/// `−f_w,i` of a panel, of controls and parameters.
-struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    directions: &'a D,
-    dy: &'a mut [Packet<E, S, W>],
-    column: usize,
-}
-
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Inputs<'_, M, E, D, S, W> {
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[3];
-    const INSTRUCTIONS: usize = 4 + 2 * S;
-    #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, row: usize) {
-        let shift = M::Shape::NX + M::Shape::NZ;
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row) else { return };
-        let Some(packet) = self.dy.get_mut(slot::<M>(r)) else { return };
-        for (row, &value) in packet.iter_mut().zip(values) {
-            self.directions.add(c - shift, -value, self.column, row);
-        }
     }
 }
 
