@@ -181,10 +181,9 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let count = pass.steps.len();
         let good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
-            pass.forward(forward, n, count, None, None)
+            pass.forward(forward, n, count, None)
         });
-        forward.result.forward.nominal = pass.work.result;
-        let good = E::and(good, forward.finite[0].is_finite());
+        let good = E::and(good, forward.write(&pass.work.result, None).is_finite());
         if adjoint {
             forward.multiply(Heap::nominal(&mut self.lambda)?.as_ref());
         }
@@ -226,15 +225,14 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let mut good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
             let Some(record) = records.get_mut(n) else { return yes::<E>() };
-            let first = Some(&mut hessian.result.first.forward);
-            let good = pass.forward(forward, n, count, Some(record.curved()), first);
+            let good = pass.forward(forward, n, count, Some(record.curved()));
             // That of the last step is still there on the way back.
             if n + 1 < count {
                 record.record(pass.work);
             }
             good
         });
-        hessian.result.first.forward.nominal = pass.work.result;
+        let finite = forward.write(&pass.work.result, Some(&mut hessian.result.first.forward));
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref());
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
@@ -246,7 +244,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             hessian.curvature(work, coefficients, n, step);
             hessian.subtract(record, n + 1 == count);
         }
-        let finite = hessian.collect(None) + forward.finite[0];
+        let finite = hessian.collect(None) + finite;
         Ok((E::and(good, finite.is_finite()), &hessian.result))
     }
 }
@@ -286,10 +284,9 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
         n: usize,
         count: usize,
         curved: Option<&mut [E]>,
-        elsewhere: Option<&mut Forward<M, E>>,
     ) -> E::Mask {
         let good = forward.advance(self.work, self.coefficients, n, curved);
-        forward.collect(self.coefficients, n, count, elsewhere);
+        forward.collect(self.coefficients, n, count);
         good
     }
 }

@@ -17,7 +17,7 @@ use crate::memory::Fallback;
 #[cfg(feature = "alloc")]
 use crate::model::ArrayX;
 use crate::model::{ArrayW, Dae, NO_COLUMN};
-use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
+use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Nominal, Seeds};
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape};
 use crate::statistics::Statistics;
@@ -31,7 +31,7 @@ pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: ForwardAdjoint<M, T>,
     pub(crate) dense: DenseForward<M, T>,
     pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
-    /// Zero if all derivatives that were written are finite, else NaN.
+    /// Zero if all derivatives of `z` are finite, else NaN.
     pub(crate) finite: [T; 1],
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
@@ -52,27 +52,38 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
         self.sweep.step(work, coefficients, directions, n == 0, curved)
     }
 
-    /// What a step contributes to the result: to that of this memory, or to one `elsewhere`.
-    pub(crate) fn collect(
-        &mut self,
-        coefficients: &Coefficients<E, S>,
-        n: usize,
-        count: usize,
-        elsewhere: Option<&mut Forward<M, E>>,
-    ) {
+    /// What a step contributes to derivatives of `z`.
+    pub(crate) fn collect(&mut self, coefficients: &Coefficients<E, S>, n: usize, count: usize) {
         let Self { result: ForwardAdjoint { forward, .. }, sweep, finite: [finite], .. } = self;
-        let forward = elsewhere.unwrap_or(forward);
         if n == 0 {
             let to = &mut Split::<M, _>::new(&mut forward.dz0_dx0, &mut forward.dz0_du, &mut forward.dz0_dp);
             *finite = sweep.write_algebraic::<Identity<M>>(&coefficients.start, to);
         }
         if n + 1 == count {
             let to = &mut Split::<M, _>::new(&mut forward.dz_dx0, &mut forward.dz_du, &mut forward.dz_dp);
-            let of_z = sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
-            let to = &mut Split::<M, _>::new(&mut forward.dx_dx0, &mut forward.dx_du, &mut forward.dx_dp);
-            to.fill_others();
-            *finite = *finite + of_z + sweep.write_end::<Identity<M>>(to);
+            *finite = *finite + sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
         }
+    }
+
+    /// The result, after the last step: that of this memory, or one `elsewhere`. Zero if all derivatives are finite, else NaN.
+    pub(crate) fn write(&mut self, nominal: &Nominal<M, E>, elsewhere: Option<&mut Forward<M, E>>) -> E {
+        let Self { result: ForwardAdjoint { forward: own, .. }, sweep, finite: [finite], .. } = self;
+        let forward = match elsewhere {
+            Some(forward) => {
+                forward.dz_dx0 = own.dz_dx0;
+                forward.dz_du = own.dz_du;
+                forward.dz_dp = own.dz_dp;
+                forward.dz0_dx0 = own.dz0_dx0;
+                forward.dz0_du = own.dz0_du;
+                forward.dz0_dp = own.dz0_dp;
+                forward
+            }
+            None => own,
+        };
+        forward.nominal = *nominal;
+        let to = &mut Split::<M, _>::new(&mut forward.dx_dx0, &mut forward.dx_du, &mut forward.dx_dp);
+        to.fill_others();
+        *finite + sweep.write_end::<Identity<M>>(to)
     }
 }
 
@@ -90,7 +101,6 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         count: usize,
         statistics: &mut Statistics,
         mut curved: Option<&mut [T]>,
-        elsewhere: Option<&mut Forward<M, T>>,
     ) -> Result<(), Error> {
         let good = self.advance(work, coefficients, n, curved.as_deref_mut());
         if !good && work.linear.factors.is_planned() {
@@ -100,7 +110,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         if const { REFINED } {
             self.sweep.refine(work, coefficients, &Identity::<M>::ALL, n == 0);
         }
-        self.collect(coefficients, n, count, elsewhere);
+        self.collect(coefficients, n, count);
         Ok(())
     }
 
@@ -123,18 +133,22 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         self.sweep.write_slopes::<Identity<M>>(weights, &mut Rows::<M, T> { rows: to });
     }
 
+    /// Writes the result to that of this memory, or to one `elsewhere`.
+    ///
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish<F: Fallback>(
+    pub(crate) fn finish(
         &mut self,
-        work: &Work<M, T, S, F>,
+        nominal: &Nominal<M, T>,
         step: usize,
-        elsewhere: Option<&mut Forward<M, T>>,
+        mut elsewhere: Option<&mut Forward<M, T>>,
     ) -> Result<(), Error> {
-        let forward = elsewhere.unwrap_or(&mut self.result.forward);
-        forward.nominal = work.result;
+        let finite = self.write(nominal, elsewhere.as_deref_mut());
         // Only where one is not finite it is looked for.
-        if self.finite[0].is_finite() { Ok(()) } else { check_result(forward, step) }
+        if finite.is_finite() {
+            return Ok(());
+        }
+        check_result(elsewhere.unwrap_or(&mut self.result.forward), step)
     }
 }
 

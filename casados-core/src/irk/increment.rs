@@ -32,6 +32,31 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
     }
 }
 
+/// The largest residual, of what is a number.
+pub(super) struct Largest<'a, E> {
+    pub residual: &'a [E],
+}
+
+impl<E: Lanes> Kernel for Largest<'_, E> {
+    type Number = E;
+    type Output = E;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E {
+        let mut largest = [E::from_f64(0.0); 8];
+        let (eights, rest) = self.residual.as_chunks::<8>();
+        for residuals in eights {
+            for (largest, residual) in largest.iter_mut().zip(residuals) {
+                *largest = residual.abs().max(*largest);
+            }
+        }
+        for (largest, residual) in largest.iter_mut().zip(rest) {
+            *largest = residual.abs().max(*largest);
+        }
+        let [a, b, c, d, e, f, g, h] = largest;
+        (a.max(b).max(c.max(d))).max(e.max(f).max(g.max(h)))
+    }
+}
+
 /// `y ← y − Δ`
 pub(super) struct Subtract<'a, E, const S: usize> {
     pub y: &'a mut [[E; S]],

@@ -343,21 +343,13 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            forward.step::<_, REFINED>(
-                parts.work,
-                parts.coefficients,
-                n,
-                count,
-                parts.statistics,
-                None,
-                None,
-            )?;
+            forward.step::<_, REFINED>(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
             match &mut along {
                 Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
                 None => Ok(()),
             }
         })?;
-        forward.finish(parts.work, count - 1, None)?;
+        forward.finish(&parts.work.result, count - 1, None)?;
         finish(&mut along)?;
         if let Some(lambda) = lambda {
             forward.gradient(lambda)?;
@@ -413,7 +405,6 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
                 n,
                 usize::MAX,
                 parts.statistics,
-                None,
                 None,
             )?;
         }
@@ -620,16 +611,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };
             let curved = Some(record.curved());
-            let first = Some(&mut memory.result.first.forward);
-            forward.step::<_, false>(
-                parts.work,
-                parts.coefficients,
-                n,
-                count,
-                parts.statistics,
-                curved,
-                first,
-            )?;
+            forward.step::<_, false>(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
@@ -639,7 +621,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             }
             Ok(())
         })?;
-        forward.finish(parts.work, count - 1, Some(&mut memory.result.first.forward))?;
+        forward.finish(&parts.work.result, count - 1, Some(&mut memory.result.first.forward))?;
         finish(&mut along)?;
         memory.run(
             parts.work,

@@ -15,7 +15,8 @@
 //! by which an increment could be small.)
 //!
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
-//! values is kept as long as the iterations that are still expected with it cost less than a new one. A new one, with
+//! values is kept as long as the iterations that are still expected with it cost less than a new one. How many that are is known from
+//! two increments; of the first one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new one, with
 //! three stages or more, is the mean of those of the stages, whose system is solved in the eigenbasis of the tableau: it
 //! costs a fraction of one with a Jacobian for each stage.
 //!
@@ -23,7 +24,7 @@
 //!
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
-use super::increment::{Measure, PlaceResidual, Subtract, Update};
+use super::increment::{Largest, Measure, PlaceResidual, Subtract, Update};
 use super::progress::{Look, Progress, Verdict};
 use super::record::{Coefficients, Work};
 use crate::linalg::dispatch;
@@ -32,6 +33,7 @@ use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
 use crate::scalar::Lanes;
 use crate::statistics::Statistics;
+use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 1.0;
@@ -66,6 +68,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let jacobian = operations.residual_jacobian as f64;
         let (updates, means) = (plan.products(s) + inverses, plan.products(1.0) + inverses);
         [(jacobian + updates * s * s) / iteration, (jacobian + means * 4.0) / iteration]
+    };
+
+    /// The cost of a residual, in iterations.
+    const RESIDUAL: f64 = {
+        let operations = M::STRUCTURE.operations.residual as f64;
+        operations / (operations + M::STRUCTURE.elimination.slots.len() as f64 * S as f64 + 1.0)
     };
 
     /// Whether factors by blocks cost no more than the iterations that they save where start values are near: with mean Jacobians, which are
@@ -124,6 +132,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             // Of linear equations every step has one matrix, which may be that of all steps.
             full || exact || !(adaptive && self.validity.factors)
         };
+        // Whether the residual that the first increment leaves is asked how good its Jacobian is.
+        let ask = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
+        let mut first = E::from_f64(0.0);
         let mut iteration = 0;
         loop {
             self.place(coefficients, step, x, y);
@@ -132,20 +143,26 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             if compensate {
                 self.place_compensated(coefficients, x, y);
             }
-            if renew {
+            let asked = ask && iteration == 1;
+            if asked || !renew {
+                statistics.residuals += 1;
+                self.evaluate_residual();
+            }
+            let early = asked && self.leaves_much(first, tolerance, basis.is_some());
+            if renew || early {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
                 self.evaluate_jacobian();
                 // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
                 mean = basis.is_some() && !near && (simplified || renewals < MEANS);
-                renewals += 1;
+                renewals += usize::from(renew);
                 match (basis, self.mean.get_mut()) {
                     (Some(basis), Some(factors)) if mean => factors.factor(&self.linear.jacobian, basis, h),
                     _ => self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h),
                 }
-            } else {
-                statistics.residuals += 1;
-                self.evaluate_residual();
+            }
+            if ask && iteration == 0 {
+                first = dispatch(Largest { residual: self.f.as_ref().as_flattened() });
             }
             if compensate {
                 self.correct_residual();
@@ -157,7 +174,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                     return Solved { converged: satisfied, exact: true };
                 }
             }
-            if !exact && iteration > 1 && verdict.stuck {
+            // The first increments of what begins far away may grow.
+            if !exact && iteration > 2 && verdict.stuck {
                 progress.accept(self.is_satisfied());
                 if !E::any(progress.active) {
                     return self.solved(&progress, mean);
@@ -207,7 +225,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
             // New factors take two more iterations themselves.
             let expensive = 2.0 + Self::RENEWAL[usize::from(cheap)];
-            renew = !exact && (full || adaptive && !near && verdict.remaining > expensive);
+            let slow = verdict.remaining > expensive && (!early || verdict.grows);
+            renew = !exact && (full || adaptive && !near && slow);
         }
     }
 }
@@ -248,6 +267,24 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let zero = E::from_f64(0.0);
         Solved { converged: E::le(zero, zero), exact: false }
+    }
+
+    /// Whether the residual that an increment leaves, of the `first` one, lets so many iterations be expected that new factors cost less.
+    /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well.
+    fn leaves_much(&self, first: E, tolerance: f64, cheap: bool) -> bool {
+        let left = dispatch(Largest { residual: self.f.as_ref().as_flattened() }) / first;
+        let expensive = 2.0 + Self::RESIDUAL + Self::RENEWAL[usize::from(cheap)];
+        let mut cell: E::Cell = Zeroable::zeroed();
+        left.store(&mut cell);
+        let slowest = (0..E::LANES)
+            .map(|lane| E::lane(&cell, lane))
+            .filter(|&left| left < 1.0 / 16.0)
+            .fold(0.0, f64::max);
+        let (mut expected, mut remaining) = (1.0, 0.0);
+        while expected > tolerance && remaining <= expensive {
+            (expected, remaining) = (expected * slowest, remaining + 1.0);
+        }
+        remaining > expensive
     }
 
     /// The residual in the slots of the equations.

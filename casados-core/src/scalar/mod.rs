@@ -241,7 +241,7 @@ pub trait Scalar: Field {
     fn powi(self, n: i32) -> Self;
     /// `aᵇ`
     fn powf(self, other: Self) -> Self;
-    /// An elementary function of two arguments that do not wait for each other: in one register, where there is one that is twice as wide.
+    /// An elementary function of two arguments that do not wait for each other: in one register where there is one that is twice as wide, else abreast.
     #[doc(hidden)]
     #[inline(always)]
     fn both<F: elementary::Elementary<K, R>, const K: usize, const R: usize>(

@@ -57,8 +57,30 @@ macro_rules! of_doubles {
     };
 }
 
+/// Two elementary functions of registers that no register is twice as wide as: the processor works on both while each waits for itself.
+#[cfg(target_arch = "x86_64")]
+macro_rules! abreast {
+    ($name:ident, $ops:ident, $a:ident, $b:ident) => {{
+        let four = [$a[0], $a[K - 1], $b[0], $b[K - 1]].map(|a| whole!($name, $ops, a));
+        let [first, second] = $ops::enter_with_four::<Abreast<F, K, R>, _>(four);
+        [first.map(|a| Self(a.0)), second.map(|a| Self(a.0))]
+    }};
+}
+
+/// The elementary functions of doubles in registers of eight, two of them abreast.
+#[cfg(target_arch = "x86_64")]
+macro_rules! of_eights {
+    ($name:ident, $ops:ident: $($functions:tt)*) => {
+        of_doubles!($name, $ops: $($functions)*);
+        #[inline(always)]
+        fn both<F: Elementary<K, R>, const K: usize, const R: usize>(a: [Self; K], b: [Self; K]) -> [[Self; R]; 2] {
+            abreast!($name, $ops, a, b)
+        }
+    };
+}
+
 /// The elementary functions of doubles, and two of them at once: in one register where each takes half of one, or where
-/// there are registers twice as wide.
+/// there are registers twice as wide; else abreast.
 #[cfg(target_arch = "x86_64")]
 macro_rules! of_fours {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
@@ -80,16 +102,31 @@ macro_rules! of_fours {
             } else if level() == Level::Avx512 {
                 let four = [a[0], a[K - 1], b[0], b[K - 1]].map(|a| whole!($name, $ops, a));
                 let [first, second] = avx512_f64::enter_with_four::<Wider<F, K, R>, _>(four);
-                let mut results = [[Self($ops::splat(0.0)); R]; 2];
-                for r in 0..R {
-                    (results[0][r], results[1][r]) = (Self(first[r].0), Self(second[r].0));
-                }
-                results
+                [first.map(|a| Self(a.0)), second.map(|a| Self(a.0))]
             } else {
-                [F::of(a), F::of(b)]
+                abreast!($name, $ops, a, b)
             }
         }
     };
+}
+
+/// A function of two registers, of the first and the last argument of the one, then of the other.
+#[cfg(target_arch = "x86_64")]
+struct Abreast<F, const K: usize, const R: usize>(core::marker::PhantomData<F>);
+
+#[cfg(target_arch = "x86_64")]
+impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithFour<D>
+    for Abreast<F, K, R>
+{
+    type Output = [[D; R]; 2];
+    #[inline(always)]
+    fn call(first: D, last: D, other_first: D, other_last: D) -> Self::Output {
+        let (mut one, mut other) = ([first; K], [other_first; K]);
+        if K > 1 {
+            (one[K - 1], other[K - 1]) = (last, other_last);
+        }
+        [F::inside(one), F::inside(other)]
+    }
 }
 
 /// A function of two registers in one that is twice as wide: its first and last argument of the one, then of the other.
@@ -506,7 +543,7 @@ single!(F32x8, avx2_f32, F64x4);
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to eight `f64`, AVX-512.
-    F64x8, f64, avx512_f64, of_doubles
+    F64x8, f64, avx512_f64, of_eights
 }
 #[cfg(target_arch = "x86_64")]
 register! {

@@ -227,6 +227,7 @@ pub mod avx2_f64 {
     pub const FUSED: bool = true;
 
     enter!("avx2,fma");
+    enter_with_four!("avx2,fma");
     halves!(f64, sse2_f64, _mm256_castpd256_pd128, _mm256_extractf128_pd);
     memory!(f64, 4, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_setr_pd; 0 1 2 3);
     wrap! {
