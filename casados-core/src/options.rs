@@ -50,8 +50,8 @@ impl Default for Newton {
 pub enum Jacobian {
     /// That of the start values in the first step, that of the last step in later ones; evaluated and factorised anew as
     /// soon as the iterations that are still expected with it cost more (by the counts of operations in the model's
-    /// structure, and the rate at which increments shrink). With three stages or more a new one is `Simplified` up to
-    /// three times in a step. With a fixed number of iterations as `Full`.
+    /// structure, and the rate at which increments shrink, or after the first one the residual). With three stages or more a new one
+    /// is `Simplified` up to three times in a step. With a fixed number of iterations as `Full`.
     #[default]
     Auto,
     /// The mean of the stages' Jacobians, in the eigenbasis of the tableau; renewed as with `Auto`. Tableaux of one or two

@@ -38,7 +38,7 @@ pub trait Cost<S: Shape, T: Real> {
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         terms: &mut Terms<'_, T>,
     ) -> Result<T, OcpError>;
 
@@ -51,17 +51,20 @@ pub trait Cost<S: Shape, T: Real> {
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError>;
 }
 
 /// Where, how much, and whether the Hessian is to be exact.
 #[derive(Clone, Copy, Debug)]
-pub struct At<T> {
+pub struct At<'a, T> {
     pub(super) stage: usize,
     pub(super) factor: T,
     pub(super) exact: bool,
+    /// `(x, u)`, if the gradient is to be that of the quadratic model at zero: `∇f − H (x, u)` with the Hessian `H` that is added, which is
+    /// [convex](Cost::CONVEX). Else it is empty.
+    pub(super) from: &'a [T],
 }
 
 impl<S: Shape, T: Real> Cost<S, T> for () {
@@ -73,10 +76,16 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     fn value(&mut self, _: &S::ArrayV<T>, _: &[T], _: usize) -> Result<T, OcpError> {
         Ok(T::ZERO)
     }
-    fn add(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<T>, _: &mut Terms<'_, T>) -> Result<T, OcpError> {
+    fn add(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<'_, T>, _: &mut Terms<'_, T>) -> Result<T, OcpError> {
         Ok(T::ZERO)
     }
-    fn cross(&mut self, _: &S::ArrayV<T>, _: &[T], _: At<T>, _: &mut Cross<'_, T>) -> Result<(), OcpError> {
+    fn cross(
+        &mut self,
+        _: &S::ArrayV<T>,
+        _: &[T],
+        _: At<'_, T>,
+        _: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
         Ok(())
     }
 }
@@ -97,7 +106,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         terms: &mut Terms<'_, T>,
     ) -> Result<T, OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
@@ -107,7 +116,7 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
         &mut self,
         v: &S::ArrayV<T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();
@@ -166,22 +175,33 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
         for (y, &r) in y.as_mut().iter_mut().zip(reference) {
             *y = *y - r;
         }
-        let mut square = T::ZERO;
-        for (k, mu) in mu.as_mut().iter_mut().enumerate() {
-            *mu = if *coupled == 0 {
-                weights[(k, k)] * y[k]
-            } else {
-                let products = y.as_ref().iter().enumerate().map(|(l, y)| weights[(k, l)] * *y);
-                products.fold(T::ZERO, |sum, product| sum + product)
-            };
-            square = square + y[k] * *mu;
-        }
+        weigh::<F, T>(weights, *coupled, y, mu);
+        let products = y.as_ref().iter().zip(mu.as_ref()).map(|(y, mu)| *y * *mu);
+        let square = products.fold(T::ZERO, |sum, product| sum + product);
         let value = T::from_f64(0.5) * square;
         if value.is_finite() {
             return Ok(value);
         }
         let (output, value) = crate::irk::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
         Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+    }
+}
+
+/// `μ = W y`
+#[inline(always)]
+fn weigh<F: Function, T: Real>(
+    weights: &MatrixYY<F, T>,
+    coupled: usize,
+    y: &ArrayY<F, T>,
+    mu: &mut ArrayY<F, T>,
+) {
+    for (k, mu) in mu.as_mut().iter_mut().enumerate() {
+        *mu = if coupled == 0 {
+            weights[(k, k)] * y[k]
+        } else {
+            let products = y.as_ref().iter().enumerate().map(|(l, y)| weights[(k, l)] * *y);
+            products.fold(T::ZERO, |sum, product| sum + product)
+        };
     }
 }
 
@@ -255,26 +275,42 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         terms: &mut Terms<'_, T>,
     ) -> Result<T, OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         let value = self.square(reference, at.stage)?;
-        let Self { weights, coupled, mu, jacobian, hessian, .. } = self;
+        let Self { weights, coupled, y, mu, jacobian, hessian } = self;
         let jacobian = jacobian.as_ref();
-        for ((k, row), &mu) in Rows::new::<F>().enumerate().take(F::Outputs::NY).zip(mu.as_ref()) {
+        // `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)`
+        let moved = |y: T, row: [Range<usize>; 3]| {
+            entries::<F, T>(row, jacobian)
+                .fold(y, |y, (i, value)| y - value * at.from.get(i).copied().unwrap_or(T::ZERO))
+        };
+        if !at.from.is_empty() && *coupled != 0 {
+            for (y, row) in y.as_mut().iter_mut().zip(Rows::new::<F>()) {
+                *y = moved(*y, row);
+            }
+            weigh::<F, T>(weights, *coupled, y, mu);
+        }
+        for ((k, row), mu) in Rows::new::<F>().enumerate().take(F::Outputs::NY).zip(mu.as_ref()) {
+            let weight = at.factor * weights[(k, k)];
+            let slope = if !at.from.is_empty() && *coupled == 0 {
+                weight * moved(y[k], row.clone())
+            } else {
+                at.factor * *mu
+            };
             let row = entries::<F, T>(row, jacobian);
             for (i, value) in row.clone() {
-                terms.slope(i, at.factor * mu * value);
+                terms.slope(i, slope * value);
             }
-            let others = Rows::new::<F>().enumerate().take(F::Outputs::NY);
             if *coupled == 0 {
-                multiply(terms, at.factor * weights[(k, k)], row.clone(), row);
-            } else {
-                for (l, other) in others {
-                    let weight = at.factor * weights[(k, l)];
-                    multiply(terms, weight, row.clone(), entries::<F, T>(other, jacobian));
-                }
+                multiply(terms, weight, row.clone(), row);
+                continue;
+            }
+            for (l, other) in Rows::new::<F>().enumerate().take(F::Outputs::NY) {
+                let weight = at.factor * weights[(k, l)];
+                multiply(terms, weight, row.clone(), entries::<F, T>(other, jacobian));
             }
         }
         if at.exact && !F::STRUCTURE.hessian.is_empty() {
@@ -288,7 +324,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
@@ -378,7 +414,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
         &mut self,
         v: &ArrayV<F, T>,
         reference: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         terms: &mut Terms<'_, T>,
     ) -> Result<T, OcpError> {
         let value = self.value(v, reference, at.stage)?;
@@ -400,7 +436,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
         &mut self,
         v: &ArrayV<F, T>,
         _: &[T],
-        at: At<T>,
+        at: At<'_, T>,
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError> {
         if !F::STRUCTURE.hessian.is_empty() {

@@ -91,6 +91,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
         // Dynamics, all intervals in one call.
         let mut objective = T::ZERO;
+        // Whether Hessians are those of costs at nodes alone.
+        let mut plain = !C::EXACT;
         let mut stages = qp.stages_mut();
         let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
@@ -104,6 +106,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             watch(k, step);
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             objective = objective + value;
+            plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
             let mut terms = Terms { gradient, hessian, ld };
             for (i, &slope) in x.iter().chain(u).enumerate() {
                 terms.slope(i, slope);
@@ -114,6 +117,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         drop(stages);
 
         // Costs and constraints, stage by stage.
+        let is_direct = |k: usize, z: &[T]| {
+            let convex = if k < intervals { P::StageCost::CONVEX } else { P::TerminalCost::CONVEX };
+            plain && convex && z.is_empty()
+        };
+        let mut others = false;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
@@ -126,6 +134,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
             let mut direct = Terms { gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
+            let here = part(v, k * ld_of::<P::Shape, T>(), n);
+            let from = if is_direct(k, z) { here } else { &[] };
+            others |= from.is_empty();
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
             let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
@@ -145,13 +156,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
                 let factor = if *running { end - time } else { T::ONE };
                 let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
-                let place = At { stage: k, factor, exact: C::EXACT };
+                let place = At { stage: k, factor, exact: C::EXACT, from };
                 objective = objective + stage_cost.add(&point, reference, place, terms)?;
                 path.linearise(&point, values, slopes, ld_slopes, k)?;
             } else {
                 let begin = intervals * P::StageCost::REFERENCES;
                 let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
-                let place = At { stage: k, factor: T::ONE, exact: C::EXACT };
+                let place = At { stage: k, factor: T::ONE, exact: C::EXACT, from };
                 objective = objective + terminal_cost.add(&point, reference, place, terms)?;
                 terminal.linearise(&point, values, slopes, ld_slopes, k)?;
             }
@@ -171,7 +182,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
             }
             // Bounds of what is linear: `lg − g + [C D] v`.
-            let here = part(v, k * ld_of::<P::Shape, T>(), n);
             let upper = part_mut(rest, ld, count);
             for (row, (value, upper)) in values.iter_mut().zip(upper).enumerate() {
                 let column = part(columns, row * ld, n);
@@ -181,8 +191,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
 
-        // Gradients of what is quadratic: `∇f − H v`.
-        for (k, mut stage) in qp.stages_mut().enumerate() {
+        // Gradients of what is quadratic: `∇f − H v`, of the other stages.
+        for (k, mut stage) in qp.stages_mut().enumerate().take(if others { usize::MAX } else { 0 }) {
+            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
+            if is_direct(k, z) {
+                continue;
+            }
             let Arrays { n, ld: stage_ld, hessian, gradient, .. } = stage.arrays();
             let convex =
                 if k < intervals { P::StageCost::CONVEX } else { P::TerminalCost::CONVEX } && !C::EXACT;

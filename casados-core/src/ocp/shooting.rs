@@ -47,8 +47,8 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
         &mut self.batch
     }
 
-    /// Copies the intervals to where the batch takes them from.
-    fn take(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+    /// Copies the intervals to where the batch takes them from, and their multipliers if they are asked for.
+    fn take(&mut self, nodes: &Nodes<'_, T>, multipliers: bool) -> Result<(), OcpError> {
         let n = nodes.len();
         reserve(&mut self.x, n)?;
         reserve(&mut self.u, n)?;
@@ -64,7 +64,9 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
             }
             self.h.push(interval.h);
             self.t.push(interval.t);
-            self.lambda.push(vector(interval.multipliers));
+            if multipliers {
+                self.lambda.push(vector(interval.multipliers));
+            }
         }
         Ok(())
     }
@@ -103,7 +105,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
     const ALGEBRAIC: bool = true;
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes)?;
+        self.take(nodes, false)?;
         places(&mut self.nominal, nodes.len())?;
         let Self { batch, x, u, p, h, t, nominal, .. } = self;
         batch.solve(&Intervals { x0: x, u, p, h, t0: t }, nominal).map_err(failed)?;
@@ -114,7 +116,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
     }
 
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes)?;
+        self.take(nodes, false)?;
         places(&mut self.forward, nodes.len())?;
         let Self { batch, x, u, p, h, t, forward, .. } = self;
         batch.forward(&Intervals { x0: x, u, p, h, t0: t }, forward).map_err(failed)?;
@@ -127,7 +129,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
 
 impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Shooting<M, B, S, T> {
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        self.take(nodes)?;
+        self.take(nodes, true)?;
         places(&mut self.hessian, nodes.len())?;
         let Self { batch, x, u, p, h, t, lambda, hessian, .. } = self;
         batch.hessian(&Intervals { x0: x, u, p, h, t0: t }, lambda, hessian).map_err(failed)?;

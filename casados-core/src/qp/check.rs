@@ -66,6 +66,27 @@ fn finite<T: Real>(field: Field, stage: usize, index: usize, value: T) -> Result
 }
 
 fn check_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
+    if make_sense(bounds) { Ok(()) } else { find_bounds(field, stage, bounds) }
+}
+
+/// Whether all bounds and penalties make sense, without a branch for each.
+fn make_sense<T: Real>(bounds: &Bounds<'_, T>) -> bool {
+    let (infinity, zero) = (T::from_f64(f64::INFINITY), T::ZERO);
+    let mut good = true;
+    for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
+        good &= (lower <= upper) & (lower < infinity) & (upper > -infinity);
+    }
+    for (&lower, &upper) in bounds.lower_linear.iter().zip(bounds.upper_linear) {
+        good &= (lower >= zero) & (upper >= zero);
+    }
+    for (&lower, &upper) in bounds.lower_quadratic.iter().zip(bounds.upper_quadratic) {
+        good &= (lower >= zero) & (lower < infinity) & (upper >= zero) & (upper < infinity);
+    }
+    good
+}
+
+/// The first that does not.
+fn find_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
     let infinity = T::from_f64(f64::INFINITY);
     for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
         if lower <= upper && lower < infinity && upper > -infinity {

@@ -86,6 +86,8 @@ pub use statistics::{Residuals, Statistics};
 
 // What the optimal control problems write and read.
 pub(crate) use check::bounds as bound_residuals;
-pub(crate) use interior::add_symmetric;
+pub(crate) use interior::{
+    Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
+};
 pub(crate) use layout::{assign, pad, part, part_mut};
 pub(crate) use problem::Arrays;

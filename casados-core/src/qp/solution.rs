@@ -16,6 +16,8 @@ use core::marker::PhantomData;
 pub struct Solution<T, D, M> {
     dims: D,
     memory: M,
+    /// Of all `v`, of all `π`, and of the multipliers of one side.
+    lengths: [usize; 3],
     number: PhantomData<T>,
 }
 
@@ -114,7 +116,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             return Err(QpError::Dimension { field: Field::Solution, stage: 0, expected, found });
         }
         memory.as_mut().fill(T::ZERO);
-        Ok(Self { dims, memory, number: PhantomData })
+        let Place { v, dynamics, row, .. } = end::<T>(dims.as_ref());
+        Ok(Self { dims, memory, lengths: [v, dynamics, row], number: PhantomData })
     }
     /// The dimensions of the stages.
     #[must_use]
@@ -123,21 +126,19 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     }
     /// For solvers.
     pub fn view_mut(&mut self) -> SolutionView<'_, T> {
-        let dims = self.dims.as_ref();
-        let (end, mut rest) = (end::<T>(dims), self.memory.as_mut());
+        let ([v, dynamics, row], mut rest) = (self.lengths, self.memory.as_mut());
         SolutionView {
-            dims,
-            v: take_mut(&mut rest, end.v),
-            dynamics: take_mut(&mut rest, end.dynamics),
-            lower: take_mut(&mut rest, end.row),
-            upper: take_mut(&mut rest, end.row),
+            dims: self.dims.as_ref(),
+            v: take_mut(&mut rest, v),
+            dynamics: take_mut(&mut rest, dynamics),
+            lower: take_mut(&mut rest, row),
+            upper: take_mut(&mut rest, row),
         }
     }
     /// All `v`, and all `π`.
     pub(crate) fn vectors(&self) -> (&[T], &[T]) {
-        let end = end::<T>(self.dims.as_ref());
-        let memory = self.memory.as_ref();
-        (part(memory, 0, end.v), part(memory, end.v, end.dynamics))
+        let ([v, dynamics, _], memory) = (self.lengths, self.memory.as_ref());
+        (part(memory, 0, v), part(memory, v, dynamics))
     }
     /// Everything of another solution of the same dimensions.
     pub(crate) fn copy_from(&mut self, other: &Self) {
@@ -157,13 +158,11 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     }
     /// All stages, in order.
     pub fn stages(&self) -> impl DoubleEndedIterator<Item = SolutionStage<'_, T>> + ExactSizeIterator {
-        let dims = self.dims.as_ref();
-        let (end, memory) = (end::<T>(dims), self.memory.as_ref());
-        let v = part(memory, 0, end.v);
-        let dynamics = part(memory, end.v, end.dynamics);
-        let lower = part(memory, end.v + end.dynamics, end.row);
-        let upper = part(memory, end.v + end.dynamics + end.row, end.row);
-        Places::<T>::new(dims).map(move |p| SolutionStage {
+        let ([_, _, row], memory) = (self.lengths, self.memory.as_ref());
+        let (v, dynamics) = self.vectors();
+        let begin = v.len() + dynamics.len();
+        let (lower, upper) = (part(memory, begin, row), part(memory, begin + row, row));
+        Places::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
             x: part(v, p.v, p.nx),
             u: part(v, p.v + p.nx, p.nu),
             dynamics: part(dynamics, p.dynamics, p.next),

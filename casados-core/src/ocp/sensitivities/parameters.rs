@@ -114,7 +114,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             let mu = exact.then_some(&**mu);
             let slopes = slopes.get_mut(k * *rows * np..).unwrap_or_default();
-            let place = |factor| At { stage: k, factor, exact };
+            let place = |factor| At { stage: k, factor, exact, from: &[] };
             let references = P::StageCost::REFERENCES;
             if k == intervals {
                 let reference = part(data.references, k * references, P::TerminalCost::REFERENCES);

@@ -11,11 +11,14 @@ mod sides;
 mod store;
 mod vector;
 
-pub(crate) use kernels::add_symmetric;
+pub(crate) use kernels::{
+    Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
+};
 #[cfg(feature = "alloc")]
-pub(super) use kernels::{Columns, MORE, Part, Source, add_transposed, product, subtract, symmetric};
+pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub use store::Store;
+pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
 use super::error::{Field, QpError};

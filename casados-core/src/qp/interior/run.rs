@@ -29,10 +29,14 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, options, limits, start, scale, solution, result } = self;
         let tries = if start == Start::Warm { options.active_sets.min(options.max_iterations) } else { 0 };
-        *result = iterate.by_active_sets::<E>(tries, &limits, solution).or_else(|statistics| {
-            iterate.begin::<E>(options, start, scale, solution);
-            iterate.iterations::<E>(statistics, options, &limits, solution)
-        });
+        // No closure: it would be compiled for another machine.
+        *result = match iterate.by_active_sets::<E>(tries, &limits, solution) {
+            Ok(statistics) => Ok(statistics),
+            Err(statistics) => {
+                iterate.begin::<E>(options, start, scale, solution);
+                iterate.iterations::<E>(statistics, options, &limits, solution)
+            }
+        };
         iterate.store(solution);
     }
 }
