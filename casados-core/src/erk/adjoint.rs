@@ -100,48 +100,24 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                 self.pull_many(scheme, stage, columns);
             }
         }
-        for (x, lambda) in self.lambda.as_mut()[..M::Shape::NX].iter_mut().enumerate() {
-            let lambda = lambda.as_mut();
-            if columns == 1 {
-                // One number: no loop over columns.
-                let mut sum = lambda[0];
-                for xibar in &self.forward.dk {
-                    sum = sum + xibar[x][0];
-                }
-                lambda[0] = sum;
-                continue;
-            }
-            for xibar in &self.forward.dk {
-                add(T::ONE, &xibar[x].as_ref()[..columns], lambda);
-            }
+        let (lambda, xibars) = (&mut self.lambda.as_mut()[..M::Shape::NX], &self.forward.dk);
+        for xibar in xibars {
+            add_rows(T::ONE, xibar.as_ref(), lambda, columns);
         }
         Ok(())
     }
 
     /// `k̄_i = h (b_i λ_{n+1} + Σ_{j>i} a_ji ξ̄_j)`
     fn stage_seed(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
-        for (x, kbar) in self.forward.dxi.as_mut().iter_mut().enumerate() {
-            if columns == 1 {
-                // One number: no loop over columns.
-                let mut sum = scheme.b[stage] * self.lambda[x][0];
-                for (a, xibar) in scheme.a.iter().zip(&self.forward.dk).skip(stage + 1) {
-                    if a[stage] != T::ZERO {
-                        sum = sum + a[stage] * xibar[x][0];
-                    }
-                }
-                kbar[0] = h * sum;
-                continue;
-            }
-            let kbar = &mut kbar.as_mut()[..columns];
-            kbar.fill(T::ZERO);
-            add(scheme.b[stage], self.lambda[x].as_ref(), kbar);
-            for (a, xibar) in scheme.a.iter().zip(&self.forward.dk).skip(stage + 1) {
-                if a[stage] != T::ZERO {
-                    add(a[stage], xibar[x].as_ref(), kbar);
-                }
-            }
-            for value in kbar {
-                *value = h * *value;
+        let Variation { dk, dxi, .. } = &mut self.forward;
+        let kbar = dxi.as_mut();
+        for row in &mut *kbar {
+            row.as_mut()[..columns].fill(T::ZERO);
+        }
+        add_rows(h * scheme.b[stage], self.lambda.as_ref(), kbar, columns);
+        for (a, xibar) in scheme.a.iter().zip(&*dk).skip(stage + 1) {
+            if a[stage] != T::ZERO {
+                add_rows(h * a[stage], xibar.as_ref(), kbar, columns);
             }
         }
     }
@@ -185,5 +161,17 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                 add(row.factor * value, &kbar.as_ref()[..columns], sum.as_mut());
             }
         }
+    }
+}
+
+/// `sums += a rows`, the first columns of them.
+#[inline(always)]
+fn add_rows<T: Real, R: Array<T>>(a: T, rows: &[R], sums: &mut [R], columns: usize) {
+    if R::LEN == 1 {
+        // Numbers next to each other: no loop over columns.
+        return add(a, R::flat(rows), R::flat_mut(sums));
+    }
+    for (sum, row) in sums.iter_mut().zip(rows) {
+        add(a, &row.as_ref()[..columns], &mut sum.as_mut()[..columns]);
     }
 }

@@ -117,11 +117,11 @@ impl<M: Ode, T: Real> Point<M, T> {
                 add(a, k.as_ref(), state);
             }
         }
-        for (index, (xi, &x)) in state.iter_mut().zip(record.x.as_ref()).enumerate() {
+        for (xi, &x) in state.iter_mut().zip(record.x.as_ref()) {
             *xi = x + grid.h * *xi;
-            if !xi.is_finite() {
-                return Err(Error::Overflow { step: at.step, index });
-            }
+        }
+        if let Some(index) = not_finite(state) {
+            return Err(Error::Overflow { step: at.step, index });
         }
         let time = T::from_whole(at.step) + c;
         self.v[M::Shape::NV - 1] = grid.start + grid.h * time;
@@ -228,7 +228,7 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
                 dispatch(EndCompensated { end, rest, record: self, b: &scheme.b, h: grid.h });
             }
         }
-        match end.as_ref().iter().position(|end| !end.is_finite()) {
+        match not_finite(end.as_ref()) {
             Some(index) => Err(Error::Overflow { step, index }),
             None => Ok(()),
         }
@@ -314,6 +314,17 @@ pub(super) fn add<T: Real>(a: T, y: &[T], sum: &mut [T]) {
     }
 }
 
+/// The first value that is infinite or NaN.
+#[inline(always)]
+fn not_finite<T: Real>(values: &[T]) -> Option<usize> {
+    // No early exit, so that there is no branch for each.
+    let mut finite = true;
+    for value in values {
+        finite &= value.is_finite();
+    }
+    if finite { None } else { values.iter().position(|value| !value.is_finite()) }
+}
+
 /// The first value that is not finite is an error.
 pub(super) fn check<T: Real>(
     values: &[T],
@@ -321,7 +332,7 @@ pub(super) fn check<T: Real>(
     at: Place,
     equation: impl FnOnce(usize) -> usize,
 ) -> Result<(), Error> {
-    match values.iter().position(|value| !value.is_finite()) {
+    match not_finite(values) {
         None => Ok(()),
         Some(i) => {
             Err(Error::NonFiniteModel { quantity, equation: equation(i), value: values[i].to_f64(), at })
