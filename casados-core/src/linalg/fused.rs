@@ -136,17 +136,24 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // ones are up to a tenth faster without AVX-512; and unoptimised programs, where each copy of a kernel is much to compile and
     // none is fast, have the one copy that runs everywhere.
     if const { align_of::<K::Number>() > 32 } {
+        // SAFETY: the one condition of calling a function with target features is that the machine has them. Numbers that are
+        // registers of AVX-512 are computed with only where it has; see the head of `lanes`.
+        unsafe { avx512(kernel) }
+    } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
+        // SAFETY: the same of AVX2.
+        unsafe { avx2(kernel) }
+    } else if const { align_of::<K::Number>() == 32 } {
         match level() {
-            // SAFETY: the one condition of calling a function with target features is that the machine has
-            // them, which is what `level` says.
+            // SAFETY: `level` says what the machine has.
             Level::Avx512 => unsafe { avx512(kernel) },
-            _ => base(kernel),
+            // SAFETY: as above.
+            _ => unsafe { avx2(kernel) },
         }
-    } else if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
+    } else if const { cfg!(debug_assertions) } {
         base(kernel)
     } else if const { K::WIDE } {
         match level() {
-            // SAFETY: as above.
+            // SAFETY: `level` says what the machine has.
             Level::Avx512 => unsafe { avx512(kernel) },
             // SAFETY: as above.
             Level::Avx2 => unsafe { avx2(kernel) },
