@@ -7,6 +7,7 @@ use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::quadrature::Integrand;
 use crate::result::Nominal;
 use crate::scalar::Real;
+use crate::scalar::lanes::REGISTERS;
 use crate::shape::{Array, Shape};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -117,10 +118,13 @@ impl<M: Ode, T: Real> Point<M, T> {
                 add(a, k.as_ref(), state);
             }
         }
-        for (xi, &x) in state.iter_mut().zip(record.x.as_ref()) {
+        for (index, (xi, &x)) in state.iter_mut().zip(record.x.as_ref()).enumerate() {
             *xi = x + grid.h * *xi;
+            if ONE_BY_ONE && !xi.is_finite() {
+                return Err(Error::Overflow { step: at.step, index });
+            }
         }
-        if let Some(index) = not_finite(state) {
+        if !ONE_BY_ONE && let Some(index) = not_finite(state) {
             return Err(Error::Overflow { step: at.step, index });
         }
         let time = T::from_whole(at.step) + c;
@@ -314,12 +318,14 @@ pub(super) fn add<T: Real>(a: T, y: &[T], sum: &mut [T]) {
     }
 }
 
+/// Whether numbers are looked at one by one. Where registers take several of them all are, without a branch for each.
+const ONE_BY_ONE: bool = !REGISTERS;
+
 /// The first value that is infinite or NaN.
 #[inline(always)]
 fn not_finite<T: Real>(values: &[T]) -> Option<usize> {
-    // No early exit, so that there is no branch for each.
-    let mut finite = true;
-    for value in values {
+    let mut finite = !ONE_BY_ONE;
+    for value in values.iter().take(if ONE_BY_ONE { 0 } else { usize::MAX }) {
         finite &= value.is_finite();
     }
     if finite { None } else { values.iter().position(|value| !value.is_finite()) }
