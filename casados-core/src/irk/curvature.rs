@@ -45,8 +45,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         let rows = M::STRUCTURE.curved.len() * S;
         let g = self.g.as_flattened_mut().as_flattened_mut().get_mut(..rows * P * W).unwrap_or_default();
         let g = g.as_chunks_mut::<W>().0.as_chunks_mut::<P>().0;
-        // All stages in registers, or two of them where numbers are registers themselves.
-        if const { size_of::<E>() <= 8 || S <= 2 } {
+        // All stages in registers, or two of them where numbers are registers themselves and there are sixteen.
+        if const { size_of::<E>() <= 8 || A::WIDE || S <= 2 } {
             multiply::<A, M, E, S, S, W, P>(self.entries, self.d, g.as_chunks_mut().0, 0, column);
         } else {
             for stage in (0..S).step_by(2) {
@@ -65,7 +65,9 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
                         }
                     }
                 }
-                if const { size_of::<E>() > 8 && V > 2 } {
+                if const { size_of::<E>() > 8 && V > 2 && A::WIDE } {
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, row, column);
+                } else if const { size_of::<E>() > 8 && V > 2 } {
                     tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, row, column);
                 } else if const { size_of::<E>() > 8 } {
                     tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, row, column);

@@ -275,13 +275,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         self.before::<A, W>(column);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         if self.phase == Phase::Whole {
-            if const { size_of::<E>() > 8 && S > 2 && W == 4 } {
-                // Four columns of all stages would not fit the registers.
-                solve_packets::<A, M, E, [E; W], S, 2>(self.factors, dy, 0);
-                solve_packets::<A, M, E, [E; W], S, 2>(self.factors, dy, 2);
-            } else {
-                solve_packets::<A, M, E, [E; W], S, W>(self.factors, dy, 0);
-            }
+            solve_packets::<A, M, E, [E; W], S, W>(self.factors, dy, 0);
         }
         self.after::<A, W>(column);
     }
@@ -354,10 +348,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         let next = panel_mut::<E, W>(self.next, column, nx);
         if unit {
             for (to, dk) in next.iter_mut().zip(dy.iter()) {
-                *to = [E::from_f64(0.0); W];
+                let mut row = [E::from_f64(0.0); W];
                 for (&b, dk) in b.iter().zip(dk) {
-                    A::subtract_row(to, b, dk);
+                    A::subtract_row(&mut row, b, dk);
                 }
+                *to = row;
             }
             for c in 0..W {
                 let direction = M::STRUCTURE.directions.get(column + c);

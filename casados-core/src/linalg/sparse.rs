@@ -266,14 +266,16 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         if pivot.slot as usize >= rows.len() {
             return;
         }
-        let packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        // Directions that have not reached this unknown, as at the start of an interval.
-        if W > 1 && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0)) {
+        // Directions that have not reached this unknown, as at the start of an interval. Asked of the memory: a packet of which single
+        // elements are looked at is not kept in registers.
+        if W > 1 && is_zero::<E, R, S, W>(rows, pivot.slot as usize, *column) {
             return;
         }
+        let slot = pivot.slot as usize;
         if is_scaled::<S>(pivot) {
             let mut product = [[E::from_f64(0.0); W]; S];
-            subtract::<A, E, S, W>(&mut product, factors.coupling, &packet);
+            let Some(source) = rows.get(slot) else { return };
+            subtract_of::<A, E, R, S, W>(&mut product, factors.coupling, source, *column);
             for (block, other) in beside(*factors, pivot.lower()) {
                 if other >= rows.len() {
                     continue;
@@ -285,12 +287,11 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             return;
         }
         for (block, other) in beside(*factors, pivot.lower()) {
-            if other >= rows.len() {
-                continue;
-            }
-            let mut target = load(rows, other, *column);
-            subtract::<A, E, S, W>(&mut target, block, &packet);
-            store(rows, other, *column, &target);
+            let Ok([source, row]) = rows.get_disjoint_mut([slot, other]) else { continue };
+            let row = core::slice::from_mut(row);
+            let mut target = load(row, 0, *column);
+            subtract_of::<A, E, R, S, W>(&mut target, block, source, *column);
+            store(row, 0, *column, &target);
         }
     }
 
@@ -305,8 +306,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             if other >= rows.len() {
                 continue;
             }
-            let other = load(rows, other, *column);
-            subtract::<A, E, S, W>(&mut packet, block, &other);
+            let Some(other) = rows.get(other) else { continue };
+            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
         }
         if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
             let mut solution = [[E::from_f64(0.0); W]; S];
@@ -422,6 +423,44 @@ fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
         }
     }
     packet
+}
+
+/// `packet − block · other`, with the other in the memory.
+#[inline(always)]
+fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    block: &Block<E, S>,
+    other: &[R; S],
+    column: usize,
+) {
+    if const { W == 1 || size_of::<E>() <= 8 } {
+        let other = load(core::slice::from_ref(other), 0, column);
+        subtract::<A, E, S, W>(packet, block, &other);
+        return;
+    }
+    for (elements, other) in block.iter().zip(other) {
+        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else { continue };
+        for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
+            A::subtract_row(packet, element, other);
+        }
+    }
+}
+
+#[inline(always)]
+fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &[[R; S]],
+    slot: usize,
+    column: usize,
+) -> bool {
+    // In loops: a closure would be compiled for every machine.
+    for row in rows.get(slot).into_iter().flatten() {
+        for element in row.as_ref().get(column..).unwrap_or_default().iter().take(W) {
+            if *element != E::from_f64(0.0) {
+                return false;
+            }
+        }
+    }
+    true
 }
 
 #[inline(always)]
