@@ -11,7 +11,7 @@ use super::norm::{mean, norm};
 use super::stages::{Convergence, FAST, Failure, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start};
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
-use crate::linalg::{Complex, EigenFactors, Eigenbasis, Rows, dispatch, slot};
+use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, dispatch, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Real, Scalar};
 use crate::shape::{Plain, Shape};
@@ -30,7 +30,7 @@ const NOISE: f64 = 0.01;
 /// Memory of a step.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-struct Memory<M: Dae, T: Plain, const S: usize, const L: usize, const G: usize> {
+struct Memory<M: Dae, T: Plain, const S: usize, const G: usize> {
     /// The unknowns `(k, z)` at the stages.
     y: ArrayK<M, Groups<T, G>>,
     /// Those of the last accepted step.
@@ -39,30 +39,30 @@ struct Memory<M: Dae, T: Plain, const S: usize, const L: usize, const G: usize> 
     points: [ArrayV<M, [T; GROUP]>; G],
     /// The residual at the stages.
     f: [ArrayK<M, [T; GROUP]>; G],
-    rows: Rows<M, T, L>,
+    rows: Rows<M, T>,
     /// Variables at one point, and the residual there.
     point: ArrayV<M, T>,
     f_point: ArrayK<M, T>,
     /// The estimated error of `(x, z)`.
     error: ArrayK<M, T>,
-    factors: EigenFactors<M, T, L>,
+    factors: EigenFactors<M, T>,
 }
 
-/// A step of the collocation method `B` with `S` stages in `G` groups, for whose eigenvalues there are `L ≥ ⌈S/2⌉` lanes.
-pub struct Collocation<M: Dae, B, T: Real, const S: usize, const L: usize, const G: usize> {
+/// A step of the collocation method `B` with `S` stages in `G` groups.
+pub struct Collocation<M: Dae, B, T: Real, const S: usize, const G: usize> {
     tableau: Tableau<S>,
     /// Columns of `A`, and of `−h A` of this step.
     a: [Groups<T, G>; S],
     minus_ha: [Groups<T, G>; S],
     c: Groups<T, G>,
-    /// Columns of the matrix of right eigenvectors, real and imaginary parts.
-    right: [[Groups<T, G>; 2]; L],
+    /// Columns of the basis, one for each part.
+    right: [Groups<T, G>; PARTS],
     /// Lagrange polynomials at the start of the step.
     lagrange: [T; S],
     /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
     factors: [f64; S],
-    basis: Eigenbasis<T, S, L>,
-    memory: Box<Memory<M, T, S, L, G>>,
+    basis: Eigenbasis<T, S, PARTS>,
+    memory: Box<Memory<M, T, S, G>>,
     method: PhantomData<fn() -> B>,
 }
 
@@ -71,25 +71,25 @@ fn groups<T: Real, const G: usize>(stages: usize, value: impl Fn(usize) -> T) ->
     from_fn(|group| from_fn(|lane| value((GROUP * group + lane).min(stages.saturating_sub(1)))))
 }
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usize>
-    Collocation<M, B, T, S, L, G>
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize>
+    Collocation<M, B, T, S, G>
 {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new() -> Result<Self, Error> {
         const { assert!(G == S.div_ceil(GROUP), "as many groups as hold the stages") };
         let tableau = B::TABLEAU;
-        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, L, G>>() };
+        let out_of_memory = Error::OutOfMemory { bytes: size_of::<Memory<M, T, S, G>>() };
         let memory = try_zeroed_box().map_err(|()| out_of_memory)?;
         // Gauss and Radau IIA methods have one: tests construct all.
-        let basis: Eigenbasis<T, S, L> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
+        let basis: Eigenbasis<T, S, PARTS> = Eigenbasis::new(&tableau).ok_or(out_of_memory)?;
         let (a, c, right) = (tableau.a(), tableau.c(), basis.right());
         let a = from_fn(|j| groups(S, |i| T::from_f64(a[i][j])));
         Ok(Self {
             a,
             minus_ha: a,
             c: groups(S, |i| T::from_f64(c[i])),
-            right: from_fn(|l| [groups(S, |i| right[i].re[l]), groups(S, |i| right[i].im[l])]),
+            right: from_fn(|part| groups(S, |i| right[part][i])),
             lagrange: tableau.lagrange(0.0).map(T::from_f64),
             factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
             basis,
@@ -132,7 +132,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
                 }
             }
         }
-        dispatch(Split::<M, T, S, L, G> {
+        dispatch(Split::<M, T, S, G> {
             left: self.basis.left(),
             f: from_fn(|group| f[group].as_ref()),
             rows: rows.as_mut(),
@@ -145,10 +145,11 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
     fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
         let Memory { y, points, rows, .. } = &mut *self.memory;
         let mut points = points.each_mut().map(|points| points.as_mut());
+        let (re, im) = self.right.split_at(PARTS / 2);
         let sum = dispatch(Advance {
             minus_ha: &self.minus_ha,
             // Of the lanes that there are eigenvalues for.
-            right: &self.right[..S.div_ceil(2)],
+            right: [&re[..S.div_ceil(2)], &im[..S.div_ceil(2)]],
             x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
             scale: start.scale.as_ref(),
             rows: if increment { rows.as_ref() } else { &[] },
@@ -200,8 +201,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
     }
 }
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usize> Stages<M, T>
-    for Collocation<M, B, T, S, L, G>
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
+    for Collocation<M, B, T, S, G>
 {
     fn count(&self) -> usize {
         S
@@ -353,13 +354,14 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const L: usize, const G: usi
         for (equation, f) in residual.as_ref().iter().enumerate() {
             let [[row]] = &mut rows[slot::<M>(equation)];
             *row = Complex::zero();
-            row.re[0] = -*f;
+            row.set(0, (-*f, T::ZERO));
         }
         factors.solve(rows);
         // Of methods with an even number of stages it is complex; the error is the real part.
-        let [re, im] = [self.basis.values().re[0], self.basis.values().im[0]].map(|value| h * value);
+        let (re, im) = self.basis.values().scaled(h).get(0);
         for (index, (error, [[row]])) in residual.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
-            *error = if index < M::Shape::NX { re * row.re[0] - im * row.im[0] } else { row.re[0] };
+            let (real, imaginary) = row.get(0);
+            *error = if index < M::Shape::NX { re * real - im * imaginary } else { real };
         }
     }
 

@@ -1,6 +1,6 @@
 //! The loops of a collocation step, compiled for each machine: stages lie side by side in groups of four.
 
-use crate::linalg::{Arithmetic, Complex, Kernel, slot};
+use crate::linalg::{Arithmetic, Complex, Kernel, PARTS, slot};
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Lanes, Real, SideBySide};
 use core::marker::PhantomData;
@@ -25,14 +25,14 @@ impl<M: Dae, T: Real> SideBySide<T, GROUP> for Residual<'_, M, T> {
 }
 
 /// `V⁻¹ f` in the slots of the equations.
-pub struct Split<'a, M: Dae, T, const S: usize, const L: usize, const G: usize> {
-    pub left: &'a [Complex<T, L>; S],
+pub struct Split<'a, M: Dae, T, const S: usize, const G: usize> {
+    pub left: &'a [Complex<T, PARTS>; S],
     pub f: [&'a [[T; GROUP]]; G],
-    pub rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+    pub rows: &'a mut [[[Complex<T, PARTS>; 1]; 1]],
     pub model: PhantomData<M>,
 }
 
-impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for Split<'_, M, T, S, L, G> {
+impl<M: Dae, T: Real, const S: usize, const G: usize> Kernel for Split<'_, M, T, S, G> {
     type Number = T;
     type Output = ();
     #[inline(always)]
@@ -47,9 +47,8 @@ impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for
             }
             let mut sum = Complex::zero();
             for (left, value) in left.iter().zip(values.as_flattened()) {
-                for l in 0..L {
-                    sum.re[l] = A::subtract(sum.re[l], -left.re[l], *value);
-                    sum.im[l] = A::subtract(sum.im[l], -left.im[l], *value);
+                for l in 0..PARTS {
+                    sum.parts[l] = A::subtract(sum.parts[l], -left.parts[l], *value);
                 }
             }
             if let Some([[row]]) = rows.get_mut(slot::<M>(equation)) {
@@ -60,19 +59,20 @@ impl<M: Dae, T: Real, const S: usize, const L: usize, const G: usize> Kernel for
 }
 
 /// See [`Collocation::advance`].
-pub struct Advance<'a, 'b, T, const S: usize, const L: usize, const G: usize> {
+pub struct Advance<'a, 'b, T, const S: usize, const G: usize> {
     /// Columns of `−h A`.
     pub minus_ha: &'a [Groups<T, G>; S],
-    pub right: &'a [[Groups<T, G>; 2]],
+    /// Columns of the basis for real parts, and for imaginary ones.
+    pub right: [&'a [Groups<T, G>]; 2],
     /// The states at the start of the step.
     pub x: &'a [T],
     pub scale: &'a [T],
-    pub rows: &'a [[[Complex<T, L>; 1]; 1]],
+    pub rows: &'a [[[Complex<T, PARTS>; 1]; 1]],
     pub y: &'a mut [Groups<T, G>],
     pub points: &'a mut [&'b mut [[T; GROUP]]; G],
 }
 
-impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance<'_, '_, T, S, L, G> {
+impl<T: Real, const S: usize, const G: usize> Kernel for Advance<'_, '_, T, S, G> {
     type Number = T;
     type Output = Groups<T, G>;
     #[inline(always)]
@@ -85,11 +85,11 @@ impl<T: Real, const S: usize, const L: usize, const G: usize> Kernel for Advance
             let before = *unknown;
             let mut y = before;
             if let Some([[row]]) = rows.get(index) {
-                for (l, [re, im]) in right.iter().enumerate() {
-                    let (real, imaginary) = (row.re[l], -row.im[l]);
-                    for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
-                        for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
-                            *y = A::subtract(A::subtract(*y, *re, real), *im, imaginary);
+                let (re, im) = row.parts.split_at(const { PARTS / 2 });
+                for (((re, im), right_re), right_im) in re.iter().zip(im).zip(right[0]).zip(right[1]) {
+                    for ((y, right_re), right_im) in y.iter_mut().zip(right_re).zip(right_im) {
+                        for ((y, right_re), right_im) in y.iter_mut().zip(right_re).zip(right_im) {
+                            *y = A::subtract(A::subtract(*y, *right_re, *re), *right_im, *im);
                         }
                     }
                 }

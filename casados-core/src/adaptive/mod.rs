@@ -167,7 +167,7 @@ macro_rules! single {
             type Replays<M: Dae, T: Real> = Single<M, Self, T, $stages>;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
                 // As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
-                Ok(Box::new(collocation::Collocation::<M, Self, T, $stages, 4, $groups>::new()?))
+                Ok(Box::new(collocation::Collocation::<M, Self, T, $stages, $groups>::new()?))
             }
         })*
     };

@@ -4,103 +4,113 @@ use crate::scalar::{Field, Lanes};
 use bytemuck::Zeroable;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `L` complex numbers side by side: what elimination computes with where it solves `L` systems of one pattern at once.
+/// `⌊N/2⌋` complex numbers side by side, and a real one if `N` is odd: what elimination computes with where it solves systems of
+/// one pattern at once.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
-#[repr(C)] // Both parts beside each other, so that they may be one register.
-pub struct Complex<T, const L: usize> {
-    /// Real parts.
-    pub re: [T; L],
-    /// Imaginary parts.
-    pub im: [T; L],
+#[repr(transparent)] // All parts beside each other, so that they may be one register.
+pub struct Complex<T, const N: usize> {
+    /// Real parts, then imaginary ones, then the real number.
+    pub parts: [T; N],
 }
 
-impl<T: Lanes, const L: usize> Complex<T, L> {
-    /// So many of them are computed. Where a number is a register by itself nothing is gained by filling one: systems that repeat
-    /// another, the second half of those of a tableau, are left out.
-    pub(super) const USED: usize = if size_of::<T>() <= 8 { L } else { L.div_ceil(2) };
+impl<T: Lanes, const N: usize> Complex<T, N> {
+    /// So many of them are complex.
+    pub const PAIRS: usize = N / 2;
 
-    /// `L` times zero.
+    /// Zeros.
     #[inline(always)]
     pub fn zero() -> Self {
-        Self::real([T::from_f64(0.0); L])
+        Self { parts: [T::from_f64(0.0); N] }
     }
 
-    /// Real numbers.
+    /// The same real number everywhere.
     #[inline(always)]
-    pub fn real(re: [T; L]) -> Self {
-        Self { re, im: [T::from_f64(0.0); L] }
+    pub fn real(value: T) -> Self {
+        Self::zero().plus(value)
+    }
+
+    /// `z + a` with a real number `a`.
+    #[inline(always)]
+    pub fn plus(mut self, a: T) -> Self {
+        for l in 0..Self::PAIRS {
+            self.parts[l] = self.parts[l] + a;
+        }
+        if const { N % 2 == 1 } {
+            self.parts[N - 1] = self.parts[N - 1] + a;
+        }
+        self
     }
 
     /// `a z` with a real number `a`.
     #[inline(always)]
-    pub fn scaled(self, a: T) -> Self {
-        let Self { mut re, mut im } = self;
-        for l in 0..Self::USED {
-            (re[l], im[l]) = (a * re[l], a * im[l]);
+    pub fn scaled(mut self, a: T) -> Self {
+        for part in &mut self.parts {
+            *part = a * *part;
         }
-        Self { re, im }
+        self
     }
 
-    /// `self − a b`, fused.
+    /// Real and imaginary part of one of them.
     #[inline(always)]
-    fn subtract<const WIDE: bool>(&mut self, a: &Self, b: &Self) {
-        if const { Self::USED == L } {
-            T::subtract_complex::<L, WIDE>([&mut self.re, &mut self.im], [&a.re, &a.im], [&b.re, &b.im]);
-            return;
-        }
-        let Self { re, im } = self;
-        for l in 0..Self::USED {
-            re[l] = re[l].subtract_product(a.re[l], b.re[l]).subtract_product(-a.im[l], b.im[l]);
-            im[l] = im[l].subtract_product(a.re[l], b.im[l]).subtract_product(a.im[l], b.re[l]);
-        }
+    pub fn get(&self, l: usize) -> (T, T) {
+        (self.parts[l], self.parts[Self::PAIRS + l])
+    }
+
+    /// Overwrites one of them.
+    #[inline(always)]
+    pub fn set(&mut self, l: usize, (re, im): (T, T)) {
+        (self.parts[l], self.parts[Self::PAIRS + l]) = (re, im);
     }
 
     /// Whether all parts are neither infinite nor NaN.
     #[inline(always)]
     pub fn is_finite(&self) -> bool {
         let mut finite = true;
-        for part in self.re.iter().take(Self::USED).chain(self.im.iter().take(Self::USED)) {
+        for part in self.parts {
             finite &= T::all(part.is_finite());
         }
         finite
     }
 }
 
-impl<T: Lanes, const L: usize> Add for Complex<T, L> {
+impl<T: Lanes, const N: usize> Add for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
     fn add(mut self, other: Self) -> Self {
-        for l in 0..Self::USED {
-            (self.re[l], self.im[l]) = (self.re[l] + other.re[l], self.im[l] + other.im[l]);
+        for (part, other) in self.parts.iter_mut().zip(other.parts) {
+            *part = *part + other;
         }
         self
     }
 }
 
-impl<T: Lanes, const L: usize> Sub for Complex<T, L> {
+impl<T: Lanes, const N: usize> Sub for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
     fn sub(mut self, other: Self) -> Self {
-        for l in 0..Self::USED {
-            (self.re[l], self.im[l]) = (self.re[l] - other.re[l], self.im[l] - other.im[l]);
+        for (part, other) in self.parts.iter_mut().zip(other.parts) {
+            *part = *part - other;
         }
         self
     }
 }
 
-impl<T: Lanes, const L: usize> Mul for Complex<T, L> {
+impl<T: Lanes, const N: usize> Mul for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
     fn mul(mut self, other: Self) -> Self {
-        for l in 0..Self::USED {
-            let re = self.re[l] * other.re[l] - self.im[l] * other.im[l];
-            (self.re[l], self.im[l]) = (re, self.re[l] * other.im[l] + self.im[l] * other.re[l]);
+        for l in 0..Self::PAIRS {
+            let ((a, b), (c, d)) = (self.get(l), other.get(l));
+            self.set(l, (a * c - b * d, a * d + b * c));
+        }
+        if const { N % 2 == 1 } {
+            self.parts[N - 1] = self.parts[N - 1] * other.parts[N - 1];
         }
         self
     }
 }
 
-impl<T: Lanes, const L: usize> Div for Complex<T, L> {
+impl<T: Lanes, const N: usize> Div for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
     #[allow(clippy::suspicious_arithmetic_impl)] // There is no other quotient.
@@ -109,42 +119,45 @@ impl<T: Lanes, const L: usize> Div for Complex<T, L> {
     }
 }
 
-impl<T: Lanes, const L: usize> Neg for Complex<T, L> {
+impl<T: Lanes, const N: usize> Neg for Complex<T, N> {
     type Output = Self;
     #[inline(always)]
     fn neg(mut self) -> Self {
-        for l in 0..Self::USED {
-            (self.re[l], self.im[l]) = (-self.re[l], -self.im[l]);
+        for part in &mut self.parts {
+            *part = -*part;
         }
         self
     }
 }
 
-impl<T: Lanes, const L: usize> Field for Complex<T, L> {
-    type Mask = [T::Mask; L];
+impl<T: Lanes, const N: usize> Field for Complex<T, N> {
+    /// One for each part.
+    type Mask = [T::Mask; N];
 
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
-        Self::real([T::from_f64(value); L])
+        Self::real(T::from_f64(value))
     }
 
     /// Divided by its larger part first, so that no square of a part overflows.
     #[inline(always)]
-    fn reciprocal(self) -> Self {
-        let (mut re, mut im) = (self.re, self.im);
-        for l in 0..Self::USED {
-            let size = self.re[l].abs().max(self.im[l].abs());
-            let scale = T::from_f64(1.0) / size;
-            let (r, i) = (self.re[l] * scale, self.im[l] * scale);
-            let square = T::from_f64(1.0) / (self.re[l] * r + self.im[l] * i);
-            (re[l], im[l]) = (r * square, -i * square);
+    fn reciprocal(mut self) -> Self {
+        for l in 0..Self::PAIRS {
+            let (re, im) = self.get(l);
+            let scale = T::from_f64(1.0) / re.abs().max(im.abs());
+            let (r, i) = (re * scale, im * scale);
+            let square = T::from_f64(1.0) / (re * r + im * i);
+            self.set(l, (r * square, -i * square));
         }
-        Self { re, im }
+        if const { N % 2 == 1 } {
+            self.parts[N - 1] = T::from_f64(1.0) / self.parts[N - 1];
+        }
+        self
     }
 
     #[inline(always)]
     fn subtract_product(mut self, a: Self, b: Self) -> Self {
-        self.subtract::<false>(&a, &b);
+        T::subtract_complex::<N, false>(&mut self.parts, &a.parts, &b.parts);
         self
     }
 
@@ -156,7 +169,7 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
     ) {
         for (column, x) in block.iter().zip(x) {
             for (target, element) in target.iter_mut().zip(column) {
-                target.subtract::<WIDE>(element, x);
+                T::subtract_complex::<N, WIDE>(&mut target.parts, &element.parts, &x.parts);
             }
         }
     }
@@ -165,17 +178,22 @@ impl<T: Lanes, const L: usize> Field for Complex<T, L> {
     #[inline(always)]
     fn is_smaller(self, other: Self) -> Self::Mask {
         let zero = T::from_f64(0.0);
-        let mut mask = [T::lt(zero, zero); L];
-        for (l, mask) in mask.iter_mut().enumerate().take(Self::USED) {
-            *mask = T::lt(self.re[l].abs() + self.im[l].abs(), other.re[l].abs() + other.im[l].abs());
+        let mut mask = [T::lt(zero, zero); N];
+        for l in 0..Self::PAIRS {
+            let ((a, b), (c, d)) = (self.get(l), other.get(l));
+            let smaller = T::lt(a.abs() + b.abs(), c.abs() + d.abs());
+            (mask[l], mask[Self::PAIRS + l]) = (smaller, smaller);
+        }
+        if const { N % 2 == 1 } {
+            mask[N - 1] = T::lt(self.parts[N - 1].abs(), other.parts[N - 1].abs());
         }
         mask
     }
 
     #[inline(always)]
     fn select(mask: Self::Mask, a: Self, mut b: Self) -> Self {
-        for (l, &mask) in mask.iter().enumerate().take(Self::USED) {
-            (b.re[l], b.im[l]) = (T::select(mask, a.re[l], b.re[l]), T::select(mask, a.im[l], b.im[l]));
+        for ((b, a), mask) in b.parts.iter_mut().zip(a.parts).zip(mask) {
+            *b = T::select(mask, a, *b);
         }
         b
     }

@@ -13,21 +13,27 @@ use crate::shape::{Aligned, Plain};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// A right-hand side or a solution of the `L` systems, one row for each slot.
-pub type Rows<M, T, const L: usize> = ArrayK<M, [[Complex<T, L>; 1]; 1]>;
+/// So many eigenvalues there may be, of complex conjugate ones one.
+const LANES: usize = 4;
 
-/// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all `L` eigenvalues.
+/// The parts of a number for each of them.
+pub const PARTS: usize = 2 * LANES;
+
+/// A right-hand side or a solution of the systems of all eigenvalues, one row for each slot.
+pub type Rows<M, T> = ArrayK<M, [[Complex<T, PARTS>; 1]; 1]>;
+
+/// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all eigenvalues.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-pub struct EigenFactors<M: Dae, T: Plain, const L: usize> {
-    blocks: Aligned<M::Factors<[[Complex<T, L>; 1]; 1]>>,
+pub struct EigenFactors<M: Dae, T: Plain> {
+    blocks: Aligned<M::Factors<[[Complex<T, PARTS>; 1]; 1]>>,
     /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
-    dense: [Dense<M, T, 2>; L],
+    dense: [Dense<M, T, 2>; LANES],
     is_dense: bool,
     pivoted: bool,
 }
 
-impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
+impl<M: Dae, T: Real> EigenFactors<M, T> {
     /// Whether the plan is in use, so that pivoting may give better factors.
     pub fn is_planned(&self) -> bool {
         !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
@@ -42,7 +48,7 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
     ///
     /// # Errors
     /// The unknown for which there is no pivot.
-    pub fn factor(&mut self, jacobian: &M::Jacobian<T>, values: &Complex<T, L>, h: T) -> Result<bool, usize> {
+    pub fn factor(&mut self, jacobian: &M::Jacobian<T>, values: &Complex<T, PARTS>, h: T) -> Result<bool, usize> {
         let scale = values.scaled(h);
         self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
         if self.is_dense {
@@ -52,22 +58,23 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
     }
 
     /// By the plan; whether that went well.
-    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> bool {
+    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> bool {
         let blocks = self.blocks.as_mut();
-        dispatch(Assemble::<M, T, L> { jacobian: jacobian.as_ref(), scale, blocks, model: PhantomData })
+        dispatch(Assemble::<M, T> { jacobian: jacobian.as_ref(), scale, blocks, model: PhantomData })
     }
 
     /// By pivoting whole matrices.
-    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, L>) -> Result<(), usize> {
+    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> Result<(), usize> {
         let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
         for (l, dense) in self.dense.iter_mut().enumerate() {
             dense.clear();
+            let (re, im) = scale.get(l);
             for e in 0..blocks[3] {
                 let (r, c) = pattern.at(e);
                 let (r, value) = (slot::<M>(r), jacobian[e]);
                 if e >= blocks[1] && e < blocks[2] {
-                    dense.add_row(r, c - nx, 0, value, &[scale.re[l], -scale.im[l]]);
-                    dense.add_row(r, c - nx, 1, value, &[scale.im[l], scale.re[l]]);
+                    dense.add_row(r, c - nx, 0, value, &[re, -im]);
+                    dense.add_row(r, c - nx, 1, value, &[im, re]);
                 } else {
                     let c = if e < blocks[1] { c } else { c - nx };
                     dense.add(r, c, 0, value);
@@ -79,8 +86,8 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
         Ok(())
     }
 
-    /// Solves all `L` systems in place; equations are in their slots.
-    pub fn solve(&self, rows: &mut Rows<M, T, L>) {
+    /// Solves all systems in place; equations are in their slots.
+    pub fn solve(&self, rows: &mut Rows<M, T>) {
         if self.is_dense {
             self.solve_dense(rows);
         } else {
@@ -90,29 +97,30 @@ impl<M: Dae, T: Real, const L: usize> EigenFactors<M, T, L> {
         }
     }
 
-    fn solve_dense(&self, rows: &mut Rows<M, T, L>) {
+    fn solve_dense(&self, rows: &mut Rows<M, T>) {
         let mut parts: ArrayK<M, [[T; 1]; 2]> = Zeroable::zeroed();
         for (l, dense) in self.dense.iter().enumerate() {
             for (part, [[row]]) in parts.as_mut().iter_mut().zip(rows.as_ref()) {
-                *part = [[row.re[l]], [row.im[l]]];
+                let (re, im) = row.get(l);
+                *part = [[re], [im]];
             }
             dense.solve(&mut parts);
             for ([[re], [im]], [[row]]) in parts.as_ref().iter().zip(rows.as_mut()) {
-                (row.re[l], row.im[l]) = (*re, *im);
+                row.set(l, (*re, *im));
             }
         }
     }
 }
 
 /// The matrices and their factors; whether these are finite.
-struct Assemble<'a, M, T, const L: usize> {
+struct Assemble<'a, M, T> {
     jacobian: &'a [T],
-    scale: &'a Complex<T, L>,
-    blocks: &'a mut [Block<Complex<T, L>, 1>],
+    scale: &'a Complex<T, PARTS>,
+    blocks: &'a mut [Block<Complex<T, PARTS>, 1>],
     model: PhantomData<M>,
 }
 
-impl<M: Dae, T: Real, const L: usize> Kernel for Assemble<'_, M, T, L> {
+impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
     type Number = T;
     type Output = bool;
     #[inline(always)]
@@ -125,7 +133,7 @@ impl<M: Dae, T: Real, const L: usize> Kernel for Assemble<'_, M, T, L> {
             let state = jacobian.get(entry.state as usize);
             let mut element = state.map_or_else(Complex::zero, |state| scale.scaled(*state));
             if let Some(direct) = jacobian.get(entry.direct as usize) {
-                element.re = element.re.map(|re| re + *direct);
+                element = element.plus(*direct);
             }
             *to = element;
         }

@@ -11,37 +11,37 @@ use crate::shape::{Aligned, Plain};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// Factors of the mean Jacobian of the stages for all `L` eigenvalues, by the plan: what an iteration takes that need
+/// Factors of the mean Jacobian of the stages for all eigenvalues, by the plan: what an iteration takes that need
 /// not be exact.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct MeanFactors<M: Dae, E: Plain, const L: usize> {
-    blocks: Aligned<M::Factors<[[Complex<E, L>; 1]; 1]>>,
-    rows: Aligned<ArrayK<M, [[Complex<E, L>; 1]; 1]>>,
+pub struct MeanFactors<M: Dae, E: Plain, const S: usize> {
+    blocks: Aligned<M::Factors<[[Complex<E, S>; 1]; 1]>>,
+    rows: Aligned<ArrayK<M, [[Complex<E, S>; 1]; 1]>>,
 }
 
-impl<M: Dae, E: Plain, const L: usize> Clone for MeanFactors<M, E, L> {
+impl<M: Dae, E: Plain, const S: usize> Clone for MeanFactors<M, E, S> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Dae, E: Plain, const L: usize> Copy for MeanFactors<M, E, L> {}
+impl<M: Dae, E: Plain, const S: usize> Copy for MeanFactors<M, E, S> {}
 
-impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
+impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite.
-    pub fn factor<const S: usize>(
+    pub fn factor(
         &mut self,
         jacobian: &M::Jacobian<[E; S]>,
-        basis: &Eigenbasis<E, S, L>,
+        basis: &Eigenbasis<E, S, S>,
         h: E,
     ) {
         let scale = basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 }));
-        dispatch(AssembleMean::<M, E, S, L> { jacobian, scale, blocks: &mut self.blocks });
+        dispatch(AssembleMean::<M, E, S> { jacobian, scale, blocks: &mut self.blocks });
         sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
 
     /// Solves the Newton system of the stages in place, equations in their slots.
-    pub fn solve<const S: usize>(&mut self, basis: &Eigenbasis<E, S, L>, b: &mut ArrayK<M, [[E; 1]; S]>) {
+    pub fn solve(&mut self, basis: &Eigenbasis<E, S, S>, b: &mut ArrayK<M, [[E; 1]; S]>) {
         dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
         let factors = Planned::<M, _, 1> {
             model: PhantomData,
@@ -54,14 +54,14 @@ impl<M: Dae, E: Lanes, const L: usize> MeanFactors<M, E, L> {
 }
 
 /// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, each block written once.
-struct AssembleMean<'a, M: Dae, E: Plain, const S: usize, const L: usize> {
+struct AssembleMean<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `hμ/s`
-    scale: Complex<E, L>,
-    blocks: &'a mut M::Factors<[[Complex<E, L>; 1]; 1]>,
+    scale: Complex<E, S>,
+    blocks: &'a mut M::Factors<[[Complex<E, S>; 1]; 1]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'_, M, E, S, L> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for AssembleMean<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -70,10 +70,10 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> Kernel for AssembleMean<'
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_, M, E, S, L> {
+impl<M: Dae, E: Lanes, const S: usize> AtRow for AssembleMean<'_, M, E, S> {
     const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
     const SIMPLE: usize = M::STRUCTURE.elimination.fill();
-    const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { L } else { L.div_ceil(4) };
+    const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
@@ -85,10 +85,7 @@ impl<M: Dae, E: Lanes, const S: usize, const L: usize> AtRow for AssembleMean<'_
             None => Complex::zero(),
         };
         if let Some(direct) = direct {
-            let direct = E::from_f64(const { 1.0 / S as f64 }) * total(direct);
-            for re in &mut element.re {
-                *re = *re + direct;
-            }
+            element = element.plus(E::from_f64(const { 1.0 / S as f64 }) * total(direct));
         }
         *to = element;
     }
@@ -112,13 +109,13 @@ fn total<E: Lanes, const S: usize>(stages: &[E; S]) -> E {
     total
 }
 
-struct Split<'a, T, const S: usize, const L: usize> {
-    basis: &'a Eigenbasis<T, S, L>,
+struct Split<'a, T, const S: usize> {
+    basis: &'a Eigenbasis<T, S, S>,
     b: &'a [[[T; 1]; S]],
-    rows: &'a mut [[[Complex<T, L>; 1]; 1]],
+    rows: &'a mut [[[Complex<T, S>; 1]; 1]],
 }
 
-impl<T: Lanes, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
+impl<T: Lanes, const S: usize> Kernel for Split<'_, T, S> {
     type Number = T;
     type Output = ();
     #[inline(always)]
@@ -131,13 +128,13 @@ impl<T: Lanes, const S: usize, const L: usize> Kernel for Split<'_, T, S, L> {
     }
 }
 
-struct Join<'a, T, const S: usize, const L: usize> {
-    basis: &'a Eigenbasis<T, S, L>,
+struct Join<'a, T, const S: usize> {
+    basis: &'a Eigenbasis<T, S, S>,
     b: &'a mut [[[T; 1]; S]],
-    rows: &'a [[[Complex<T, L>; 1]; 1]],
+    rows: &'a [[[Complex<T, S>; 1]; 1]],
 }
 
-impl<T: Lanes, const S: usize, const L: usize> Kernel for Join<'_, T, S, L> {
+impl<T: Lanes, const S: usize> Kernel for Join<'_, T, S> {
     type Number = T;
     type Output = ();
     #[inline(always)]

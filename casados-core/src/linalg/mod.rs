@@ -29,7 +29,7 @@ pub(crate) use block::Packet;
 pub(crate) use complex::Complex;
 pub(crate) use eigen::Eigenbasis;
 #[cfg(feature = "alloc")]
-pub(crate) use eigen_factors::{EigenFactors, Rows};
+pub(crate) use eigen_factors::{EigenFactors, PARTS, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::axpy;

@@ -141,18 +141,22 @@ pub trait Field:
         }
     }
 
-    /// `target − a b` of `L` complex numbers side by side, each their real parts and their imaginary ones, fused. As
-    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// `target − a b` of `⌊N/2⌋` complex numbers side by side, their real parts, then their imaginary ones, and of a real number
+    /// if `N` is odd, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
     #[inline(always)]
-    fn subtract_complex<const L: usize, const WIDE: bool>(
-        [re, im]: [&mut [Self; L]; 2],
-        a: [&[Self; L]; 2],
-        b: [&[Self; L]; 2],
+    fn subtract_complex<const N: usize, const WIDE: bool>(
+        target: &mut [Self; N],
+        a: &[Self; N],
+        b: &[Self; N],
     ) {
-        Self::subtract_products::<L, WIDE>(re, a[0], b[0]);
-        Self::subtract_products::<L, WIDE>(re, &a[1].map(|a| -a), b[1]);
-        Self::subtract_products::<L, WIDE>(im, a[0], b[1]);
-        Self::subtract_products::<L, WIDE>(im, a[1], b[0]);
+        for l in 0..const { N / 2 } {
+            let m = const { N / 2 } + l;
+            target[l] = target[l].subtract_product(a[l], b[l]).subtract_product(-a[m], b[m]);
+            target[m] = target[m].subtract_product(a[l], b[m]).subtract_product(a[m], b[l]);
+        }
+        if const { N % 2 == 1 } {
+            target[N - 1] = target[N - 1].subtract_product(a[N - 1], b[N - 1]);
+        }
     }
 
     /// `|a| < |b|`

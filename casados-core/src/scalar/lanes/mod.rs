@@ -339,24 +339,28 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
-        fn subtract_complex<const L: usize, const WIDE: bool>(
-            [re, im]: [&mut [Self; L]; 2],
-            a: [&[Self; L]; 2],
-            b: [&[Self; L]; 2],
+        fn subtract_complex<const N: usize, const WIDE: bool>(
+            target: &mut [Self; N],
+            a: &[Self; N],
+            b: &[Self; N],
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
-            if const { WIDE && 2 * L == $most } {
-                Wide::<$most>::subtract_complex([re, im], a, b);
-                return;
+            // The complex ones, and the real one behind them.
+            if const { WIDE && N / 2 * 2 == $most } {
+                Wide::<$most>::subtract_complex(target, a, b);
+            } else if const { N / 2 * 2 == $more } {
+                Register::<$more>::subtract_complex(target, a, b);
+            } else {
+                let (m, minus) = (const { N / 2 }, a.map(|a| -a));
+                let ((re, im), (b_re, b_im)) = (target.split_at_mut(m), b.split_at(m));
+                Register::<$more>::subtract_each(re, &a[..m], b_re);
+                Register::<$more>::subtract_each(re, &minus[m..], b_im);
+                Register::<$more>::subtract_each(im, &a[..m], b_im);
+                Register::<$more>::subtract_each(im, &a[m..], b_re);
             }
-            if const { 2 * L == $more } {
-                Register::<$more>::subtract_complex([re, im], a, b);
-                return;
+            if const { N % 2 == 1 } {
+                target[N - 1] = target[N - 1].subtract_product(a[N - 1], b[N - 1]);
             }
-            Self::subtract_products::<L, WIDE>(re, a[0], b[0]);
-            Self::subtract_products::<L, WIDE>(re, &a[1].map(|a| -a), b[1]);
-            Self::subtract_products::<L, WIDE>(im, a[0], b[1]);
-            Self::subtract_products::<L, WIDE>(im, a[1], b[0]);
         }
     };
 }

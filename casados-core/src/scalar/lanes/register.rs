@@ -464,31 +464,44 @@ macro_rules! single {
 macro_rules! complex {
     ($name:ident, $element:ident, $ops:ident) => {
         impl $name<{ $ops::WIDTH }> {
-            /// From its halves.
+            /// `target − a b` of the numbers at the beginning of arrays, half as many as the register has elements.
             #[inline(always)]
-            fn halves<const L: usize>(low: &[$element; L], high: &[$element; L]) -> Self {
-                let mut all = [0.0; $ops::WIDTH];
-                let (to_low, to_high) = all.split_at_mut($ops::WIDTH / 2);
-                to_low.copy_from_slice(low);
-                to_high.copy_from_slice(high);
-                Self::load(&all)
-            }
-            /// `target − a b`, of half as many numbers as the register holds.
-            #[inline(always)]
-            pub fn subtract_complex<const L: usize>(
-                [re, im]: [&mut [$element; L]; 2],
-                a: [&[$element; L]; 2],
-                b: [&[$element; L]; 2],
+            pub fn subtract_complex<const N: usize>(
+                target: &mut [$element; N],
+                a: &[$element; N],
+                b: &[$element; N],
             ) {
-                let (target, numbers) = (Self::halves(re, im), Self::halves(b[0], b[1]));
-                let imaginary = $ops::xor(Self::halves(a[1], a[1]).0, $ops::signs_below());
-                let target = target.subtract_product(Self::halves(a[0], a[0]), numbers);
-                let target = target.subtract_product(Self(imaginary), Self($ops::swap_halves(numbers.0)));
+                let (Some(target), Some(a), Some(b)) = (target.first_chunk_mut(), a.first_chunk(), b.first_chunk())
+                else {
+                    return;
+                };
+                let numbers = Self::load(b);
+                let imaginary = $ops::xor(Self::twice(a, $ops::WIDTH / 2).0, $ops::signs_below());
+                let difference = Self::load(target).subtract_product(Self::twice(a, 0), numbers);
+                difference.subtract_product(Self(imaginary), Self($ops::swap_halves(numbers.0))).store(target);
+            }
+            /// `target − a b`, element by element, as far as all go.
+            #[inline(always)]
+            pub fn subtract_each(target: &mut [$element], a: &[$element], b: &[$element]) {
+                let length = target.len().min(a.len()).min(b.len());
+                let (target, target_rest) = target[..length].as_chunks_mut();
+                let ((a, a_rest), (b, b_rest)) = (a[..length].as_chunks(), b[..length].as_chunks());
+                for ((target, a), b) in target.iter_mut().zip(a).zip(b) {
+                    Self::load(target).subtract_product(Self::load(a), Self::load(b)).store(target);
+                }
+                for ((target, &a), &b) in target_rest.iter_mut().zip(a_rest).zip(b_rest) {
+                    *target = target.subtract_product(a, b);
+                }
+            }
+            /// Half of the elements, in both halves.
+            #[inline(always)]
+            fn twice(elements: &[$element; $ops::WIDTH], begin: usize) -> Self {
                 let mut all = [0.0; $ops::WIDTH];
-                target.store(&mut all);
-                let (low, high) = all.split_at($ops::WIDTH / 2);
-                re.copy_from_slice(low);
-                im.copy_from_slice(high);
+                let half = &elements[begin..begin + $ops::WIDTH / 2];
+                let (low, high) = all.split_at_mut($ops::WIDTH / 2);
+                low.copy_from_slice(half);
+                high.copy_from_slice(half);
+                Self::load(&all)
             }
         }
     };
