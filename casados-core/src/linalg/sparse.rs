@@ -263,35 +263,46 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
-        if pivot.slot as usize >= rows.len() {
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() {
             return;
+        }
+        let scaled = is_scaled::<S>(pivot);
+        // What is added to a row is added in registers. Of one column of plain numbers that would take as long as additions wait for
+        // each other; and large blocks come from the second cache fastest as they lie, column by column.
+        let by_rows = const { (W > 1 || align_of::<E>() > 8) && size_of::<Block<E, S>>() <= 256 };
+        if by_rows && !pivot.left(S).is_empty() {
+            let mut packet = load(rows, slot, *column);
+            for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
+                let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
+                let (Some(block), Some(other)) = (block, other) else { continue };
+                subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+            }
+            store(rows, slot, *column, &packet);
         }
         // Directions that have not reached this unknown, as at the start of an interval. Asked of the memory: a packet of which single
         // elements are looked at is not kept in registers.
-        if W > 1 && is_zero::<E, R, S, W>(rows, pivot.slot as usize, *column) {
+        if by_rows && !scaled || W > 1 && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
-        let slot = pivot.slot as usize;
-        if is_scaled::<S>(pivot) {
-            let mut product = [[E::from_f64(0.0); W]; S];
+        let mut packet = [[E::from_f64(0.0); W]; S];
+        if scaled {
             let Some(source) = rows.get(slot) else { return };
-            subtract_of::<A, E, R, S, W>(&mut product, factors.coupling, source, *column);
-            for (block, other) in beside(*factors, pivot.lower()) {
-                if other >= rows.len() {
-                    continue;
-                }
-                let mut target = load(rows, other, *column);
-                subtract_scaled::<A, E, S, W>(&mut target, block, &product);
-                store(rows, other, *column, &target);
-            }
-            return;
+            subtract_of::<A, E, R, S, W>(&mut packet, factors.coupling, source, *column);
+        } else {
+            packet = load(rows, slot, *column);
         }
         for (block, other) in beside(*factors, pivot.lower()) {
-            let Ok([source, row]) = rows.get_disjoint_mut([slot, other]) else { continue };
-            let row = core::slice::from_mut(row);
-            let mut target = load(row, 0, *column);
-            subtract_of::<A, E, R, S, W>(&mut target, block, source, *column);
-            store(row, 0, *column, &target);
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            if scaled {
+                subtract_scaled::<A, E, S, W>(&mut target, block, &packet);
+            } else {
+                subtract::<A, E, S, W>(&mut target, block, &packet);
+            }
+            store(rows, other, *column, &target);
         }
     }
 

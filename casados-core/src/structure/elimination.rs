@@ -10,6 +10,8 @@ pub struct Elimination {
     pub pivots: &'static [Pivot],
     /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its unknown.
     pub slots: &'static [u32],
+    /// For each pivot the blocks of `L` in its row: of pivots that are not scaled, then of those that are.
+    pub left: &'static [Left],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
     pub updates: &'static [u32],
     /// For each block what it is made of before elimination, those of a kind one after the other, fill first.
@@ -21,7 +23,7 @@ pub struct Elimination {
 impl Elimination {
     /// No plan: the matrix is eliminated as a dense one.
     pub const NONE: Self =
-        Self { pivots: &[], slots: &[], updates: &[], assembly: &[], slot_of_equation: &[] };
+        Self { pivots: &[], slots: &[], left: &[], updates: &[], assembly: &[], slot_of_equation: &[] };
 
     /// How many blocks are fill.
     #[must_use]
@@ -58,6 +60,8 @@ pub struct Pivot {
     pub upper: u32,
     /// Where the blocks of its row end.
     pub end: u32,
+    /// Where in [`Elimination::left`] the blocks of `L` in its row begin, where those of scaled pivots begin, and where all end.
+    pub left: [u32; 3],
     /// The pivot is the identity, whatever the step size and the point.
     pub identity: bool,
     /// The pivot is the identity, and nothing has been added to the blocks of its column, three or more, which are
@@ -72,12 +76,28 @@ impl Pivot {
     pub const fn lower(&self) -> core::ops::Range<usize> {
         self.block as usize + 1..self.upper as usize
     }
+    /// The blocks of `L` in its row, in [`Elimination::left`], for so many stages: those whose pivots are scaled are left out where
+    /// that means anything.
+    #[must_use]
+    #[inline(always)]
+    pub const fn left(&self, stages: usize) -> core::ops::Range<usize> {
+        self.left[0] as usize..self.left[if stages > 1 { 1 } else { 2 }] as usize
+    }
     /// The blocks of its row, to the right of it.
     #[must_use]
     #[inline(always)]
     pub const fn upper(&self) -> core::ops::Range<usize> {
         self.upper as usize..self.end as usize
     }
+}
+
+/// A block of `L`, as it is met in its row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Left {
+    /// The block.
+    pub block: u32,
+    /// The slot of the pivot whose column it is in.
+    pub slot: u32,
 }
 
 /// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`; zero where there is only fill.

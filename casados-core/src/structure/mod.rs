@@ -7,7 +7,7 @@ mod elimination;
 
 pub use cost::Cost;
 pub use curvature::{NO_COLUMN, Term, by_column, columns, symmetric};
-pub use elimination::{Assembly, Elimination, Pivot};
+pub use elimination::{Assembly, Elimination, Left, Pivot};
 
 /// What is known about a model before it runs.
 #[derive(Clone, Copy, Debug)]

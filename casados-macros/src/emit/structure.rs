@@ -119,13 +119,29 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             if lower { slot_of_equation[row as usize] } else { column }
         })
         .collect();
-    let kinds = identity.iter().zip(scaled);
-    let pivots =
-        plan.pivots.iter().zip(&plan.ranges).zip(kinds).map(|((pivot, range), (identity, scaled))| {
-            let [slot, block, upper, end] =
-                [pivot.1, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
-            quote!(pivot(#slot, #block, #upper, #end, #identity, #scaled))
-        });
+    // Blocks of `L` row by row: those of scaled pivots behind the others.
+    let mut rows = vec![[Vec::new(), Vec::new()]; plan.pivots.len()];
+    for ((&(_, slot), &[block, upper, _]), &scaled) in plan.pivots.iter().zip(&plan.ranges).zip(scaled) {
+        for block in block + 1..upper {
+            rows[slots[block as usize] as usize][usize::from(scaled)].push([block, slot]);
+        }
+    }
+    let (mut left, mut pivots) = (Vec::new(), Vec::new());
+    for (((&(_, slot), range), identity), scaled) in
+        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled)
+    {
+        let mut ends = [left.len(); 3];
+        for (kind, end) in rows[slot as usize].iter().zip(&mut ends[1..]) {
+            left.extend(kind.iter().map(|pair| {
+                let [block, slot] = pair.map(Literal::u32_unsuffixed);
+                quote!(left(#block, #slot))
+            }));
+            *end = left.len();
+        }
+        let ends = ends.map(Literal::usize_unsuffixed);
+        let [slot, block, upper, end] = [slot, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
+        pivots.push(quote!(pivot(#slot, #block, #upper, #end, [#(#ends),*], #identity, #scaled)));
+    }
     let scaled: HashSet<u32> = plan
         .ranges
         .iter()
@@ -156,9 +172,20 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     let [slots, updates, slot_of_equation] =
         [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Pivot};
-        const fn pivot(slot: u32, block: u32, upper: u32, end: u32, identity: bool, scaled: bool) -> Pivot {
-            Pivot { slot, block, upper, end, identity, scaled }
+        use #krate::model::{Assembly, Left, Pivot};
+        const fn pivot(
+            slot: u32,
+            block: u32,
+            upper: u32,
+            end: u32,
+            left: [u32; 3],
+            identity: bool,
+            scaled: bool,
+        ) -> Pivot {
+            Pivot { slot, block, upper, end, left, identity, scaled }
+        }
+        const fn left(block: u32, slot: u32) -> Left {
+            Left { block, slot }
         }
         const fn assembly(block: u32, direct: u32, state: u32, scaled: bool) -> Assembly {
             Assembly { block, direct, state, scaled }
@@ -166,6 +193,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },
             slots: &[#(#slots),*],
+            left: &const { [#(#left),*] },
             updates: &[#(#updates),*],
             assembly: &const { [#(#assembly),*] },
             slot_of_equation: &[#(#slot_of_equation),*],
