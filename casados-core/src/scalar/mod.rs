@@ -245,14 +245,14 @@ pub trait Scalar: Field {
     fn powi(self, n: i32) -> Self;
     /// `aᵇ`
     fn powf(self, other: Self) -> Self;
-    /// An elementary function of two arguments that do not wait for each other: in one register where there is one that is twice as wide, else abreast.
+    /// An elementary function of two or four arguments that do not wait for each other: two in one register where there is one that is
+    /// twice as wide, and abreast.
     #[doc(hidden)]
     #[inline(always)]
-    fn both<F: elementary::Elementary<K, R>, const K: usize, const R: usize>(
-        a: [Self; K],
-        b: [Self; K],
-    ) -> [[Self; R]; 2] {
-        [F::of(a), F::of(b)]
+    fn together<F: elementary::Elementary<K, R>, const K: usize, const R: usize, const N: usize>(
+        a: [[Self; K]; N],
+    ) -> [[Self; R]; N] {
+        a.map(F::of)
     }
     /// `|a|`
     fn abs(self) -> Self;

@@ -28,20 +28,20 @@ pub struct Chunk {
 /// What a statement computes.
 pub fn computed(step: Step) -> impl Iterator<Item = Node> {
     let list = match step {
-        Step::Compute(node) => [Some(node), None, None, None],
-        Step::SinCos(sin, cos) => [Some(sin), Some(cos), None, None],
-        Step::Both([(a, more_of_a), (b, more_of_b)]) => [Some(a), more_of_a, Some(b), more_of_b],
+        Step::Compute(node) => [Some((node, None)), None, None, None],
+        Step::SinCos(sin, cos) => [Some((sin, Some(cos))), None, None, None],
+        Step::Together(values) => values,
         Step::Store(_) => [None; 4],
     };
-    list.into_iter().flatten()
+    list.into_iter().flatten().flat_map(|(node, other)| [node].into_iter().chain(other))
 }
 
 /// What a statement reads, leaves included.
 pub fn read(graph: &Graph, outputs: &[Node], step: Step) -> impl Iterator<Item = Node> {
     let (stored, ops) = match step {
-        Step::Compute(node) | Step::SinCos(node, _) => (None, [Some(graph.op(node)), None]),
-        Step::Both(both) => (None, both.map(|(node, _)| Some(graph.op(node)))),
-        Step::Store(output) => (Some(outputs[output]), [None; 2]),
+        Step::Compute(node) | Step::SinCos(node, _) => (None, [Some(graph.op(node)), None, None, None]),
+        Step::Together(values) => (None, values.map(|values| values.map(|(node, _)| graph.op(node)))),
+        Step::Store(output) => (Some(outputs[output]), [None; 4]),
     };
     stored.into_iter().chain(ops.into_iter().flatten().flat_map(Op::operands))
 }

@@ -6,7 +6,7 @@ mod documentation;
 mod dual;
 mod function;
 mod model;
-mod pairs;
+mod together;
 mod routine;
 mod schedule;
 mod structure;

@@ -1,7 +1,7 @@
 //! A list of expressions as Rust functions: straight-line code, generic over the scalar.
 
 use super::chunk::{self, Chunk, Plan};
-use super::pairs::{self, Function};
+use super::together::{self, Function};
 use super::schedule::{self, Step};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 use crate::language::Variables;
@@ -32,7 +32,7 @@ impl Routine<'_> {
     /// Writes the routine. `S: Scalar` must be in scope.
     pub fn write(&self, graph: &Graph, variables: &Variables, opaque: usize) -> String {
         let outputs: Vec<Node> = self.stores.iter().map(|store| store.2).collect();
-        let steps = pairs::in_pairs(graph, &schedule::schedule(graph, &outputs));
+        let steps = together::together(graph, &schedule::schedule(graph, &outputs));
         let operations = steps.iter().copied().flat_map(chunk::computed).count();
         let plan = chunk::plan(graph, &outputs, &steps, LIMIT);
         let mut names = vec![u32::MAX; graph.len()];
@@ -149,14 +149,18 @@ impl Writer<'_> {
                         argument.unwrap_or_default()
                     );
                 }
-                Step::Both(both) => {
-                    let Some(function) = pairs::function_of(self.graph, both[0]) else { continue };
+                Step::Together(values) => {
+                    let values: Vec<_> = values.into_iter().flatten().collect();
+                    let function = values.first().and_then(|&values| together::function_of(self.graph, values));
+                    let Some(function) = function else { continue };
                     let list = |nodes: &mut dyn Iterator<Item = Node>| {
                         let atoms: Vec<String> = nodes.map(|node| self.atom(node)).collect();
                         format!("[{}]", atoms.join(", "))
                     };
-                    let results = both.map(|(node, other)| list(&mut [node].into_iter().chain(other)));
-                    let arguments = both.map(|(node, _)| list(&mut self.graph.op(node).operands()));
+                    let results: Vec<_> =
+                        values.iter().map(|(node, other)| list(&mut [*node].into_iter().chain(*other))).collect();
+                    let arguments: Vec<_> =
+                        values.iter().map(|(node, _)| list(&mut self.graph.op(*node).operands())).collect();
                     let function = match function {
                         Function::Unary(function) => unary(function),
                         Function::Binary(function) => binary(function),
@@ -164,7 +168,7 @@ impl Writer<'_> {
                     };
                     let _ = writeln!(
                         text,
-                        "let [{}] = S::both::<elementary::{function}, _, _>({});",
+                        "let [{}] = S::together::<elementary::{function}, _, _, _>([{}]);",
                         results.join(", "),
                         arguments.join(", ")
                     );

@@ -11,8 +11,8 @@ pub enum Step {
     Compute(Node),
     /// Compute the sine and the cosine of the same argument.
     SinCos(Node, Node),
-    /// Compute the same elementary function of two arguments that do not depend on it.
-    Both([Values; 2]),
+    /// Compute the same elementary function of two or four arguments that do not depend on it.
+    Together([Option<Values>; 4]),
     /// Store an output, by its index in the list of outputs.
     Store(usize),
 }

@@ -57,62 +57,104 @@ macro_rules! of_doubles {
     };
 }
 
-/// Two elementary functions of registers that no register is twice as wide as: the processor works on both while each waits for itself.
+/// The first and the last arguments of two functions, and of four.
 #[cfg(target_arch = "x86_64")]
-macro_rules! abreast {
-    ($name:ident, $ops:ident, $a:ident, $b:ident) => {{
-        let four = [$a[0], $a[K - 1], $b[0], $b[K - 1]].map(|a| whole!($name, $ops, a));
-        let [first, second] = $ops::enter_with_four::<Abreast<F, K, R>, _>(four);
-        [first.map(|a| Self(a.0)), second.map(|a| Self(a.0))]
+macro_rules! ends {
+    ($name:ident, $ops:ident, $a:ident: $($index:literal)*) => {
+        [$($a[$index][0], $a[$index][K - 1]),*].map(|a| whole!($name, $ops, a))
+    };
+}
+
+/// Results of registers that are all used, in such as these.
+#[cfg(target_arch = "x86_64")]
+macro_rules! results {
+    ($results:expr) => {{
+        let (found, mut results) = ($results, [[Self::splat(0.0); R]; COUNT]);
+        for (to, from) in results.as_flattened_mut().iter_mut().zip(found.as_flattened()) {
+            *to = Self(from.0);
+        }
+        results
     }};
 }
 
-/// The elementary functions of doubles in registers of eight, two of them abreast.
+/// The elementary functions of doubles in registers of eight, and two or four of them abreast: the processor works on each while
+/// others wait for themselves.
 #[cfg(target_arch = "x86_64")]
 macro_rules! of_eights {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
         of_doubles!($name, $ops: $($functions)*);
         #[inline(always)]
-        fn both<F: Elementary<K, R>, const K: usize, const R: usize>(a: [Self; K], b: [Self; K]) -> [[Self; R]; 2] {
-            abreast!($name, $ops, a, b)
+        fn together<F: Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
+            a: [[Self; K]; COUNT],
+        ) -> [[Self; R]; COUNT] {
+            if const { COUNT == 4 } {
+                let ends = ends!($name, $ops, a: 0 1 2 3);
+                results!($ops::enter_with_eight::<Abreast<F, K, R>, _>(ends))
+            } else if const { COUNT == 2 } {
+                results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
+            } else {
+                a.map(F::of)
+            }
         }
     };
 }
 
-/// The elementary functions of doubles, and two of them at once: in one register where each takes half of one, or where
+/// The elementary functions of doubles, and several of them together: two in one register where each takes half of one, or where
 /// there are registers twice as wide; else abreast.
 #[cfg(target_arch = "x86_64")]
 macro_rules! of_fours {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
         of_doubles!($name, $ops: $($functions)*);
         #[inline(always)]
-        fn both<F: Elementary<K, R>, const K: usize, const R: usize>(a: [Self; K], b: [Self; K]) -> [[Self; R]; 2] {
-            if const { 2 * N <= $ops::WIDTH } {
-                let mut joined = a.map(|a| whole!($name, $ops, a));
-                for (a, b) in joined.iter_mut().zip(b) {
-                    *a = $name($ops::low_halves(a.0, b.0));
-                }
-                let joined = F::of(joined);
-                let mut results = [[Self($ops::splat(0.0)); R]; 2];
-                for (r, joined) in joined.iter().enumerate() {
-                    results[0][r] = Self($ops::low_halves(joined.0, joined.0));
-                    results[1][r] = Self($ops::high_halves(joined.0, joined.0));
+        fn together<F: Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
+            a: [[Self; K]; COUNT],
+        ) -> [[Self; R]; COUNT] {
+            if const { 2 * N <= $ops::WIDTH && COUNT % 2 == 0 } {
+                let mut results = [[Self($ops::splat(0.0)); R]; COUNT];
+                for k in (0..COUNT - 1).step_by(2) {
+                    let mut joined = a[k].map(|a| whole!($name, $ops, a));
+                    for (joined, other) in joined.iter_mut().zip(a[k + 1]) {
+                        *joined = $name($ops::low_halves(joined.0, other.0));
+                    }
+                    for (r, joined) in F::of(joined).iter().enumerate() {
+                        results[k][r] = Self($ops::low_halves(joined.0, joined.0));
+                        results[k + 1][r] = Self($ops::high_halves(joined.0, joined.0));
+                    }
                 }
                 results
-            } else if level() == Level::Avx512 {
-                let four = [a[0], a[K - 1], b[0], b[K - 1]].map(|a| whole!($name, $ops, a));
-                let [first, second] = avx512_f64::enter_with_four::<Wider<F, K, R>, _>(four);
-                [first.map(|a| Self(a.0)), second.map(|a| Self(a.0))]
+            } else if level() == Level::Avx512 && const { COUNT == 4 } {
+                let ends = ends!($name, $ops, a: 0 1 2 3);
+                results!(avx512_f64::enter_with_eight::<Wider<F, K, R>, _>(ends))
+            } else if level() == Level::Avx512 && const { COUNT == 2 } {
+                results!(avx512_f64::enter_with_four::<Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
+            } else if const { COUNT == 4 } {
+                // Four would not fit sixteen registers.
+                let first = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1));
+                let second = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 2 3));
+                let all = [first, second];
+                results!(all.as_flattened())
+            } else if const { COUNT == 2 } {
+                results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
             } else {
-                abreast!($name, $ops, a, b)
+                a.map(F::of)
             }
         }
     };
 }
-
-/// A function of two registers, of the first and the last argument of the one, then of the other.
+/// Functions abreast, each given by its first and its last argument.
 #[cfg(target_arch = "x86_64")]
 struct Abreast<F, const K: usize, const R: usize>(core::marker::PhantomData<F>);
+
+/// The arguments of a function.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn arguments<D: Copy, const K: usize>(first: D, last: D) -> [D; K] {
+    let mut all = [first; K];
+    if K > 1 {
+        all[K - 1] = last;
+    }
+    all
+}
 
 #[cfg(target_arch = "x86_64")]
 impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithFour<D>
@@ -120,16 +162,28 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> functions::
 {
     type Output = [[D; R]; 2];
     #[inline(always)]
-    fn call(first: D, last: D, other_first: D, other_last: D) -> Self::Output {
-        let (mut one, mut other) = ([first; K], [other_first; K]);
-        if K > 1 {
-            (one[K - 1], other[K - 1]) = (last, other_last);
-        }
-        [F::inside(one), F::inside(other)]
+    fn call([a, b, c, d]: [D; 4]) -> Self::Output {
+        [F::inside(arguments(a, b)), F::inside(arguments(c, d))]
     }
 }
 
-/// A function of two registers in one that is twice as wide: its first and last argument of the one, then of the other.
+#[cfg(target_arch = "x86_64")]
+impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithEight<D>
+    for Abreast<F, K, R>
+{
+    type Output = [[D; R]; 4];
+    #[inline(always)]
+    fn call([a, b, c, d, e, f, g, h]: [D; 8]) -> Self::Output {
+        [
+            F::inside(arguments(a, b)),
+            F::inside(arguments(c, d)),
+            F::inside(arguments(e, f)),
+            F::inside(arguments(g, h)),
+        ]
+    }
+}
+
+/// Functions in registers that are twice as wide, two in each, given by their first and their last arguments.
 #[cfg(target_arch = "x86_64")]
 struct Wider<F, const K: usize, const R: usize>(core::marker::PhantomData<F>);
 
@@ -139,19 +193,46 @@ impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithFou
 {
     type Output = [[F64x4<4>; R]; 2];
     #[inline(always)]
-    fn call(first: F64x4<4>, last: F64x4<4>, other_first: F64x4<4>, other_last: F64x4<4>) -> Self::Output {
-        let mut joined = [F64x8(avx512_f64::join(first.0, other_first.0)); K];
-        if K > 1 {
-            joined[K - 1] = F64x8(avx512_f64::join(last.0, other_last.0));
-        }
-        let joined = F::inside(joined);
-        let mut results = [[first; R]; 2];
+    fn call([a, b, c, d]: [F64x4<4>; 4]) -> Self::Output {
+        let joined = F::inside(arguments(join(a, c), join(b, d)));
+        let mut results = [[a; R]; 2];
         for r in 0..R {
-            let [low, high] = avx512_f64::halves(joined[r].0);
-            (results[0][r], results[1][r]) = (F64x4(low), F64x4(high));
+            [results[0][r], results[1][r]] = apart(joined[r]);
         }
         results
     }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithEight<F64x4<4>>
+    for Wider<F, K, R>
+{
+    type Output = [[F64x4<4>; R]; 4];
+    #[inline(always)]
+    fn call([a, b, c, d, e, f, g, h]: [F64x4<4>; 8]) -> Self::Output {
+        let first = F::inside(arguments(join(a, c), join(b, d)));
+        let second = F::inside(arguments(join(e, g), join(f, h)));
+        let mut results = [[a; R]; 4];
+        for r in 0..R {
+            [results[0][r], results[1][r]] = apart(first[r]);
+            [results[2][r], results[3][r]] = apart(second[r]);
+        }
+        results
+    }
+}
+
+/// Both in one register, inside of a function for AVX-512.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn join(a: F64x4<4>, b: F64x4<4>) -> F64x8<8> {
+    F64x8(avx512_f64::join(a.0, b.0))
+}
+
+/// Both halves.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn apart(joined: F64x8<8>) -> [F64x4<4>; 2] {
+    avx512_f64::halves(joined.0).map(F64x4)
 }
 
 /// The elementary functions of `f32`: those of doubles, rounded.

@@ -3,7 +3,7 @@
 //! One module for each kind of register, all with the same functions.
 #![allow(unsafe_code)]
 
-use super::functions::{Call, CallWithFour};
+use super::functions::{Call, CallWithEight, CallWithFour};
 use core::arch::x86_64::*;
 
 // SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine
@@ -91,20 +91,25 @@ macro_rules! enter {
     };
 }
 
-/// A function that is compiled for given instructions, of four arguments. Each has a place of its own: from an array registers
-/// would be loaded with parts of two of them, for which the processor waits until both are in the cache.
-macro_rules! enter_with_four {
+/// Functions that are compiled for given instructions, of four and of eight arguments. Each has a place of its own: from an array
+/// registers would be loaded with parts of two of them, for which the processor waits until both are in the cache.
+macro_rules! enter_with_many {
     ($features:literal) => {
+        enter_with_many!($features, enter_with_four, CallWithFour, 4: a b c d);
+        enter_with_many!($features, enter_with_eight, CallWithEight, 8: a b c d e f g h);
+    };
+    ($features:literal, $enter:ident, $call:ident, $count:literal: $($argument:ident)*) => {
         /// Calls `F` where the instructions of this register may be used; not inlined.
         #[inline(always)]
-        pub fn enter_with_four<F: CallWithFour<A>, A>([a, b, c, d]: [A; 4]) -> F::Output {
+        pub fn $enter<F: $call<A>, A>([$($argument),*]: [A; $count]) -> F::Output {
             #[target_feature(enable = $features)]
             #[inline(never)]
-            fn inside<F: CallWithFour<A>, A>(a: A, b: A, c: A, d: A) -> F::Output {
-                F::call(a, b, c, d)
+            #[allow(clippy::too_many_arguments)]
+            fn inside<F: $call<A>, A>($($argument: A),*) -> F::Output {
+                F::call([$($argument),*])
             }
             // SAFETY: see the head of the file.
-            unsafe { inside::<F, A>(a, b, c, d) }
+            unsafe { inside::<F, A>($($argument),*) }
         }
     };
 }
@@ -227,7 +232,7 @@ pub mod avx2_f64 {
     pub const FUSED: bool = true;
 
     enter!("avx2,fma");
-    enter_with_four!("avx2,fma");
+    enter_with_many!("avx2,fma");
     halves!(f64, sse2_f64, _mm256_castpd256_pd128, _mm256_extractf128_pd);
     memory!(f64, 4, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_setr_pd; 0 1 2 3);
     wrap! {
@@ -363,7 +368,7 @@ pub mod avx512_f64 {
     pub const FUSED: bool = true;
 
     enter!("avx512f,avx512dq,avx512vl");
-    enter_with_four!("avx512f,avx512dq,avx512vl");
+    enter_with_many!("avx512f,avx512dq,avx512vl");
     halves!(f64, avx2_f64, _mm512_castpd512_pd256, _mm512_extractf64x4_pd);
     masked!(f64, 8, u8, _mm512_mask_loadu_pd, _mm512_mask_storeu_pd, _mm512_mask_blend_pd);
     wrap! {

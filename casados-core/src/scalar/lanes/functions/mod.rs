@@ -138,7 +138,15 @@ pub trait CallWithFour<A> {
     /// Its result.
     type Output;
     /// `#[inline(always)]`
-    fn call(a: A, b: A, c: A, d: A) -> Self::Output;
+    fn call(a: [A; 4]) -> Self::Output;
+}
+
+/// The same of eight arguments.
+pub trait CallWithEight<A> {
+    /// Its result.
+    type Output;
+    /// `#[inline(always)]`
+    fn call(a: [A; 8]) -> Self::Output;
 }
 
 /// An elementary function of `K` numbers with `R` results.

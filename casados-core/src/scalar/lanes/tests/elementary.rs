@@ -319,22 +319,22 @@ fn sine_and_cosine_together_are_what_they_are_alone() {
     on_every_register!(check);
 }
 
-/// Two arguments at once have the values that one after the other has.
-fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize>(_: F) {
+/// Several arguments at once have the values that one after the other has.
+fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize, const N: usize>(_: F) {
     let values = specials();
     inside::<L>(|| {
         for i in 0..values.len() {
             let argument = |shift: usize| L::load(&cell::<L>(&values, i + shift, 1));
-            let (a, b) =
-                (core::array::from_fn(|k| argument(7 * k)), core::array::from_fn(|k| argument(3 + 5 * k)));
-            let (both, each) = (L::both::<F, K, R>(a, b), [F::of(a), F::of(b)]);
-            for (both, each) in both.as_flattened().iter().zip(each.as_flattened()) {
-                let [mut found, mut expected] = [cell::<L>(&[0.0], 0, 1); 2];
-                both.store(&mut found);
+            let a: [[L; K]; N] =
+                core::array::from_fn(|n| core::array::from_fn(|k| argument(2 * n + (7 - n) * k)));
+            let (together, each) = (L::together::<F, K, R, N>(a), a.map(F::of));
+            for (found, each) in together.as_flattened().iter().zip(each.as_flattened()) {
+                let [mut of_all, mut expected] = [cell::<L>(&[0.0], 0, 1); 2];
+                found.store(&mut of_all);
                 each.store(&mut expected);
                 for lane in 0..L::LANES {
-                    let (found, expected) = (L::lane(&found, lane), L::lane(&expected, lane));
-                    assert!(same(found, expected), "{found:e}, not {expected:e}, of {a:?} and {b:?}");
+                    let (found, expected) = (L::lane(&of_all, lane), L::lane(&expected, lane));
+                    assert!(same(found, expected), "{found:e}, not {expected:e}, of {a:?}");
                 }
             }
         }
@@ -342,10 +342,10 @@ fn at_once<L: Lanes, F: Elementary<K, R>, const K: usize, const R: usize>(_: F) 
 }
 
 #[test]
-fn two_at_once_are_what_each_is() {
+fn those_together_are_what_each_is() {
     macro_rules! all {
         ($register:ty: $($function:ident)*) => {
-            $( at_once::<$register, _, _, _>(functions::$function); )*
+            $( at_once::<$register, _, _, _, 2>(functions::$function); at_once::<$register, _, _, _, 4>(functions::$function); )*
         };
     }
     macro_rules! check {

@@ -1,15 +1,16 @@
-//! Elementary functions in pairs: two arguments at once take hardly longer than one in registers that have room for both.
+//! Elementary functions together: two arguments at once take hardly longer than one in registers that have room for both, and of four
+//! the processor works on some while others wait for themselves.
 
 use super::chunk::computed;
 use super::schedule::{Step, Values};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
-/// So many statements a function may come earlier than it would, to be one of a pair: what waits for its use in the
+/// So many statements a function may come earlier than it would, to be computed with another: what waits for its use in the
 /// meantime takes registers.
 const REACH: usize = 500;
 
-/// An elementary function that is worth being one of a pair.
+/// An elementary function that is worth being computed with others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Function {
     /// Of one argument.
@@ -35,20 +36,20 @@ fn function(graph: &Graph, step: Step) -> Option<(Function, Values)> {
             };
             Some((function, (node, None)))
         }
-        Step::Both(_) | Step::Store(_) => None,
+        Step::Together(_) | Step::Store(_) => None,
     }
 }
 
-/// The function of a pair.
+/// The function that has these values.
 pub fn function_of(graph: &Graph, (node, other): Values) -> Option<Function> {
     let step = other.map_or(Step::Compute(node), |cos| Step::SinCos(node, cos));
     function(graph, step).map(|(function, _)| function)
 }
 
-/// The same statements, elementary functions with the next one of their kind and level: what that one waits for comes before
-/// both. The level of a value is the most elementary functions that are one within the other in it, so that none of a level waits
+/// The same statements, elementary functions with the next one or the next three of their kind and level: what these wait for comes
+/// before all. The level of a value is the most elementary functions that are one within the other in it, so that none of a level waits
 /// for another.
-pub fn in_pairs(graph: &Graph, steps: &[Step]) -> Vec<Step> {
+pub fn together(graph: &Graph, steps: &[Step]) -> Vec<Step> {
     let mut position = HashMap::new();
     let mut levels = vec![0u32; steps.len()];
     let mut waiting: HashMap<(Function, u32), VecDeque<usize>> = HashMap::new();
@@ -68,21 +69,23 @@ pub fn in_pairs(graph: &Graph, steps: &[Step]) -> Vec<Step> {
             continue;
         }
         done[index] = true;
-        let others = function(graph, step).and_then(|(kind, _)| waiting.get_mut(&(kind, levels[index])));
-        let partner = others.and_then(|others| {
-            while others.front().is_some_and(|&other| done[other]) {
-                others.pop_front();
-            }
-            let is_near = others.front().is_some_and(|&other| other - index < REACH);
-            if is_near { others.pop_front() } else { None }
-        });
-        let (Some(other), Some((_, values))) = (partner, function(graph, step)) else {
+        let Some((kind, values)) = function(graph, step) else {
             list.push(step);
             continue;
         };
-        // What the other one waits for.
+        let others = waiting.entry((kind, levels[index])).or_default();
+        while others.front().is_some_and(|&other| done[other]) {
+            others.pop_front();
+        }
+        let near = others.iter().take(3).take_while(|&&other| other - index < REACH).count();
+        let partners: Vec<usize> = others.drain(..if near == 3 { 3 } else { near.min(1) }).collect();
+        if partners.is_empty() {
+            list.push(step);
+            continue;
+        }
+        // What the others wait for.
         let mut first = BTreeSet::new();
-        let mut stack = vec![other];
+        let mut stack = partners.clone();
         while let Some(at) = stack.pop() {
             let before = operands(graph, steps[at]).filter_map(|node| position.get(&node).copied());
             stack.extend(before.filter(|&at| !done[at] && first.insert(at)));
@@ -91,8 +94,12 @@ pub fn in_pairs(graph: &Graph, steps: &[Step]) -> Vec<Step> {
             done[at] = true;
             list.push(steps[at]);
         }
-        done[other] = true;
-        list.extend(function(graph, steps[other]).map(|(_, others)| Step::Both([values, others])));
+        let mut all = [Some(values), None, None, None];
+        for (to, &other) in all[1..].iter_mut().zip(&partners) {
+            done[other] = true;
+            *to = function(graph, steps[other]).map(|(_, values)| values);
+        }
+        list.push(Step::Together(all));
     }
     list
 }
@@ -108,36 +115,52 @@ mod tests {
     use super::*;
 
     fn check(graph: &Graph, outputs: &[Node]) -> Vec<Step> {
-        let steps = in_pairs(graph, &schedule(graph, outputs));
+        let steps = together(graph, &schedule(graph, outputs));
         assert_complete(graph, outputs, &steps);
         for step in &steps {
-            if let Step::Both([a, b]) = *step {
-                assert!(function_of(graph, a).is_some() && function_of(graph, a) == function_of(graph, b));
+            if let Step::Together(values) = *step {
+                let functions: Vec<_> =
+                    values.into_iter().flatten().map(|values| function_of(graph, values)).collect();
+                assert!(matches!(functions.len(), 2 | 4) && functions[0].is_some(), "{functions:?}");
+                assert!(functions.iter().all(|function| *function == functions[0]), "{functions:?}");
             }
         }
         steps
     }
 
+    fn pair(a: Values, b: Values) -> Step {
+        Step::Together([Some(a), Some(b), None, None])
+    }
+
     #[test]
-    fn functions_go_in_pairs_where_they_do_not_wait_for_each_other() {
+    fn functions_go_together_where_they_do_not_wait_for_each_other() {
         let mut g = Graph::default();
         let x = [0, 1, 2].map(|index| g.variable(index));
         let scaled = x.map(|x| g.binary(Binary::Mul, x, x));
         let inner = scaled.map(|a| g.unary(Unary::Exp, a));
         let outer = inner.map(|a| g.unary(Unary::Exp, a));
         let steps = check(&g, &outer);
-        let both = |a: Node, b: Node| Step::Both([(a, None), (b, None)]);
         // The third has no other one left.
-        assert!(steps.contains(&both(inner[0], inner[1])), "{steps:?}");
-        assert!(steps.contains(&both(outer[0], outer[1])), "{steps:?}");
-        assert_eq!(steps.iter().filter(|step| matches!(step, Step::Both(_))).count(), 2, "{steps:?}");
+        assert!(steps.contains(&pair((inner[0], None), (inner[1], None))), "{steps:?}");
+        assert!(steps.contains(&pair((outer[0], None), (outer[1], None))), "{steps:?}");
+        assert_eq!(steps.iter().filter(|step| matches!(step, Step::Together(_))).count(), 2, "{steps:?}");
         // A function of a function of the same kind waits for it.
-        assert!(!check(&g, &[outer[0]]).iter().any(|step| matches!(step, Step::Both(_))));
+        assert!(!check(&g, &[outer[0]]).iter().any(|step| matches!(step, Step::Together(_))));
 
         let (s, c) = (x.map(|x| g.unary(Unary::Sin, x)), x.map(|x| g.unary(Unary::Cos, x)));
         let sums = [0, 1].map(|k| g.binary(Binary::Add, s[k], c[k]));
-        let pair = Step::Both([(s[0], Some(c[0])), (s[1], Some(c[1]))]);
-        assert_eq!(check(&g, &sums)[0], pair);
+        assert_eq!(check(&g, &sums)[0], pair((s[0], Some(c[0])), (s[1], Some(c[1]))));
+    }
+
+    #[test]
+    fn four_go_together_and_what_is_left_in_pairs() {
+        let mut g = Graph::default();
+        let x: [Node; 7] = std::array::from_fn(|index| g.variable(index as u32));
+        let f = x.map(|x| g.unary(Unary::Ln, x));
+        let found: Vec<Step> =
+            check(&g, &f).into_iter().filter(|step| !matches!(step, Step::Store(_))).collect();
+        let values = [0, 1, 2, 3].map(|k| Some((f[k], None)));
+        assert_eq!(found, [Step::Together(values), pair((f[4], None), (f[5], None)), Step::Compute(f[6])]);
     }
 
     #[test]
@@ -149,6 +172,6 @@ mod tests {
         }
         let sum = g.binary(Binary::Add, nodes[0], nodes[1]);
         // Depth first the second chain begins where the first one ends, out of reach.
-        assert!(!check(&g, &[sum]).iter().any(|step| matches!(step, Step::Both(_))));
+        assert!(!check(&g, &[sum]).iter().any(|step| matches!(step, Step::Together(_))));
     }
 }
