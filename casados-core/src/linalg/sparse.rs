@@ -262,16 +262,66 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
 {
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        // What is added to a row is added in registers where one column fills them; but large blocks come from the second cache
+        // fastest as they lie, column by column.
+        if const { align_of::<E>() > 8 && size_of::<Block<E, S>>() <= 256 } {
+            self.down_by_rows::<A>(pivot);
+        } else {
+            self.down_by_columns::<A>(pivot);
+        }
+    }
+
+    #[inline(always)]
+    fn down_by_columns<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() {
             return;
         }
-        let scaled = is_scaled::<S>(pivot);
-        // What is added to a row is added in registers. Of one column of plain numbers that would take as long as additions wait for
-        // each other; and large blocks come from the second cache fastest as they lie, column by column.
-        let by_rows = const { (W > 1 || align_of::<E>() > 8) && size_of::<Block<E, S>>() <= 256 };
-        if by_rows && !pivot.left(S).is_empty() {
+        // Directions that have not reached this unknown, as at the start of an interval. Of registers the memory is asked: a packet of
+        // which single elements are looked at is not kept in registers.
+        if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
+            return;
+        }
+        let packet = load::<E, R, S, W>(rows, slot, *column);
+        if const { W > 1 && size_of::<E>() <= 8 }
+            && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0))
+        {
+            return;
+        }
+        if is_scaled::<S>(pivot) {
+            let mut product = [[E::from_f64(0.0); W]; S];
+            let Some(row) = rows.get(slot) else { return };
+            subtract_of::<A, E, R, S, W>(&mut product, factors.coupling, row, *column);
+            for (block, other) in beside(*factors, pivot.lower()) {
+                if other >= rows.len() {
+                    continue;
+                }
+                let mut target = load(rows, other, *column);
+                subtract_scaled::<A, E, S, W>(&mut target, block, &product);
+                store(rows, other, *column, &target);
+            }
+            return;
+        }
+        for (block, other) in beside(*factors, pivot.lower()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            subtract::<A, E, S, W>(&mut target, block, &packet);
+            store(rows, other, *column, &target);
+        }
+    }
+
+    /// The same, but for the columns of scaled pivots.
+    #[inline(always)]
+    fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() {
+            return;
+        }
+        if !pivot.left(S).is_empty() {
             let mut packet = load(rows, slot, *column);
             for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
                 let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
@@ -280,29 +330,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             }
             store(rows, slot, *column, &packet);
         }
-        // Directions that have not reached this unknown, as at the start of an interval. Asked of the memory: a packet of which single
-        // elements are looked at is not kept in registers.
-        if by_rows && !scaled || W > 1 && is_zero::<E, R, S, W>(rows, slot, *column) {
-            return;
-        }
-        let mut packet = [[E::from_f64(0.0); W]; S];
-        if scaled {
-            let Some(source) = rows.get(slot) else { return };
-            subtract_of::<A, E, R, S, W>(&mut packet, factors.coupling, source, *column);
-        } else {
-            packet = load(rows, slot, *column);
-        }
-        for (block, other) in beside(*factors, pivot.lower()) {
-            if other >= rows.len() {
-                continue;
-            }
-            let mut target = load(rows, other, *column);
-            if scaled {
-                subtract_scaled::<A, E, S, W>(&mut target, block, &packet);
-            } else {
-                subtract::<A, E, S, W>(&mut target, block, &packet);
-            }
-            store(rows, other, *column, &target);
+        if is_scaled::<S>(pivot) {
+            self.down_by_columns::<A>(pivot);
         }
     }
 
@@ -457,13 +486,13 @@ fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, con
     }
 }
 
+/// In loops: a closure would be compiled for every machine.
 #[inline(always)]
 fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
     column: usize,
 ) -> bool {
-    // In loops: a closure would be compiled for every machine.
     for row in rows.get(slot).into_iter().flatten() {
         for element in row.as_ref().get(column..).unwrap_or_default().iter().take(W) {
             if *element != E::from_f64(0.0) {
