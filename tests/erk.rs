@@ -35,6 +35,7 @@ impl Dae for Oscillator {
         linear: &[false, true],
         linear_in_state: false,
         constant_matrix: false,
+        autonomous: false,
         constant_rows: &[false; 2],
         trivial: &[],
         quadratures: &[],

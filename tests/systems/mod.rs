@@ -163,6 +163,7 @@ macro_rules! system {
                     linear: &[false; $nx + $nz],
                     linear_in_state: false,
                     constant_matrix: false,
+                    autonomous: false,
                     constant_rows: &[false; $nx + $nz],
                     trivial: &[],
                     quadratures: &[],

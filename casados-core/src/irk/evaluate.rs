@@ -35,28 +35,32 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// The residual at all stages.
     pub(crate) fn evaluate_residual(&mut self) {
+        // Of stages that are all alike one is evaluated.
+        let all = core::mem::take(&mut self.alike);
         let Self { points, f, stage, .. } = self;
         if let Err(call) = E::side_by_side(Residual::<M, E, S> { points, f, stage }) {
             let Residual { points, f, stage } = call;
-            for i in 0..S {
+            for i in 0..if all { 1 } else { S } {
                 dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
                 M::residual::<E>(&stage.v, &mut stage.f);
-                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i });
+                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i, all });
             }
         }
     }
 
     /// The residual and the Jacobian at all stages.
     pub(crate) fn evaluate_jacobian(&mut self) {
+        // Of stages that are all alike one is evaluated.
+        let all = core::mem::take(&mut self.alike);
         let Self { points, f, stage, linear, .. } = self;
         let jacobian = &mut linear.jacobian;
         if let Err(call) = E::side_by_side(ResidualJacobian::<M, E, S> { points, f, jacobian, stage }) {
             let ResidualJacobian { points, f, jacobian, stage } = call;
-            for i in 0..S {
+            for i in 0..if all { 1 } else { S } {
                 dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
                 M::residual_jacobian::<E>(&stage.v, &mut stage.f, &mut stage.jacobian);
-                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i });
-                dispatch(Give { cells: stage.jacobian.as_ref(), to: jacobian.as_mut(), i });
+                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i, all });
+                dispatch(Give { cells: stage.jacobian.as_ref(), to: jacobian.as_mut(), i, all });
             }
         }
     }
@@ -82,11 +86,12 @@ impl<E: Lanes, const S: usize> Kernel for Take<'_, E, S> {
     }
 }
 
-/// What was computed at stage `i`.
+/// What was computed at stage `i`, for this one or for all.
 pub(crate) struct Give<'a, E: Lanes, const S: usize> {
     pub cells: &'a [E::Cell],
     pub to: &'a mut [[E; S]],
     pub i: usize,
+    pub all: bool,
 }
 
 impl<E: Lanes, const S: usize> Kernel for Give<'_, E, S> {
@@ -94,8 +99,15 @@ impl<E: Lanes, const S: usize> Kernel for Give<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        for (cell, to) in self.cells.iter().zip(self.to) {
-            if let Some(to) = to.get_mut(self.i) {
+        let Self { cells, to, i, all } = self;
+        if all {
+            for (cell, to) in cells.iter().zip(to) {
+                *to = [E::load(cell); S];
+            }
+            return;
+        }
+        for (cell, to) in cells.iter().zip(to) {
+            if let Some(to) = to.get_mut(i) {
                 *to = E::load(cell);
             }
         }

@@ -133,7 +133,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
                 dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
                 dispatch(Take { cells: stage.mu.as_mut(), from: mu.as_ref(), i });
                 M::hessian::<E>(&stage.v, &stage.mu, &mut stage.hessian);
-                dispatch(Give { cells: stage.hessian.as_ref(), to: entries.as_mut(), i });
+                dispatch(Give { cells: stage.hessian.as_ref(), to: entries.as_mut(), i, all: false });
             }
         }
     }

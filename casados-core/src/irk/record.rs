@@ -147,6 +147,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     pub(crate) ready: bool,
     /// Whether start values are solutions but for their last digits.
     pub(crate) near: bool,
+    /// Whether the model has the same values at all stages when it is evaluated next.
+    pub(crate) alike: bool,
 }
 
 /// What the model is given and gives back at one stage.

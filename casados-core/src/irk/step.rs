@@ -30,13 +30,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued.
     pub(crate) fn start(
-        &self,
+        &mut self,
         coefficients: &Coefficients<E, S>,
         from: &From<'_, M, E, S>,
         n: usize,
         before: Option<&Step<M, E, S>>,
         y: &mut ArrayK<M, [E; S]>,
     ) {
+        self.alike = false;
         match (from, before, &coefficients.next) {
             (From::Record(record), ..) => {
                 if let Some(record) = record.get(n) {
@@ -46,7 +47,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             (_, Some(before), Some(next)) => {
                 dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
             }
-            (From::Zero, ..) => y.as_mut().fill([E::from_f64(0.0); S]),
+            (From::Zero, ..) => {
+                y.as_mut().fill([E::from_f64(0.0); S]);
+                self.alike = M::STRUCTURE.autonomous;
+            }
             (From::Given, ..) => {
                 for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
                     *y = [*given; S];

@@ -41,6 +41,8 @@ pub struct Structure {
     /// Those entries do not depend on `t` either: nothing in the Newton matrix changes within an interval but with the
     /// size of the steps. One factorisation then serves all steps of an interval, and all intervals of the same `u` and `p`.
     pub constant_matrix: bool,
+    /// Nothing depends on `t`: stages at the same point have the same values.
+    pub autonomous: bool,
     /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton matrix depend on the step
     /// size and the tableau only, so that they are assembled once; and one exact iteration of Newton's method
     /// satisfies these equations to rounding.

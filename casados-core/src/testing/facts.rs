@@ -39,9 +39,22 @@ pub(super) fn compare<M: Dae>(
     if structure.constant_matrix {
         unchanged("constant matrix", &all, &|i| i < end_z || i == time);
     }
+    if structure.autonomous {
+        unchanged("autonomous", &(0..structure.jacobian.len()).collect::<Vec<_>>(), &|i| i == time);
+    }
     let constant = |&e: &usize| structure.constant_rows.get(structure.jacobian.at(e).0) == Some(&true);
     unchanged("constant rows", &all.iter().copied().filter(constant).collect::<Vec<_>>(), &|_| true);
 
+    if structure.autonomous {
+        let residual = |t: f64| {
+            let v = <ArrayV<M, f64> as Array<f64>>::from_fn(|i| if i == time { t } else { v[i] });
+            evaluate::jacobian::<M, f64>(&v).0
+        };
+        let (here, there) = (residual(v[time]), residual(other[time]));
+        let found = (0..M::Shape::NK)
+            .map(|row| (row, Entry { value: there[row], expected: here[row], tolerance: 0.0 }));
+        report.compare("autonomous", "another time", number, 0.0, found, |row| format!("equation {row}"));
+    }
     let mut sorted: Vec<usize> = (structure.blocks[1]..structure.blocks[5]).collect();
     sorted.sort_by_key(|&e| structure.jacobian.at(e).1);
     let found = sorted.iter().enumerate().map(|(i, &e)| {

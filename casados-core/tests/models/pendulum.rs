@@ -107,6 +107,7 @@ impl Dae for Pendulum {
         linear: &[true, true, false, false],
         linear_in_state: false,
         constant_matrix: false,
+        autonomous: false,
         constant_rows: &[false; 4],
         trivial: &[],
         quadratures: &[0],

@@ -119,6 +119,7 @@ pub fn write(model: &Model) -> TokenStream {
                         linear: &[false; #lk],
                         linear_in_state: false,
                         constant_matrix: false,
+                        autonomous: false,
                         constant_rows: &[false; #lk],
                         trivial: &[],
                         quadratures: &[],

@@ -21,7 +21,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let [begin, inputs] = [blocks[1], blocks[5] - blocks[1]].map(Literal::usize_unsuffixed);
     let blocks = blocks.map(Literal::usize_unsuffixed);
     let operations = self::operations(krate, operations);
-    let Facts { linear_in_state, constant_matrix, constant_rows, .. } = facts;
+    let Facts { linear_in_state, constant_matrix, autonomous, constant_rows, .. } = facts;
     let [trivial, quadratures, directions, curved] =
         [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved].map(|list| numbers(list));
     let [count, terms] = [curved.len(), terms].map(Literal::usize_unsuffixed);
@@ -45,6 +45,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             linear: &[#(#linear),*],
             linear_in_state: #linear_in_state,
             constant_matrix: #constant_matrix,
+            autonomous: #autonomous,
             constant_rows: &[#(#constant_rows),*],
             trivial: &[#(#trivial),*],
             quadratures: &[#(#quadratures),*],

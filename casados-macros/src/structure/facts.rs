@@ -10,6 +10,8 @@ pub struct Facts {
     pub linear_in_state: bool,
     /// Nor on `t`.
     pub constant_matrix: bool,
+    /// Nothing depends on `t`.
+    pub autonomous: bool,
     /// Equations whose entries in `f_ẋ, f_x, f_z` are constant.
     pub constant_rows: Vec<bool>,
     /// Equations `c ẋ_j + c′ v + c″(t) = 0`.
@@ -25,6 +27,7 @@ pub struct Facts {
 /// Reads the facts off the derivatives. `ends` is where `ẋ, x, z, u, p` end among the variables.
 pub fn find(
     graph: &Graph,
+    residual: &[Node],
     (jacobian, blocks, constant): (&[Entry], [usize; 6], &[bool]),
     hessian: &[Entry],
     linear: &[bool],
@@ -56,6 +59,7 @@ pub fn find(
     Facts {
         linear_in_state: independent(&|variable| variable < end_z),
         constant_matrix: independent(&|variable| variable < end_z || variable == time),
+        autonomous: graph.degrees(residual, &|variable| variable == time).iter().all(|&d| d == Degree::Constant),
         trivial: (0..).zip(&terms).filter(trivial).map(|(row, _)| row).collect(),
         constant_rows,
         quadratures: (0..nx).filter(|state| !used.contains(&(state + nx))).collect(),

@@ -129,6 +129,7 @@ fn facts() {
     let expected = Facts {
         linear_in_state: false,
         constant_matrix: false,
+        autonomous: false,
         constant_rows: vec![true, false, false, true],
         trivial: vec![0],
         quadratures: vec![2],
@@ -140,7 +141,7 @@ fn facts() {
     let straight = Facts { linear_in_state: true, ..expected.clone() };
     assert_eq!(build(false, true), straight);
     // The bilinear terms p x₀ and p x₁ are curved, but not within an interval.
-    let constant = Facts { constant_matrix: true, curved: vec![3, 4, 9], ..straight };
+    let constant = Facts { constant_matrix: true, autonomous: true, curved: vec![3, 4, 9], ..straight };
     assert_eq!(build(false, false), constant);
 }
 

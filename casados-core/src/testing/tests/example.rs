@@ -21,6 +21,7 @@ pub const QUADRATURE_DECLARED: u8 = 10;
 pub const TRIVIAL_DECLARED: u8 = 11;
 pub const STRAIGHT_DECLARED: u8 = 12;
 pub const MATRIX_DECLARED: u8 = 13;
+pub const TIME_FORGOTTEN: u8 = 14;
 
 fn residual<S: Scalar>(v: &[S], f: &mut [S]) {
     f[0] = v[0] - v[3] * v[1].sin() - v[2];
@@ -64,6 +65,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         linear: if FAULT == LINEAR_DECLARED { &[false, true] } else { &[false, false] },
         linear_in_state: FAULT == STRAIGHT_DECLARED,
         constant_matrix: FAULT == MATRIX_DECLARED,
+        autonomous: FAULT == TIME_FORGOTTEN,
         constant_rows: if FAULT == CONSTANT_DECLARED { &[false, true] } else { &[false, false] },
         trivial: if FAULT == TRIVIAL_DECLARED { &[0] } else { &[] },
         quadratures: if FAULT == QUADRATURE_DECLARED { &[0] } else { &[] },
@@ -80,6 +82,9 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         let (mut values, cells) = (f.map(|cell| S::load(&cell)), f);
         let f = &mut values;
         residual(v, f);
+        if FAULT == TIME_FORGOTTEN {
+            f[0] = f[0] - v[5];
+        }
         cells.iter_mut().zip(f).for_each(|(cell, value)| value.store(cell));
     }
     fn jacobian_constants<S: Lanes>(jacobian: &mut Self::Jacobian<S::Cell>) {

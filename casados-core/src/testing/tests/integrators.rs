@@ -206,6 +206,7 @@ mod logistic {
             linear: &[false],
             linear_in_state: false,
             constant_matrix: false,
+            autonomous: false,
             constant_rows: &[false; 1],
             trivial: &[],
             quadratures: &[],

@@ -55,6 +55,7 @@ fn false_facts_are_found() {
     found::<TRIVIAL_DECLARED>("trivial equations");
     found::<STRAIGHT_DECLARED>("linear in the state");
     found::<MATRIX_DECLARED>("constant matrix");
+    found::<TIME_FORGOTTEN>("autonomous");
 }
 
 #[test]
