@@ -17,6 +17,9 @@ use core::marker::PhantomData;
 /// So many strands a sum over all columns has.
 pub(super) const STRANDS: usize = 4;
 
+/// So many bytes are in the nearest cache, beside others.
+const NEAREST: usize = 1 << 15;
+
 /// Derivatives of one step in directions, as many as there are elements in `R`, in panels.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
@@ -247,8 +250,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
                 }
             }
         }
-        // Of a large model each panel by itself, which then is in the nearest cache.
-        if const { D::SPARSE && is_short::<A, Scatter<'_, M, E, D, S>>() }
+        if const { D::SPARSE && Self::is_small::<A>() }
             && self.phase != Phase::After
             && self.first
         {
@@ -270,6 +272,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
+    /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model each is filled when its turn comes.
+    const fn is_small<A: Arithmetic>() -> bool {
+        let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
+        bytes <= NEAREST && is_short::<A, Scatter<'_, M, E, D, S>>()
+    }
+
     #[inline(always)]
     fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
         self.before::<A, W>(column);
@@ -310,7 +318,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             dy.fill([[E::from_f64(0.0); W]; S]);
             Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
             each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
-        } else if const { !is_short::<A, Scatter<'_, M, E, D, S>>() } {
+        } else if const { !Self::is_small::<A>() } {
             dy.fill([[E::from_f64(0.0); W]; S]);
             self.placed = place::<M, E, D, S, W>(jacobian, self.placed, dy, column);
         }
