@@ -71,9 +71,7 @@ fn groups<T: Real, const G: usize>(stages: usize, value: impl Fn(usize) -> T) ->
     from_fn(|group| from_fn(|lane| value((GROUP * group + lane).min(stages.saturating_sub(1)))))
 }
 
-impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize>
-    Collocation<M, B, T, S, G>
-{
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
     /// # Errors
     /// [`Error::OutOfMemory`]
     pub fn new() -> Result<Self, Error> {

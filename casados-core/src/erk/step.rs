@@ -2,7 +2,7 @@
 
 use super::along::Along;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, moved};
+use crate::linalg::{Arithmetic, Kernel, are_finite, dispatch, dot_compensated, moved};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
 use crate::quadrature::Integrand;
 use crate::result::Nominal;
@@ -324,11 +324,7 @@ const ONE_BY_ONE: bool = !REGISTERS;
 /// The first value that is infinite or NaN.
 #[inline(always)]
 fn not_finite<T: Real>(values: &[T]) -> Option<usize> {
-    let mut finite = !ONE_BY_ONE;
-    for value in values.iter().take(if ONE_BY_ONE { 0 } else { usize::MAX }) {
-        finite &= value.is_finite();
-    }
-    if finite { None } else { values.iter().position(|value| !value.is_finite()) }
+    if !ONE_BY_ONE && are_finite(values) { None } else { values.iter().position(|value| !value.is_finite()) }
 }
 
 /// The first value that is not finite is an error.

@@ -4,7 +4,7 @@
 //! has registers of that many numbers, one call of the model computes them all.
 
 use super::record::{Coefficients, Stage, Times, Work};
-use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::linalg::{Arithmetic, Kernel, are_finite, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide};
@@ -240,7 +240,7 @@ pub(crate) fn not_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     values.iter().position(|value| !value.is_finite()).map(|index| (index, values[index].to_f64()))
 }
 
-/// Whether all elements are finite.
+/// See [`are_finite`].
 struct Finite<'a, T> {
     values: &'a [T],
 }
@@ -252,14 +252,4 @@ impl<T: Real> Kernel for Finite<'_, T> {
     fn run<A: Arithmetic>(self) -> bool {
         are_finite(self.values)
     }
-}
-
-/// Without an early exit, so that it is a SIMD loop.
-#[inline(always)]
-fn are_finite<T: Real>(values: &[T]) -> bool {
-    let mut finite = true;
-    for value in values {
-        finite &= value.is_finite();
-    }
-    finite
 }

@@ -25,7 +25,7 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::increment::{Largest, Measure, PlaceResidual, Subtract, Update};
-use super::progress::{Look, Progress, Verdict};
+use super::progress::{Look, Progress, Verdict, remaining};
 use super::record::{Coefficients, Work};
 use crate::linalg::dispatch;
 use crate::memory::{Fallback, Kept};
@@ -58,23 +58,24 @@ pub(crate) struct Solved<E: Lanes> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// The operations of an iteration with old factors: what is computed for all stages side by side counts once.
+    const ITERATION: f64 = {
+        let blocks = M::STRUCTURE.elimination.slots.len() as f64;
+        M::STRUCTURE.operations.residual as f64 + blocks * S as f64 + 1.0
+    };
+
     /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis.
     const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
-        let (s, blocks) = (S as f64, plan.slots.len() as f64);
-        let inverses = 4.0 * plan.pivots.len() as f64;
-        // What is computed for all stages side by side counts once; a complex product is four real ones.
-        let iteration = operations.residual as f64 + blocks * s + 1.0;
+        let (s, inverses) = (S as f64, 4.0 * plan.pivots.len() as f64);
+        // A complex product is four real ones.
         let jacobian = operations.residual_jacobian as f64;
         let (updates, means) = (plan.products(s) + inverses, plan.products(1.0) + inverses);
-        [(jacobian + updates * s * s) / iteration, (jacobian + means * 4.0) / iteration]
+        [(jacobian + updates * s * s) / Self::ITERATION, (jacobian + means * 4.0) / Self::ITERATION]
     };
 
     /// The cost of a residual, in iterations.
-    const RESIDUAL: f64 = {
-        let operations = M::STRUCTURE.operations.residual as f64;
-        operations / (operations + M::STRUCTURE.elimination.slots.len() as f64 * S as f64 + 1.0)
-    };
+    const RESIDUAL: f64 = M::STRUCTURE.operations.residual as f64 / Self::ITERATION;
 
     /// Whether factors by blocks cost no more than the iterations that they save where start values are near: with mean Jacobians, which are
     /// renewed up to three times, it took 7 to 12 of them, with blocks 4 or 5 (Robertson, Van der Pol, Oregonator, HIRES, Akzo Nobel).
@@ -280,11 +281,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             .map(|lane| E::lane(&cell, lane))
             .filter(|&left| left < 1.0 / 16.0)
             .fold(0.0, f64::max);
-        let (mut expected, mut remaining) = (1.0, 0.0);
-        while expected > tolerance && remaining <= expensive {
-            (expected, remaining) = (expected * slowest, remaining + 1.0);
-        }
-        remaining > expensive
+        remaining(true, 1.0, slowest, tolerance) > expensive
     }
 
     /// The residual in the slots of the equations.

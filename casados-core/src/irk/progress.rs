@@ -136,17 +136,22 @@ impl<E: Lanes> Judge<'_, E> {
             }
         }
         *progress = Progress { active, converged, last, rate, tolerance, exact };
-        let mut verdict = Verdict {
+        Verdict {
             active: E::any(active),
             changed: E::any(E::and(before, E::not(active))),
             grows: E::any(E::and(active, E::lt(one, rate))),
             stuck: E::any(E::and(active, E::le(half, rate))),
-            remaining: 0.0,
-        };
-        let mut expected = last;
-        while verdict.remaining < 64.0 && E::any(E::and(active, E::lt(tolerance, expected))) {
-            (expected, verdict.remaining) = (expected * rate, verdict.remaining + 1.0);
+            remaining: remaining(active, last, rate, tolerance),
         }
-        verdict
     }
+}
+
+/// How many times a size is to be multiplied by a rate to be no larger than the tolerance; 64 times at most.
+#[inline(always)]
+pub(super) fn remaining<E: Lanes>(active: E::Mask, mut size: E, rate: E, tolerance: E) -> f64 {
+    let mut count = 0.0;
+    while count < 64.0 && E::any(E::and(active, E::lt(tolerance, size))) {
+        (size, count) = (size * rate, count + 1.0);
+    }
+    count
 }

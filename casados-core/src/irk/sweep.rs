@@ -250,10 +250,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
                 }
             }
         }
-        if const { D::SPARSE && Self::is_small::<A>() }
-            && self.phase != Phase::After
-            && self.first
-        {
+        if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
             self.dy.fill(E::from_f64(0.0));
             let (jacobian, dy) = (self.jacobian, &mut *self.dy);
             each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, dy, directions: PhantomData });

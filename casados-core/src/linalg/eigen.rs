@@ -34,7 +34,12 @@ pub struct Eigenbasis<T, const S: usize, const N: usize> {
 impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
     /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than `1e-10`.
     pub fn new(tableau: &Tableau<S>) -> Option<Self> {
-        const { assert!(N == S || (N.is_multiple_of(2) && N > S), "a part for each stage, or complex numbers alone") };
+        const {
+            assert!(
+                N == S || (N.is_multiple_of(2) && N > S),
+                "a part for each stage, or complex numbers alone"
+            )
+        };
         let basis = Eigenbasis::<f64, S, N>::compute(tableau.a())?;
         let cast = |z: Complex<f64, N>| Complex { parts: z.parts.map(T::from_f64) };
         Some(Self {

@@ -48,7 +48,12 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
     ///
     /// # Errors
     /// The unknown for which there is no pivot.
-    pub fn factor(&mut self, jacobian: &M::Jacobian<T>, values: &Complex<T, PARTS>, h: T) -> Result<bool, usize> {
+    pub fn factor(
+        &mut self,
+        jacobian: &M::Jacobian<T>,
+        values: &Complex<T, PARTS>,
+        h: T,
+    ) -> Result<bool, usize> {
         let scale = values.scaled(h);
         self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
         if self.is_dense {

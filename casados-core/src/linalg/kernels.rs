@@ -1,6 +1,6 @@
 //! The inner loops.
 
-use crate::scalar::Field;
+use crate::scalar::{Field, Real};
 
 /// `y += a x`
 #[inline(always)]
@@ -16,4 +16,14 @@ pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
     for x in x {
         *x = *x / a;
     }
+}
+
+/// Whether all elements are neither infinite nor NaN. Without an early exit, so that it is a SIMD loop.
+#[inline(always)]
+pub(crate) fn are_finite<T: Real>(values: &[T]) -> bool {
+    let mut finite = true;
+    for value in values {
+        finite &= value.is_finite();
+    }
+    finite
 }

@@ -29,12 +29,7 @@ impl<M: Dae, E: Plain, const S: usize> Copy for MeanFactors<M, E, S> {}
 
 impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite.
-    pub fn factor(
-        &mut self,
-        jacobian: &M::Jacobian<[E; S]>,
-        basis: &Eigenbasis<E, S, S>,
-        h: E,
-    ) {
+    pub fn factor(&mut self, jacobian: &M::Jacobian<[E; S]>, basis: &Eigenbasis<E, S, S>, h: E) {
         let scale = basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 }));
         dispatch(AssembleMean::<M, E, S> { jacobian, scale, blocks: &mut self.blocks });
         sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());

@@ -32,7 +32,7 @@ pub(crate) use eigen::Eigenbasis;
 pub(crate) use eigen_factors::{EigenFactors, PARTS, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
-pub(crate) use kernels::axpy;
+pub(crate) use kernels::{are_finite, axpy};
 pub(crate) use mean::MeanFactors;
 pub(crate) use sparse::{Planned, solve_packets};
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};

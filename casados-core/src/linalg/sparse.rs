@@ -479,7 +479,9 @@ fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, con
         return;
     }
     for (elements, other) in block.iter().zip(other) {
-        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else { continue };
+        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else {
+            continue;
+        };
         for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
             A::subtract_row(packet, element, other);
         }

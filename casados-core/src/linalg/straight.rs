@@ -160,7 +160,8 @@ const fn is_short_plan<A: Arithmetic, M: Dae, V: AtPivot>() -> bool {
 /// A pivot and its updates; beyond the last, where nobody looks, any.
 const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [u32]) {
     if n >= plan.pivots.len() {
-        const NONE: Pivot = Pivot { slot: 0, block: 0, upper: 1, end: 1, left: [0; 3], identity: true, scaled: false };
+        const NONE: Pivot =
+            Pivot { slot: 0, block: 0, upper: 1, end: 1, left: [0; 3], identity: true, scaled: false };
         return (&NONE, &[]);
     }
     let (mut begin, mut index) = (0, 0);

@@ -121,7 +121,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let convex = if k < intervals { P::StageCost::CONVEX } else { P::TerminalCost::CONVEX };
             plain && convex && z.is_empty()
         };
-        let mut others = false;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
@@ -136,7 +135,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
             let here = part(v, k * ld_of::<P::Shape, T>(), n);
             let from = if is_direct(k, z) { here } else { &[] };
-            others |= from.is_empty();
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
             let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
@@ -192,7 +190,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
 
         // Gradients of what is quadratic: `∇f − H v`, of the other stages.
-        for (k, mut stage) in qp.stages_mut().enumerate().take(if others { usize::MAX } else { 0 }) {
+        for (k, mut stage) in qp.stages_mut().enumerate() {
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
             if is_direct(k, z) {
                 continue;

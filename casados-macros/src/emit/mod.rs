@@ -6,12 +6,12 @@ mod documentation;
 mod dual;
 mod function;
 mod model;
-mod together;
 mod routine;
 mod schedule;
 mod structure;
 #[cfg(test)]
 mod tests;
+mod together;
 
 use crate::language::{self, Instance, Model, Place};
 use crate::structure::{Analysis, FunctionAnalysis};

@@ -1,8 +1,8 @@
 //! A list of expressions as Rust functions: straight-line code, generic over the scalar.
 
 use super::chunk::{self, Chunk, Plan};
-use super::together::{self, Function};
 use super::schedule::{self, Step};
+use super::together::{self, Function};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 use crate::language::Variables;
 use std::collections::BTreeSet;
@@ -151,14 +151,17 @@ impl Writer<'_> {
                 }
                 Step::Together(values) => {
                     let values: Vec<_> = values.into_iter().flatten().collect();
-                    let function = values.first().and_then(|&values| together::function_of(self.graph, values));
+                    let function =
+                        values.first().and_then(|&values| together::function_of(self.graph, values));
                     let Some(function) = function else { continue };
                     let list = |nodes: &mut dyn Iterator<Item = Node>| {
                         let atoms: Vec<String> = nodes.map(|node| self.atom(node)).collect();
                         format!("[{}]", atoms.join(", "))
                     };
-                    let results: Vec<_> =
-                        values.iter().map(|(node, other)| list(&mut [*node].into_iter().chain(*other))).collect();
+                    let results: Vec<_> = values
+                        .iter()
+                        .map(|(node, other)| list(&mut [*node].into_iter().chain(*other)))
+                        .collect();
                     let arguments: Vec<_> =
                         values.iter().map(|(node, _)| list(&mut self.graph.op(*node).operands())).collect();
                     let function = match function {

@@ -59,7 +59,10 @@ pub fn find(
     Facts {
         linear_in_state: independent(&|variable| variable < end_z),
         constant_matrix: independent(&|variable| variable < end_z || variable == time),
-        autonomous: graph.degrees(residual, &|variable| variable == time).iter().all(|&d| d == Degree::Constant),
+        autonomous: graph
+            .degrees(residual, |variable| variable == time)
+            .iter()
+            .all(|&d| d == Degree::Constant),
         trivial: (0..).zip(&terms).filter(trivial).map(|(row, _)| row).collect(),
         constant_rows,
         quadratures: (0..nx).filter(|state| !used.contains(&(state + nx))).collect(),

@@ -89,7 +89,8 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     let derivatives = differentiate(&mut model, ends);
     let Derivatives { jacobian, blocks, constant, hessian, linear, .. } = &derivatives;
     index::check(&model, jacobian, ends)?;
-    let facts = facts::find(&model.graph, &model.residual, (jacobian, *blocks, constant), hessian, linear, ends);
+    let facts =
+        facts::find(&model.graph, &model.residual, (jacobian, *blocks, constant), hessian, linear, ends);
     let explicit = explicit(&model, jacobian, ends);
     let elimination = elimination(&model, jacobian, *blocks);
     Ok(Analysis { model, derivatives, facts, explicit, elimination })

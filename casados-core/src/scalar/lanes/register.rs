@@ -552,14 +552,17 @@ macro_rules! complex {
                 a: &[$element; N],
                 b: &[$element; N],
             ) {
-                let (Some(target), Some(a), Some(b)) = (target.first_chunk_mut(), a.first_chunk(), b.first_chunk())
+                let (Some(target), Some(a), Some(b)) =
+                    (target.first_chunk_mut(), a.first_chunk(), b.first_chunk())
                 else {
                     return;
                 };
                 let numbers = Self::load(b);
                 let imaginary = $ops::xor(Self::twice(a, $ops::WIDTH / 2).0, $ops::signs_below());
                 let difference = Self::load(target).subtract_product(Self::twice(a, 0), numbers);
-                difference.subtract_product(Self(imaginary), Self($ops::swap_halves(numbers.0))).store(target);
+                difference
+                    .subtract_product(Self(imaginary), Self($ops::swap_halves(numbers.0)))
+                    .store(target);
             }
             /// `target − a b`, element by element, as far as all go.
             #[inline(always)]
