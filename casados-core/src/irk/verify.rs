@@ -138,6 +138,9 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
 /// The weighted sum over all seeds.
 #[inline(always)]
 fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
+    if const { C == 1 } {
+        return seeds[0];
+    }
     let mut sum = E::from_f64(0.0);
     for (seed, &value) in seeds.iter().enumerate() {
         sum = sum + weight::<E>(seed, false) * value;
@@ -149,6 +152,16 @@ fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
 #[inline(always)]
 fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
     E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
+}
+
+/// `|value|` at each stage.
+#[inline(always)]
+fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
+    let mut sizes = *values;
+    for size in &mut sizes {
+        *size = size.abs();
+    }
+    sizes
 }
 
 struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
@@ -177,36 +190,36 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
             return E::lt(zero, zero);
         }
-        for (probe, stages) in probe.iter_mut().skip(nx + nx).zip(stage_sums.iter().skip(nx)) {
-            for (z, strands) in probe.iter_mut().zip(stages) {
-                *z = total(strands);
+        // Columns of −hA.
+        let mut minus_ha = [[zero; S]; S];
+        for (i, row) in a.iter().enumerate() {
+            for (column, &a) in minus_ha.iter_mut().zip(row) {
+                column[i] = -(h * a);
             }
         }
-        let (xdot, rest) = probe.split_at_mut(nx.min(probe.len()));
-        for ((stages, start), (xdot, xi)) in stage_sums.iter().zip(start_sums).zip(xdot.iter_mut().zip(rest))
-        {
-            *xi = [total(start); S];
-            for (xdot, strands) in xdot.iter_mut().zip(stages) {
-                *xdot = total(strands);
+        for (unknown, stages) in stage_sums.iter().enumerate() {
+            let mut sum = [zero; S];
+            for (sum, strands) in sum.iter_mut().zip(stages) {
+                *sum = total(strands);
             }
-            for (xi, a) in xi.iter_mut().zip(a) {
-                for (&a, &dk) in a.iter().zip(xdot.iter()) {
-                    *xi = A::subtract(*xi, -(h * a), dk);
+            let size = sizes_of(&sum);
+            if unknown < nx {
+                let start = total(&start_sums[unknown]);
+                let (mut xi, mut xi_size) = ([start; S], [start.abs(); S]);
+                for ((column, &dk), &dk_size) in minus_ha.iter().zip(&sum).zip(&size) {
+                    for ((xi, xi_size), &element) in xi.iter_mut().zip(&mut xi_size).zip(column) {
+                        *xi = A::subtract(*xi, element, dk);
+                        *xi_size = A::subtract(*xi_size, -element.abs(), dk_size);
+                    }
                 }
+                (probe[unknown], sizes[unknown]) = (sum, size);
+                (probe[nx + unknown], sizes[nx + unknown]) = (xi, xi_size);
+            } else {
+                (probe[nx + unknown], sizes[nx + unknown]) = (sum, size);
             }
         }
-        for (sizes, values) in sizes.iter_mut().zip(probe.iter()) {
-            for (size, value) in sizes.iter_mut().zip(values) {
-                *size = value.abs();
-            }
-        }
-        for ((xi, start), xdot) in sizes.iter_mut().skip(nx).zip(start_sums).zip(probe.iter()) {
-            for (xi, a) in xi.iter_mut().zip(a) {
-                *xi = total(start).abs();
-                for (&a, &dk) in a.iter().zip(xdot) {
-                    *xi = A::subtract(*xi, -(h * a).abs(), dk.abs());
-                }
-            }
+        for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
+            *sizes = sizes_of(values);
         }
         sums.as_mut().fill([zero; S]);
         terms.as_mut().fill([zero; S]);
@@ -246,8 +259,9 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
         // In registers: the optimiser cannot know that nothing here overlaps.
         let (mut sum, mut term) = (*sums, *terms);
         for i in 0..S {
-            sum[i] = sum[i] + values[i] * probe[i];
-            term[i] = term[i] + values[i].abs() * sizes[i];
+            // The sign of the sum is of no interest.
+            sum[i] = A::subtract(sum[i], values[i], probe[i]);
+            term[i] = A::subtract(term[i], -values[i].abs(), sizes[i]);
         }
         (*sums, *terms) = (sum, term);
     }
