@@ -171,7 +171,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
     /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if all of these are finite, else
     /// NaN.
     pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>) -> E {
-        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        let nx = M::Shape::NX;
         let Self { result, backward, sum, .. } = self;
         for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
             *to = *from;
@@ -185,14 +185,36 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         }
         mirror::<E, _>(sum.as_mut());
         let sum = Symmetric::<M, E> { sum: sum.as_ref(), more };
-        let (u, p) = (nx, nx + nu);
-        sum.write(&mut result.h_xx, 0, 0)
-            + sum.write(&mut result.h_uu, u, u)
-            + sum.write(&mut result.h_pp, p, p)
-            + sum.write(&mut result.h_xu, 0, u)
-            + sum.write(&mut result.h_xp, 0, p)
-            + sum.write(&mut result.h_up, u, p)
+        sum.write::<_, X, X>(&mut result.h_xx)
+            + sum.write::<_, U, U>(&mut result.h_uu)
+            + sum.write::<_, P, P>(&mut result.h_pp)
+            + sum.write::<_, X, U>(&mut result.h_xu)
+            + sum.write::<_, X, P>(&mut result.h_xp)
+            + sum.write::<_, U, P>(&mut result.h_up)
     }
+}
+
+/// The parts of `w`.
+const X: usize = 0;
+const U: usize = 1;
+const P: usize = 2;
+
+/// Where a part of `w` begins.
+const fn begin<M: Dae>(part: usize) -> usize {
+    match part {
+        X => 0,
+        U => M::Shape::NX,
+        _ => M::Shape::NX + M::Shape::NU,
+    }
+}
+
+/// How many directions that have any influence come before one.
+const fn before<M: Dae>(direction: usize) -> usize {
+    let (directions, mut count) = (M::STRUCTURE.directions, 0);
+    while count < directions.len() && (directions[count] as usize) < direction {
+        count += 1;
+    }
+    count
 }
 
 /// A symmetric matrix over the directions that have any influence.
@@ -222,39 +244,37 @@ fn mirror<V: Copy, R: Array<V>>(rows: &mut [R]) {
 }
 
 impl<M: Dae, E: Lanes> Symmetric<'_, M, E> {
-    /// Its part over the directions from `row` on and those from `column` on, which are not before them.
-    fn write<B: Matrix<E>>(&self, to: &mut B, row: usize, column: usize) -> E {
+    /// Its part over the directions of one part of `w` and those of another, which is not before it.
+    fn write<B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, to: &mut B) -> E {
         let columns = to.as_mut_slice();
         if columns.is_empty() {
             return E::from_f64(0.0);
         }
-        dispatch(Part::<M, E, B> { of: self, columns, row, column, model: PhantomData })
+        dispatch(Part::<M, E, B, OF_ROWS, OF_COLUMNS> { of: self, columns, model: PhantomData })
     }
 }
 
 /// See [`Symmetric::write`].
-struct Part<'a, M: Dae, E: Plain, B> {
+struct Part<'a, M: Dae, E: Plain, B, const OF_ROWS: usize, const OF_COLUMNS: usize> {
     of: &'a Symmetric<'a, M, E>,
     columns: &'a mut [E],
-    row: usize,
-    column: usize,
     model: PhantomData<B>,
 }
 
-impl<M: Dae, E: Lanes, B: Matrix<E>> Kernel for Part<'_, M, E, B> {
+impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
+    for Part<'_, M, E, B, OF_ROWS, OF_COLUMNS>
+{
     type Number = E;
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { of: Symmetric { sum, more }, columns, row, column, .. } = self;
-        let (zero, end) = (E::from_f64(0.0), row + B::ROWS);
-        let directions = M::STRUCTURE.directions;
+        let Self { of: Symmetric { sum, more }, columns, .. } = self;
+        let zero = E::from_f64(0.0);
+        let (row, column) = const { (begin::<M>(OF_ROWS), begin::<M>(OF_COLUMNS)) };
         let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
         // The directions of these rows that have any influence.
-        let before =
-            |row: usize| if all { row } else { directions.partition_point(|&to| (to as usize) < row) };
-        let range = before(row)..before(end);
-        let directions = directions.get(range.clone()).unwrap_or_default();
+        let range = const { before::<M>(begin::<M>(OF_ROWS))..before::<M>(begin::<M>(OF_ROWS) + B::ROWS) };
+        let directions = M::STRUCTURE.directions.get(range.clone()).unwrap_or_default();
         // Nothing times a number that is not finite is not a number.
         let (mut nothing, mut others) = ([zero; 4], [zero; 4]);
         for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {
