@@ -7,6 +7,7 @@ use super::dense::Dense;
 use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
+use super::substitution;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Real;
 use crate::shape::{Aligned, Plain};
@@ -98,7 +99,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         } else {
             let blocks = self.blocks.as_ref();
             let factors = Planned::<M, _, 1> { model: PhantomData, blocks, coupling: &[[Complex::zero()]] };
-            sparse::solve(factors, rows.as_mut());
+            substitution::solve(factors, rows.as_mut());
         }
     }
 

@@ -5,6 +5,7 @@ use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
+use super::substitution;
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes, Real};
@@ -55,7 +56,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) => dense.solve(b),
-            None => sparse::solve(self.planned(), b.as_mut()),
+            None => substitution::solve(self.planned(), b.as_mut()),
         }
     }
 
@@ -63,7 +64,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) => dense.solve_transposed(b),
-            None => sparse::solve_transposed(self.planned(), b.as_mut()),
+            None => substitution::solve_transposed(self.planned(), b.as_mut()),
         }
     }
 

@@ -5,6 +5,7 @@ use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
+use super::substitution;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Plain};
@@ -43,7 +44,7 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
             blocks: self.blocks.as_ref(),
             coupling: &[[Complex::zero()]],
         };
-        sparse::solve(factors, self.rows.as_mut());
+        substitution::solve(factors, self.rows.as_mut());
         dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
     }
 }

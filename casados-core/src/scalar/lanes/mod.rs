@@ -29,6 +29,8 @@ mod register;
 #[cfg(all(test, any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))))]
 mod tests;
 #[cfg(target_arch = "x86_64")]
+mod together;
+#[cfg(target_arch = "x86_64")]
 mod x86;
 
 use core::sync::atomic::{AtomicU8, Ordering};

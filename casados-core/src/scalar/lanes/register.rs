@@ -1,14 +1,12 @@
 //! The types: one number type over each kind of register.
 
-#[cfg(target_arch = "x86_64")]
-use super::functions::Elementary;
 use super::functions::{self, Double, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
-use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
+use super::together::{ends, of_eights, of_fours, results};
 #[cfg(target_arch = "x86_64")]
-use super::{Level, level};
+use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 use crate::scalar::{Field, Lanes, Packed, Piece, Scalar};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
@@ -57,181 +55,17 @@ macro_rules! of_doubles {
     };
 }
 
-/// The first and the last arguments of two functions, and of four.
-#[cfg(target_arch = "x86_64")]
-macro_rules! ends {
-    ($name:ident, $ops:ident, $a:ident: $($index:literal)*) => {
-        [$($a[$index][0], $a[$index][K - 1]),*].map(|a| whole!($name, $ops, a))
-    };
-}
-
-/// Results of registers that are all used, in such as these.
-#[cfg(target_arch = "x86_64")]
-macro_rules! results {
-    ($results:expr) => {{
-        let (found, mut results) = ($results, [[Self::splat(0.0); R]; COUNT]);
-        for (to, from) in results.as_flattened_mut().iter_mut().zip(found.as_flattened()) {
-            *to = Self(from.0);
-        }
-        results
-    }};
-}
-
-/// The elementary functions of doubles in registers of eight, and two or four of them abreast: the processor works on each while
-/// others wait for themselves.
-#[cfg(target_arch = "x86_64")]
-macro_rules! of_eights {
-    ($name:ident, $ops:ident: $($functions:tt)*) => {
-        of_doubles!($name, $ops: $($functions)*);
-        #[inline(always)]
-        fn together<F: Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
-            a: [[Self; K]; COUNT],
-        ) -> [[Self; R]; COUNT] {
-            if const { COUNT == 4 } {
-                let ends = ends!($name, $ops, a: 0 1 2 3);
-                results!($ops::enter_with_eight::<Abreast<F, K, R>, _>(ends))
-            } else if const { COUNT == 2 } {
-                results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
-            } else {
-                a.map(F::of)
-            }
-        }
-    };
-}
-
-/// The elementary functions of doubles, and several of them together: two in one register where each takes half of one, or where
-/// there are registers twice as wide; else abreast.
-#[cfg(target_arch = "x86_64")]
-macro_rules! of_fours {
-    ($name:ident, $ops:ident: $($functions:tt)*) => {
-        of_doubles!($name, $ops: $($functions)*);
-        #[inline(always)]
-        fn together<F: Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
-            a: [[Self; K]; COUNT],
-        ) -> [[Self; R]; COUNT] {
-            if const { 2 * N <= $ops::WIDTH && COUNT % 2 == 0 } {
-                let mut results = [[Self($ops::splat(0.0)); R]; COUNT];
-                for k in (0..COUNT - 1).step_by(2) {
-                    let mut joined = a[k].map(|a| whole!($name, $ops, a));
-                    for (joined, other) in joined.iter_mut().zip(a[k + 1]) {
-                        *joined = $name($ops::low_halves(joined.0, other.0));
-                    }
-                    for (r, joined) in F::of(joined).iter().enumerate() {
-                        results[k][r] = Self($ops::low_halves(joined.0, joined.0));
-                        results[k + 1][r] = Self($ops::high_halves(joined.0, joined.0));
-                    }
-                }
-                results
-            } else if level() == Level::Avx512 && const { COUNT == 4 } {
-                let ends = ends!($name, $ops, a: 0 1 2 3);
-                results!(avx512_f64::enter_with_eight::<Wider<F, K, R>, _>(ends))
-            } else if level() == Level::Avx512 && const { COUNT == 2 } {
-                results!(avx512_f64::enter_with_four::<Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
-            } else if const { COUNT == 4 } {
-                // Four would not fit sixteen registers.
-                let first = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1));
-                let second = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 2 3));
-                let all = [first, second];
-                results!(all.as_flattened())
-            } else if const { COUNT == 2 } {
-                results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
-            } else {
-                a.map(F::of)
-            }
-        }
-    };
-}
-/// Functions abreast, each given by its first and its last argument.
-#[cfg(target_arch = "x86_64")]
-struct Abreast<F, const K: usize, const R: usize>(core::marker::PhantomData<F>);
-
-/// The arguments of a function.
-#[cfg(target_arch = "x86_64")]
-#[inline(always)]
-fn arguments<D: Copy, const K: usize>(first: D, last: D) -> [D; K] {
-    let mut all = [first; K];
-    if K > 1 {
-        all[K - 1] = last;
-    }
-    all
-}
-
-#[cfg(target_arch = "x86_64")]
-impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithFour<D>
-    for Abreast<F, K, R>
-{
-    type Output = [[D; R]; 2];
-    #[inline(always)]
-    fn call([a, b, c, d]: [D; 4]) -> Self::Output {
-        [F::inside(arguments(a, b)), F::inside(arguments(c, d))]
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithEight<D>
-    for Abreast<F, K, R>
-{
-    type Output = [[D; R]; 4];
-    #[inline(always)]
-    fn call([a, b, c, d, e, f, g, h]: [D; 8]) -> Self::Output {
-        [
-            F::inside(arguments(a, b)),
-            F::inside(arguments(c, d)),
-            F::inside(arguments(e, f)),
-            F::inside(arguments(g, h)),
-        ]
-    }
-}
-
-/// Functions in registers that are twice as wide, two in each, given by their first and their last arguments.
-#[cfg(target_arch = "x86_64")]
-struct Wider<F, const K: usize, const R: usize>(core::marker::PhantomData<F>);
-
-#[cfg(target_arch = "x86_64")]
-impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithFour<F64x4<4>>
-    for Wider<F, K, R>
-{
-    type Output = [[F64x4<4>; R]; 2];
-    #[inline(always)]
-    fn call([a, b, c, d]: [F64x4<4>; 4]) -> Self::Output {
-        let joined = F::inside(arguments(join(a, c), join(b, d)));
-        let mut results = [[a; R]; 2];
-        for r in 0..R {
-            [results[0][r], results[1][r]] = apart(joined[r]);
-        }
-        results
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-impl<F: Elementary<K, R>, const K: usize, const R: usize> functions::CallWithEight<F64x4<4>>
-    for Wider<F, K, R>
-{
-    type Output = [[F64x4<4>; R]; 4];
-    #[inline(always)]
-    fn call([a, b, c, d, e, f, g, h]: [F64x4<4>; 8]) -> Self::Output {
-        let first = F::inside(arguments(join(a, c), join(b, d)));
-        let second = F::inside(arguments(join(e, g), join(f, h)));
-        let mut results = [[a; R]; 4];
-        for r in 0..R {
-            [results[0][r], results[1][r]] = apart(first[r]);
-            [results[2][r], results[3][r]] = apart(second[r]);
-        }
-        results
-    }
-}
-
 /// Both in one register, inside of a function for AVX-512.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn join(a: F64x4<4>, b: F64x4<4>) -> F64x8<8> {
+pub(super) fn join(a: F64x4<4>, b: F64x4<4>) -> F64x8<8> {
     F64x8(avx512_f64::join(a.0, b.0))
 }
 
 /// Both halves.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn apart(joined: F64x8<8>) -> [F64x4<4>; 2] {
+pub(super) fn apart(joined: F64x8<8>) -> [F64x4<4>; 2] {
     avx512_f64::halves(joined.0).map(F64x4)
 }
 

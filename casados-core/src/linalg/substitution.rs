@@ -1,0 +1,403 @@
+//! Right-hand sides by the factors of a plan (`sparse`): down through `I + L`, up through `P + U`, and both transposed.
+//!
+//! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each other. Where one column fills
+//! registers, what is added to a row is added in them instead, and stored once.
+
+use super::block::{Block, Packet, negate, subtract, subtract_scaled, subtract_transposed};
+use super::fused::{Arithmetic, Kernel, dispatch};
+use super::sparse::{Planned, beside, has_all, is_scaled};
+use super::straight::{AtPivot, from_first, from_last, is_long};
+use crate::model::{Dae, Pivot};
+use crate::scalar::Field;
+use crate::shape::{Array, Plain, Shape};
+
+/// Calls a function for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at
+/// a time, or the packet of all stages would not fit them.
+macro_rules! packets {
+    ($columns:expr, $function:ident($factors:ident, $rows:ident)) => {{
+        let mut column = 0;
+        if const { size_of::<E>() <= 8 } {
+            while column + 8 <= $columns {
+                $function::<A, M, E, R, S, 8>($factors, $rows, column);
+                column += 8;
+            }
+            if column + 4 <= $columns {
+                $function::<A, M, E, R, S, 4>($factors, $rows, column);
+                column += 4;
+            }
+        }
+        while column + 2 <= $columns {
+            $function::<A, M, E, R, S, 2>($factors, $rows, column);
+            column += 2;
+        }
+        if column < $columns {
+            $function::<A, M, E, R, S, 1>($factors, $rows, column);
+        }
+    }};
+}
+
+/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all columns.
+///
+/// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
+/// rows stays in the nearest cache.
+pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
+    dispatch(Solve { factors, rows });
+}
+
+struct Solve<'a, M, E, R, const S: usize> {
+    factors: Planned<'a, M, E, S>,
+    rows: &'a mut [[R; S]],
+}
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { factors, rows } = self;
+        packets!(R::LEN, solve_packets(factors, rows));
+    }
+}
+
+/// Solves `Mᵀ X = R` in place.
+pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
+    dispatch(SolveTransposed(Solve { factors, rows }));
+}
+
+struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Solve { factors, rows } = self.0;
+        packets!(R::LEN, solve_packet_transposed(factors, rows));
+    }
+}
+
+/// The part of [`solve`] for `W` columns, inside of a kernel.
+#[inline(always)]
+pub fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+    column: usize,
+) {
+    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
+        return;
+    }
+    let mut down = Sweep::<M, E, R, S, W, DOWN> { factors, rows, column };
+    from_first::<A, M, _>(&mut down);
+    let mut up = Sweep::<M, E, R, S, W, UP> { factors, rows: down.rows, column };
+    from_last::<A, M, _>(&mut up);
+}
+
+#[inline(always)]
+fn solve_packet_transposed<
+    A: Arithmetic,
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    const S: usize,
+    const W: usize,
+>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+    column: usize,
+) {
+    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
+        return;
+    }
+    let mut down = Sweep::<M, E, R, S, W, TRANSPOSED_DOWN> { factors, rows, column };
+    from_first::<A, M, _>(&mut down);
+    let mut up = Sweep::<M, E, R, S, W, TRANSPOSED_UP> { factors, rows: down.rows, column };
+    from_last::<A, M, _>(&mut up);
+}
+
+/// The triangular systems: `I + L`, `P + U`, and both transposed.
+const DOWN: usize = 0;
+const UP: usize = 1;
+const TRANSPOSED_DOWN: usize = 2;
+const TRANSPOSED_UP: usize = 3;
+
+/// One of them, for `W` columns.
+struct Sweep<'a, M, E, R, const S: usize, const W: usize, const SYSTEM: usize> {
+    factors: Planned<'a, M, E, S>,
+    rows: &'a mut [[R; S]],
+    column: usize,
+}
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize> AtPivot
+    for Sweep<'_, M, E, R, S, W, SYSTEM>
+{
+    const INSTRUCTIONS: usize = {
+        let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
+        4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
+    };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [u32]) {
+        match SYSTEM {
+            DOWN => self.down::<A>(pivot),
+            UP => self.up::<A>(pivot),
+            TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
+            _ => self.transposed_up::<A>(pivot),
+        }
+    }
+}
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize>
+    Sweep<'_, M, E, R, S, W, SYSTEM>
+{
+    #[inline(always)]
+    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        // What is added to a row is added in registers where one column fills them; but large blocks come from the second cache
+        // fastest as they lie, column by column.
+        if const { align_of::<E>() > 8 && size_of::<Block<E, S>>() <= 256 } {
+            self.down_by_rows::<A>(pivot);
+        } else {
+            self.down_by_columns::<A>(pivot);
+        }
+    }
+
+    #[inline(always)]
+    fn down_by_columns<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() {
+            return;
+        }
+        // Directions that have not reached this unknown, as at the start of an interval. Of registers the memory is asked: a packet of
+        // which single elements are looked at is not kept in registers.
+        if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
+            return;
+        }
+        let packet = load::<E, R, S, W>(rows, slot, *column);
+        if const { W > 1 && size_of::<E>() <= 8 }
+            && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0))
+        {
+            return;
+        }
+        if is_scaled::<S>(pivot) {
+            let mut product = [[E::from_f64(0.0); W]; S];
+            let Some(row) = rows.get(slot) else { return };
+            subtract_of::<A, E, R, S, W>(&mut product, factors.coupling, row, *column);
+            for (block, other) in beside(*factors, pivot.lower()) {
+                if other >= rows.len() {
+                    continue;
+                }
+                let mut target = load(rows, other, *column);
+                subtract_scaled::<A, E, S, W>(&mut target, block, &product);
+                store(rows, other, *column, &target);
+            }
+            return;
+        }
+        for (block, other) in beside(*factors, pivot.lower()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            subtract::<A, E, S, W>(&mut target, block, &packet);
+            store(rows, other, *column, &target);
+        }
+    }
+
+    /// The same, but for the columns of scaled pivots.
+    #[inline(always)]
+    fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() {
+            return;
+        }
+        if !pivot.left(S).is_empty() {
+            let mut packet = load(rows, slot, *column);
+            for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
+                let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
+                let (Some(block), Some(other)) = (block, other) else { continue };
+                subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+            }
+            store(rows, slot, *column, &packet);
+        }
+        if is_scaled::<S>(pivot) {
+            self.down_by_columns::<A>(pivot);
+        }
+    }
+
+    #[inline(always)]
+    fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        for (block, other) in beside(*factors, pivot.upper()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let Some(other) = rows.get(other) else { continue };
+            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+        }
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            // Of one number the inverse: the packet then stays in its registers.
+            if const { S == 1 } {
+                let mut inverse = *inverse;
+                negate(&mut inverse);
+                subtract::<A, E, S, W>(&mut solution, &inverse, &packet);
+            } else {
+                negate(&mut packet);
+                subtract::<A, E, S, W>(&mut solution, inverse, &packet);
+            }
+            packet = solution;
+        }
+        store(rows, pivot.slot as usize, *column, &packet);
+    }
+
+    #[inline(always)]
+    fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            negate(&mut packet);
+            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
+            packet = solution;
+            store(rows, pivot.slot as usize, *column, &packet);
+        }
+        for (block, other) in beside(*factors, pivot.upper()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
+            store(rows, other, *column, &target);
+        }
+    }
+
+    #[inline(always)]
+    fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if is_scaled::<S>(pivot) {
+            let mut sum = [[E::from_f64(0.0); W]; S];
+            for index in pivot.lower().rev() {
+                let Some((block, other)) = one(*factors, index) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let other = load(rows, other, *column);
+                subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
+            }
+            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
+        } else {
+            for index in pivot.lower().rev() {
+                let Some((block, other)) = one(*factors, index) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let other = load(rows, other, *column);
+                subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+            }
+        }
+        store(rows, pivot.slot as usize, *column, &packet);
+    }
+}
+
+/// One block, with the slot at its other end.
+#[inline(always)]
+fn one<'a, M: Dae, E, const S: usize>(
+    factors: Planned<'a, M, E, S>,
+    index: usize,
+) -> Option<(&'a Block<E, S>, usize)> {
+    let &slot = M::STRUCTURE.elimination.slots.get(index)?;
+    Some((factors.blocks.get(index)?, slot as usize))
+}
+
+/// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
+#[inline(always)]
+fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &[[R; S]],
+    slot: usize,
+    column: usize,
+) -> Packet<E, S, W> {
+    let mut packet = [[E::from_f64(0.0); W]; S];
+    if let Some(row) = rows.get(slot) {
+        for (packet, row) in packet.iter_mut().zip(row) {
+            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
+                *packet = *columns;
+            }
+        }
+    }
+    packet
+}
+
+/// `packet − block · other`, with the other in the memory.
+#[inline(always)]
+fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    block: &Block<E, S>,
+    other: &[R; S],
+    column: usize,
+) {
+    if const { W == 1 || size_of::<E>() <= 8 } {
+        let other = load(core::slice::from_ref(other), 0, column);
+        subtract::<A, E, S, W>(packet, block, &other);
+        return;
+    }
+    for (elements, other) in block.iter().zip(other) {
+        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else {
+            continue;
+        };
+        for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
+            A::subtract_row(packet, element, other);
+        }
+    }
+}
+
+/// In loops: a closure would be compiled for every machine.
+#[inline(always)]
+fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &[[R; S]],
+    slot: usize,
+    column: usize,
+) -> bool {
+    for row in rows.get(slot).into_iter().flatten() {
+        for element in row.as_ref().get(column..).unwrap_or_default().iter().take(W) {
+            if *element != E::from_f64(0.0) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+#[inline(always)]
+fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &mut [[R; S]],
+    slot: usize,
+    column: usize,
+    packet: &Packet<E, S, W>,
+) {
+    if let Some(row) = rows.get_mut(slot) {
+        for (packet, row) in packet.iter().zip(row) {
+            let columns = row.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut());
+            if let Some(columns) = columns {
+                *columns = *packet;
+            }
+        }
+    }
+}
