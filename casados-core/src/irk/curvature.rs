@@ -34,7 +34,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E
                 start += 16;
             }
         }
-        panels!(M::STRUCTURE.directions.len(), E, column from start, W => self.panels::<A, W, 1>(column));
+        panels!(M::STRUCTURE.directions.len(), E, S, column from start, W => self.panels::<A, W, 1>(column));
     }
 }
 
@@ -53,7 +53,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
                 multiply::<A, M, E, S, 2, W, P>(self.entries, self.d, g.as_chunks_mut().0, stage, column);
             }
         }
-        panels!(M::STRUCTURE.directions.len(), E, row, V => {
+        panels!(M::STRUCTURE.directions.len(), E, S, row, V => {
             if row >= column {
                 let d = panel::<E, V>(self.d, row, rows);
                 let sum = &mut *self.sum;

@@ -7,22 +7,30 @@ use crate::model::{Dae, NO_COLUMN};
 use crate::scalar::{Field, Lanes};
 use core::marker::PhantomData;
 
-/// Evaluates an expression for each panel: from `$column` on, `$W` columns, eight, four, two or one; of numbers that
-/// are registers themselves four at most. It may begin with a later panel.
+/// How many columns the widest panels have: eight; of numbers that are registers themselves four, or the packet of all stages would not
+/// fit beside what it is multiplied by. Of two stages eight do where there are thirty-two registers: if columns are many, factors, which
+/// then come from the second cache, are read half as often.
+pub(super) const fn width<E>(stages: usize, count: usize) -> usize {
+    let many = size_of::<E>() == 64 && stages <= 2 && count >= 16;
+    if size_of::<E>() <= 8 || many { 8 } else { 4 }
+}
+
+/// Evaluates an expression for each panel of `$S` stages: from `$column` on, `$W` columns, as many as [`width`] says, four, two or one.
+/// It may begin with a later panel.
 macro_rules! panels {
-    ($count:expr, $E:ty, $column:ident, $W:ident => $panel:expr) => {
-        panels!($count, $E, $column from 0, $W => $panel)
+    ($count:expr, $E:ty, $S:expr, $column:ident, $W:ident => $panel:expr) => {
+        panels!($count, $E, $S, $column from 0, $W => $panel)
     };
-    ($count:expr, $E:ty, $column:ident from $start:expr, $W:ident => $panel:expr) => {{
+    ($count:expr, $E:ty, $S:expr, $column:ident from $start:expr, $W:ident => $panel:expr) => {{
         let mut $column = $start;
-        if const { size_of::<$E>() <= 8 && $count >= 8 } {
+        if const { $count >= 8 && $crate::irk::directions::width::<$E>($S, $count) == 8 } {
             while $column + 8 <= const { $count } {
                 const $W: usize = 8;
                 $panel;
                 $column += 8;
             }
         }
-        if const { $count >= 4 && (size_of::<$E>() > 8 || $count % 8 >= 4) } {
+        if const { $count >= 4 && ($count % 8 >= 4 || $crate::irk::directions::width::<$E>($S, $count) == 4) } {
             while $column + 4 <= const { $count } {
                 const $W: usize = 4;
                 $panel;
@@ -44,8 +52,8 @@ pub(super) use panels;
 
 /// Where the panel of a column begins, and how many columns it has.
 #[inline(always)]
-pub(super) const fn panel_of<E>(column: usize, count: usize) -> (usize, usize) {
-    let (mut begin, mut width) = (0, if size_of::<E>() <= 8 { 8 } else { 4 });
+pub(super) const fn panel_of<E>(column: usize, count: usize, stages: usize) -> (usize, usize) {
+    let (mut begin, mut width) = (0, width::<E>(stages, count));
     loop {
         let whole = begin + (count - begin) / width * width;
         if column < whole || width == 1 {

@@ -24,7 +24,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
         let nk = M::Shape::NK;
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
         let Some(column) = direction::<M, E, D>(c) else { return };
-        let (begin, width) = panel_of::<E>(column, D::COUNT);
+        let (begin, width) = panel_of::<E>(column, D::COUNT, S);
         let place = begin * nk * S + slot::<M>(r) * S * width + (column - begin);
         for (stage, &value) in values.iter().enumerate() {
             if let Some(to) = self.dy.get_mut(place + stage * width) {
@@ -82,21 +82,29 @@ pub(super) struct Later<'a, M: Dae, E: Plain, const S: usize, const W: usize> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
+    /// The first entry of `f_x`.
+    const FIRST: usize = M::STRUCTURE.blocks[1];
+
     #[inline(always)]
     pub fn all<A: Arithmetic>(mut self) {
         if const { is_short::<A, Self>() } {
+            self.dy.fill([[E::from_f64(0.0); W]; S]);
             each_row::<A, _>(&mut self);
-            return;
+        } else {
+            self.row_by_row::<A>();
         }
-        // Row by row, each in registers.
-        let (mut packet, mut last) = ([[E::from_f64(0.0); W]; S], None);
+    }
+
+    /// Each row in registers, and written once; zeros where equations have no states.
+    #[inline(always)]
+    fn row_by_row<A: Arithmetic>(&mut self) {
+        let (mut packet, mut last) = ([[E::from_f64(0.0); W]; S], 0);
         for row in 0..Self::ROWS {
-            let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else {
-                return;
-            };
-            if last != Some(r) {
+            let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
+            if last != r {
                 self.put(last, &packet);
-                (packet, last) = ([[E::from_f64(0.0); W]; S], Some(r));
+                self.clear(last + 1, r);
+                (packet, last) = ([[E::from_f64(0.0); W]; S], r);
             }
             let Some(v) = self.v.get(c - M::Shape::NX) else { return };
             for (row, &value) in packet.iter_mut().zip(values) {
@@ -104,13 +112,22 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
             }
         }
         self.put(last, &packet);
+        self.clear(last + 1, M::Shape::NK);
     }
 
     /// The row of an equation.
     #[inline(always)]
-    fn put(&mut self, equation: Option<usize>, packet: &Packet<E, S, W>) {
-        if let Some(to) = equation.and_then(|r| self.dy.get_mut(slot::<M>(r))) {
+    fn put(&mut self, equation: usize, packet: &Packet<E, S, W>) {
+        if let Some(to) = self.dy.get_mut(slot::<M>(equation)) {
             *to = *packet;
+        }
+    }
+
+    /// Equations without states.
+    #[inline(always)]
+    fn clear(&mut self, begin: usize, end: usize) {
+        for equation in begin..end {
+            self.put(equation, &[[E::from_f64(0.0); W]; S]);
         }
     }
 }
@@ -120,7 +137,7 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize> AtRow for Later<'_, M, E,
     const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
         let (Some(packet), Some(v)) = (self.dy.get_mut(slot::<M>(r)), self.v.get(c - M::Shape::NX)) else {
             return;
         };

@@ -14,7 +14,7 @@ use crate::shape::{Aligned, Array, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
-/// So many strands a sum over all columns has.
+/// So many strands a sum over all columns has; of numbers that are registers themselves only the first is used.
 pub(super) const STRANDS: usize = 4;
 
 /// So many bytes are in the nearest cache, beside others.
@@ -56,7 +56,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         // Without an operating system every call takes the same time, the first one too.
         if !(cfg!(feature = "std") && D::SPARSE && self.begun) {
             let end = R::flat_mut(self.v[0].as_mut());
-            dispatch(Start { v: end, rows: M::Shape::NX, directions });
+            dispatch(Start::<_, _, S> { v: end, rows: M::Shape::NX, directions });
         }
         self.begun = D::SPARSE;
     }
@@ -168,7 +168,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         let Work { increment, linear, .. } = work;
         let rows = M::Shape::NK;
         let dy = R::flat_mut(self.dy.as_mut().as_flattened_mut());
-        panels!(D::COUNT, E, column, W => {
+        panels!(D::COUNT, E, S, column, W => {
             let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
             for c in 0..W {
                 for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {
@@ -185,28 +185,33 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 }
 
+/// Whether sums have one strand: those of other rows are computed meanwhile, and its memory is written once for each row of a panel.
+const fn is_one<E>() -> bool {
+    size_of::<E>() > 8
+}
+
 /// The sum of all strands.
 #[inline(always)]
 pub(super) fn total<E: Field>(strands: &[E; STRANDS]) -> E {
     let [a, b, c, d] = *strands;
-    (a + b) + (c + d)
+    if const { is_one::<E>() } { a } else { (a + b) + (c + d) }
 }
 
 /// See [`Sweep::start`].
-struct Start<'a, E, D> {
+struct Start<'a, E, D, const S: usize> {
     v: &'a mut [E],
     rows: usize,
     directions: &'a D,
 }
 
-impl<E: Lanes, D: Directions<E>> Kernel for Start<'_, E, D> {
+impl<E: Lanes, D: Directions<E>, const S: usize> Kernel for Start<'_, E, D, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { v, rows, directions } = self;
         v.fill(E::from_f64(0.0));
-        panels!(D::COUNT, E, column, W => {
+        panels!(D::COUNT, E, S, column, W => {
             for (index, row) in panel_mut::<E, W>(v, column, rows).iter_mut().enumerate() {
                 directions.add(index, E::from_f64(1.0), column, row);
             }
@@ -242,8 +247,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         if self.phase != Phase::Before {
-            self.sums.fill([[E::from_f64(0.0); STRANDS]; S]);
-            self.start_sums.fill([E::from_f64(0.0); STRANDS]);
+            for strands in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
+                clear(strands);
+            }
             if D::SPARSE && self.first {
                 for (state, [sum, ..]) in self.start_sums.iter_mut().enumerate() {
                     *sum = self.directions.total(state, self.second);
@@ -264,7 +270,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
                 start += 16;
             }
         }
-        panels!(D::COUNT, E, column from start, W => self.panel::<A, W>(column));
+        panels!(D::COUNT, E, S, column from start, W => self.panel::<A, W>(column));
     }
 }
 
@@ -312,7 +318,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
         if !(self.first && D::SPARSE) {
-            dy.fill([[E::from_f64(0.0); W]; S]);
             Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
             each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
         } else if const { !Self::is_small::<A>() } {
@@ -386,6 +391,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
     }
 }
 
+/// A sum over no columns.
+#[inline(always)]
+fn clear<E: Field>(strands: &mut [E; STRANDS]) {
+    let [first, others @ ..] = strands;
+    *first = E::from_f64(0.0);
+    if const { !is_one::<E>() } {
+        *others = [E::from_f64(0.0); STRANDS - 1];
+    }
+}
+
 /// `strands −= weights · row`, as far apart as the strands are.
 #[inline(always)]
 fn accumulate<A: Arithmetic, E: Field, const W: usize>(
@@ -393,6 +408,13 @@ fn accumulate<A: Arithmetic, E: Field, const W: usize>(
     weights: &[E; W],
     row: &[E; W],
 ) {
+    if const { is_one::<E>() } {
+        let [sum, ..] = strands;
+        for (&weight, &element) in weights.iter().zip(row) {
+            *sum = A::subtract(*sum, weight, element);
+        }
+        return;
+    }
     let ((weights, last_weights), (row, last)) = (weights.as_chunks(), row.as_chunks());
     for (weights, row) in weights.iter().zip(row) {
         A::subtract_products(strands, weights, row);

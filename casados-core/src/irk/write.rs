@@ -109,7 +109,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
                 continue;
             }
             let unknown = if variable < nx { variable } else { variable - nx };
-            panels!(M::STRUCTURE.directions.len(), E, column, W => {
+            panels!(M::STRUCTURE.directions.len(), E, S, column, W => {
                 let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
                 let v = panel::<E, W>(v, column, nx);
                 let mut values = [zero; W];
@@ -158,7 +158,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
         let unknowns = if ALGEBRAIC { nx..nk } else { 0..nx };
         // Nothing times a number that is not finite is not a number.
         let (mut nothing, mut finite) = ([zero; 8], zero);
-        panels!(D::COUNT, E, column, W => {
+        panels!(D::COUNT, E, S, column, W => {
             let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
             let (packets, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
             let packets = packets.get(unknowns.clone()).unwrap_or_default();
