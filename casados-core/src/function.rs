@@ -15,6 +15,8 @@
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Array, Outputs, Plain, Shape};
 use crate::structure::{Operations, Pattern};
+#[doc(no_inline)]
+pub use crate::structure::{begins, by_row};
 
 /// `[T; NY]` of a function: one element for each output.
 pub type ArrayY<F, T> = <<F as Function>::Outputs as Outputs>::ArrayY<T>;
@@ -113,6 +115,10 @@ pub struct FunctionStructure {
     pub jacobian: Pattern,
     /// Where each of the five blocks begins in `jacobian`, and its end.
     pub blocks: [usize; 6],
+    /// The entries of `y_x, y_z, y_u`, output by output: what [`by_row`] makes of them.
+    pub by_row: &'static [u32],
+    /// Where each output begins in `by_row`, and the end of that: what [`begins`] makes of it.
+    pub begins: &'static [u32],
     /// Entries of the Jacobian that are constant.
     pub constant: &'static [bool],
     /// Non-zeros of the lower triangle of `∇²(μᵀ y)`: variable ≥ variable.

@@ -44,6 +44,7 @@ mod error;
 mod horizon;
 mod instance;
 mod kkt;
+mod least_squares;
 mod linearise;
 mod map;
 mod point;
@@ -59,13 +60,14 @@ mod transfer;
 
 pub use constraint::{Constraint, Constraints};
 pub use convexify::Convexification;
-pub use cost::{Cost, GeneralCost, LeastSquaresCost};
+pub use cost::{Cost, GeneralCost};
 pub use dynamics::{Dynamics, IntegralTerms, Interval, Names, Nodes, SecondOrder, Sink, Step};
 pub use error::{ConstraintName, OcpError, Part, Text};
 pub use horizon::Horizon;
 #[cfg(feature = "alloc")]
 pub use instance::HeapOcp;
 pub use instance::Ocp;
+pub use least_squares::LeastSquaresCost;
 pub use linearise::{Curvature, Exact, GaussNewton};
 pub use map::Map;
 pub use problem::{Formulation, Problem};

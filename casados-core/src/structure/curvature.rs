@@ -79,6 +79,38 @@ pub const fn by_column<const V: usize, const N: usize>(jacobian: &Pattern, begin
     entries
 }
 
+/// The first `N` entries of a Jacobian, by rows, and within each as they are.
+#[must_use]
+pub const fn by_row<const N: usize>(jacobian: &Pattern) -> [u32; N] {
+    let (mut entries, mut count, mut row) = ([0; N], 0, 0);
+    while count < N {
+        let mut entry = 0;
+        while entry < N {
+            if jacobian.at(entry).0 == row {
+                entries[count] = entry as u32;
+                count += 1;
+            }
+            entry += 1;
+        }
+        row += 1;
+    }
+    entries
+}
+
+/// Where each of `N − 1` rows begins among entries that are given by rows, and where the last one ends.
+#[must_use]
+pub const fn begins<const N: usize>(jacobian: &Pattern, by_row: &[u32]) -> [u32; N] {
+    let (mut begins, mut place, mut row) = ([0; N], 0, 0);
+    while row < N {
+        while place < by_row.len() && jacobian.at(by_row[place] as usize).0 < row {
+            place += 1;
+        }
+        begins[row] = place as u32;
+        row += 1;
+    }
+    begins
+}
+
 /// For each of `N` directions its position among those that count, or [`NO_COLUMN`].
 #[must_use]
 pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {

@@ -68,25 +68,31 @@ pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
     let Variables { x, z, u, p } = &model.variables;
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let blocks = blocks.map(Literal::usize_unsuffixed);
+    let entries = &blocks[4];
+    let rows = Literal::usize_unsuffixed(model.residual.len() + 1);
     let operations = self::operations(krate, operations);
     let variables: BTreeSet<u32> = derivatives.jacobian.iter().map(|entry| entry.1).collect();
     let variables = numbers(&variables.into_iter().collect::<Vec<_>>());
-    quote! {
+    quote! {{
+        const JACOBIAN: #krate::model::Pattern = #jacobian;
+        const BY_ROW: &[u32] = &const { #krate::function::by_row::<#entries>(&JACOBIAN) };
         #krate::function::FunctionStructure {
             name: #name,
             x: &[#(#x),*],
             z: &[#(#z),*],
             u: &[#(#u),*],
             p: &[#(#p),*],
-            jacobian: #jacobian,
+            jacobian: JACOBIAN,
             blocks: [#(#blocks),*],
+            by_row: BY_ROW,
+            begins: &const { #krate::function::begins::<#rows>(&JACOBIAN, BY_ROW) },
             constant: &[#(#constant),*],
             hessian: #hessian,
             linear: &[#(#linear),*],
             variables: &[#(#variables),*],
             operations: #operations,
         }
-    }
+    }}
 }
 
 fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {

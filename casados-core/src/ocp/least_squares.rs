@@ -1,0 +1,265 @@
+//! Least-squares costs at the nodes.
+
+use super::cost::{At, Cost};
+use super::error::{OcpError, Part};
+use super::point::{Cross, Terms, There, parameter, position};
+use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
+use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Outputs, Plain};
+use bytemuck::Zeroable;
+use core::ops::Range;
+
+/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and a reference `r`, which every stage has for itself.
+///
+/// Its Hessian is `JᵀWJ`, that of Gauss and Newton; the exact one has the second derivatives of `y` too.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
+    weights: MatrixYY<F, T>,
+    /// Zero if `W` is diagonal.
+    coupled: usize,
+    y: ArrayY<F, T>,
+    mu: ArrayY<F, T>,
+    jacobian: F::Jacobian<T>,
+    hessian: F::Hessian<T>,
+}
+
+impl<F: Function, T: Real> LeastSquaresCost<F, T> {
+    /// With the weights `W`, which are symmetric.
+    #[must_use]
+    pub fn new(weights: &MatrixYY<F, T>) -> Self {
+        let mut cost: Self = Zeroable::zeroed();
+        cost.set_weights(weights);
+        F::jacobian_constants::<T>(&mut cost.jacobian);
+        cost
+    }
+
+    /// With a weight for each output.
+    #[must_use]
+    pub fn diagonal(weights: &ArrayY<F, T>) -> Self {
+        let mut matrix: MatrixYY<F, T> = Zeroable::zeroed();
+        for (i, &weight) in weights.as_ref().iter().enumerate() {
+            matrix[(i, i)] = weight;
+        }
+        Self::new(&matrix)
+    }
+
+    /// Other weights.
+    pub fn set_weights(&mut self, weights: &MatrixYY<F, T>) {
+        let elements = || (0..F::Outputs::NY).flat_map(|i| (0..i).map(move |j| (i, j)));
+        self.coupled =
+            usize::from(elements().any(|(i, j)| weights[(i, j)] != T::ZERO || weights[(j, i)] != T::ZERO));
+        self.weights = *weights;
+    }
+
+    /// `μ = W (y − r)`, and `½ (y − r)ᵀ μ`.
+    #[inline(always)]
+    fn square(&mut self, reference: &[T], stage: usize) -> Result<T, OcpError> {
+        let Self { weights, coupled, y, mu, .. } = self;
+        for (y, &r) in y.as_mut().iter_mut().zip(reference) {
+            *y = *y - r;
+        }
+        weigh::<F, T>(weights, *coupled, y, mu);
+        let products = y.as_ref().iter().zip(mu.as_ref()).map(|(y, mu)| *y * *mu);
+        let square = products.fold(T::ZERO, |sum, product| sum + product);
+        let value = T::from_f64(0.5) * square;
+        if value.is_finite() {
+            return Ok(value);
+        }
+        let (output, value) = crate::irk::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
+        Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+    }
+}
+
+/// `μ = W y`
+#[inline(always)]
+fn weigh<F: Function, T: Real>(
+    weights: &MatrixYY<F, T>,
+    coupled: usize,
+    y: &ArrayY<F, T>,
+    mu: &mut ArrayY<F, T>,
+) {
+    for (k, mu) in mu.as_mut().iter_mut().enumerate() {
+        *mu = if coupled == 0 {
+            weights[(k, k)] * y[k]
+        } else {
+            let products = y.as_ref().iter().enumerate().map(|(l, y)| weights[(k, l)] * *y);
+            products.fold(T::ZERO, |sum, product| sum + product)
+        };
+    }
+}
+
+impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
+    const REFERENCES: usize = F::Outputs::NY;
+    const CONVEX: bool = true;
+
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        for (index, value) in self.weights.as_slice().iter().enumerate() {
+            if !value.is_finite() {
+                let value = value.to_f64();
+                return Err(OcpError::InvalidValue { part: Part::Weights, stage: 0, index, value });
+            }
+        }
+        there.check::<F>()
+    }
+
+    fn value(&mut self, v: &ArrayV<F, T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
+        F::value::<T>(v, &mut self.y);
+        self.square(reference, stage)
+    }
+
+    fn add(
+        &mut self,
+        v: &ArrayV<F, T>,
+        reference: &[T],
+        at: At<'_, T>,
+        terms: &mut Terms<'_, T>,
+    ) -> Result<T, OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        let value = self.square(reference, at.stage)?;
+        let Self { weights, coupled, y, mu, jacobian, hessian } = self;
+        let mut square = Square::<F, T> { weights, y, jacobian, at, terms: &mut *terms };
+        if *coupled == 0 {
+            dispatch(square);
+        } else {
+            square.coupled();
+        }
+        if at.exact && !F::STRUCTURE.hessian.is_empty() {
+            F::hessian::<T>(v, mu, hessian);
+            terms.curvature::<F>(hessian, at.factor);
+        }
+        Ok(at.factor * value)
+    }
+
+    fn cross(
+        &mut self,
+        v: &ArrayV<F, T>,
+        reference: &[T],
+        at: At<'_, T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        self.square(reference, at.stage)?;
+        let Self { weights, mu, jacobian, hessian, .. } = self;
+        let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
+        for (&a, (k, variable)) in entries() {
+            let Some(i) = position::<F::Shape>(variable) else { continue };
+            for (&b, (l, variable)) in entries() {
+                let Some(p) = parameter::<F::Shape>(variable) else { continue };
+                cross.add(i, p, at.factor * weights[(k, l)] * a * b);
+            }
+        }
+        if at.exact && !F::STRUCTURE.hessian.is_empty() {
+            F::hessian::<T>(v, mu, hessian);
+            cross.curvature::<F>(hessian, at.factor);
+        }
+        Ok(())
+    }
+}
+
+/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; or `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)` from a point `v` on.
+struct Square<'a, 'b, F: Function, T: Plain> {
+    weights: &'a MatrixYY<F, T>,
+    /// `y − r`
+    y: &'a ArrayY<F, T>,
+    jacobian: &'a F::Jacobian<T>,
+    at: At<'a, T>,
+    terms: &'a mut Terms<'b, T>,
+}
+
+impl<F: Function, T: Real> Square<'_, '_, F, T> {
+    /// Where the entries of an output begin and end.
+    #[inline(always)]
+    fn range(output: usize) -> Range<usize> {
+        let begin = |output: usize| F::STRUCTURE.begins.get(output).map_or(0, |&begin| begin as usize);
+        begin(output)..begin(output + 1)
+    }
+
+    /// One of them, as a position in `(x, u, z)` and a value.
+    #[inline(always)]
+    fn entry(&self, place: usize) -> Option<(usize, T)> {
+        let entry = *F::STRUCTURE.by_row.get(place)? as usize;
+        let (_, variable) = F::STRUCTURE.jacobian.get(entry)?;
+        Some((position::<F::Shape>(variable)?, *self.jacobian.as_ref().get(entry)?))
+    }
+
+    /// `y − r`, or `y − r − J v`, of an output.
+    #[inline(always)]
+    fn moved(&self, output: usize) -> T {
+        let mut y = self.y[output];
+        for place in Self::range(output) {
+            if let Some((i, value)) = self.entry(place)
+                && let Some(&v) = self.at.from.get(i)
+            {
+                y = y - value * v;
+            }
+        }
+        y
+    }
+
+    /// Adds what two outputs do to the Hessian.
+    #[inline(always)]
+    fn curve(&mut self, weight: T, [k, l]: [usize; 2]) {
+        for a in Self::range(k) {
+            for b in Self::range(l) {
+                if let (Some((i, a)), Some((j, b))) = (self.entry(a), self.entry(b))
+                    && i >= j
+                {
+                    self.terms.curve(i, j, weight * a * b);
+                }
+            }
+        }
+    }
+
+    /// Adds what an output does to the gradient.
+    #[inline(always)]
+    fn slope(&mut self, slope: T, output: usize) {
+        for place in Self::range(output) {
+            if let Some((i, value)) = self.entry(place) {
+                self.terms.slope(i, slope * value);
+            }
+        }
+    }
+
+    /// With weights between outputs.
+    fn coupled(&mut self) {
+        for k in 0..F::Outputs::NY {
+            let mut slope = T::ZERO;
+            for l in 0..F::Outputs::NY {
+                let weight = self.at.factor * self.weights[(k, l)];
+                if weight != T::ZERO {
+                    slope = slope + weight * self.moved(l);
+                    self.curve(weight, [k, l]);
+                }
+            }
+            self.slope(slope, k);
+        }
+    }
+}
+
+/// With a weight for each output.
+impl<F: Function, T: Real> Kernel for Square<'_, '_, F, T> {
+    type Number = T;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<F: Function, T: Real> AtRow for Square<'_, '_, F, T> {
+    const ROWS: usize = F::Outputs::NY;
+    const INSTRUCTIONS: usize = {
+        let entries = F::STRUCTURE.by_row.len() / if Self::ROWS > 0 { Self::ROWS } else { 1 } + 1;
+        4 * entries + 3 * entries * entries
+    };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, output: usize) {
+        let weight = self.at.factor * self.weights[(output, output)];
+        if weight != T::ZERO {
+            self.slope(weight * self.moved(output), output);
+            self.curve(weight, [output, output]);
+        }
+    }
+}
