@@ -95,11 +95,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut plain = !C::EXACT;
         let mut stages = qp.stages_mut();
         let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
+        // The first interval that adds to costs; before it they are cleared where those at nodes are added.
+        let mut adding = usize::MAX;
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
-            hessian.fill(T::ZERO);
-            gradient.fill(T::ZERO);
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             let (columns, point) = ([step.dx, step.du], part(v, k * ld, ld));
             Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
@@ -107,6 +107,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             objective = objective + value;
             plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
+            if adding == usize::MAX && plain && x.is_empty() && u.is_empty() {
+                return;
+            }
+            adding = adding.min(k);
+            hessian.fill(T::ZERO);
+            gradient.fill(T::ZERO);
             let mut terms = Terms { gradient, hessian, ld };
             for (i, &slope) in x.iter().chain(u).enumerate() {
                 terms.slope(i, slope);
@@ -124,7 +130,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            if k == intervals {
+            if k < adding || k == intervals {
                 hessian.fill(T::ZERO);
                 gradient.fill(T::ZERO);
             }

@@ -1,11 +1,14 @@
 //! The linearised dynamics of an interval, in the layout of the QP.
 
-use crate::qp::{assign, part, part_mut, splat};
+use crate::qp::{part, part_mut, splat};
 use crate::scalar::{Packed, Real, Registers};
 use bytemuck::Zeroable;
 
 /// More lanes than any register has.
 const MOST_LANES: usize = 16;
+
+/// So many rows are copied element by element.
+const FEW: usize = 2;
 
 /// `[A B]ᵀ`, a column for each next state, and `x₊ − A x − B u`.
 pub(super) struct Transfer<'a, T> {
@@ -30,47 +33,37 @@ impl<T: Real> Transfer<'_, T> {
 impl<T: Real> Registers<T> for Transfer<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let (nx, ld) = (self.next.len(), self.ld);
-        let [a, b] = self.columns;
+        let Self { columns: [a, b], next, point, matrix, ld, offset } = self;
+        let nx = next.len();
         let n = nx + b.len() / nx.max(1);
-        // Of `[A B]`.
-        let column = |j: usize| if j < nx { part(a, j * nx, nx) } else { part(b, (j - nx) * nx, nx) };
+        // Element `i` of column `j` of `[A B]`, and what follows.
+        let from = |i: usize, j: usize| {
+            let (columns, j) = if j < nx { (a, j) } else { (b, j - nx) };
+            columns.get(j * nx + i..).unwrap_or_default()
+        };
         let whole = nx - nx % E::LANES;
-        assign(self.offset, self.next);
+        let end = if whole + FEW < nx && nx >= E::LANES { nx } else { whole };
         let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
         let Some(tile) = tile.get_mut(..E::LANES) else { return };
-        for j in (0..n).step_by(E::LANES) {
-            let count = E::LANES.min(n - j);
-            let mut from = [&[][..]; MOST_LANES];
-            let mut factors = [E::from_f64(0.0); MOST_LANES];
-            for (l, (from, factor)) in from.iter_mut().zip(&mut factors).enumerate().take(count) {
-                *from = column(j + l);
-                *factor = splat::<T, E>(self.point.get(j + l).copied().unwrap_or(T::ZERO));
-            }
-            // The last rows together with some that were there before.
-            let overlapping = (whole < nx && nx >= E::LANES).then(|| nx - E::LANES);
-            for i in (0..whole).step_by(E::LANES).chain(overlapping) {
-                let Some(offset) = E::cells_mut(part_mut(self.offset, i, E::LANES)).first_mut() else {
-                    return;
-                };
+        for i in (0..end).step_by(E::LANES) {
+            // The last rows together with some that are written a second time.
+            let i = i.min(nx - E::LANES);
+            let Some(next) = E::cells(part(next, i, E::LANES)).first() else { return };
+            let mut sum = E::load(next);
+            for j in (0..n).step_by(E::LANES) {
                 let mut columns = [E::from_f64(0.0); MOST_LANES];
-                let mut sum = E::load(offset);
                 // As many as the optimiser knows.
-                for l in 0..E::LANES {
-                    if let Some(cell) = E::cells(part(from[l], i, E::LANES)).first() {
-                        columns[l] = E::load(cell);
-                        sum = sum.minus_product(columns[l], factors[l]);
+                for (l, column) in columns.iter_mut().enumerate().take(E::LANES) {
+                    if j + l < n
+                        && let Some(cell) = E::cells(part(from(i, j + l), 0, E::LANES)).first()
+                        && let Some(&v) = point.get(j + l)
+                    {
+                        *column = E::load(cell);
+                        sum = sum.minus_product(*column, splat(v));
                     }
                 }
-                let before = *offset;
-                sum.store(offset);
-                // Those that have it already.
-                let had = if i + E::LANES > whole { whole - i } else { 0 };
-                for lane in 0..had {
-                    E::set_lane(offset, lane, E::lane(&before, lane));
-                }
                 E::transpose(&columns[..E::LANES], tile);
-                let rows = self.matrix.get_mut(i * ld..).unwrap_or_default().chunks_mut(ld.max(1));
+                let rows = matrix.get_mut(i * ld..).unwrap_or_default().chunks_mut(ld.max(1));
                 for (row, from) in rows.zip(&*tile) {
                     // Zeros go where there are zeros.
                     if let Some(to) = E::cells_mut(part_mut(row, j, E::LANES)).first_mut() {
@@ -78,15 +71,19 @@ impl<T: Real> Registers<T> for Transfer<'_, T> {
                     }
                 }
             }
-            let begin = if overlapping.is_some() { nx } else { whole };
-            let rows = self.matrix.get_mut(begin * ld..).unwrap_or_default().chunks_mut(ld.max(1));
-            let last = self.offset.get_mut(begin..nx).unwrap_or_default().iter_mut();
-            for (i, (row, offset)) in rows.zip(last).enumerate() {
-                let (row, point) = (part_mut(row, j, count), part(self.point, j, count));
-                for ((to, from), &v) in row.iter_mut().zip(&from).zip(point) {
-                    *to = from.get(begin + i).copied().unwrap_or(T::ZERO);
-                    *offset = *offset - *to * v;
-                }
+            if let Some(offset) = E::cells_mut(part_mut(offset, i, E::LANES)).first_mut() {
+                sum.store(offset);
+            }
+        }
+        for i in end..nx {
+            let row = part_mut(matrix, i * ld, n);
+            let mut sum = next.get(i).copied().unwrap_or(T::ZERO);
+            for (j, (to, &v)) in row.iter_mut().zip(point).enumerate() {
+                *to = from(i, j).first().copied().unwrap_or(T::ZERO);
+                sum = sum - *to * v;
+            }
+            if let Some(offset) = offset.get_mut(i) {
+                *offset = sum;
             }
         }
     }

@@ -50,9 +50,12 @@ pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
 /// Finds bounds and penalties that make no sense.
 pub(super) fn check_all_bounds<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
     for (k, stage) in qp.stages().enumerate() {
-        check_bounds(Field::StateBounds, k, &stage.x_bounds())?;
-        check_bounds(Field::ControlBounds, k, &stage.u_bounds())?;
-        check_bounds(Field::GeneralBounds, k, &stage.g_bounds())?;
+        // Only where some make none they are looked for.
+        if !make_sense(&stage.all_bounds()) {
+            find_bounds(Field::StateBounds, k, &stage.x_bounds())?;
+            find_bounds(Field::ControlBounds, k, &stage.u_bounds())?;
+            find_bounds(Field::GeneralBounds, k, &stage.g_bounds())?;
+        }
     }
     Ok(())
 }
@@ -65,31 +68,43 @@ fn finite<T: Real>(field: Field, stage: usize, index: usize, value: T) -> Result
     }
 }
 
-fn check_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
-    if make_sense(bounds) { Ok(()) } else { find_bounds(field, stage, bounds) }
+/// Whether there are numbers between two bounds.
+#[inline(always)]
+fn is_range<T: Real>(lower: T, upper: T) -> bool {
+    let infinity = T::from_f64(f64::INFINITY);
+    (lower <= upper) & (lower < infinity) & (upper > -infinity)
+}
+
+/// A linear penalty may be infinite: then the bound is hard.
+#[inline(always)]
+fn is_linear_penalty<T: Real>(penalty: T) -> bool {
+    penalty >= T::ZERO
+}
+
+#[inline(always)]
+fn is_quadratic_penalty<T: Real>(penalty: T) -> bool {
+    (penalty >= T::ZERO) & (penalty < T::from_f64(f64::INFINITY))
 }
 
 /// Whether all bounds and penalties make sense, without a branch for each.
 fn make_sense<T: Real>(bounds: &Bounds<'_, T>) -> bool {
-    let (infinity, zero) = (T::from_f64(f64::INFINITY), T::ZERO);
     let mut good = true;
     for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
-        good &= (lower <= upper) & (lower < infinity) & (upper > -infinity);
+        good &= is_range(lower, upper);
     }
     for (&lower, &upper) in bounds.lower_linear.iter().zip(bounds.upper_linear) {
-        good &= (lower >= zero) & (upper >= zero);
+        good &= is_linear_penalty(lower) & is_linear_penalty(upper);
     }
     for (&lower, &upper) in bounds.lower_quadratic.iter().zip(bounds.upper_quadratic) {
-        good &= (lower >= zero) & (lower < infinity) & (upper >= zero) & (upper < infinity);
+        good &= is_quadratic_penalty(lower) & is_quadratic_penalty(upper);
     }
     good
 }
 
 /// The first that does not.
 fn find_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
-    let infinity = T::from_f64(f64::INFINITY);
     for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
-        if lower <= upper && lower < infinity && upper > -infinity {
+        if is_range(lower, upper) {
             continue;
         }
         let (l, u) = (lower.to_f64(), upper.to_f64());
@@ -101,19 +116,20 @@ fn find_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> R
             QpError::CrossedBounds { field, stage, index, lower: l, upper: u }
         });
     }
-    let penalties =
-        [bounds.lower_linear, bounds.upper_linear, bounds.lower_quadratic, bounds.upper_quadratic];
-    for (kind, penalties) in penalties.into_iter().enumerate() {
-        for (index, &penalty) in penalties.iter().enumerate() {
-            // A linear penalty may be infinite: then the bound is hard.
-            if !(penalty >= T::ZERO && (kind < 2 || penalty < infinity)) {
-                return Err(QpError::InvalidValue {
-                    field: Field::Penalty,
-                    stage,
-                    index,
-                    value: penalty.to_f64(),
-                });
-            }
+    let linear =
+        [bounds.lower_linear, bounds.upper_linear].map(|all| (all, is_linear_penalty as fn(T) -> bool));
+    let quadratic = [bounds.lower_quadratic, bounds.upper_quadratic]
+        .map(|all| (all, is_quadratic_penalty as fn(T) -> bool));
+    for (penalties, is_penalty) in linear.into_iter().chain(quadratic) {
+        if let Some((index, penalty)) =
+            penalties.iter().enumerate().find(|(_, penalty)| !is_penalty(**penalty))
+        {
+            return Err(QpError::InvalidValue {
+                field: Field::Penalty,
+                stage,
+                index,
+                value: penalty.to_f64(),
+            });
         }
     }
     Ok(())
@@ -206,6 +222,20 @@ fn gradient<T: Real>(
     objective
 }
 
+/// Whether there are neither bounds nor multipliers: nothing can be wrong with either.
+#[inline(always)]
+fn is_free<T: Real>(bounds: &Bounds<'_, T>, lower: &[T], upper: &[T]) -> bool {
+    let infinity = T::from_f64(f64::INFINITY);
+    let mut free = true;
+    for (&lower, &upper) in bounds.lower.iter().zip(bounds.upper) {
+        free &= (lower == -infinity) & (upper == infinity);
+    }
+    for (&lower, &upper) in lower.iter().zip(upper) {
+        free &= (lower == T::ZERO) & (upper == T::ZERO);
+    }
+    free
+}
+
 /// Adds to the residuals of bounds, and returns the penalties.
 pub(crate) fn bounds<T: Real>(
     bounds: &Bounds<'_, T>,
@@ -215,6 +245,9 @@ pub(crate) fn bounds<T: Real>(
     residuals: &mut Residuals,
 ) -> f64 {
     let mut penalties = 0.0;
+    if is_free(bounds, lower, upper) {
+        return penalties;
+    }
     for i in 0..lower.len() {
         let value = value(i);
         let hard = at(bounds.lower_linear, i).is_infinite() && at(bounds.upper_linear, i).is_infinite();

@@ -176,7 +176,9 @@ impl<'a, T> Places<'a, T> {
 impl<T> Iterator for Places<'_, T> {
     type Item = Place;
 
-    #[inline]
+    // What nobody asks of a place is not computed where the optimiser sees who asks; in firmware memory is dearer.
+    #[cfg_attr(feature = "std", inline(always))]
+    #[cfg_attr(not(feature = "std"), inline)]
     fn next(&mut self) -> Option<Place> {
         let (&first, rest) = self.dims.split_first()?;
         let next = rest.first().map_or(self.next, |dims| dims.nx);
@@ -190,7 +192,8 @@ impl<T> Iterator for Places<'_, T> {
 }
 
 impl<T> DoubleEndedIterator for Places<'_, T> {
-    #[inline]
+    #[cfg_attr(feature = "std", inline(always))]
+    #[cfg_attr(not(feature = "std"), inline)]
     fn next_back(&mut self) -> Option<Place> {
         let (&last, rest) = self.dims.split_last()?;
         let back = match self.back {

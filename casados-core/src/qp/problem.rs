@@ -268,7 +268,14 @@ impl<'a, T: Real> Stage<'a, T> {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
     }
     fn bounds(&self, field: Field) -> Bounds<'a, T> {
-        let (begin, length) = self.place.kind(field);
+        self.some_bounds(self.place.kind(field))
+    }
+    /// Those of everything; what is padding is zero.
+    pub(crate) fn all_bounds(&self) -> Bounds<'a, T> {
+        self.some_bounds((0, self.place.rows))
+    }
+    #[inline(always)]
+    fn some_bounds(&self, (begin, length): (usize, usize)) -> Bounds<'a, T> {
         let rows = |row| part(self.data, self.place.row_data(row) + begin, length);
         Bounds {
             lower: rows(Row::Lower),
