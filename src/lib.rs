@@ -101,6 +101,31 @@
 //! # Ok::<(), casados::Error>(())
 //! ```
 //!
+//! ## Second derivatives of algebraic states
+//!
+//! The Hessian of `λᵀx + νᵀz₀` has those of the algebraic states at the start of an interval, too, on which costs and constraints may
+//! depend; problems of optimal control ask for it by themselves.
+//!
+//! ```
+//! use casados::prelude::*;
+//! use nalgebra::{Vector1, vector};
+//!
+//! /// A state that stays as it is, and its third power.
+//! #[dae]
+//! fn cube(xdot: [f64; 1], x: [f64; 1], z: f64) -> [f64; 2] {
+//!     [xdot[0], z - x[0].powi(3)]
+//! }
+//!
+//! let mut irk = Irk::<Cube, Gauss<2>>::new(Options::default())?;
+//! let (x0, lambda, nu) = (vector![1.5], vector![0.0], Vector1::new(0.5));
+//! let step = irk.hessian_with_z0(&x0, &vector![], 0.1, &lambda, &nu)?;
+//!
+//! // Of ½ x₀³.
+//! assert!((step.grad_x0[0] - 1.5 * 1.5_f64.powi(2)).abs() < 1e-14);
+//! assert!((step.h_xx[0] - 3.0 * 1.5).abs() < 1e-14);
+//! # Ok::<(), casados::Error>(())
+//! ```
+//!
 //! ## Optimal control
 //!
 //! ```

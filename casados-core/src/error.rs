@@ -214,6 +214,8 @@ pub enum Argument {
     T,
     /// The adjoint seed `λ`.
     Lambda,
+    /// The weights `ν` of the algebraic states at the start.
+    Nu,
     /// The forward seed of `x0`.
     SeedX,
     /// The forward seed of `u`.
@@ -249,6 +251,7 @@ impl fmt::Display for Argument {
             Argument::P => "p",
             Argument::T => "t",
             Argument::Lambda => "lambda",
+            Argument::Nu => "nu",
             Argument::SeedX => "the seed of x0",
             Argument::SeedU => "the seed of u",
             Argument::SeedP => "the seed of p",

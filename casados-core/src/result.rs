@@ -103,7 +103,7 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
     pub grad_p: VectorP<M, T>,
 }
 
-/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`.
+/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`; of `λᵀx + νᵀz0` where weights `ν` are given.
 ///
 /// The Hessian over `(x₀, u, p)` is symmetric to the last bit; of its blocks beside the diagonal
 /// the upper ones are given.

@@ -406,6 +406,15 @@ fn batches() {
                     &lambda,
                     &mut results
                 )),
+                _ if seed % 2 == 0 => {
+                    let nu: Vec<_> = (0..many(&mut source)).map(|_| source.vector::<f64, 1>()).collect();
+                    call!(hessian, Hessian, |results| batch.hessian_with_z0(
+                        &intervals,
+                        &lambda,
+                        &nu,
+                        &mut results
+                    ))
+                }
                 _ => call!(hessian, Hessian, |results| batch.hessian(&intervals, &lambda, &mut results)),
             }
             assert_eq!(batch.status(count), Err(Error::NoResult));

@@ -131,7 +131,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize> Replay<M, T> for Single<M, B
         lambda: &VectorX<M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, along)
+        self.go(step)?.hessian_along(step.at.x, step.at.u, step.h, lambda, &[], along)
     }
 
     fn adjoint(

@@ -128,7 +128,7 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send {
 }
 
 macro_rules! answer {
-    ($type:ident, $call:ident($($lambda:ident)?), $columns:expr) => {
+    ($type:ident, $together:ident, $columns:expr, |$irk:ident, $interval:ident, $u:ident| $alone:expr) => {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
 
@@ -139,20 +139,24 @@ macro_rules! answer {
                 group: &mut Group<M, E, S>,
                 warm: bool,
             ) -> Verdict<'_, E, Self::Wide<E>> {
-                group.$call(warm)
+                group.$together(warm)
             }
             fn alone<'a, B, const S: usize>(
-                irk: &'a mut Integrator<M, B, S, T, Heap>,
-                interval: &Interval<'_, M, T>,
+                $irk: &'a mut Integrator<M, B, S, T, Heap>,
+                $interval: &Interval<'_, M, T>,
             ) -> Result<&'a Self, Error> {
-                let u: VectorU<M, T> = vector(interval.u);
-                irk.$call(interval.x0, &u, interval.h $(, &vector(interval.$lambda))?)
+                let $u: VectorU<M, T> = vector($interval.u);
+                $alone
             }
         }
     };
 }
-answer!(Nominal, solve(), 1);
-answer!(Forward, forward(), M::Shape::NW);
-answer!(ForwardAdjoint, forward_adjoint(lambda), M::Shape::NW);
-answer!(Adjoint, adjoint(lambda), 1);
-answer!(Hessian, hessian(lambda), M::Shape::NW);
+answer!(Nominal, solve, 1, |irk, at, u| irk.solve(at.x0, &u, at.h));
+answer!(Forward, forward, M::Shape::NW, |irk, at, u| irk.forward(at.x0, &u, at.h));
+answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |irk, at, u| {
+    irk.forward_adjoint(at.x0, &u, at.h, &vector(at.lambda))
+});
+answer!(Adjoint, adjoint, 1, |irk, at, u| irk.adjoint(at.x0, &u, at.h, &vector(at.lambda)));
+answer!(Hessian, hessian, M::Shape::NW, |irk, at, u| {
+    irk.hessian_along(at.x0, &u, at.h, &vector(at.lambda), at.nu, None)
+});

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::irk::{AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Step, Work};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::{Heap, Memory, WithForward, WithHessian};
-use crate::model::{ArrayK, ArrayX, Dae};
+use crate::model::{ArrayK, ArrayX, Dae, VectorZ};
 use crate::options::{Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Lanes;
@@ -36,6 +36,9 @@ pub struct Group<M: Dae, E: Lanes, const S: usize> {
     /// The warm start.
     record: Places<Step<M, E, S>>,
     lambda: Place<ArrayX<M, E>>,
+    /// Weights of the algebraic states at the start, and whether there are any.
+    nu: Place<VectorZ<M, E>>,
+    weighted: bool,
     forward: Place<ForwardMemory<M, E, S>>,
     adjoint: Place<AdjointMemory<M, E, S, 1>>,
     hessian: Place<HessianMemory<M, E, S>>,
@@ -85,6 +88,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             steps: Default::default(),
             record: Default::default(),
             lambda: Default::default(),
+            nu: Default::default(),
+            weighted: false,
             forward: Default::default(),
             adjoint: Default::default(),
             hessian: Default::default(),
@@ -134,6 +139,11 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             dispatch(Pack { from: &[*given; MOST_LANES], to });
         }
         pack!(Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
+        // All of them have some, or none.
+        self.weighted = intervals.iter().all(|interval| !interval.nu.is_empty());
+        if self.weighted {
+            pack!(Heap::nominal(&mut self.nu)?.as_mut_slice(), |interval| interval.nu);
+        }
         Heap::tape(&mut self.steps, count)?;
         let Some(records) = records else { return Ok(()) };
         for (n, step) in Heap::tape(&mut self.record, count)?.iter_mut().enumerate() {
@@ -202,7 +212,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             }
             yes::<E>()
         });
-        adjoint.backward.start(lambda.as_ref());
+        adjoint.backward.start(lambda.as_ref(), &[]);
         let Pass { steps, coefficients, work, statistics, .. } = pass;
         for (n, step) in steps.iter().enumerate().rev() {
             if n + 1 < count {
@@ -220,6 +230,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let forward = Heap::forward(&mut self.forward)?;
         let hessian = Heap::hessian(&mut self.hessian)?;
         let lambda = Heap::nominal(&mut self.lambda)?;
+        let nu = if self.weighted { Heap::nominal(&mut self.nu)?.as_slice() } else { &[] };
         let count = pass.steps.len();
         let records = Heap::hessian_tape(&mut self.tape, count)?;
         let mut good = pass.run(|pass, n, step, exact| {
@@ -234,10 +245,13 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         });
         let finite = forward.write(&pass.work.result, Some(&mut hessian.result.first.forward));
         let Pass { steps, coefficients, work, .. } = pass;
-        hessian.begin(lambda.as_ref());
+        hessian.begin(lambda.as_ref(), nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
             if n + 1 < count {
                 record.recall(work);
+            }
+            if n == 0 {
+                hessian.backward.weigh(coefficients);
             }
             good = E::and(good, hessian.backward.stages(work, coefficients));
             hessian.backward.advance(&work.linear);

@@ -133,7 +133,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         intervals: &Intervals<'_, M, T>,
         results: &mut [Nominal<M, T>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, None, results.len())?, results)
+        self.run(&Inputs::new(intervals, None, None, results.len())?, results)
     }
 
     /// The solutions, and their derivatives with respect to `x₀`, `u` and `p`.
@@ -145,7 +145,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         intervals: &Intervals<'_, M, T>,
         results: &mut [Forward<M, T>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, None, results.len())?, results)
+        self.run(&Inputs::new(intervals, None, None, results.len())?, results)
     }
 
     /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for each interval, or one
@@ -159,7 +159,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         lambda: &[VectorX<M, T>],
         results: &mut [Adjoint<M, T>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
     }
 
     /// The solutions, their derivatives, and the gradients of `λᵀx₊`.
@@ -172,7 +172,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         lambda: &[VectorX<M, T>],
         results: &mut [ForwardAdjoint<M, T>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
     }
 
     /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊`.
@@ -185,7 +185,31 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         lambda: &[VectorX<M, T>],
         results: &mut [Hessian<M, T>],
     ) -> Result<(), BatchError> {
-        self.run(&Inputs::new(intervals, Some(lambda), results.len())?, results)
+        self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
+    }
+
+    /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`, with the algebraic states `z₀` at the
+    /// starts of the intervals; one `ν` for each interval, or one for all.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    ///
+    /// ```
+    /// # use casados_core::{Batch, BatchError, Gauss, Dae, Intervals, model::{VectorX, VectorZ}, result::Hessian};
+    /// # fn example<Crane: Dae>(batch: &mut Batch<Crane, Gauss<2>>, intervals: &Intervals<Crane>, lambda: &[VectorX<Crane, f64>], nu: &[VectorZ<Crane, f64>]) -> Result<(), BatchError> {
+    /// let mut results = vec![Hessian::default(); intervals.x0.len()];
+    /// batch.hessian_with_z0(intervals, lambda, nu, &mut results)?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn hessian_with_z0(
+        &mut self,
+        intervals: &Intervals<'_, M, T>,
+        lambda: &[VectorX<M, T>],
+        nu: &[VectorZ<M, T>],
+        results: &mut [Hessian<M, T>],
+    ) -> Result<(), BatchError> {
+        self.run(&Inputs::new(intervals, Some(lambda), Some(nu), results.len())?, results)
     }
 
     fn run<R: Answer<M, T>>(

@@ -3,7 +3,7 @@
 use super::error::{BatchError, Slice};
 use crate::error::{Argument, Error};
 use crate::irk::check;
-use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
@@ -49,6 +49,8 @@ pub struct Interval<'a, M: Dae, T: Plain> {
     pub t0: T,
     /// Empty if nobody asks for adjoints.
     pub lambda: &'a [T],
+    /// Weights of the algebraic states at the start; empty if there are none.
+    pub nu: &'a [T],
 }
 
 impl<M: Dae, T: Plain> Clone for Interval<'_, M, T> {
@@ -62,6 +64,7 @@ impl<M: Dae, T: Plain> Copy for Interval<'_, M, T> {}
 pub struct Inputs<'a, M: Dae, T: Plain> {
     intervals: &'a Intervals<'a, M, T>,
     lambda: Option<&'a [VectorX<M, T>]>,
+    nu: Option<&'a [VectorZ<M, T>]>,
 }
 
 impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
@@ -70,16 +73,18 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
     pub fn new(
         intervals: &'a Intervals<'a, M, T>,
         lambda: Option<&'a [VectorX<M, T>]>,
+        nu: Option<&'a [VectorZ<M, T>]>,
         results: usize,
     ) -> Result<Self, BatchError> {
         let count = intervals.x0.len();
-        let (no_u, no_p) = (M::Shape::NU == 0, M::Shape::NP == 0);
+        let [no_u, no_p, no_z] = [M::Shape::NU, M::Shape::NP, M::Shape::NZ].map(|length| length == 0);
         for (argument, length, may_be_empty) in [
             (Argument::U, intervals.u.len(), no_u),
             (Argument::P, intervals.p.len(), no_p),
             (Argument::H, intervals.h.len(), false),
             (Argument::T, intervals.t0.len(), true),
             (Argument::Lambda, lambda.map_or(count, <[_]>::len), false),
+            (Argument::Nu, nu.map_or(count, <[_]>::len), no_z),
         ] {
             if length != count && length != 1 && !(length == 0 && may_be_empty) {
                 return Err(BatchError::Length {
@@ -92,7 +97,7 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
         if results != count {
             return Err(BatchError::Length { slice: Slice::Results, length: results, intervals: count });
         }
-        Ok(Self { intervals, lambda })
+        Ok(Self { intervals, lambda, nu })
     }
 
     /// One interval.
@@ -108,6 +113,7 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
             h: of(h, index).map_or(T::ZERO, |h| *h),
             t0: of(t0, index).map_or(T::ZERO, |t| *t),
             lambda: self.lambda.and_then(|lambda| of(lambda, index)).map_or(&[], Matrix::as_slice),
+            nu: self.nu.and_then(|nu| of(nu, index)).map_or(&[], Matrix::as_slice),
         };
         check(Argument::X0, interval.x0.as_slice())?;
         check(Argument::U, interval.u)?;
@@ -115,6 +121,7 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
         check(Argument::H, &[interval.h])?;
         check(Argument::T, &[interval.t0])?;
         check(Argument::Lambda, interval.lambda)?;
+        check(Argument::Nu, interval.nu)?;
         Ok(interval)
     }
 }

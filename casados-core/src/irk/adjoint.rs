@@ -3,6 +3,8 @@
 //! ```text
 //! Jᵀ μ = h (b ⊗ λ_{n+1}, 0)        λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i        λ_w −= Σ_i f_w,iᵀ μ_i
 //! ```
+//!
+//! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i` there is `ℓ_i(0) ν`.
 
 use super::along::Along;
 use super::evaluate::entry;
@@ -11,7 +13,7 @@ use super::step::check;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayW, ArrayX, Dae};
+use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Aligned, Matrix, Plain, Shape};
@@ -28,24 +30,45 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) gradient: ArrayW<M, [T; C]>,
     /// `μ`, one row per slot and stage.
     pub(crate) mu: Aligned<ArrayK<M, [[T; C]; S]>>,
-    /// What an integrand adds to the right-hand side of the unknowns at the stages,
+    /// What an integrand, or weights of `z₀`, add to the right-hand side of the unknowns at the stages,
     pub(crate) source: ArrayK<M, [T; S]>,
     /// and to `(λ_n, λ_w)`.
     pub(crate) shift: ArrayW<M, T>,
-    /// Whether there is one.
+    /// Whether there is any of it.
     pub(crate) sourced: bool,
+    /// The weights `ν` of `z₀`, and whether there are any.
+    nu: VectorZ<M, T>,
+    weighted: bool,
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] Backward<M, T, S, C>);
 
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
-    /// `λ_N`: seeds in column-major order.
-    pub(crate) fn start(&mut self, seeds: &[E]) {
+    /// `λ_N`: seeds in column-major order; and the weights of `z₀`, or none.
+    pub(crate) fn start(&mut self, seeds: &[E], nu: &[E]) {
         let nx = M::Shape::NX;
         for (state, row) in self.lambda.as_mut().iter_mut().enumerate() {
             *row = core::array::from_fn(|column| seeds[column * nx + state]);
         }
         self.gradient.as_mut().fill([E::from_f64(0.0); C]);
         self.sourced = false;
+        self.weighted = !nu.is_empty();
+        for (to, &from) in self.nu.as_mut_slice().iter_mut().zip(nu) {
+            *to = from;
+        }
+    }
+
+    /// What weights of `z₀` add to the right-hand side, in the first step, after what an integrand does.
+    pub(crate) fn weigh(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { M::Shape::NZ == 0 } || !self.weighted {
+            return;
+        }
+        if !self.sourced {
+            self.source.as_mut().fill([E::from_f64(0.0); S]);
+            self.shift.as_mut().fill(E::from_f64(0.0));
+            self.sourced = true;
+        }
+        let source = self.source.as_mut().get_mut(M::Shape::NX..).unwrap_or_default();
+        dispatch(Weigh { nu: self.nu.as_slice(), start: &coefficients.start, source });
     }
 
     /// `μ` of a step that is linearised, by the factors that are there; whether it satisfies its equations.
@@ -68,12 +91,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         let Self { lambda, mu, source, sourced, .. } = self;
         dispatch(RightHandSide { lambda: lambda.as_ref(), b: &coefficients.b, h, mu: mu.as_mut() });
         if *sourced {
-            for (mu, source) in mu.as_mut().as_flattened_mut().iter_mut().zip(source.as_ref().as_flattened())
-            {
-                for mu in mu {
-                    *mu = *mu + *source;
-                }
-            }
+            dispatch(Add { to: mu.as_mut().as_flattened_mut(), from: source.as_ref().as_flattened() });
         }
         linear.factors.solve_transposed(mu);
     }
@@ -85,12 +103,9 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         let (lambda, gradient) = (lambda.as_mut(), gradient.as_mut());
         dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda: &mut *lambda, gradient: &mut *gradient });
         if *sourced {
-            let rows = lambda.iter_mut().chain(gradient.iter_mut().skip(M::Shape::NX));
-            for (row, shift) in rows.zip(shift.as_ref()) {
-                for element in row {
-                    *element = *element + *shift;
-                }
-            }
+            let (states, inputs) = shift.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
+            dispatch(Add { to: lambda, from: states });
+            dispatch(Add { to: gradient.get_mut(M::Shape::NX..).unwrap_or_default(), from: inputs });
         }
     }
 }
@@ -111,6 +126,9 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
     ) -> Result<(), Error> {
         if let Some(integrand) = along {
             work.along_adjoint(coefficients, n, step, self, &mut **integrand)?;
+        }
+        if n == 0 {
+            self.weigh(coefficients);
         }
         if !self.stages(work, coefficients) && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
@@ -141,6 +159,45 @@ impl<E: Lanes, const S: usize, const C: usize> Kernel for RightHandSide<'_, E, S
                 for (mu, &lambda) in mu.iter_mut().zip(lambda) {
                     *mu = h * b * lambda;
                 }
+            }
+        }
+    }
+}
+
+/// Adds the same to all seeds.
+struct Add<'a, E, const C: usize> {
+    to: &'a mut [[E; C]],
+    from: &'a [E],
+}
+
+impl<E: Lanes, const C: usize> Kernel for Add<'_, E, C> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (to, &from) in self.to.iter_mut().zip(self.from) {
+            for to in to {
+                *to = *to + from;
+            }
+        }
+    }
+}
+
+/// `source_i += ℓ_i(0) ν` at every stage.
+struct Weigh<'a, E, const S: usize> {
+    nu: &'a [E],
+    start: &'a [E; S],
+    source: &'a mut [[E; S]],
+}
+
+impl<E: Lanes, const S: usize> Kernel for Weigh<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (source, &nu) in self.source.iter_mut().zip(self.nu) {
+            for (source, &start) in source.iter_mut().zip(self.start) {
+                *source = *source + start * nu;
             }
         }
     }

@@ -13,12 +13,12 @@ use super::run::Parts;
 use super::sweep::Sweep;
 use crate::error::{Error, Place};
 use crate::memory::{Fallback, Memory, WithAdjoint, WithForward, WithHessian};
-use crate::model::{ArrayW, Dae, VectorU, VectorX};
+use crate::model::{ArrayW, Dae, VectorU, VectorX, VectorZ};
 pub(super) use crate::quadrature::{Along, begin, finish, reborrow};
 use crate::quadrature::{Integrand, With};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::Shape;
+use crate::shape::{Matrix, Shape};
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// The variables at a stage, which are in `points`, to where the integrand takes them from.
@@ -184,6 +184,24 @@ impl<'a, M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
     where
         W: WithHessian,
     {
-        self.integrator.hessian_along(x0, u, h, lambda, Some(self.integrand))
+        self.integrator.hessian_along(x0, u, h, lambda, &[], Some(self.integrand))
+    }
+
+    /// See [`Integrator::hessian_with_z0`]; gradient and Hessian are those of `λᵀx + νᵀz₀` and the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn hessian_with_z0(
+        self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        nu: &VectorZ<M, T>,
+    ) -> Result<&'a Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        self.integrator.hessian_along(x0, u, h, lambda, nu.as_slice(), Some(self.integrand))
     }
 }

@@ -4,7 +4,8 @@
 //! d²(λᵀ x_N)/dw² = − Σ_n Σ_i D_iᵀ [∇²(μ_iᵀ f)_i] D_i
 //! ```
 //!
-//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of `curvature`.
+//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of `curvature`. With weights `ν` of `z₀`,
+//! which is a sum of unknowns, it is `d²(λᵀ x_N + νᵀ z₀)/dw²`: they are in `μ` alone.
 
 use super::adjoint::Backward;
 use super::along::Along;
@@ -80,11 +81,12 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
         coefficients: &Coefficients<T, S>,
         steps: &[Step<M, T, S>],
         records: &[HessianStep<M, T, S, F>],
-        seed: &[T],
+        lambda: &[T],
+        nu: &[T],
         statistics: &mut Statistics,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        self.begin(seed);
+        self.begin(lambda, nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
             if n + 1 < steps.len() {
                 record.recall(work);
@@ -106,9 +108,9 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
-    /// Before the last step.
-    pub(crate) fn begin(&mut self, seed: &[E]) {
-        self.backward.start(seed);
+    /// Before the last step, with `λ` and `ν`; the latter may be empty.
+    pub(crate) fn begin(&mut self, lambda: &[E], nu: &[E]) {
+        self.backward.start(lambda, nu);
     }
 
     /// `∇²(μ_iᵀ f)` at all stages of a step.

@@ -542,7 +542,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             }
             if n + 1 == count { parts.linearize(n, step, exact) } else { Ok(()) }
         })?;
-        memory.backward.start(seeds);
+        memory.backward.start(seeds, &[]);
         for (n, step) in parts.steps.iter().enumerate().rev() {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
@@ -585,22 +585,55 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        self.hessian_along(x0, u, h, lambda, None)
+        self.hessian_along(x0, u, h, lambda, &[], None)
     }
 
-    /// As [`Integrator::hessian`], with an integrand.
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the algebraic states `z₀` at the
+    /// start of the interval, which are [`z0`](Nominal::z0) of the results: in the same pass.
+    ///
+    /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on algebraic states.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    ///
+    /// ```
+    /// # use casados_core::{Error, Irk, Gauss, Dae, Options, model::{VectorU, VectorX, VectorZ}};
+    /// # fn example<Crane: Dae>(x0: VectorX<Crane, f64>, u: VectorU<Crane, f64>, lambda: VectorX<Crane, f64>, nu: VectorZ<Crane, f64>) -> Result<(), Error> {
+    /// let mut irk = Irk::<Crane, Gauss<4>>::new(Options::default())?;
+    /// let step = irk.hessian_with_z0(&x0, &u, 0.05, &lambda, &nu)?;
+    /// let (gradient, hessian) = (step.grad_x0, step.h_xx);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn hessian_with_z0(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        nu: &VectorZ<M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        self.hessian_along(x0, u, h, lambda, nu.as_slice(), None)
+    }
+
+    /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an integrand.
     pub(crate) fn hessian_along(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
         h: T,
         lambda: &VectorX<M, T>,
+        nu: &[T],
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,
     {
         check(Argument::Lambda, lambda.as_slice())?;
+        check(Argument::Nu, nu)?;
         begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;
@@ -629,6 +662,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             parts.steps,
             records,
             lambda.as_slice(),
+            nu,
             parts.statistics,
             reborrow(&mut along),
         )?;
