@@ -2,13 +2,13 @@
 
 use crate::Test;
 use casados::ocp::{
-    Constraint, Convexification, Exact, GaussNewton, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map,
-    OcpError, Problem, Sensitivities, Shooting,
+    Constraint, Convexification, Dynamics, Exact, GaussNewton, GeneralCost, HeapOcp, HeapSqp, Horizon,
+    LeastSquaresCost, Map, Names, Nodes, OcpError, Problem, SecondOrder, Sensitivities, Shooting, Sink,
 };
 use casados::prelude::*;
 use casados::qp::QpView;
 
-/// `z = 0.7 c + 0.4 u − 0.3 p` with a state `c` that does not change: the polynomial of the stages is exact at the start.
+/// `sinh z = 0.7 c + 0.4 u − 0.3 p + 0.5 c u p` with a state `c` that does not change: the polynomial of the stages is exact at the start.
 mod implicit {
     use casados::prelude::*;
 
@@ -18,7 +18,7 @@ mod implicit {
             xdot[0] - x[1],
             xdot[1] + x[0].sin() * x[2] - z[0] - 0.5 * u[0],
             xdot[2],
-            z[0] - 0.7 * x[2] - 0.4 * u[0] + 0.3 * p[0],
+            z[0].sinh() - 0.7 * x[2] - 0.4 * u[0] + 0.3 * p[0] - 0.5 * x[2] * u[0] * p[0],
         ]
     }
     #[function]
@@ -37,17 +37,17 @@ mod explicit {
 
     #[ode]
     pub fn cart(x: [f64; 3], u: [f64; 1], p: [f64; 1]) -> [f64; 3] {
-        let z = 0.7 * x[2] + 0.4 * u[0] - 0.3 * p[0];
+        let z = (0.7 * x[2] + 0.4 * u[0] - 0.3 * p[0] + 0.5 * x[2] * u[0] * p[0]).asinh();
         [x[1], -x[0].sin() * x[2] + z + 0.5 * u[0], 0.0]
     }
     #[function]
     pub fn tracking(x: [f64; 3], u: [f64; 1], p: [f64; 1]) -> [f64; 3] {
-        let z = 0.7 * x[2] + 0.4 * u[0] - 0.3 * p[0];
+        let z = (0.7 * x[2] + 0.4 * u[0] - 0.3 * p[0] + 0.5 * x[2] * u[0] * p[0]).asinh();
         [x[0] - 0.2 * z, z * z + 0.1 * p[0], 0.5 * u[0] + z * x[1]]
     }
     #[function]
     pub fn power(x: [f64; 3], u: [f64; 1], p: [f64; 1]) -> [f64; 2] {
-        let z = 0.7 * x[2] + 0.4 * u[0] - 0.3 * p[0];
+        let z = (0.7 * x[2] + 0.4 * u[0] - 0.3 * p[0] + 0.5 * x[2] * u[0] * p[0]).asinh();
         [x[1] * z + 0.2 * p[0] * z, u[0] + z * z]
     }
 }
@@ -112,23 +112,27 @@ macro_rules! at_a_point {
     }};
 }
 
-/// To rounding: all derivatives of `z` are those that are written down in the other problem, whose second ones are zero.
+/// To rounding: all derivatives of `z`, second ones in exact Hessians too, are those that are written down in the other problem.
 #[test]
 fn the_same_quadratic_programs() -> Test {
     let exact = Exact { convexification: Convexification::None };
     let gauss_newton = GaussNewton::default();
-    let batch = Batch::<implicit::Cart, Gauss<2>>::new(Options::default())?;
+    let batch = || Batch::<implicit::Cart, Gauss<2>>::new(Options::default());
     let pairs = [
         (
             at_a_point!(ocp!(implicit, implicit_irk()?), gauss_newton),
             at_a_point!(ocp!(explicit, explicit_irk()?), gauss_newton),
         ),
         (
-            at_a_point!(ocp!(implicit, Shooting::new(batch)), gauss_newton),
+            at_a_point!(ocp!(implicit, Shooting::new(batch()?)), gauss_newton),
             at_a_point!(ocp!(explicit, explicit_irk()?), gauss_newton),
         ),
         (
             at_a_point!(ocp!(implicit, implicit_irk()?), exact),
+            at_a_point!(ocp!(explicit, explicit_irk()?), exact),
+        ),
+        (
+            at_a_point!(ocp!(implicit, Shooting::new(batch()?)), exact),
             at_a_point!(ocp!(explicit, explicit_irk()?), exact),
         ),
     ];
@@ -188,6 +192,60 @@ fn the_same_solutions() -> Test {
     Ok(())
 }
 
+/// Counts simulations, and second-order passes that are given weights.
+struct Counted<I> {
+    inner: I,
+    simulations: usize,
+    weighted: [usize; 2],
+}
+impl<I: Dynamics<f64>> Dynamics<f64> for Counted<I> {
+    type Shape = I::Shape;
+    const NAMES: Names = I::NAMES;
+    const ALGEBRAIC: bool = I::ALGEBRAIC;
+    fn simulate(&mut self, nodes: &Nodes<'_, f64>, sink: Sink<'_, f64>) -> Result<(), OcpError> {
+        self.simulations += 1;
+        self.inner.simulate(nodes, sink)
+    }
+    fn linearise(&mut self, nodes: &Nodes<'_, f64>, sink: Sink<'_, f64>) -> Result<(), OcpError> {
+        self.inner.linearise(nodes, sink)
+    }
+}
+impl<I: SecondOrder<f64>> SecondOrder<f64> for Counted<I> {
+    fn second_order(&mut self, nodes: &Nodes<'_, f64>, sink: Sink<'_, f64>) -> Result<(), OcpError> {
+        for interval in nodes.iter() {
+            self.weighted[usize::from(!interval.nu.is_empty())] += 1;
+        }
+        self.inner.second_order(nodes, sink)
+    }
+}
+
+#[function]
+fn speed(x: [f64; 3], _z: [f64; 1], u: [f64; 1], _p: [f64; 1]) -> f64 {
+    x[1] * x[1] + u[0] * u[0]
+}
+
+/// Nothing more is simulated where nothing depends on algebraic states, or where Hessians are not exact.
+#[test]
+fn what_nobody_needs() -> Test {
+    macro_rules! count {
+        ($cost:ty, $constraint:ty, $curvature:expr) => {{
+            let dynamics = Counted { inner: implicit_irk()?, simulations: 0, weighted: [0; 2] };
+            let mut ocp = Problem::new(dynamics)
+                .stage_cost(GeneralCost::<$cost>::new())
+                .path_constraints(Constraint::<$constraint>::new(Default::default(), Default::default()))
+                .on(Horizon::uniform(N, 0.25))?;
+            ocp.fix_initial_state(&X0)?.guess(&X0, &[0.0])?.set_parameters(.., &[0.6])?;
+            ocp.linearise($curvature)?;
+            (ocp.problem().dynamics.simulations, ocp.problem().dynamics.weighted)
+        }};
+    }
+    assert_eq!(count!(Speed, Speed, Exact::default()), (0, [N, 0]));
+    assert_eq!(count!(implicit::Tracking, Speed, Exact::default()), (1, [0, N]));
+    assert_eq!(count!(Speed, implicit::Power, Exact::default()), (1, [0, N]));
+    assert_eq!(count!(implicit::Tracking, implicit::Power, GaussNewton::default()), (0, [0, 0]));
+    Ok(())
+}
+
 #[function]
 fn next(x: [f64; 1], _z: [f64; 1], u: [f64; 1]) -> [f64; 1] {
     [x[0] + u[0]]
@@ -213,5 +271,107 @@ fn where_there_are_none() -> Test {
         .terminal_constraints(Constraint::<Last>::new([0.0], [1.0]))
         .on(Horizon::uniform(3, 0.1));
     assert!(matches!(problem.map(|_: HeapOcp<_, f64>| ()), Err(OcpError::NotThere { terminal: true, .. })));
+    Ok(())
+}
+
+/// A motor whose torque is an algebraic state, nonlinear in everything, with friction as a parameter; at the start of an interval
+/// it is what the polynomial of the stages continues to.
+#[dae]
+fn motor(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 3] {
+    [
+        xdot[0] - x[1],
+        xdot[1] + x[0].sin() - z[0] * x[0].cos(),
+        z[0] + 0.5 * z[0].powi(3) - u[0] * (1.0 + 0.5 * x[0] * x[0]) + p[0] * x[1] * x[1],
+    ]
+}
+#[function]
+fn task(x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 4] {
+    [x[0] - 1.0, 0.4 * x[1], z[0] - p[0], 0.1 * u[0]]
+}
+#[function]
+fn heat(x: [f64; 2], z: [f64; 1], _u: [f64; 1], _p: [f64; 1]) -> f64 {
+    z[0] + 0.5 * x[1] * z[0]
+}
+
+macro_rules! motor_problem {
+    ($dynamics:expr) => {{
+        let mut ocp = Problem::new($dynamics)
+            .stage_cost(LeastSquaresCost::<Task>::diagonal(&[1.0, 1.0, 2.0, 1.0]))
+            .path_constraints(Constraint::<Heat>::new([f64::NEG_INFINITY], [1.2]))
+            .on(Horizon::uniform(N, 0.2))?;
+        ocp.fix_initial_state(&MOTOR_X0)?.guess(&MOTOR_X0, &[0.0])?.set_parameters(.., &[MOTOR_P])?;
+        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        (sqp.options.tolerance, sqp.options.qp_accuracy) = (1e-11, 0.0);
+        sqp.qp_solver.options.tolerance = 1e-13;
+        (ocp, sqp)
+    }};
+}
+const MOTOR_X0: [f64; 2] = [-0.6, 0.3];
+const MOTOR_P: f64 = 0.8;
+
+/// With second derivatives of everything, full steps are those of Newton's method: `r₊ ≤ C r²` of the largest residuals. Linear
+/// convergence has a quotient that grows without bound. What is below is rounding.
+macro_rules! quadratic {
+    ($problem:expr) => {{
+        let (mut ocp, mut sqp) = $problem;
+        let outcome = sqp.solve(&mut ocp)?;
+        assert!(outcome.is_converged(), "{}{outcome}", sqp.log());
+        let all: Vec<f64> = sqp.log().0.iter().map(|row| row.residuals.largest()).collect();
+        let near: Vec<f64> = all.into_iter().skip_while(|&r| r > 0.1).collect();
+        let [first, second, ..] = near[..] else { return Err("no iterations".into()) };
+        let constant = second / (first * first);
+        assert!(near.len() >= 4, "{near:?}");
+        for pair in near.windows(2).skip(1) {
+            assert!(pair[1] < 2.0 * constant * pair[0] * pair[0] + 1e-14, "{near:?}");
+        }
+        let active = ocp.iterate().stages().filter(|stage| stage.g_upper.iter().any(|&mu| mu > 1e-2)).count();
+        assert!((1..N).contains(&active), "{active}");
+    }};
+}
+
+#[test]
+fn quadratic_convergence() -> Test {
+    let batch = Batch::<Motor, RadauIIA<2>>::new(Options { steps: 3, ..Options::default() })?;
+    quadratic!(motor_problem!(Irk::<Motor, Gauss<2>>::new(Options::default())?));
+    quadratic!(motor_problem!(Shooting::new(batch)));
+    Ok(())
+}
+
+/// Against differences of order eight of problems that are solved again.
+#[test]
+fn derivatives_of_solutions() -> Test {
+    let (mut ocp, mut sqp) = motor_problem!(Irk::<Motor, Gauss<2>>::new(Options::default())?);
+    assert!(sqp.solve(&mut ocp)?.is_converged());
+    let mut result = Sensitivities::new(&ocp)?;
+    ocp.differentiate(Exact { convexification: Convexification::None }, &mut result)?;
+    let (step, weights) = (2e-3, [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0]);
+    for direction in 0..3 {
+        let mut solve = |change: f64| -> Result<Vec<f64>, Box<dyn std::error::Error>> {
+            let (mut x0, mut p) = (MOTOR_X0, MOTOR_P);
+            *(if direction < 2 { &mut x0[direction] } else { &mut p }) += change;
+            ocp.fix_initial_state(&x0)?.set_parameters(.., &[p])?;
+            assert!(sqp.solve(&mut ocp)?.is_converged());
+            Ok(ocp.iterate().stages().flat_map(|stage| [stage.x, stage.u].concat()).collect())
+        };
+        let mut differences = vec![0.0; 3 * N + 2];
+        for (i, weight) in weights.into_iter().enumerate() {
+            let change = (i + 1) as f64 * step;
+            let sides = solve(change)?.into_iter().zip(solve(-change)?);
+            differences
+                .iter_mut()
+                .zip(sides)
+                .for_each(|(sum, (plus, minus))| *sum += weight / step * (plus - minus));
+        }
+        for (k, differences) in differences.chunks(3).enumerate() {
+            let (x, u) = if direction < 2 {
+                (&result.dx(k)[2 * direction..][..2], result.du(k).get(direction..))
+            } else {
+                (&result.dx_dp(k)[..2], Some(result.du_dp(k)))
+            };
+            for (found, expected) in x.iter().chain(u.unwrap_or_default().first()).zip(differences) {
+                assert!((found - expected).abs() < 1e-7, "{direction} {k}: {found} {expected}");
+            }
+        }
+    }
     Ok(())
 }

@@ -1,12 +1,27 @@
-//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the integrator.
+//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the integrator, `z = ζ(x, u, p)`.
+//!
+//! With `L = l + μᵀg` and `ν = ∂L/∂z`:
+//!
+//! ```text
+//! ∇L = L_v + Zᵀν        ∇²L = [I; Z]ᵀ L'' [I; Z] + Σ_j ν_j ∇²ζ_j        v = (x, u), Z = ∂ζ/∂v
+//! ```
+//!
+//! The last term comes from the integrator, which is told `ν` for it, as it is told `π` for that of the dynamics.
 
-use super::dynamics::Step;
+use super::constraint::Constraints;
+use super::cost::{At, Cost};
+use super::data::{inputs, is_algebraic, split};
+use super::dynamics::{Dynamics, Step};
+use super::error::OcpError;
+use super::instance::{Ocp, nodes};
 #[cfg(feature = "alloc")]
 use super::point::Cross;
-use super::point::Terms;
-use crate::qp::{part, part_mut};
+use super::point::{Terms, read};
+use super::problem::{Formulation, Problem};
+use crate::qp::{StageDims, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
+use bytemuck::Zeroable;
 
 /// `NX + NU` and `NZ`.
 const fn lengths<S: Shape>() -> [usize; 2] {
@@ -123,6 +138,46 @@ impl<'a, T: Real> Extended<'a, T> {
                 }
             }
         }
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states themselves are simulated for them. Nothing
+    /// where nothing depends on these.
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
+    pub(super) fn weigh(&mut self) -> Result<(), OcpError> {
+        if const { !is_algebraic::<P, T>() } {
+            return Ok(());
+        }
+        let intervals = self.intervals();
+        let (n, nz, np) = (inputs::<P::Shape>(), P::Shape::NZ, P::Shape::NP);
+        let data = split::<P, T>(self.data.as_mut(), intervals);
+        let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
+        let (v, multipliers) = self.iterate.vectors();
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
+        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
+        for (k, stage) in self.iterate.stages().enumerate().take(intervals) {
+            let [time, end] = [k, k + 1].map(|k| get(data.times, k));
+            let (z, _) = at::<P::Shape, T>(data.algebraic, k);
+            read::<P::Shape, T>(&mut point, [stage.x, z, stage.u, part(data.p, k * np, np)], time);
+            let factor = if *running { end - time } else { T::ONE };
+            let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
+            let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
+            let place = At { stage: k, factor, exact: false, from: &[] };
+            stage_cost.add(&point, reference, place, &mut terms)?;
+            path.linearise(&point, &mut [], columns, terms.ld, k)?;
+            for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {
+                *nu = get(terms.gradient, n + j);
+                let mu = stage.g_upper.iter().zip(stage.g_lower);
+                for ((&upper, &lower), column) in mu.zip(columns.chunks_exact(terms.ld.max(1))) {
+                    *nu = *nu + (upper - lower) * get(column, n + j);
+                }
+            }
+        }
+        Ok(())
     }
 }
 

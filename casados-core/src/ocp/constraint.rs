@@ -1,7 +1,7 @@
 //! Constraints at the nodes.
 
 use super::error::{OcpError, Part};
-use super::point::{Cross, Terms, There, parameter, position};
+use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape};
@@ -11,6 +11,8 @@ use bytemuck::Zeroable;
 pub trait Constraints<S: Shape, T: Real> {
     /// How many rows.
     const ROWS: usize;
+    /// Whether they depend on algebraic states.
+    const ALGEBRAIC: bool;
 
     /// Whether they depend on what is there only.
     ///
@@ -53,6 +55,7 @@ pub trait Constraints<S: Shape, T: Real> {
 
 impl<S: Shape, T: Real> Constraints<S, T> for () {
     const ROWS: usize = 0;
+    const ALGEBRAIC: bool = false;
     fn check(&self, _: There) -> Result<(), OcpError> {
         Ok(())
     }
@@ -79,6 +82,7 @@ impl<S: Shape, T: Real> Constraints<S, T> for () {
 
 impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<S, T> for (A, B) {
     const ROWS: usize = A::ROWS + B::ROWS;
+    const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
     fn check(&self, there: There) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
@@ -170,6 +174,7 @@ impl<F: Function, T: Real> Constraint<F, T> {
 
 impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
     const ROWS: usize = F::Outputs::NY;
+    const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {
         let part = if there.u { Part::PathBounds } else { Part::TerminalBounds };

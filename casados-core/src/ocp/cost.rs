@@ -1,7 +1,7 @@
 //! Costs at the nodes.
 
 use super::error::OcpError;
-use super::point::{Cross, Terms, There, position};
+use super::point::{Cross, Terms, There, is_algebraic, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape};
@@ -13,6 +13,8 @@ pub trait Cost<S: Shape, T: Real> {
     const REFERENCES: usize;
     /// Whether the Hessian that [`Cost::add`] adds is positive semidefinite where an exact one is not asked for.
     const CONVEX: bool;
+    /// Whether it depends on algebraic states.
+    const ALGEBRAIC: bool;
 
     /// Whether it depends on what is there only, and has weights that make sense.
     ///
@@ -69,6 +71,7 @@ pub struct At<'a, T> {
 impl<S: Shape, T: Real> Cost<S, T> for () {
     const REFERENCES: usize = 0;
     const CONVEX: bool = true;
+    const ALGEBRAIC: bool = false;
     fn check(&self, _: There) -> Result<(), OcpError> {
         Ok(())
     }
@@ -93,6 +96,7 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
 impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     const REFERENCES: usize = A::REFERENCES + B::REFERENCES;
     const CONVEX: bool = A::CONVEX && B::CONVEX;
+    const ALGEBRAIC: bool = A::ALGEBRAIC || B::ALGEBRAIC;
     fn check(&self, there: There) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
@@ -153,6 +157,7 @@ impl<F: Function, T: Plain> Default for GeneralCost<F, T> {
 impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
     const REFERENCES: usize = 0;
     const CONVEX: bool = F::STRUCTURE.hessian.is_empty();
+    const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {
         there.check::<F>()

@@ -22,6 +22,8 @@ pub(super) struct Data<'a, T> {
     pub upper: &'a mut [T],
     /// Algebraic states of every stage but the last, and `∂z/∂(x, u)`, row after row.
     pub algebraic: &'a mut [T],
+    /// Weights of the second derivatives of algebraic states, of every stage but the last, if anything depends on these.
+    pub weights: &'a mut [T],
     /// Room for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and its constraints; nothing if there is no `z`.
     pub extended: &'a mut [T],
     /// Room for two matrices and a vector over `(x, u)`.
@@ -33,7 +35,12 @@ pub(super) const fn inputs<S: Shape>() -> usize {
     S::NX + S::NU
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 8] {
+/// Whether a cost or a constraint depends on algebraic states.
+pub(super) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
+    P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
+}
+
+const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 9] {
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
     let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
     let n = inputs::<P::Shape>();
@@ -45,6 +52,7 @@ const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 8] {
         rows,
         rows,
         intervals * kept::<P::Shape>(),
+        if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
         extended::<P::Shape>(constraints),
         (2 * n + 1) * pad::<T>(n),
     ]
@@ -52,20 +60,20 @@ const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 8] {
 
 /// How many numbers it takes.
 pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
-    let [a, b, c, d, e, f, g, h] = lengths::<P, T>(intervals);
-    a + b + c + d + e + f + g + h
+    let [a, b, c, d, e, f, g, h, i] = lengths::<P, T>(intervals);
+    a + b + c + d + e + f + g + h + i
 }
 
 /// The parts.
 pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
     let mut rest = memory;
-    let [times, p, references, lower, upper, algebraic, extended, scratch] =
+    let [times, p, references, lower, upper, algebraic, weights, extended, scratch] =
         lengths::<P, T>(intervals).map(|length| {
             let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
             rest = behind;
             part
         });
-    Data { times, p, references, lower, upper, algebraic, extended, scratch }
+    Data { times, p, references, lower, upper, algebraic, weights, extended, scratch }
 }
 
 /// The dimensions of a stage.

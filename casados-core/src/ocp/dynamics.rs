@@ -30,6 +30,8 @@ pub struct Interval<'a, T> {
     pub p: &'a [T],
     /// The multipliers `π` of its end.
     pub multipliers: &'a [T],
+    /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if nothing depends on these.
+    pub nu: &'a [T],
     /// The time at its start.
     pub t: T,
     /// Its length.
@@ -41,10 +43,11 @@ pub struct Interval<'a, T> {
 pub struct Nodes<'a, T> {
     pub(super) v: &'a [T],
     pub(super) multipliers: &'a [T],
+    pub(super) weights: &'a [T],
     pub(super) p: &'a [T],
     pub(super) times: &'a [T],
-    /// `NX`, `NU`, `NP`
-    pub(super) dims: [usize; 3],
+    /// `NX`, `NU`, `NP`, `NZ`
+    pub(super) dims: [usize; 4],
     /// Distances of stages in `v`, and in `multipliers`.
     pub(super) ld: [usize; 2],
 }
@@ -62,7 +65,7 @@ impl<'a, T: Real> Nodes<'a, T> {
     }
     /// All intervals, in order.
     pub fn iter(&self) -> impl Iterator<Item = Interval<'a, T>> + use<'a, T> {
-        let Self { v, multipliers, p, times, dims: [nx, nu, np], ld: [ld, ld_next] } = *self;
+        let Self { v, multipliers, weights, p, times, dims: [nx, nu, np, nz], ld: [ld, ld_next] } = *self;
         let part = crate::qp::part::<T>;
         times.windows(2).enumerate().map(move |(k, times)| {
             let [t, end] = [0, 1].map(|i| times.get(i).copied().unwrap_or(T::ZERO));
@@ -71,6 +74,7 @@ impl<'a, T: Real> Nodes<'a, T> {
                 u: part(v, k * ld + nx, nu),
                 p: part(p, k * np, np),
                 multipliers: part(multipliers, k * ld_next, nx),
+                nu: part(weights, k * nz, nz),
                 t,
                 h: end - t,
             }
@@ -93,7 +97,7 @@ pub struct Step<'a, T> {
     pub du: &'a [T],
     /// `∂φ/∂p`
     pub dp: &'a [T],
-    /// `∇²(πᵀφ + integral)`: blocks `xx`, `xu`, `uu`.
+    /// `∇²(πᵀφ + νᵀζ + integral)`: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
     /// The blocks `xp`, `up` of the same.
     pub hessian_p: [&'a [T]; 2],
@@ -203,7 +207,8 @@ pub trait Dynamics<T: Real> {
     note = "integrators with `Heap` or `Inline<mode::Hessian>` memory have them"
 )]
 pub trait SecondOrder<T: Real>: Dynamics<T> {
-    /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + integral)`.
+    /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + νᵀζ + integral)` with the multipliers `π` and the weights
+    /// `ν` of the [`Interval`].
     ///
     /// # Errors
     /// [`OcpError::Integration`]

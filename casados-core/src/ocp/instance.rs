@@ -293,13 +293,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-/// The intervals at a point.
+/// The intervals at a point; weights of algebraic states may be empty.
 pub(super) fn nodes<'a, S: Shape, T: Real>(
     v: &'a [T],
     multipliers: &'a [T],
+    weights: &'a [T],
     p: &'a [T],
     times: &'a [T],
 ) -> Nodes<'a, T> {
-    let dims = [S::NX, S::NU, S::NP];
-    Nodes { v, multipliers, p, times, dims, ld: [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)] }
+    let dims = [S::NX, S::NU, S::NP, S::NZ];
+    Nodes { v, multipliers, weights, p, times, dims, ld: [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)] }
 }

@@ -2,7 +2,7 @@
 
 use super::cost::{At, Cost};
 use super::error::{OcpError, Part};
-use super::point::{Cross, Terms, There, parameter, position};
+use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
 use crate::scalar::Real;
@@ -93,6 +93,7 @@ fn weigh<F: Function, T: Real>(
 impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
+    const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {
         for (index, value) in self.weights.as_slice().iter().enumerate() {

@@ -37,7 +37,8 @@ pub struct GaussNewton {
     pub convexification: Convexification,
 }
 
-/// The Hessian of the Lagrangian, made convex stage by stage.
+/// The Hessian of the Lagrangian, made convex stage by stage. Where costs or constraints depend on algebraic states, all intervals are
+/// simulated first: what second derivatives of these states are multiplied by depends on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Exact {
     /// What is done where a stage is not convex.
@@ -80,6 +81,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         mut watch: impl FnMut(usize, &Step<'_, T>),
     ) -> Result<(), OcpError> {
         self.check()?;
+        if C::EXACT {
+            self.weigh()?;
+        }
         let intervals = self.intervals();
         let (nx, np) = (P::Shape::NX, P::Shape::NP);
         let n = inputs::<P::Shape>();
@@ -94,7 +98,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // Whether Hessians are those of costs at nodes alone.
         let mut plain = !C::EXACT;
         let mut stages = qp.stages_mut();
-        let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
+        let weights = if C::EXACT { &*data.weights } else { &[] };
+        let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
         // The first interval that adds to costs; before it they are cleared where those at nodes are added.
         let mut adding = usize::MAX;
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
@@ -239,7 +244,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
         let (v, multipliers) = at.vectors();
         let mut objective = T::ZERO;
-        let nodes = nodes::<P::Shape, T>(v, multipliers, data.p, data.times);
+        let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
         dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
             objective = objective + step.cost.value;
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);

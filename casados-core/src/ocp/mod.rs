@@ -25,7 +25,8 @@
 //! each sample, in two phases. `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback gains.
 //!
 //! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its stages to there (`z0` of its results), with their exact
-//! first derivatives; second derivatives of `ζ` itself are in no Hessian. At the end of the horizon there are none.
+//! first derivatives; those of second order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of the horizon there
+//! are none.
 //!
 //! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
 //! stage 0 given by equal bounds. So are parameters that are to be found.

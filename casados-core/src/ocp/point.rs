@@ -26,6 +26,11 @@ pub(super) fn parameter<S: Shape>(variable: usize) -> Option<usize> {
     variable.checked_sub(2 * S::NX + S::NZ + S::NU).filter(|&p| p < S::NP)
 }
 
+/// Whether a function depends on algebraic states.
+pub(super) const fn is_algebraic<F: Function>() -> bool {
+    F::STRUCTURE.blocks[2] < F::STRUCTURE.blocks[3]
+}
+
 /// Writes the variables `(0, x, z, u, p, t)`.
 #[inline(always)]
 pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, [x, z, u, p]: [&[T]; 4], t: T) {

@@ -4,7 +4,7 @@ use super::dynamics::{Dynamics, Names, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::single::names;
 use crate::batch::{BatchError, Integrator, Intervals};
-use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Shape;
@@ -19,6 +19,7 @@ pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
     h: Vec<T>,
     t: Vec<T>,
     lambda: Vec<VectorX<M, T>>,
+    nu: Vec<VectorZ<M, T>>,
     nominal: Vec<Nominal<M, T>>,
     forward: Vec<Forward<M, T>>,
     hessian: Vec<Hessian<M, T>>,
@@ -36,6 +37,7 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
             h: Vec::new(),
             t: Vec::new(),
             lambda: Vec::new(),
+            nu: Vec::new(),
             nominal: Vec::new(),
             forward: Vec::new(),
             hessian: Vec::new(),
@@ -56,6 +58,7 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
         reserve(&mut self.h, n)?;
         reserve(&mut self.t, n)?;
         reserve(&mut self.lambda, n)?;
+        reserve(&mut self.nu, n)?;
         for interval in nodes.iter() {
             self.x.push(vector(interval.x));
             self.u.push(vector(interval.u));
@@ -66,6 +69,9 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
             self.t.push(interval.t);
             if multipliers {
                 self.lambda.push(vector(interval.multipliers));
+            }
+            if !interval.nu.is_empty() {
+                self.nu.push(vector(interval.nu));
             }
         }
         Ok(())
@@ -131,8 +137,13 @@ impl<M: Dae, B, const S: usize, T: Real> SecondOrder<T> for Shooting<M, B, S, T>
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, true)?;
         places(&mut self.hessian, nodes.len())?;
-        let Self { batch, x, u, p, h, t, lambda, hessian, .. } = self;
-        batch.hessian(&Intervals { x0: x, u, p, h, t0: t }, lambda, hessian).map_err(failed)?;
+        let Self { batch, x, u, p, h, t, lambda, nu, hessian, .. } = self;
+        let intervals = Intervals { x0: x, u, p, h, t0: t };
+        let outcome = match nu.is_empty() {
+            true => batch.hessian(&intervals, lambda, hessian),
+            false => batch.hessian_with_z0(&intervals, lambda, nu, hessian),
+        };
+        outcome.map_err(failed)?;
         for (k, result) in hessian.iter().enumerate() {
             sink(k, &result.into());
         }

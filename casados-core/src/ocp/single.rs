@@ -81,7 +81,7 @@ fn at<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
 }
 
 macro_rules! single {
-    ($module:ident, $model:ident) => {
+    ($module:ident, $model:ident $(, $nu:ident)?) => {
         /// Parameters and time of an interval.
         impl<M: $model, B, const S: usize, T: Real, W: Memory> Begin<T>
             for $module::Integrator<M, B, S, T, W>
@@ -128,7 +128,9 @@ macro_rules! single {
                 for (k, interval) in nodes.iter().enumerate() {
                     at(k, self.begin(&interval))?;
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
-                    let result = at(k, self.hessian(&x, &u, interval.h, &vector(interval.multipliers)))?;
+                    let lambda: VectorX<M, T> = vector(interval.multipliers);
+                    let result = self.hessian_along(&x, &u, interval.h, &lambda, $(interval.$nu,)? None);
+                    let result = at(k, result)?;
                     sink(k, &result.into());
                 }
                 Ok(())
@@ -177,7 +179,9 @@ macro_rules! single {
                     integral.prepare();
                     let (x, u): (VectorX<M, T>, VectorU<M, T>) = (vector(interval.x), vector(interval.u));
                     let lambda: VectorX<M, T> = vector(interval.multipliers);
-                    let result = at(k, integrator.with(integral).hessian(&x, &u, interval.h, &lambda))?;
+                    let along: Option<&mut dyn Integrand<M, T>> = Some(&mut *integral);
+                    let result = integrator.hessian_along(&x, &u, interval.h, &lambda, $(interval.$nu,)? along);
+                    let result = at(k, result)?;
                     // The Hessian is that of both together: what the integral would add is in it.
                     let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 2], ..integral.terms() };
                     sink(k, &Step { cost, ..result.into() });
@@ -193,5 +197,5 @@ trait Begin<T> {
     fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error>;
 }
 
-single!(irk, Dae);
+single!(irk, Dae, nu);
 single!(erk, Ode);
