@@ -185,10 +185,17 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
         Some((position::<F::Shape>(variable)?, *self.jacobian.as_ref().get(entry)?))
     }
 
+    /// The weight of two outputs, without a place for a panic.
+    #[inline(always)]
+    fn weight(&self, k: usize, l: usize) -> T {
+        let weight = self.weights.as_slice().get(l * F::Outputs::NY + k);
+        self.at.factor * weight.copied().unwrap_or(T::ZERO)
+    }
+
     /// `y − r`, or `y − r − J v`, of an output.
     #[inline(always)]
     fn moved(&self, output: usize) -> T {
-        let mut y = self.y[output];
+        let mut y = self.y.as_ref().get(output).copied().unwrap_or(T::ZERO);
         for place in Self::range(output) {
             if let Some((i, value)) = self.entry(place)
                 && let Some(&v) = self.at.from.get(i)
@@ -228,7 +235,7 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
         for k in 0..F::Outputs::NY {
             let mut slope = T::ZERO;
             for l in 0..F::Outputs::NY {
-                let weight = self.at.factor * self.weights[(k, l)];
+                let weight = self.weight(k, l);
                 if weight != T::ZERO {
                     slope = slope + weight * self.moved(l);
                     self.curve(weight, [k, l]);
@@ -257,7 +264,7 @@ impl<F: Function, T: Real> AtRow for Square<'_, '_, F, T> {
     };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, output: usize) {
-        let weight = self.at.factor * self.weights[(output, output)];
+        let weight = self.weight(output, output);
         if weight != T::ZERO {
             self.slope(weight * self.moved(output), output);
             self.curve(weight, [output, output]);
