@@ -4,7 +4,7 @@
 //! has registers of that many numbers, one call of the model computes them all.
 
 use super::record::{Coefficients, Stage, Times, Work};
-use crate::linalg::{Arithmetic, Kernel, are_finite, dispatch};
+use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide};
@@ -35,32 +35,31 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
     /// The residual at all stages.
     pub(crate) fn evaluate_residual(&mut self) {
-        // Of stages that are all alike one is evaluated.
-        let all = core::mem::take(&mut self.alike);
-        let Self { points, f, stage, .. } = self;
-        if let Err(call) = E::side_by_side(Residual::<M, E, S> { points, f, stage }) {
-            let Residual { points, f, stage } = call;
-            for i in 0..if all { 1 } else { S } {
-                dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
-                M::residual::<E>(&stage.v, &mut stage.f);
-                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i, all });
-            }
-        }
+        self.evaluate::<false>();
     }
 
     /// The residual and the Jacobian at all stages.
     pub(crate) fn evaluate_jacobian(&mut self) {
+        self.evaluate::<true>();
+    }
+
+    #[inline(always)]
+    fn evaluate<const JACOBIAN: bool>(&mut self) {
         // Of stages that are all alike one is evaluated.
         let all = core::mem::take(&mut self.alike);
         let Self { points, f, stage, linear, .. } = self;
-        let jacobian = &mut linear.jacobian;
-        if let Err(call) = E::side_by_side(ResidualJacobian::<M, E, S> { points, f, jacobian, stage }) {
-            let ResidualJacobian { points, f, jacobian, stage } = call;
+        let call = Evaluate::<M, E, S, JACOBIAN> { points, f, jacobian: &mut linear.jacobian, stage };
+        if let Err(call) = E::side_by_side(call) {
+            let Evaluate { points, f, jacobian, stage } = call;
             for i in 0..if all { 1 } else { S } {
                 dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
-                M::residual_jacobian::<E>(&stage.v, &mut stage.f, &mut stage.jacobian);
+                if JACOBIAN {
+                    M::residual_jacobian::<E>(&stage.v, &mut stage.f, &mut stage.jacobian);
+                    dispatch(Give { cells: stage.jacobian.as_ref(), to: jacobian.as_mut(), i, all });
+                } else {
+                    M::residual::<E>(&stage.v, &mut stage.f);
+                }
                 dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i, all });
-                dispatch(Give { cells: stage.jacobian.as_ref(), to: jacobian.as_mut(), i, all });
             }
         }
     }
@@ -114,32 +113,24 @@ impl<E: Lanes, const S: usize> Kernel for Give<'_, E, S> {
     }
 }
 
-/// `f` at all stages in one call.
-struct Residual<'a, M: Dae, E: Lanes, const S: usize> {
-    points: &'a ArrayV<M, [E; S]>,
-    f: &'a mut ArrayK<M, [E; S]>,
-    stage: &'a mut Stage<M, E::Cell>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Residual<'_, M, E, S> {
-    #[inline(always)]
-    fn call<R: Lanes<Cell = [E; S]>>(self) {
-        M::residual::<R>(self.points, self.f);
-    }
-}
-
-/// `f` and its Jacobian at all stages in one call.
-struct ResidualJacobian<'a, M: Dae, E: Lanes, const S: usize> {
+/// `f`, and its Jacobian if it is asked for, at all stages in one call.
+struct Evaluate<'a, M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> {
     points: &'a ArrayV<M, [E; S]>,
     f: &'a mut ArrayK<M, [E; S]>,
     jacobian: &'a mut M::Jacobian<[E; S]>,
     stage: &'a mut Stage<M, E::Cell>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for ResidualJacobian<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
+    for Evaluate<'_, M, E, S, JACOBIAN>
+{
     #[inline(always)]
     fn call<R: Lanes<Cell = [E; S]>>(self) {
-        M::residual_jacobian::<R>(self.points, self.f, self.jacobian);
+        if JACOBIAN {
+            M::residual_jacobian::<R>(self.points, self.f, self.jacobian);
+        } else {
+            M::residual::<R>(self.points, self.f);
+        }
     }
 }
 
@@ -175,16 +166,10 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Place<'_, M, E, S> {
         xdot.copy_from_slice(k);
         let (xi, points) = points.split_at_mut(nx);
         points[..z.len()].copy_from_slice(z);
-        // Columns of −hA.
-        let mut ha = [[h; S]; S];
-        for (i, row) in a.iter().enumerate() {
-            for (column, &a) in ha.iter_mut().zip(row) {
-                column[i] = -(h * a);
-            }
-        }
+        let minus_ha = coupling(a, h);
         for ((xi, &x), k) in xi.iter_mut().zip(x).zip(k) {
             let mut sum = [x; S];
-            for (column, &k) in ha.iter().zip(k) {
+            for (column, &k) in minus_ha.iter().zip(k) {
                 for (sum, &element) in sum.iter_mut().zip(column) {
                     *sum = A::subtract(*sum, element, k);
                 }

@@ -5,7 +5,8 @@ use super::directions::{Directions, panel, panel_mut, panels, weight};
 use super::record::{Coefficients, Work, copy};
 use super::right_side::{Inputs, Later, Scatter, place};
 use crate::linalg::{
-    Arithmetic, Kernel, Packet, Planned, dispatch, each_row, is_long, is_short, solve_packets, solve_two,
+    Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, each_row, is_long, is_short,
+    solve_packets, solve_two,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -381,10 +382,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         if let Some(curved) = &mut self.curved {
             let count = M::STRUCTURE.curved.len();
             let (d, _) = panel_mut::<E, W>(curved, column, count * S).as_chunks_mut::<S>();
-            let mut minus_ha = self.coefficients.a;
-            for a in minus_ha.as_flattened_mut() {
-                *a = -(self.h * *a);
-            }
+            let minus_ha = coupling(&self.coefficients.a, self.h);
             Curved::<M, E, D, S> { minus_ha, directions: self.directions, model: PhantomData }
                 .panel::<A, W>(v, dy, d, column);
         }
@@ -427,7 +425,7 @@ fn accumulate<A: Arithmetic, E: Field, const W: usize>(
 /// The rows of `D` at all stages that enter second derivatives.
 struct Curved<'a, M, E, D, const S: usize> {
     /// `−hA`
-    minus_ha: [[E; S]; S],
+    minus_ha: Block<E, S>,
     directions: &'a D,
     model: PhantomData<M>,
 }
@@ -450,10 +448,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Curved<'_, M, E, D, S> 
                 }
             } else if variable < 2 * nx {
                 let (Some(dk), Some(v)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
-                for (d, minus_ha) in d.iter_mut().zip(&self.minus_ha) {
+                for (i, d) in d.iter_mut().enumerate() {
                     let mut row = *v;
-                    for (&minus_ha, dk) in minus_ha.iter().zip(dk) {
-                        A::subtract_row(&mut row, minus_ha, dk);
+                    for (column, dk) in self.minus_ha.iter().zip(dk) {
+                        A::subtract_row(&mut row, column[i], dk);
                     }
                     *d = row;
                 }

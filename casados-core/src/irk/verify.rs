@@ -12,7 +12,7 @@ use super::directions::{Directions, weight};
 use super::evaluate::entry;
 use super::record::{Coefficients, Work};
 use super::sweep::{STRANDS, Sweep, total};
-use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
@@ -190,13 +190,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
         if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
             return E::lt(zero, zero);
         }
-        // Columns of −hA.
-        let mut minus_ha = [[zero; S]; S];
-        for (i, row) in a.iter().enumerate() {
-            for (column, &a) in minus_ha.iter_mut().zip(row) {
-                column[i] = -(h * a);
-            }
-        }
+        let minus_ha = coupling(a, h);
         for (unknown, stages) in stage_sums.iter().enumerate() {
             let mut sum = [zero; S];
             for (sum, strands) in sum.iter_mut().zip(stages) {

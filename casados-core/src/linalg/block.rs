@@ -12,6 +12,18 @@ pub type Block<E, const S: usize> = [[E; S]; S];
 /// `s` rows of `W` columns, row after row: the stages of a slot in a right-hand side.
 pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
 
+/// `−hA` of a tableau: what states at the stages have of the derivatives there, with another sign.
+#[inline(always)]
+pub fn coupling<E: Field, const S: usize>(a: &[[E; S]; S], h: E) -> Block<E, S> {
+    let mut block = [[h; S]; S];
+    for (i, row) in a.iter().enumerate() {
+        for (column, &a) in block.iter_mut().zip(row) {
+            column[i] = -(h * a);
+        }
+    }
+    block
+}
+
 /// `left · right`
 #[inline(always)]
 pub fn product<A: Arithmetic, E: Field, const S: usize>(

@@ -1,6 +1,6 @@
 //! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
 
-use super::block::Block;
+use super::block::{Block, coupling};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
@@ -111,12 +111,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        let Self { a, h, coupling, .. } = &mut self;
-        for (i, row) in a.iter().enumerate() {
-            for (column, &a) in coupling.iter_mut().zip(row) {
-                column[i] = -(*h * a);
-            }
-        }
+        *self.coupling = coupling(self.a, self.h);
         each_row::<A, _>(&mut self);
     }
 }

@@ -25,7 +25,7 @@ mod substitution;
 mod twice;
 mod two_panels;
 
-pub(crate) use block::Packet;
+pub(crate) use block::{Block, Packet, coupling};
 #[cfg(feature = "alloc")]
 pub(crate) use complex::Complex;
 pub(crate) use eigen::Eigenbasis;
