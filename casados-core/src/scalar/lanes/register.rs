@@ -4,9 +4,11 @@ use super::functions::{self, Double, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
-use super::together::{ends, of_eights, of_fours, results};
+use super::together::{Abreast, Wider, abreast, ends, of_eights, of_fours, results};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
+#[cfg(target_arch = "x86_64")]
+use super::{Level, functions::Elementary, level};
 use crate::scalar::{Field, Lanes, Packed, Piece, Scalar};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};

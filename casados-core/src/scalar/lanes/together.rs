@@ -23,37 +23,47 @@ macro_rules! results {
     }};
 }
 
-/// The elementary functions of doubles in registers of eight, and two or four of them abreast: the processor works on each while
-/// others wait for themselves.
-macro_rules! of_eights {
-    ($name:ident, $ops:ident: $($functions:tt)*) => {
+/// The elementary functions of doubles, and two or four of them abreast: the processor works on each while others wait for themselves.
+/// Before that what is listed is looked at: a condition, and the results where it holds.
+macro_rules! abreast {
+    ($name:ident, $ops:ident [$($functions:tt)*] |$a:ident| $($condition:expr => $first:expr),*) => {
         of_doubles!($name, $ops: $($functions)*);
         #[inline(always)]
-        fn together<F: $crate::scalar::lanes::functions::Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
-            a: [[Self; K]; COUNT],
+        fn together<F: Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
+            $a: [[Self; K]; COUNT],
         ) -> [[Self; R]; COUNT] {
-            if const { COUNT == 4 } {
-                let ends = ends!($name, $ops, a: 0 1 2 3);
-                results!($ops::enter_with_eight::<$crate::scalar::lanes::together::Abreast<F, K, R>, _>(ends))
+            $(if $condition {
+                return $first;
+            })*
+            if const { COUNT == 4 && $ops::WIDTH == 8 } {
+                results!($ops::enter_with_eight::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 0 1 2 3)))
+            } else if const { COUNT == 4 } {
+                // All of them would not fit sixteen registers.
+                let first = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 0 1));
+                let second = $ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 2 3));
+                let all = [first, second];
+                results!(all.as_flattened())
             } else if const { COUNT == 2 } {
-                results!($ops::enter_with_four::<$crate::scalar::lanes::together::Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
+                results!($ops::enter_with_four::<Abreast<F, K, R>, _>(ends!($name, $ops, $a: 0 1)))
             } else {
-                a.map(F::of)
+                $a.map(F::of)
             }
         }
     };
 }
 
-/// The elementary functions of doubles, and several of them together: two in one register where each takes half of one, or where
-/// there are registers twice as wide; else abreast.
+/// In registers of eight.
+macro_rules! of_eights {
+    ($name:ident, $ops:ident: $($functions:tt)*) => {
+        abreast!($name, $ops [$($functions)*] |a|);
+    };
+}
+
+/// In registers of four: two in one register where each takes half of one, or where there are registers twice as wide.
 macro_rules! of_fours {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
-        of_doubles!($name, $ops: $($functions)*);
-        #[inline(always)]
-        fn together<F: $crate::scalar::lanes::functions::Elementary<K, R>, const K: usize, const R: usize, const COUNT: usize>(
-            a: [[Self; K]; COUNT],
-        ) -> [[Self; R]; COUNT] {
-            if const { 2 * N <= $ops::WIDTH && COUNT % 2 == 0 } {
+        abreast!($name, $ops [$($functions)*] |a|
+            const { 2 * N <= $ops::WIDTH && COUNT % 2 == 0 } => {
                 let mut results = [[Self($ops::splat(0.0)); R]; COUNT];
                 for k in (0..COUNT - 1).step_by(2) {
                     let mut joined = a[k].map(|a| whole!($name, $ops, a));
@@ -66,26 +76,15 @@ macro_rules! of_fours {
                     }
                 }
                 results
-            } else if $crate::scalar::lanes::level() == $crate::scalar::lanes::Level::Avx512 && const { COUNT == 4 } {
-                let ends = ends!($name, $ops, a: 0 1 2 3);
-                results!(avx512_f64::enter_with_eight::<$crate::scalar::lanes::together::Wider<F, K, R>, _>(ends))
-            } else if $crate::scalar::lanes::level() == $crate::scalar::lanes::Level::Avx512 && const { COUNT == 2 } {
-                results!(avx512_f64::enter_with_four::<$crate::scalar::lanes::together::Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
-            } else if const { COUNT == 4 } {
-                // Four would not fit sixteen registers.
-                let first = $ops::enter_with_four::<$crate::scalar::lanes::together::Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1));
-                let second = $ops::enter_with_four::<$crate::scalar::lanes::together::Abreast<F, K, R>, _>(ends!($name, $ops, a: 2 3));
-                let all = [first, second];
-                results!(all.as_flattened())
-            } else if const { COUNT == 2 } {
-                results!($ops::enter_with_four::<$crate::scalar::lanes::together::Abreast<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
-            } else {
-                a.map(F::of)
-            }
-        }
+            },
+            const { COUNT == 4 } && level() == Level::Avx512 =>
+                results!(avx512_f64::enter_with_eight::<Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1 2 3))),
+            const { COUNT == 2 } && level() == Level::Avx512 =>
+                results!(avx512_f64::enter_with_four::<Wider<F, K, R>, _>(ends!($name, $ops, a: 0 1)))
+        );
     };
 }
-pub(super) use {ends, of_eights, of_fours, results};
+pub(super) use {abreast, ends, of_eights, of_fours, results};
 
 /// Functions abreast, each given by its first and its last argument.
 pub struct Abreast<F, const K: usize, const R: usize>(PhantomData<F>);
