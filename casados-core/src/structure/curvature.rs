@@ -58,43 +58,45 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
 /// The `N` entries of a Jacobian from one on, by columns, of which there are `V`, and within each as they are.
 #[must_use]
 pub const fn by_column<const V: usize, const N: usize>(jacobian: &Pattern, begin: usize) -> [u32; N] {
-    let (mut entries, mut next) = ([0; N], [0; V]);
+    sorted::<V, N, true>(jacobian, begin)
+}
+
+/// The first `N` entries of a Jacobian, by rows, of which there are `R`, and within each as they are.
+#[must_use]
+pub const fn by_row<const R: usize, const N: usize>(jacobian: &Pattern) -> [u32; N] {
+    sorted::<R, N, false>(jacobian, 0)
+}
+
+/// Entries by columns, or else by rows, of which there are `K`: counted first, so that each goes to its place at once.
+const fn sorted<const K: usize, const N: usize, const COLUMNS: bool>(
+    jacobian: &Pattern,
+    begin: usize,
+) -> [u32; N] {
+    let (mut entries, mut next) = ([0; N], [0; K]);
     let mut entry = begin;
     while entry < begin + N {
-        next[jacobian.at(entry).1] += 1;
+        next[key::<COLUMNS>(jacobian, entry)] += 1;
         entry += 1;
     }
-    let (mut column, mut sum) = (0, 0);
-    while column < V {
-        (next[column], sum) = (sum, sum + next[column]);
-        column += 1;
+    let (mut key, mut sum) = (0, 0);
+    while key < K {
+        (next[key], sum) = (sum, sum + next[key]);
+        key += 1;
     }
     let mut entry = begin;
     while entry < begin + N {
-        let column = jacobian.at(entry).1;
-        entries[next[column]] = entry as u32;
-        next[column] += 1;
+        let key = self::key::<COLUMNS>(jacobian, entry);
+        entries[next[key]] = entry as u32;
+        next[key] += 1;
         entry += 1;
     }
     entries
 }
 
-/// The first `N` entries of a Jacobian, by rows, and within each as they are.
-#[must_use]
-pub const fn by_row<const N: usize>(jacobian: &Pattern) -> [u32; N] {
-    let (mut entries, mut count, mut row) = ([0; N], 0, 0);
-    while count < N {
-        let mut entry = 0;
-        while entry < N {
-            if jacobian.at(entry).0 == row {
-                entries[count] = entry as u32;
-                count += 1;
-            }
-            entry += 1;
-        }
-        row += 1;
-    }
-    entries
+/// The column of an entry, or else its row.
+const fn key<const COLUMN: bool>(jacobian: &Pattern, entry: usize) -> usize {
+    let (row, column) = jacobian.at(entry);
+    if COLUMN { column } else { row }
 }
 
 /// Where each of `N − 1` rows begins among entries that are given by rows, and where the last one ends.
@@ -148,6 +150,18 @@ mod tests {
         let terms = symmetric::<3, 6>(&hessian, &[3, 7, 9]);
         let found = terms.map(|Term { row, column, entry }| (row, column, entry));
         assert_eq!(found, [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 2, 2), (2, 1, 2), (2, 2, 3)]);
+    }
+
+    #[test]
+    fn entries_are_met_by_columns_and_by_rows() {
+        // Two blocks, each by row: (0, 4), (2, 3), (2, 4), and (0, 6), (2, 5), (2, 6).
+        let jacobian = Pattern { rows: &[0, 2, 2, 0, 2, 2], columns: &[4, 3, 4, 6, 5, 6] };
+        assert_eq!(by_column::<7, 6>(&jacobian, 0), [1, 0, 2, 4, 3, 5]);
+        assert_eq!(by_column::<7, 3>(&jacobian, 3), [4, 3, 5]);
+        let by_row = by_row::<3, 6>(&jacobian);
+        assert_eq!(by_row, [0, 3, 1, 2, 4, 5]);
+        // Nothing is in the second row.
+        assert_eq!(begins::<4>(&jacobian, &by_row), [0, 2, 2, 6]);
     }
 
     #[test]

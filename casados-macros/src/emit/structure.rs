@@ -69,13 +69,13 @@ pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let blocks = blocks.map(Literal::usize_unsuffixed);
     let entries = &blocks[4];
-    let rows = Literal::usize_unsuffixed(model.residual.len() + 1);
+    let [rows, begins] = [0, 1].map(|more| Literal::usize_unsuffixed(model.residual.len() + more));
     let operations = self::operations(krate, operations);
     let variables: BTreeSet<u32> = derivatives.jacobian.iter().map(|entry| entry.1).collect();
     let variables = numbers(&variables.into_iter().collect::<Vec<_>>());
     quote! {{
         const JACOBIAN: #krate::model::Pattern = #jacobian;
-        const BY_ROW: &[u32] = &const { #krate::function::by_row::<#entries>(&JACOBIAN) };
+        const BY_ROW: &[u32] = &const { #krate::function::by_row::<#rows, #entries>(&JACOBIAN) };
         #krate::function::FunctionStructure {
             name: #name,
             x: &[#(#x),*],
@@ -85,7 +85,7 @@ pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
             jacobian: JACOBIAN,
             blocks: [#(#blocks),*],
             by_row: BY_ROW,
-            begins: &const { #krate::function::begins::<#rows>(&JACOBIAN, BY_ROW) },
+            begins: &const { #krate::function::begins::<#begins>(&JACOBIAN, BY_ROW) },
             constant: &[#(#constant),*],
             hessian: #hessian,
             linear: &[#(#linear),*],
