@@ -122,8 +122,14 @@ impl<D: Double> Pair<D> {
         // One division: the quotient may be off by two units, of which the rest knows.
         let reciprocal = c::<D>(1.0) / other.high;
         let quotient = self.high * reciprocal;
-        let p = product(quotient, other.high);
-        let rest = ((self.high - p.high) - p.low) + (self.low - quotient * other.low);
+        let rest = if D::FUSED {
+            // The first product leaves less than a double has digits for.
+            let rest = (-quotient).mul_add(other.high, self.high);
+            (-quotient).mul_add(other.low, rest + self.low)
+        } else {
+            let p = product(quotient, other.high);
+            ((self.high - p.high) - p.low) + (self.low - quotient * other.low)
+        };
         Self { high: quotient, low: rest * reciprocal }
     }
     /// The square root; of zero it is zero.
