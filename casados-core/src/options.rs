@@ -78,6 +78,23 @@ pub enum Start {
 }
 
 impl Options {
+    /// Stages lifted to the level of a problem of optimal control, which then solves their equations too: each call takes one iteration,
+    /// from the stages of the last one (in the first call from zero). Stages converge with the iterates instead of in every one of them,
+    /// and at convergence agree with those of any other options (R. Quirynen, S. Gros, M. Diehl, "Lifted implicit integrators for
+    /// direct optimal control", CDC 2015). Until then ends of intervals have errors of second order in the last step; derivatives are exact
+    /// at the stages that there are. Whether that saves more than an iteration more of the problem costs is to be measured.
+    ///
+    /// ```
+    /// # use casados_core::{Newton, Options, Start};
+    /// let options = Options { steps: 2, ..Default::default() }.lifted();
+    /// assert_eq!((options.start, options.newton.fixed_iterations), (Start::Warm, Some(1)));
+    /// ```
+    #[must_use]
+    pub fn lifted(self) -> Self {
+        let newton = Newton { fixed_iterations: Some(1), ..self.newton };
+        Self { newton, start: Start::Warm, ..self }
+    }
+
     /// # Errors
     /// [`Error::InvalidOption`] for the first value that makes no sense.
     pub fn check(&self) -> Result<(), Error> {

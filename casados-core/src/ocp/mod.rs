@@ -28,6 +28,9 @@
 //! first derivatives; those of second order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of the horizon there
 //! are none.
 //!
+//! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call, from the stages of the last one: these converge with the
+//! iterates, to the same solution.
+//!
 //! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
 //! stage 0 given by equal bounds. So are parameters that are to be found.
 //!
