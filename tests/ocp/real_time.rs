@@ -2,7 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Globalisation, HeapOcp, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem, Status,
+    Globalisation, HeapOcp, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem,
+    Sensitivities, Status,
 };
 use casados::prelude::*;
 
@@ -55,6 +56,32 @@ fn converges_to_the_solution() -> Test {
     assert!(apart < 1e-6, "{apart}");
     for (a, b) in controller.ocp().iterate().stages().zip(ocp.iterate().stages()) {
         assert!(a.x.iter().zip(b.x).all(|(a, b)| (a - b).abs() < 1e-6));
+    }
+    Ok(())
+}
+
+/// Gains of the QP that gave the feedback: where the same bounds are active its solution is linear in the state.
+#[test]
+fn gains_are_those_of_the_qp() -> Test {
+    // Where the bound is met at the start the first control does not move; where it is not, it does.
+    for (near, moves) in [(X0, false), ([0.1, 0.05], true)] {
+        let feedback = |x0: [f64; 2]| -> Result<_, OcpError> {
+            let mut controller = HeapRealTime::new(problem()?)?;
+            controller.qp_solver.options.tolerance = 1e-12;
+            let u = controller.prepare()?.feedback(&x0)?.u[0];
+            Ok((controller, u))
+        };
+        let (controller, u) = feedback(near)?;
+        let mut result = Sensitivities::new(controller.ocp())?;
+        controller.ocp().gains(&mut result)?;
+        for (i, &gain) in result.gain(0).iter().enumerate() {
+            let mut other = near;
+            other[i] += 1e-3;
+            let difference = (feedback(other)?.1 - u) / 1e-3;
+            // Bounds of the plan are springs of 1.5e-8 relative to what they hold, and the QP is solved to 1e-12 / 0.09, twice.
+            assert!((difference - gain).abs() < 1e-7 * (1.0 + gain.abs()), "{difference} {gain}");
+            assert_eq!(gain.abs() > 1e-3, moves, "{gain}");
+        }
     }
     Ok(())
 }

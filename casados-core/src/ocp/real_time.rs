@@ -65,6 +65,8 @@ use alloc::vec::Vec;
 /// # }
 /// ```
 ///
+/// Between two samples the plan may be followed with the gains of its QP, `gains` (feature `alloc`) of [`RealTime::ocp`]: `u_k + K_k (x − x_k)`.
+///
 /// What a sample takes is bounded by the options of the solver of QPs: `max_iterations`, and `locate` switched off. After
 /// any error the plan is as it was before the call.
 pub struct RealTime<P, S, C, T, D, M> {

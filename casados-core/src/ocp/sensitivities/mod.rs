@@ -107,6 +107,32 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         curvature: C,
         result: &mut Sensitivities<T>,
     ) -> Result<(), OcpError> {
+        self.check_memory(result)?;
+        let problem = &mut result.problem;
+        self.linearise_watched(curvature, |k, step| problem.take(k, step))?;
+        self.differentiate_functions(C::EXACT, problem)?;
+        recursion::backward(self.qp.view(), &self.iterate, result)?;
+        recursion::forward(self.qp.view(), result);
+        Ok(())
+    }
+
+    /// The gains `K_k` of the last QP at its solution, which is the iterate: after a feedback of [`RealTime`](super::RealTime) those of the feedback
+    /// that was given, to be used until the next one. Nothing is linearised for it, and nothing else than gains is in the result.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory is of another problem; [`OcpError::Qp`] if
+    /// the reduced Hessian is not positive definite.
+    pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
+        self.check_memory(result)?;
+        recursion::backward(self.qp.view(), &self.iterate, result)?;
+        let Sensitivities { x, u, x_p, u_p, .. } = result;
+        for derivatives in [x, u, x_p, u_p] {
+            derivatives.fill(T::ZERO);
+        }
+        Ok(())
+    }
+
+    fn check_memory(&self, result: &Sensitivities<T>) -> Result<(), OcpError> {
         if self.initial != Initial::Fixed {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
@@ -115,11 +141,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if expected != found || [result.nu, result.np] != [P::Shape::NU, P::Shape::NP] {
             return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
         }
-        let problem = &mut result.problem;
-        self.linearise_watched(curvature, |k, step| problem.take(k, step))?;
-        self.differentiate_functions(C::EXACT, problem)?;
-        recursion::backward(self.qp.view(), &self.iterate, result)?;
-        recursion::forward(self.qp.view(), result);
         Ok(())
     }
 }
