@@ -85,7 +85,7 @@ impl Options {
     /// at the stages that there are. Whether that saves more than an iteration more of the problem costs is to be measured.
     ///
     /// ```
-    /// # use casados_core::{Newton, Options, Start};
+    /// # use casados_core::options::{Options, Start};
     /// let options = Options { steps: 2, ..Default::default() }.lifted();
     /// assert_eq!((options.start, options.newton.fixed_iterations), (Start::Warm, Some(1)));
     /// ```
