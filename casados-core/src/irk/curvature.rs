@@ -1,7 +1,10 @@
 //! `Σ_i D_iᵀ H_i D_i` over the stages of a step, with `H_i` sparse and symmetric: first `G = −H D`, a few columns at a time,
 //! then the lower triangle of `Dᵀ G`.
+//!
+//! In a panel of `D` the stages of a variable lie beside each other, or, where it is large, variables of a stage do: what is multiplied is
+//! then in the nearest cache.
 
-use super::directions::{panel, panels};
+use super::directions::{NEAREST, panel, panels, width};
 use crate::linalg::{Arithmetic, Kernel, is_long};
 use crate::model::Dae;
 use crate::scalar::Lanes;
@@ -10,6 +13,22 @@ use core::marker::PhantomData;
 
 /// So many columns of `G` are there at a time: two panels where registers are enough for their products.
 pub const COLUMNS: usize = if cfg!(all(target_arch = "x86_64", feature = "std")) { 16 } else { 8 };
+
+/// Whether all stages of a variable lie together: unless a panel is too large for the nearest cache.
+const fn together<M: Dae, E, const S: usize>() -> bool {
+    let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, M::STRUCTURE.directions.len()) * size_of::<E>();
+    panel <= NEAREST / 2
+}
+
+/// Where the row of a curved variable at a stage lies in a panel of `D`.
+#[inline(always)]
+pub const fn row_of<M: Dae, E, const S: usize>(variable: usize, stage: usize) -> usize {
+    if const { together::<M, E, S>() } {
+        variable * S + stage
+    } else {
+        stage * M::STRUCTURE.curved.len() + variable
+    }
+}
 
 /// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins with zero.
 pub struct Subtract<'a, M, E, R, const S: usize> {
@@ -39,25 +58,57 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
-    /// `P` panels of `W` columns.
+    /// `P` panels of `W` columns: all stages at a time, or pairs of them.
     #[inline(always)]
     fn panels<A: Arithmetic, const W: usize, const P: usize>(&mut self, column: usize) {
-        let rows = M::STRUCTURE.curved.len() * S;
-        let g = self.g.as_flattened_mut().as_flattened_mut().get_mut(..rows * P * W).unwrap_or_default();
-        let g = g.as_chunks_mut::<W>().0.as_chunks_mut::<P>().0;
-        // All stages in registers, or two of them where numbers are registers themselves and there are sixteen.
-        if const { size_of::<E>() <= 8 || A::WIDE || S <= 2 } {
-            multiply::<A, M, E, S, S, W, P>(self.entries, self.d, g.as_chunks_mut().0, 0, column);
-        } else {
-            for stage in (0..S).step_by(2) {
-                multiply::<A, M, E, S, 2, W, P>(self.entries, self.d, g.as_chunks_mut().0, stage, column);
-            }
+        if const { together::<M, E, S>() } {
+            self.stages::<A, S, 1, W, P>(0, column);
+            return;
         }
+        let mut stage = 0;
+        while stage + 2 <= S {
+            self.stages::<A, 1, 2, W, P>(stage, column);
+            stage += 2;
+        }
+        if const { S % 2 == 1 } {
+            self.stages::<A, 1, 1, W, P>(stage, column);
+        }
+    }
+
+    /// `N` groups of `L` stages, which lie together, from a stage on.
+    #[inline(always)]
+    fn stages<A: Arithmetic, const L: usize, const N: usize, const W: usize, const P: usize>(
+        &mut self,
+        stage: usize,
+        column: usize,
+    ) {
+        let curved = M::STRUCTURE.curved.len();
+        let rows = curved * L;
+        let g = self.g.as_flattened_mut().as_flattened_mut().get_mut(..rows * N * P * W).unwrap_or_default();
+        let g = g.as_chunks_mut::<W>().0.as_chunks_mut::<P>().0;
+        multiply::<A, M, E, S, L, N, W, P>(self.entries, self.d, g.as_chunks_mut().0, stage, column);
+        for group in 0..N {
+            self.tiles::<A, W, P>(group * rows, rows, (stage + group * L) * curved, column);
+        }
+    }
+
+    /// `sum −= Dᵀ G` for some rows of panels of `−G`, from a first one on, which belong to rows of `D` from another one on.
+    #[inline(always)]
+    fn tiles<A: Arithmetic, const W: usize, const P: usize>(
+        &mut self,
+        of_g: usize,
+        count: usize,
+        of_d: usize,
+        column: usize,
+    ) {
+        let all = M::STRUCTURE.curved.len() * S;
+        let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
+        let g = g.get(of_g..of_g + count).unwrap_or_default();
         panels!(M::STRUCTURE.directions.len(), E, S, row, V => {
             if row >= column {
-                let d = panel::<E, V>(self.d, row, rows);
+                let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
                 let sum = &mut *self.sum;
-                if self.fresh {
+                if self.fresh && of_d == 0 {
                     for sum in sum.iter_mut().skip(row).take(V) {
                         let to = sum.as_mut().get_mut(column..).and_then(|sum| sum.as_chunks_mut::<W>().0.first_chunk_mut());
                         if let Some(to) = to {
@@ -85,36 +136,43 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
     }
 }
 
-/// `G = −H D` at `N` stages, from a stage on, in `P` panels from a column on.
+/// `G = −H D` at `N` groups of `L` stages, from a stage on, in `P` panels from a column on.
 #[inline(always)]
 fn multiply<
     A: Arithmetic,
     M: Dae,
     E: Lanes,
     const S: usize,
+    const L: usize,
     const N: usize,
     const W: usize,
     const P: usize,
 >(
     entries: &[[E; S]],
     d: &[E],
-    g: &mut [[[[E; W]; P]; S]],
+    g: &mut [[[[E; W]; P]; L]],
     stage: usize,
     column: usize,
 ) {
-    let rows = M::STRUCTURE.curved.len() * S;
-    let mut of_d: [&[[[E; W]; S]]; P] = [&[]; P];
-    for (p, of_d) in of_d.iter_mut().enumerate() {
-        *of_d = panel::<E, W>(d, column + p * W, rows).as_chunks().0;
+    let curved = M::STRUCTURE.curved.len();
+    let mut of_d: [[&[[[E; W]; L]]; P]; N] = [[&[]; P]; N];
+    for (group, of_d) in of_d.iter_mut().enumerate() {
+        let first = stage + group * L;
+        for (p, of_d) in of_d.iter_mut().enumerate() {
+            let panel = panel::<E, W>(d, column + p * W, curved * S);
+            *of_d = panel.get(first * curved..(first + L) * curved).unwrap_or_default().as_chunks().0;
+        }
     }
     // Without a slice for each row, which would have to be found.
-    let (mut packet, mut terms) = ([[[E::from_f64(0.0); W]; P]; N], M::STRUCTURE.symmetric.iter());
+    let (mut packets, mut terms) = ([[[[E::from_f64(0.0); W]; P]; L]; N], M::STRUCTURE.symmetric.iter());
     let mut next = terms.next();
     while let Some(term) = next {
         if let Some(values) = entries.get(term.entry as usize) {
-            for (p, d) in of_d.iter().enumerate() {
-                let Some(d) = d.get(term.column as usize) else { continue };
-                subtract_stages::<A, E, N, W, P>(&mut packet, p, from(values, stage), from(d, stage));
+            for (group, (packet, of_d)) in packets.iter_mut().zip(&of_d).enumerate() {
+                for (p, d) in of_d.iter().enumerate() {
+                    let Some(d) = d.get(term.column as usize) else { continue };
+                    subtract_stages::<A, E, L, W, P>(packet, p, from(values, stage + group * L), d);
+                }
             }
         }
         next = terms.next();
@@ -123,12 +181,12 @@ fn multiply<
         {
             continue;
         }
-        if let Some(rows) = g.get_mut(term.row as usize).and_then(|rows| rows.get_mut(stage..)) {
-            for (to, packet) in rows.iter_mut().zip(&packet) {
+        for (group, packet) in packets.iter().enumerate() {
+            if let Some(to) = g.get_mut(group * curved + term.row as usize) {
                 *to = *packet;
             }
         }
-        packet = [[[E::from_f64(0.0); W]; P]; N];
+        packets = [[[[E::from_f64(0.0); W]; P]; L]; N];
     }
 }
 
@@ -138,7 +196,7 @@ fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, cons
     packet: &mut [[[E; W]; P]; N],
     p: usize,
     values: &[E],
-    d: &[[E; W]],
+    d: &[[E; W]; N],
 ) {
     if const { W == 1 && P == 1 }
         && let Some(packet) = packet.as_flattened_mut().as_flattened_mut().first_chunk_mut::<N>()

@@ -7,6 +7,9 @@ use crate::model::{Dae, NO_COLUMN};
 use crate::scalar::{Field, Lanes};
 use core::marker::PhantomData;
 
+/// So many bytes are in the nearest cache, beside others.
+pub(super) const NEAREST: usize = 1 << 15;
+
 /// How many columns the widest panels have: eight; of numbers that are registers themselves four, or the packet of all stages would not
 /// fit beside what it is multiplied by. Of two stages eight do where there are thirty-two registers: if columns are many, factors, which
 /// then come from the second cache, are read half as often.

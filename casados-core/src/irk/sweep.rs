@@ -1,7 +1,8 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to `V_{n+1}`, and to what second
 //! derivatives need of both.
 
-use super::directions::{Directions, panel, panel_mut, panels, weight};
+use super::curvature::row_of;
+use super::directions::{Directions, NEAREST, panel, panel_mut, panels, weight};
 use super::record::{Coefficients, Work, copy};
 use super::right_side::{Inputs, Later, Scatter, place};
 use crate::linalg::{
@@ -17,9 +18,6 @@ use core::marker::PhantomData;
 
 /// So many strands a sum over all columns has; of numbers that are registers themselves only the first is used.
 pub(super) const STRANDS: usize = 4;
-
-/// So many bytes are in the nearest cache, beside others.
-const NEAREST: usize = 1 << 15;
 
 /// Derivatives of one step in directions, as many as there are elements in `R`, in panels.
 #[derive(Zeroable)]
@@ -381,7 +379,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         }
         if let Some(curved) = &mut self.curved {
             let count = M::STRUCTURE.curved.len();
-            let (d, _) = panel_mut::<E, W>(curved, column, count * S).as_chunks_mut::<S>();
+            let d = panel_mut::<E, W>(curved, column, count * S);
             let minus_ha = coupling(&self.coefficients.a, self.h);
             Curved::<M, E, D, S> { minus_ha, directions: self.directions, model: PhantomData }
                 .panel::<A, W>(v, dy, d, column);
@@ -436,19 +434,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Curved<'_, M, E, D, S> 
         &self,
         v: &[[E; W]],
         dy: &[Packet<E, S, W>],
-        d: &mut [Packet<E, S, W>],
+        d: &mut [[E; W]],
         column: usize,
     ) {
         let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        for (&variable, d) in M::STRUCTURE.curved.iter().zip(d) {
+        for (c, &variable) in M::STRUCTURE.curved.iter().enumerate() {
             let variable = variable as usize;
-            if variable < nx {
-                if let Some(dk) = dy.get(variable) {
-                    *d = *dk;
-                }
-            } else if variable < 2 * nx {
+            if (nx..2 * nx).contains(&variable) {
                 let (Some(dk), Some(v)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
-                for (i, d) in d.iter_mut().enumerate() {
+                for i in 0..S {
+                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
                     let mut row = *v;
                     for (column, dk) in self.minus_ha.iter().zip(dk) {
                         A::subtract_row(&mut row, column[i], dk);
@@ -456,11 +451,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Curved<'_, M, E, D, S> 
                     *d = row;
                 }
             } else if variable < 2 * nx + nz {
-                if let Some(dz) = dy.get(variable - nx) {
-                    *d = *dz;
+                let unknown = if variable < nx { variable } else { variable - nx };
+                let Some(dy) = dy.get(unknown) else { continue };
+                for (i, dy) in dy.iter().enumerate() {
+                    if let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) {
+                        *d = *dy;
+                    }
                 }
             } else {
-                for d in d {
+                for i in 0..S {
+                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
                     *d = [E::from_f64(0.0); W];
                     self.directions.add(variable - nx - nz, E::from_f64(1.0), column, d);
                 }

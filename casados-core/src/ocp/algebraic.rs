@@ -10,7 +10,7 @@
 
 use super::constraint::Constraints;
 use super::cost::{At, Cost};
-use super::data::{inputs, is_algebraic, split};
+use super::data::{Node, inputs, is_algebraic, split};
 use super::dynamics::{Dynamics, Step};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
@@ -152,7 +152,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Ok(());
         }
         let intervals = self.intervals();
-        let (n, nz, np) = (inputs::<P::Shape>(), P::Shape::NZ, P::Shape::NP);
+        let (n, nz) = (inputs::<P::Shape>(), P::Shape::NZ);
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
@@ -160,14 +160,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, stage) in self.iterate.stages().enumerate().take(intervals) {
-            let [time, end] = [k, k + 1].map(|k| get(data.times, k));
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, _) = at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [stage.x, z, stage.u, part(data.p, k * np, np)], time);
-            let factor = if *running { end - time } else { T::ONE };
-            let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
+            read::<P::Shape, T>(&mut point, [stage.x, z, stage.u, node.p], node.time);
             let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
-            let place = At { stage: k, factor, exact: false, from: &[] };
-            stage_cost.add(&point, reference, place, &mut terms)?;
+            let place = At { stage: k, factor: node.factor, exact: false, from: &[] };
+            stage_cost.add(&point, node.reference, place, &mut terms)?;
             path.linearise(&point, &mut [], columns, terms.ld, k)?;
             for (j, nu) in part_mut(data.weights, k * nz, nz).iter_mut().enumerate() {
                 *nu = get(terms.gradient, n + j);

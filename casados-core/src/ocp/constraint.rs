@@ -227,12 +227,7 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
         Ok(())
     }
     fn curve(&mut self, v: &ArrayV<F, T>, mu: &[T], terms: &mut Terms<'_, T>) {
-        if F::STRUCTURE.hessian.is_empty() {
-            return;
-        }
-        let mu = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
-        F::hessian::<T>(v, &mu, &mut self.hessian);
-        terms.curvature::<F>(&self.hessian, T::ONE);
+        terms.curvature::<F>(v, &multipliers::<F, T>(mu), T::ONE, &mut self.hessian);
     }
     fn cross(&mut self, v: &ArrayV<F, T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>) {
         F::value_jacobian::<T>(v, &mut self.g, &mut self.jacobian);
@@ -242,15 +237,16 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
                 *slope = value;
             }
         }
-        if let Some(mu) = mu
-            && !F::STRUCTURE.hessian.is_empty()
-        {
-            let mu = Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO));
-            F::hessian::<T>(v, &mu, &mut self.hessian);
-            cross.curvature::<F>(&self.hessian, T::ONE);
+        if let Some(mu) = mu {
+            cross.curvature::<F>(v, &multipliers::<F, T>(mu), T::ONE, &mut self.hessian);
         }
     }
     fn name(row: usize) -> (&'static str, usize) {
         (F::STRUCTURE.name, row)
     }
+}
+
+/// Those of the outputs of a function.
+fn multipliers<F: Function, T: Real>(mu: &[T]) -> ArrayY<F, T> {
+    Array::from_fn(|i| mu.get(i).copied().unwrap_or(T::ZERO))
 }

@@ -1,7 +1,7 @@
 //! Costs at the nodes.
 
 use super::error::OcpError;
-use super::point::{Cross, Terms, There, is_algebraic, position};
+use super::point::{Cross, Terms, There, finite, is_algebraic, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape};
@@ -166,11 +166,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
     fn value(&mut self, v: &ArrayV<F, T>, _: &[T], stage: usize) -> Result<T, OcpError> {
         F::value::<T>(v, &mut self.y);
         let sum = self.y.as_ref().iter().fold(T::ZERO, |sum, &y| sum + y);
-        if sum.is_finite() {
-            return Ok(sum);
-        }
-        let (output, value) = crate::irk::not_finite(self.y.as_ref()).unwrap_or((0, sum.to_f64()));
-        Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+        finite::<F, T>(&self.y, sum, stage)
     }
 
     fn add(
@@ -188,10 +184,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
                 terms.slope(i, at.factor * slope);
             }
         }
-        if !F::STRUCTURE.hessian.is_empty() {
-            F::hessian::<T>(v, &self.mu, &mut self.hessian);
-            terms.curvature::<F>(&self.hessian, at.factor);
-        }
+        terms.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
         Ok(at.factor * value)
     }
 
@@ -202,11 +195,8 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
         at: At<'_, T>,
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError> {
-        if !F::STRUCTURE.hessian.is_empty() {
-            self.mu = Array::from_fn(|_| T::ONE);
-            F::hessian::<T>(v, &self.mu, &mut self.hessian);
-            cross.curvature::<F>(&self.hessian, at.factor);
-        }
+        self.mu = Array::from_fn(|_| T::ONE);
+        cross.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
         Ok(())
     }
 }

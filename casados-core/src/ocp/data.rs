@@ -1,10 +1,10 @@
 //! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
 
-use super::algebraic::{extended, kept};
+use super::algebraic::{extended, get, kept};
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::problem::Formulation;
-use crate::qp::{StageDims, pad};
+use crate::qp::{StageDims, pad, part};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -74,6 +74,37 @@ pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usi
             part
         });
     Data { times, p, references, lower, upper, algebraic, weights, extended, scratch }
+}
+
+/// What is given at a node.
+pub(super) struct Node<'a, T> {
+    pub time: T,
+    pub p: &'a [T],
+    /// Of its cost.
+    pub reference: &'a [T],
+    /// What its cost is multiplied by: the length of the interval that begins there, if costs are rates.
+    pub factor: T,
+}
+
+impl<'a, T: Real> Node<'a, T> {
+    /// Of the `times`, `p` and `references` of [`Data`].
+    #[inline(always)]
+    pub fn new<P: Formulation<T>>(
+        k: usize,
+        intervals: usize,
+        running: bool,
+        [times, p, references]: [&'a [T]; 3],
+    ) -> Self {
+        let (np, time, of_stage) = (P::Shape::NP, get(times, k), P::StageCost::REFERENCES);
+        let is_stage = k < intervals;
+        let length = if is_stage { of_stage } else { P::TerminalCost::REFERENCES };
+        Self {
+            time,
+            p: part(p, k * np, np),
+            reference: part(references, k * of_stage, length),
+            factor: if running && is_stage { get(times, k + 1) - time } else { T::ONE },
+        }
+    }
 }
 
 /// The dimensions of a stage.

@@ -2,11 +2,11 @@
 
 use super::cost::{At, Cost};
 use super::error::{OcpError, Part};
-use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
+use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Outputs, Plain};
+use crate::shape::{Array, Matrix, Outputs, Plain};
 use bytemuck::Zeroable;
 use core::ops::Range;
 
@@ -63,12 +63,7 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
         weigh::<F, T>(weights, *coupled, y, mu);
         let products = y.as_ref().iter().zip(mu.as_ref()).map(|(y, mu)| *y * *mu);
         let square = products.fold(T::ZERO, |sum, product| sum + product);
-        let value = T::from_f64(0.5) * square;
-        if value.is_finite() {
-            return Ok(value);
-        }
-        let (output, value) = crate::irk::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
-        Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
+        finite::<F, T>(y, T::from_f64(0.5) * square, stage)
     }
 }
 
@@ -126,9 +121,8 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
         } else {
             square.coupled();
         }
-        if at.exact && !F::STRUCTURE.hessian.is_empty() {
-            F::hessian::<T>(v, mu, hessian);
-            terms.curvature::<F>(hessian, at.factor);
+        if at.exact {
+            terms.curvature::<F>(v, mu, at.factor, hessian);
         }
         Ok(at.factor * value)
     }
@@ -151,9 +145,8 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
                 cross.add(i, p, at.factor * weights[(k, l)] * a * b);
             }
         }
-        if at.exact && !F::STRUCTURE.hessian.is_empty() {
-            F::hessian::<T>(v, mu, hessian);
-            cross.curvature::<F>(hessian, at.factor);
+        if at.exact {
+            cross.curvature::<F>(v, mu, at.factor, hessian);
         }
         Ok(())
     }
@@ -232,12 +225,13 @@ impl<F: Function, T: Real> Square<'_, '_, F, T> {
 
     /// With weights between outputs.
     fn coupled(&mut self) {
+        let moved: ArrayY<F, T> = Array::from_fn(|output| self.moved(output));
         for k in 0..F::Outputs::NY {
             let mut slope = T::ZERO;
-            for l in 0..F::Outputs::NY {
+            for (l, &moved) in moved.as_ref().iter().enumerate() {
                 let weight = self.weight(k, l);
                 if weight != T::ZERO {
-                    slope = slope + weight * self.moved(l);
+                    slope = slope + weight * moved;
                     self.curve(weight, [k, l]);
                 }
             }

@@ -4,7 +4,7 @@ use super::algebraic::{self, Extended};
 use super::constraint::Constraints;
 use super::convexify::{Convexification, convexify};
 use super::cost::{At, Cost};
-use super::data::{inputs, split};
+use super::data::{Node, inputs, split};
 use super::dynamics::{Dynamics, IntegralTerms, Nodes, SecondOrder, Sink, Step};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
@@ -85,7 +85,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.weigh()?;
         }
         let intervals = self.intervals();
-        let (nx, np) = (P::Shape::NX, P::Shape::NP);
+        let nx = P::Shape::NX;
         let n = inputs::<P::Shape>();
         let ld = pad::<T>(n);
         let Self { problem, qp, iterate, data, .. } = self;
@@ -139,9 +139,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 hessian.fill(T::ZERO);
                 gradient.fill(T::ZERO);
             }
-            let time = data.times.get(k).copied().unwrap_or(T::ZERO);
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
             let mut direct = Terms { gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
             let here = part(v, k * ld_of::<P::Shape, T>(), n);
@@ -161,18 +161,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let first = k * P::Path::ROWS;
             let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
+            let place = At { stage: k, factor: node.factor, exact: C::EXACT, from };
             if k < intervals {
-                let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
-                let factor = if *running { end - time } else { T::ONE };
-                let reference = part(data.references, k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
-                let place = At { stage: k, factor, exact: C::EXACT, from };
-                objective = objective + stage_cost.add(&point, reference, place, terms)?;
+                objective = objective + stage_cost.add(&point, node.reference, place, terms)?;
                 path.linearise(&point, values, slopes, ld_slopes, k)?;
             } else {
-                let begin = intervals * P::StageCost::REFERENCES;
-                let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
-                let place = At { stage: k, factor: T::ONE, exact: C::EXACT, from };
-                objective = objective + terminal_cost.add(&point, reference, place, terms)?;
+                objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
                 terminal.linearise(&point, values, slopes, ld_slopes, k)?;
             }
             if C::EXACT && count > 0 {
@@ -239,7 +233,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub(super) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
         let intervals = self.intervals();
-        let (nx, np) = (P::Shape::NX, P::Shape::NP);
+        let nx = P::Shape::NX;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
         let (v, multipliers) = at.vectors();
@@ -253,19 +247,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let values = ends.get_mut(intervals * nx..).unwrap_or_default();
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in at.stages().enumerate() {
-            let time = data.times.get(k).copied().unwrap_or(T::ZERO);
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
-            let (begin, length) = (k * P::StageCost::REFERENCES, P::StageCost::REFERENCES);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
             if k < intervals {
-                let end = data.times.get(k + 1).copied().unwrap_or(T::ZERO);
-                let factor = if *running { end - time } else { T::ONE };
-                let reference = part(data.references, begin, length);
-                objective = objective + factor * stage_cost.value(&point, reference, k)?;
+                objective = objective + node.factor * stage_cost.value(&point, node.reference, k)?;
                 path.value(&point, part_mut(values, k * P::Path::ROWS, P::Path::ROWS), k)?;
             } else {
-                let reference = part(data.references, begin, P::TerminalCost::REFERENCES);
-                objective = objective + terminal_cost.value(&point, reference, k)?;
+                objective = objective + terminal_cost.value(&point, node.reference, k)?;
                 terminal.value(&point, part_mut(values, k * P::Path::ROWS, P::Terminal::ROWS), k)?;
             }
         }

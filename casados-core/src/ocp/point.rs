@@ -1,7 +1,7 @@
 //! Functions at a node: what they are evaluated at, and where their derivatives go.
 
 use super::error::OcpError;
-use crate::function::{Function, FunctionStructure};
+use crate::function::{ArrayV, ArrayY, Function, FunctionStructure};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -43,6 +43,18 @@ pub(super) fn read<S: Shape, T: Real>(v: &mut S::ArrayV<T>, [x, z, u, p]: [&[T];
             *to = from;
         }
     }
+}
+
+/// A value that follows from the outputs of a function, if it is finite.
+///
+/// # Errors
+/// [`OcpError::NonFiniteFunction`]
+pub(super) fn finite<F: Function, T: Real>(y: &ArrayY<F, T>, value: T, stage: usize) -> Result<T, OcpError> {
+    if value.is_finite() {
+        return Ok(value);
+    }
+    let (output, value) = crate::irk::not_finite(y.as_ref()).unwrap_or((0, value.to_f64()));
+    Err(OcpError::NonFiniteFunction { function: F::STRUCTURE.name, stage, output, value })
 }
 
 /// What is there where a function is evaluated.
@@ -99,9 +111,19 @@ impl<T: Real> Terms<'_, T> {
             *element = *element + value;
         }
     }
-    /// Adds the entries of the Hessian of a function.
+    /// Adds `factor ∇²(μᵀy)` of the outputs of a function, whose entries are computed in `hessian`.
     #[inline(always)]
-    pub(super) fn curvature<F: Function>(&mut self, hessian: &F::Hessian<T>, factor: T) {
+    pub(super) fn curvature<F: Function>(
+        &mut self,
+        v: &ArrayV<F, T>,
+        mu: &ArrayY<F, T>,
+        factor: T,
+        hessian: &mut F::Hessian<T>,
+    ) {
+        if F::STRUCTURE.hessian.is_empty() {
+            return;
+        }
+        F::hessian::<T>(v, mu, hessian);
         for (entry, &value) in hessian.as_ref().iter().enumerate() {
             let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
             if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
@@ -128,8 +150,18 @@ impl<T: Real> Cross<'_, T> {
             *element = *element + value;
         }
     }
-    /// Adds the entries of the Hessian of a function.
-    pub(super) fn curvature<F: Function>(&mut self, hessian: &F::Hessian<T>, factor: T) {
+    /// Adds what parameters change of `factor ∇(μᵀy)` of the outputs of a function; entries of its Hessian are computed in `hessian`.
+    pub(super) fn curvature<F: Function>(
+        &mut self,
+        v: &ArrayV<F, T>,
+        mu: &ArrayY<F, T>,
+        factor: T,
+        hessian: &mut F::Hessian<T>,
+    ) {
+        if F::STRUCTURE.hessian.is_empty() {
+            return;
+        }
+        F::hessian::<T>(v, mu, hessian);
         for (entry, &value) in hessian.as_ref().iter().enumerate() {
             // Parameters come after states and controls: they are rows of the lower triangle.
             let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };

@@ -1,10 +1,10 @@
 //! What parameters change of the conditions of optimality.
 
-use super::{get, zeros};
+use super::zeros;
 use crate::ocp::algebraic::{self, Extended};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::cost::{At, Cost};
-use crate::ocp::data::{inputs, split};
+use crate::ocp::data::{Node, inputs, split};
 use crate::ocp::dynamics::Step;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
@@ -101,9 +101,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Parameters { gradients, slopes, algebraic: dz_dp, extended, mu, values, rows, .. } = result;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in self.iterate.stages().enumerate() {
-            let time = get(data.times, k);
+            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
             let (z, dz) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, part(data.p, k * np, np)], time);
+            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
             let columns = part_mut(gradients, k * size * np, size * np);
             if k == intervals {
                 columns.fill(T::ZERO);
@@ -114,27 +114,23 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             let mu = exact.then_some(&**mu);
             let slopes = slopes.get_mut(k * *rows * np..).unwrap_or_default();
-            let place = |factor| At { stage: k, factor, exact, from: &[] };
-            let references = P::StageCost::REFERENCES;
+            let place = At { stage: k, factor: node.factor, exact, from: &[] };
             if k == intervals {
-                let reference = part(data.references, k * references, P::TerminalCost::REFERENCES);
-                terminal_cost.cross(&point, reference, place(T::ONE), &mut cross)?;
+                terminal_cost.cross(&point, node.reference, place, &mut cross)?;
                 terminal.cross(&point, mu, slopes, &mut cross);
                 continue;
             }
-            let factor = if *running { get(data.times, k + 1) - time } else { T::ONE };
-            let reference = part(data.references, k * references, references);
             if z.is_empty() {
-                stage_cost.cross(&point, reference, place(factor), &mut cross)?;
+                stage_cost.cross(&point, node.reference, place, &mut cross)?;
                 path.cross(&point, mu, slopes, &mut cross);
                 continue;
             }
             extended.fill(T::ZERO);
             let mut direct = Cross { columns: extended, ld: size + z.len() };
-            stage_cost.cross(&point, reference, place(factor), &mut direct)?;
+            stage_cost.cross(&point, node.reference, place, &mut direct)?;
             path.cross(&point, mu, slopes, &mut direct);
             let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
-            stage_cost.add(&point, reference, place(factor), &mut terms)?;
+            stage_cost.add(&point, node.reference, place, &mut terms)?;
             path.linearise(&point, values, columns, terms.ld, k)?;
             if let Some(mu) = mu {
                 path.curve(&point, mu, &mut terms);
