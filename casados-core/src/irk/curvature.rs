@@ -6,7 +6,7 @@
 
 use super::directions::{NEAREST, panel, panels, width};
 use crate::linalg::{Arithmetic, Kernel, is_long};
-use crate::model::Dae;
+use crate::model::{Dae, Term};
 use crate::scalar::Lanes;
 use crate::shape::Array;
 use core::marker::PhantomData;
@@ -107,29 +107,21 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         panels!(M::STRUCTURE.directions.len(), E, S, row, V => {
             if row >= column {
                 let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
-                let sum = &mut *self.sum;
-                if self.fresh && of_d == 0 {
-                    for sum in sum.iter_mut().skip(row).take(V) {
-                        let to = sum.as_mut().get_mut(column..).and_then(|sum| sum.as_chunks_mut::<W>().0.first_chunk_mut());
-                        if let Some(to) = to {
-                            *to = [[E::from_f64(0.0); W]; P];
-                        }
-                    }
-                }
+                let (sum, fresh) = (&mut *self.sum, self.fresh && of_d == 0);
                 if const { size_of::<E>() > 8 && V > 2 && A::WIDE } {
-                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 && V > 2 } {
-                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 } {
-                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 4 && A::WIDE } {
-                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 4 } {
-                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { V > 2 } {
-                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, fresh, [row, column]);
                 } else {
-                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, row, column);
+                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, fresh, [row, column]);
                 }
             }
         });
@@ -163,30 +155,77 @@ fn multiply<
             *of_d = panel.get(first * curved..(first + L) * curved).unwrap_or_default().as_chunks().0;
         }
     }
-    // Without a slice for each row, which would have to be found.
-    let (mut packets, mut terms) = ([[[[E::from_f64(0.0); W]; P]; L]; N], M::STRUCTURE.symmetric.iter());
-    let mut next = terms.next();
-    while let Some(term) = next {
-        if let Some(values) = entries.get(term.entry as usize) {
-            for (group, (packet, of_d)) in packets.iter_mut().zip(&of_d).enumerate() {
-                for (p, d) in of_d.iter().enumerate() {
-                    let Some(d) = d.get(term.column as usize) else { continue };
-                    subtract_stages::<A, E, L, W, P>(packet, p, from(values, stage + group * L), d);
+    let mut terms = M::STRUCTURE.symmetric;
+    while let Some(first) = terms.first() {
+        let of = Multiply { entries, d: &of_d, stage };
+        terms = match first.rows {
+            3 => of.rows::<A, M, 3>(terms, g),
+            2 => of.rows::<A, M, 2>(terms, g),
+            _ => of.rows::<A, M, 1>(terms, g),
+        };
+    }
+}
+
+/// See [`multiply`].
+struct Multiply<'a, E, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize> {
+    entries: &'a [[E; S]],
+    d: &'a [[&'a [[[E; W]; L]]; P]; N],
+    stage: usize,
+}
+
+impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize>
+    Multiply<'_, E, S, L, N, W, P>
+{
+    /// `R` rows of `G` whose terms alternate, all of them in registers or one by one; the terms of the others.
+    #[inline(always)]
+    fn rows<A: Arithmetic, M: Dae, const R: usize>(
+        &self,
+        terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+    ) -> &'static [Term] {
+        let register = if A::WIDE { 64 } else { 32 };
+        if R * L * N * P * (W * size_of::<E>()).div_ceil(register) <= if A::WIDE { 24 } else { 12 } {
+            return self.some_rows::<A, M, R, R>(terms, g, 0);
+        }
+        let mut others = terms;
+        for row in 0..R {
+            others = self.some_rows::<A, M, R, 1>(terms, g, row);
+        }
+        others
+    }
+
+    /// `T` of these, from one of them on.
+    #[inline(always)]
+    fn some_rows<A: Arithmetic, M: Dae, const R: usize, const T: usize>(
+        &self,
+        mut terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+        from_row: usize,
+    ) -> &'static [Term] {
+        let mut packets = [[[[[E::from_f64(0.0); W]; P]; L]; N]; T];
+        let Some((&rows, _)) = terms.split_first_chunk::<R>() else { return &[] };
+        while let Some((now, rest)) = terms.split_first_chunk::<R>()
+            && now[0].row == rows[0].row
+        {
+            for (term, packets) in from(now, from_row).iter().zip(&mut packets) {
+                let Some(values) = self.entries.get(term.entry as usize) else { continue };
+                for (group, (packet, of_d)) in packets.iter_mut().zip(self.d).enumerate() {
+                    for (p, d) in of_d.iter().enumerate() {
+                        let Some(d) = d.get(now[0].column as usize) else { continue };
+                        subtract_stages::<A, E, L, W, P>(packet, p, from(values, self.stage + group * L), d);
+                    }
+                }
+            }
+            terms = rest;
+        }
+        for (term, packets) in from(&rows, from_row).iter().zip(&packets) {
+            for (group, packet) in packets.iter().enumerate() {
+                if let Some(to) = g.get_mut(group * M::STRUCTURE.curved.len() + term.row as usize) {
+                    *to = *packet;
                 }
             }
         }
-        next = terms.next();
-        if let Some(next) = next
-            && next.row == term.row
-        {
-            continue;
-        }
-        for (group, packet) in packets.iter().enumerate() {
-            if let Some(to) = g.get_mut(group * curved + term.row as usize) {
-                *to = *packet;
-            }
-        }
-        packets = [[[[E::from_f64(0.0); W]; P]; L]; N];
+        terms
     }
 }
 
@@ -211,10 +250,10 @@ fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, cons
     }
 }
 
-/// The stages from one of them on.
+/// From one of them on.
 #[inline(always)]
-fn from<V>(stages: &[V], first: usize) -> &[V] {
-    stages.get(first..).unwrap_or_default()
+fn from<V>(all: &[V], first: usize) -> &[V] {
+    all.get(first..).unwrap_or_default()
 }
 
 /// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each tile is in registers while it
@@ -234,8 +273,8 @@ fn tiles<
     d: &[[E; V]],
     g: &[[[E; W]; P]],
     sum: &mut [R],
-    row: usize,
-    column: usize,
+    fresh: bool,
+    [row, column]: [usize; 2],
 ) {
     for t in 0..V / ROWS {
         let mut strands = [[[[E::from_f64(0.0); W]; P]; ROWS]; STRANDS];
@@ -255,11 +294,15 @@ fn tiles<
                 *to = *to + *from;
             }
         }
-        for (tile, sum) in tile.iter().zip(sum.iter_mut().skip(row + t * ROWS)) {
-            let (columns, _) = sum.as_mut().get_mut(column..).unwrap_or_default().as_chunks_mut::<W>();
-            let Some(columns) = columns.first_chunk_mut::<P>() else { continue };
-            for (sum, &tile) in columns.as_flattened_mut().iter_mut().zip(tile.as_flattened()) {
-                *sum = *sum - tile;
+        for (r, tile) in tile.iter().enumerate() {
+            let row = sum.get_mut(row + t * ROWS + r).and_then(|sum| sum.as_mut().get_mut(column..));
+            let columns = row.and_then(|row| row.as_chunks_mut::<W>().0.first_chunk_mut::<P>());
+            let Some(columns) = columns else { continue };
+            // In registers: of loops over single elements the compiler makes one over rows, which lie far apart.
+            for (columns, tile) in columns.iter_mut().zip(tile) {
+                let mut sum = if fresh { [E::from_f64(0.0); W] } else { *columns };
+                A::subtract_row(&mut sum, E::from_f64(1.0), tile);
+                *columns = sum;
             }
         }
     }

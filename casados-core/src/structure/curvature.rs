@@ -15,13 +15,19 @@ pub struct Term {
     pub column: u32,
     /// Its value, an index into the lower triangle.
     pub entry: u32,
+    /// How many rows, this one among them, have their terms beside each other: they have the same columns.
+    pub rows: u32,
 }
 
-/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern, row by row; `curved` are
-/// the `C` variables that occur in it.
+/// So many rows at most have their terms beside each other.
+pub const MOST_ROWS: usize = 3;
+
+/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern; `curved` are the `C` variables
+/// that occur in it. Row by row; but rows with the same columns, as those of the coordinates of a point, go through these together, so
+/// that what is multiplied is fetched once.
 #[must_use]
 pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved: &[u32; C]) -> [Term; N] {
-    let mut terms = [Term { row: 0, column: 0, entry: 0 }; N];
+    let mut terms = [Term { row: 0, column: 0, entry: 0, rows: 1 }; N];
     // Where the next term of each row goes.
     let mut next = [0; C];
     let mut entry = 0;
@@ -44,15 +50,66 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     while entry < hessian.len() {
         let (row, column) = hessian.at(entry);
         let (row, column) = (position(curved, row), position(curved, column));
-        terms[next[row]] = Term { row: row as u32, column: column as u32, entry: entry as u32 };
+        terms[next[row]] = Term { row: row as u32, column: column as u32, entry: entry as u32, rows: 1 };
         next[row] += 1;
         if row != column {
-            terms[next[column]] = Term { row: column as u32, column: row as u32, entry: entry as u32 };
+            terms[next[column]] =
+                Term { row: column as u32, column: row as u32, entry: entry as u32, rows: 1 };
             next[column] += 1;
         }
         entry += 1;
     }
+    beside(&terms, &next)
+}
+
+/// Terms row by row, given where each row ends, such that those of rows with the same columns alternate.
+const fn beside<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
+    // Rows with the same columns are near each other, if there are any.
+    const NEAR: usize = 8;
+    let (mut terms, mut place, mut done, mut row) = (*by_row, 0, [false; C], 0);
+    while row < C {
+        let (mut rows, mut count, mut other) = ([row; MOST_ROWS], 0, row);
+        while other < C && other < row + NEAR && count < MOST_ROWS && !done[row] {
+            if !done[other] && have_same_columns(by_row, range(ends, row), range(ends, other)) {
+                rows[count] = other;
+                count += 1;
+            }
+            other += 1;
+        }
+        let (mut term, [begin, end]) = (0, range(ends, row));
+        while term < end - begin && count > 0 {
+            let mut of = 0;
+            while of < count {
+                terms[place] = by_row[range(ends, rows[of])[0] + term];
+                terms[place].rows = count as u32;
+                (place, of) = (place + 1, of + 1);
+            }
+            term += 1;
+        }
+        while count > 0 {
+            count -= 1;
+            done[rows[count]] = true;
+        }
+        row += 1;
+    }
     terms
+}
+
+/// Where a row begins and ends.
+const fn range<const C: usize>(ends: &[usize; C], row: usize) -> [usize; 2] {
+    [if row > 0 { ends[row - 1] } else { 0 }, ends[row]]
+}
+
+/// Whether two ranges of terms have the same columns.
+const fn have_same_columns(terms: &[Term], [begin, end]: [usize; 2], [other, last]: [usize; 2]) -> bool {
+    let mut term = 0;
+    while term < end - begin
+        && other + term < last
+        && terms[begin + term].column == terms[other + term].column
+    {
+        term += 1;
+    }
+    begin + term == end && other + term == last
 }
 
 /// The `N` entries of a Jacobian from one on, by columns, of which there are `V`, and within each as they are.
@@ -150,6 +207,25 @@ mod tests {
         let terms = symmetric::<3, 6>(&hessian, &[3, 7, 9]);
         let found = terms.map(|Term { row, column, entry }| (row, column, entry));
         assert_eq!(found, [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 2, 2), (2, 1, 2), (2, 2, 3)]);
+        assert!(terms.iter().all(|term| term.rows == 1));
+    }
+
+    #[test]
+    fn rows_with_the_same_columns_alternate() {
+        // All of the first four with each other, and the last one, between which no other row is, with itself.
+        let hessian =
+            Pattern { rows: &[0, 1, 1, 2, 2, 2, 3, 3, 3, 3, 4], columns: &[0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 4] };
+        let terms = symmetric::<5, 17>(&hessian, &[0, 1, 2, 3, 4]);
+        let row_of = |first: usize| terms[first..].iter().map(|term| term.row);
+        assert!(row_of(0).take(12).eq([0, 1, 2].repeat(4)));
+        assert!(row_of(12).eq([3, 3, 3, 3, 4]));
+        assert!(terms.iter().map(|term| term.rows).eq([3; 12].into_iter().chain([1; 5])));
+        assert!(terms.iter().map(|term| term.column).take(12).eq([0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3]));
+        let entry_of = |row: usize, column: usize| row * (row + 1) / 2 + column;
+        for term in &terms[..16] {
+            let [row, column] = [term.row, term.column].map(|index| index as usize);
+            assert_eq!(term.entry as usize, entry_of(row.max(column), row.min(column)));
+        }
     }
 
     #[test]
