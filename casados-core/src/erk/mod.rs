@@ -13,6 +13,7 @@ mod along;
 mod forward;
 mod hessian;
 mod integrator;
+mod sensitivities;
 mod step;
 
 pub use integrator::Integrator;

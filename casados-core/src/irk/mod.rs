@@ -14,8 +14,8 @@
 //!
 //! One file for each thing: `evaluate` the model at the stages, `newton`, its `increment` and its `progress`, and, where that does
 //! not arrive, `pivoted`, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`,
-//! `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all calls share, `integrator` what
-//! users see.
+//! `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
+//! `sensitivities` what users see.
 
 mod adjoint;
 mod along;
@@ -35,6 +35,7 @@ mod record;
 mod refine;
 mod right_side;
 mod run;
+mod sensitivities;
 mod step;
 mod sweep;
 mod verify;

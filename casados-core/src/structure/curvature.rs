@@ -205,7 +205,7 @@ mod tests {
         // 3 7 9 with entries (3, 3), (7, 3), (9, 7), (9, 9).
         let hessian = Pattern { rows: &[3, 7, 9, 9], columns: &[3, 3, 7, 9] };
         let terms = symmetric::<3, 6>(&hessian, &[3, 7, 9]);
-        let found = terms.map(|Term { row, column, entry }| (row, column, entry));
+        let found = terms.map(|Term { row, column, entry, .. }| (row, column, entry));
         assert_eq!(found, [(0, 0, 0), (0, 1, 1), (1, 0, 1), (1, 2, 2), (2, 1, 2), (2, 2, 3)]);
         assert!(terms.iter().all(|term| term.rows == 1));
     }

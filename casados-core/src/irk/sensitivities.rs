@@ -1,0 +1,428 @@
+//! Derivatives of a call, as users see them: forward, in directions, adjoint, of second order.
+
+use super::along::{Along, begin, finish, reborrow};
+use super::dense::Point;
+use super::integrator::Integrator;
+use super::run::{Arguments, check};
+use crate::error::{Argument, Error};
+use crate::memory::{Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
+use crate::model::{Dae, MatrixXC, VectorU, VectorX, VectorZ};
+use crate::result::{Adjoint, DenseForward, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
+use crate::scalar::Real;
+use crate::shape::Matrix;
+
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Allocates what `forward` needs, so that no call of it will.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn reserve_forward(&mut self) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
+        W::forward(&mut self.forward)?;
+        self.run.reserve()
+    }
+
+    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        self.forward_along(x0, u, h, None)
+    }
+
+    /// As [`Integrator::forward`], with an integrand.
+    pub(crate) fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        Ok(&self.differentiate::<false>(&Arguments { x0, u, h }, None, along)?.forward)
+    }
+
+    /// The same, with derivatives refined where digits were lost.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn forward_refined(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        Ok(&self.differentiate::<true>(&Arguments { x0, u, h }, None, along)?.forward)
+    }
+
+    /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the derivatives.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn forward_adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&ForwardAdjoint<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        check(Argument::Lambda, lambda.as_slice())?;
+        self.differentiate::<false>(&Arguments { x0, u, h }, Some(lambda.as_slice()), None)
+    }
+
+    fn differentiate<const REFINED: bool>(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        lambda: Option<&[T]>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&ForwardAdjoint<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        self.sweep = None;
+        begin(&mut along);
+        let forward = W::forward(&mut self.forward)?;
+        let count = self.run.options.steps;
+        let parts = self.run.steps(arguments, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            forward.step::<_, REFINED>(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
+            match &mut along {
+                Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
+                None => Ok(()),
+            }
+        })?;
+        forward.finish(&parts.work.result, count - 1, None)?;
+        finish(&mut along)?;
+        if let Some(lambda) = lambda {
+            forward.gradient(lambda)?;
+        }
+        self.run.keep()?;
+        self.sweep = Some(count - 1);
+        Ok(&forward.result)
+    }
+
+    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`]
+    #[cfg(feature = "alloc")]
+    pub(crate) fn slopes(
+        &mut self,
+        weights: &[f64],
+        to: &mut crate::model::ArrayW<M, crate::model::ArrayX<M, T>>,
+    ) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
+        let weights: &[f64; S] = weights.first_chunk().ok_or(Error::NoResult)?;
+        W::forward(&mut self.forward)?.slopes(&weights.map(T::from_f64), to);
+        Ok(())
+    }
+
+    /// The solution at a time inside the interval of the last successful call, and its derivatives with
+    /// respect to `x₀`, `u` and `p`.
+    ///
+    /// The stages of that call are differentiated step by step up to the one that contains the time; times
+    /// in the same step or a later one go on from there.
+    ///
+    /// # Errors
+    /// Those of [`Integrator::dense`], and of [`Integrator::forward`].
+    pub fn dense_forward(&mut self, t: T) -> Result<&DenseForward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        let forward = W::forward(&mut self.forward)?;
+        let last = self.run.last()?;
+        let point = Point::new(t, &last.work.kept, last.steps.len(), &last.coefficients.tableau)?;
+        let done = self.sweep.take().filter(|done| *done <= point.step);
+        let mut parts = last;
+        parts.work.inputs = parts.work.kept;
+        parts.work.place_inputs();
+        let first = done.map_or(0, |done| done + 1);
+        for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
+            parts.linearize(n, step, false)?;
+            forward.step::<_, false>(
+                parts.work,
+                parts.coefficients,
+                n,
+                usize::MAX,
+                parts.statistics,
+                None,
+            )?;
+        }
+        self.sweep = Some(point.step);
+        let h = parts.work.kept.time.step;
+        if let Some(step) = parts.steps.get(point.step) {
+            point.evaluate(step, h, &mut forward.dense.dense)?;
+        }
+        point.differentiate(h, forward)?;
+        Ok(&forward.dense)
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Allocates what `directional` with `C` directions needs, so that no call of it will.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn reserve_directional<const C: usize>(&mut self) -> Result<(), Error>
+    where
+        W: WithDirectional<C>,
+    {
+        W::directional(&mut self.directional)?;
+        self.run.reserve()
+    }
+
+    /// The solution, and its derivatives in `C` directions.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn directional<const C: usize>(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        seeds: &Seeds<M, T, C>,
+    ) -> Result<&Directional<M, T, C>, Error>
+    where
+        W: WithDirectional<C>,
+    {
+        check(Argument::SeedX, seeds.x0.as_slice())?;
+        check(Argument::SeedU, seeds.u.as_slice())?;
+        check(Argument::SeedP, seeds.p.as_slice())?;
+        let memory = W::directional(&mut self.directional)?;
+        memory.seed(seeds);
+        let count = self.run.options.steps;
+        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            memory.step(parts.work, parts.coefficients, n, count, parts.statistics)
+        })?;
+        memory.finish(parts.work, count - 1)?;
+        self.sweep = None;
+        self.run.keep()?;
+        Ok(&memory.result)
+    }
+
+    /// Allocates what `adjoint_many` with `C` seeds needs, so that no call of it will. `adjoint` has one.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn reserve_adjoint<const C: usize>(&mut self) -> Result<(), Error>
+    where
+        W: WithAdjoint<C>,
+    {
+        W::adjoint(&mut self.adjoint)?;
+        self.run.reserve()
+    }
+
+    /// The solution, and the gradient of `λᵀx₊` with respect to `x₀`, `u` and `p`.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn adjoint(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Adjoint<M, T>, Error>
+    where
+        W: WithAdjoint<1>,
+    {
+        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), None)
+    }
+
+    /// As [`Integrator::adjoint`], with an integrand.
+    pub(crate) fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error>
+    where
+        W: WithAdjoint<1>,
+    {
+        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), along)
+    }
+
+    /// The solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of `lambdas`.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn adjoint_many<const C: usize>(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambdas: &MatrixXC<M, T, C>,
+    ) -> Result<&Adjoint<M, T, C>, Error>
+    where
+        W: WithAdjoint<C>,
+    {
+        self.backward(&Arguments { x0, u, h }, lambdas.as_slice(), None)
+    }
+
+    fn backward<const C: usize>(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        seeds: &[T],
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T, C>, Error>
+    where
+        W: WithAdjoint<C>,
+    {
+        check(Argument::Lambda, seeds)?;
+        begin(&mut along);
+        let memory = W::adjoint(&mut self.adjoint)?;
+        let count = self.run.options.steps;
+        // On the way forth only the last step is linearised: it is where the way back begins.
+        let mut parts = self.run.steps(arguments, |parts, n, step, exact| {
+            if let Some(integrand) = &mut along {
+                parts.work.along_value(parts.coefficients, n, step, &mut **integrand)?;
+            }
+            if n + 1 == count { parts.linearize(n, step, exact) } else { Ok(()) }
+        })?;
+        memory.backward.start(seeds, &[]);
+        for (n, step) in parts.steps.iter().enumerate().rev() {
+            if n + 1 < count {
+                parts.linearize(n, step, false)?;
+            }
+            memory.backward.step(parts.work, parts.coefficients, n, step, parts.statistics, &mut along)?;
+        }
+        memory.finish(parts.work)?;
+        finish(&mut along)?;
+        self.sweep = None;
+        self.run.keep()?;
+        Ok(&memory.result)
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Allocates what `hessian` needs, so that no call of it will.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn reserve_hessian(&mut self) -> Result<(), Error>
+    where
+        W: WithHessian,
+    {
+        W::hessian(&mut self.hessian)?;
+        W::hessian_tape(&mut self.hessian_tape, self.run.options.steps)?;
+        self.reserve_forward()
+    }
+
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊`, in one pass.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    pub fn hessian(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        self.hessian_along(x0, u, h, lambda, &[], None)
+    }
+
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the algebraic states `z₀` at the
+    /// start of the interval, which are [`z0`](Nominal::z0) of the results: in the same pass.
+    ///
+    /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on algebraic states.
+    ///
+    /// # Errors
+    /// See [`Integrator`].
+    ///
+    /// ```
+    /// # use casados_core::{Error, Irk, Gauss, Dae, Options, model::{VectorU, VectorX, VectorZ}};
+    /// # fn example<Crane: Dae>(x0: VectorX<Crane, f64>, u: VectorU<Crane, f64>, lambda: VectorX<Crane, f64>, nu: VectorZ<Crane, f64>) -> Result<(), Error> {
+    /// let mut irk = Irk::<Crane, Gauss<4>>::new(Options::default())?;
+    /// let step = irk.hessian_with_z0(&x0, &u, 0.05, &lambda, &nu)?;
+    /// let (gradient, hessian) = (step.grad_x0, step.h_xx);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn hessian_with_z0(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        nu: &VectorZ<M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        self.hessian_along(x0, u, h, lambda, nu.as_slice(), None)
+    }
+
+    /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an integrand.
+    pub(crate) fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        nu: &[T],
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        check(Argument::Lambda, lambda.as_slice())?;
+        check(Argument::Nu, nu)?;
+        begin(&mut along);
+        self.sweep = None;
+        let count = self.run.options.steps;
+        let forward = W::forward(&mut self.forward)?;
+        let memory = W::hessian(&mut self.hessian)?;
+        let records = W::hessian_tape(&mut self.hessian_tape, count)?;
+        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            let Some(record) = records.get_mut(n) else { return Ok(()) };
+            let curved = Some(record.curved());
+            forward.step::<_, false>(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
+            if let Some(integrand) = &mut along {
+                parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
+            }
+            // That of the last step is still there on the way back.
+            if n + 1 < count {
+                record.record(parts.work);
+            }
+            Ok(())
+        })?;
+        forward.finish(&parts.work.result, count - 1, Some(&mut memory.result.first.forward))?;
+        finish(&mut along)?;
+        memory.run(
+            parts.work,
+            parts.coefficients,
+            parts.steps,
+            records,
+            lambda.as_slice(),
+            nu,
+            parts.statistics,
+            reborrow(&mut along),
+        )?;
+        memory.finish(along.as_ref().and_then(|integrand| integrand.second()))?;
+        self.run.keep()?;
+        self.sweep = Some(count - 1);
+        Ok(&memory.result)
+    }
+}
