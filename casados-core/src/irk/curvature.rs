@@ -14,10 +14,11 @@ use core::marker::PhantomData;
 /// So many columns of `G` are there at a time: two panels where registers are enough for their products.
 pub const COLUMNS: usize = if cfg!(all(target_arch = "x86_64", feature = "std")) { 16 } else { 8 };
 
-/// Whether all stages of a variable lie together: unless a panel is too large for the nearest cache.
+/// Whether all stages of a variable lie together: unless a panel is too large for the nearest cache, or numbers are registers of which
+/// there may be sixteen, too few for more than two stages.
 const fn together<M: Dae, E, const S: usize>() -> bool {
     let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, M::STRUCTURE.directions.len()) * size_of::<E>();
-    panel <= NEAREST / 2
+    panel <= NEAREST / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
 }
 
 /// Where the row of a curved variable at a stage lies in a panel of `D`.

@@ -100,8 +100,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut stages = qp.stages_mut();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
-        // The first interval that adds to costs; before it they are cleared where those at nodes are added.
-        let mut adding = usize::MAX;
+        // Whether intervals add to costs: all of them do, or none. Then these are cleared where those at nodes are added.
+        let mut adding = false;
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
@@ -112,10 +112,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             objective = objective + value;
             plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
-            if adding == usize::MAX && plain && x.is_empty() && u.is_empty() {
+            if plain && x.is_empty() && u.is_empty() {
                 return;
             }
-            adding = adding.min(k);
+            adding = true;
             hessian.fill(T::ZERO);
             gradient.fill(T::ZERO);
             let mut terms = Terms { gradient, hessian, ld };
@@ -135,7 +135,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            if k < adding || k == intervals {
+            if !adding || k == intervals {
                 hessian.fill(T::ZERO);
                 gradient.fill(T::ZERO);
             }
