@@ -9,6 +9,7 @@ use crate::linalg::{Arithmetic, Kernel, is_long};
 use crate::model::{Dae, Term};
 use crate::scalar::Lanes;
 use crate::shape::Array;
+use crate::structure::MOST_ROWS;
 use core::marker::PhantomData;
 
 /// So many columns of `G` are there at a time: two panels where registers are enough for their products.
@@ -160,8 +161,8 @@ fn multiply<
     while let Some(first) = terms.first() {
         let of = Multiply { entries, d: &of_d, stage };
         terms = match first.rows {
-            3 => of.rows::<A, M, 3>(terms, g),
-            2 => of.rows::<A, M, 2>(terms, g),
+            3 if const { MOST_ROWS >= 3 } => of.rows::<A, M, 3>(terms, g),
+            2 if const { MOST_ROWS >= 2 } => of.rows::<A, M, 2>(terms, g),
             _ => of.rows::<A, M, 1>(terms, g),
         };
     }

@@ -6,7 +6,7 @@ mod describe;
 mod elimination;
 
 pub use cost::Cost;
-pub use curvature::{NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
+pub use curvature::{MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
 pub use elimination::{Assembly, Elimination, Left, Pivot};
 
 /// What is known about a model before it runs.
