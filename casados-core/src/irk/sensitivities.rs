@@ -343,7 +343,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 
     /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the algebraic states `z₀` at the
-    /// start of the interval, which are [`z0`](Nominal::z0) of the results: in the same pass.
+    /// start of the interval, which are [`z0`](crate::result::Nominal::z0) of the results: in the same pass.
     ///
     /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on algebraic states.
     ///
