@@ -120,18 +120,32 @@ impl<T: Real> Terms<'_, T> {
         factor: T,
         hessian: &mut F::Hessian<T>,
     ) {
-        if F::STRUCTURE.hessian.is_empty() {
-            return;
-        }
-        F::hessian::<T>(v, mu, hessian);
-        for (entry, &value) in hessian.as_ref().iter().enumerate() {
-            let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
+        each_entry::<F, T>(v, mu, hessian, |row, column, value| {
             if let (Some(row), Some(column)) = (position::<F::Shape>(row), position::<F::Shape>(column)) {
                 // Controls come before algebraic states here, and behind them in a model.
                 let swap = F::Shape::NZ > 0 && row < column;
                 let (row, column) = if swap { (column, row) } else { (row, column) };
                 self.curve(row, column, factor * value);
             }
+        });
+    }
+}
+
+/// The entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value; computed in `hessian`.
+#[inline(always)]
+fn each_entry<F: Function, T: Real>(
+    v: &ArrayV<F, T>,
+    mu: &ArrayY<F, T>,
+    hessian: &mut F::Hessian<T>,
+    mut visit: impl FnMut(usize, usize, T),
+) {
+    if F::STRUCTURE.hessian.is_empty() {
+        return;
+    }
+    F::hessian::<T>(v, mu, hessian);
+    for (entry, &value) in hessian.as_ref().iter().enumerate() {
+        if let Some((row, column)) = F::STRUCTURE.hessian.get(entry) {
+            visit(row, column, value);
         }
     }
 }
@@ -158,17 +172,12 @@ impl<T: Real> Cross<'_, T> {
         factor: T,
         hessian: &mut F::Hessian<T>,
     ) {
-        if F::STRUCTURE.hessian.is_empty() {
-            return;
-        }
-        F::hessian::<T>(v, mu, hessian);
-        for (entry, &value) in hessian.as_ref().iter().enumerate() {
+        each_entry::<F, T>(v, mu, hessian, |row, column, value| {
             // Parameters come after states and controls: they are rows of the lower triangle.
-            let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
             if let (Some(p), Some(position)) = (parameter::<F::Shape>(row), position::<F::Shape>(column)) {
                 self.add(position, p, factor * value);
             }
-        }
+        });
     }
     /// Adds matrices `xp` and `up`, column after column.
     #[cfg(feature = "alloc")]
