@@ -1,6 +1,6 @@
 //! The types: one number type over each kind of register.
 
-use super::functions::{self, Double, Single};
+use super::functions::{self, Doubles, Single};
 #[cfg(target_arch = "aarch64")]
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
@@ -316,7 +316,7 @@ macro_rules! register {
 
 macro_rules! double {
     ($name:ident, $ops:ident) => {
-        impl Double for $name<{ $ops::WIDTH }> {
+        impl Doubles for $name<{ $ops::WIDTH }> {
             const FUSED: bool = $ops::FUSED;
 
             #[inline(always)]

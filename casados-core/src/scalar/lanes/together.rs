@@ -1,7 +1,7 @@
 //! Elementary functions of several arguments at once: in registers that have room for two, and abreast, so that the processor works
 //! on some while others wait for themselves.
 
-use super::functions::{CallWithEight, CallWithFour, Double, Elementary};
+use super::functions::{CallWithEight, CallWithFour, Double, Elementary, Two};
 use super::register::{F64x4, apart, join};
 use core::marker::PhantomData;
 
@@ -103,7 +103,13 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithFou
     type Output = [[D; R]; 2];
     #[inline(always)]
     fn call([a, b, c, d]: [D; 4]) -> Self::Output {
-        [F::inside(arguments(a, b)), F::inside(arguments(c, d))]
+        let results = F::inside(arguments(Two(a, c), Two(b, d)));
+        let mut apart = [[a; R]; 2];
+        for (r, result) in results.into_iter().enumerate() {
+            apart[0][r] = result.0;
+            apart[1][r] = result.1;
+        }
+        apart
     }
 }
 
@@ -111,12 +117,15 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithEig
     type Output = [[D; R]; 4];
     #[inline(always)]
     fn call([a, b, c, d, e, f, g, h]: [D; 8]) -> Self::Output {
-        [
-            F::inside(arguments(a, b)),
-            F::inside(arguments(c, d)),
-            F::inside(arguments(e, f)),
-            F::inside(arguments(g, h)),
-        ]
+        let results = F::inside(arguments(Two(Two(a, c), Two(e, g)), Two(Two(b, d), Two(f, h))));
+        let mut apart = [[a; R]; 4];
+        for (r, result) in results.into_iter().enumerate() {
+            apart[0][r] = result.0.0;
+            apart[1][r] = result.0.1;
+            apart[2][r] = result.1.0;
+            apart[3][r] = result.1.1;
+        }
+        apart
     }
 }
 

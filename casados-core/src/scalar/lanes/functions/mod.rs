@@ -31,6 +31,7 @@
 //!
 //! Functions of `f32` are those of `f64`, rounded: 0.5 + 2⁻²⁹ units.
 
+mod abreast;
 mod exponential;
 mod logarithm;
 #[cfg(any(test, not(feature = "std")))]
@@ -39,12 +40,13 @@ mod pair;
 mod root;
 mod trigonometric;
 
-use crate::scalar::{Lanes, Piece, Scalar};
+use crate::scalar::{Field, Lanes, Piece, Scalar};
+pub use abreast::{Double, Two};
 use bytemuck::Zeroable;
 
 /// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are written as
 /// doubles.
-pub trait Double: Lanes {
+pub trait Doubles: Lanes {
     /// Whether [`mul_add`](Self::mul_add) rounds once.
     const FUSED: bool;
 
@@ -71,7 +73,7 @@ pub trait Double: Lanes {
 /// A register of `f32`, whose functions are computed in two registers of doubles.
 pub trait Single: Lanes {
     /// The register of doubles.
-    type Double: Double;
+    type Double: Doubles;
     /// The lower and the upper half.
     fn widen(self) -> [Self::Double; 2];
     /// The number that has these halves, rounded.
@@ -96,21 +98,23 @@ mod one {
 /// Replaces the lanes of `result` that are rare by what the function of one number gives.
 #[inline(always)]
 fn repair<D: Double>(rare: D::Mask, a: D, result: &mut D, f: fn(f64) -> f64) {
-    if D::bits_of(rare) != 0 {
-        each(rare, a, a, result, f, |f, a, _| f(a));
-    }
+    D::replace(rare, [a, a], result, f, |f, a, _| f(a));
 }
 
 /// The same for a function of two numbers.
 #[inline(always)]
 fn repair2<D: Double>(rare: D::Mask, a: D, b: D, result: &mut D, f: fn(f64, f64) -> f64) {
-    if D::bits_of(rare) != 0 {
-        each(rare, a, b, result, f, |f, a, b| f(a, b));
-    }
+    D::replace(rare, [a, b], result, f, |f, a, b| f(a, b));
 }
 
 #[cold]
-fn each<D: Double, F: Copy>(rare: D::Mask, a: D, b: D, result: &mut D, f: F, apply: fn(F, f64, f64) -> f64) {
+fn each<D: Doubles, F: Copy>(
+    rare: <D as Field>::Mask,
+    [a, b]: [D; 2],
+    result: &mut D,
+    f: F,
+    apply: fn(F, f64, f64) -> f64,
+) {
     let lanes = D::bits_of(rare);
     let (mut left, mut right, mut values) = (D::Cell::zeroed(), D::Cell::zeroed(), D::Cell::zeroed());
     a.store(&mut left);

@@ -1,8 +1,8 @@
 //! A number as a register of one: what machines without registers compute with.
 
-use super::Double;
+use super::Doubles;
 
-impl Double for f64 {
+impl Doubles for f64 {
     const FUSED: bool = false;
 
     #[inline(always)]
