@@ -193,6 +193,13 @@ pub trait Scalar: Field {
         piece.run();
     }
 
+    /// Zeros, made with the fewest instructions outside of [`vectorize`](Scalar::vectorize) too.
+    #[doc(hidden)]
+    #[inline(always)]
+    fn zeros<const N: usize>() -> [Self; N] {
+        [Self::from_f64(0.0); N]
+    }
+
     /// `√a`
     fn sqrt(self) -> Self;
     /// `∛a`

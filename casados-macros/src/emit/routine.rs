@@ -90,7 +90,7 @@ impl Writer<'_> {
             parameters.join(", ")
         );
         if plan.slots > 0 {
-            let _ = writeln!(text, "let mut w = [S::from_f64(0.0); {}];", plan.slots);
+            let _ = writeln!(text, "let mut w = S::zeros::<{}>();", plan.slots);
         }
         let names: Vec<&str> = self
             .arguments(plan.slots, "")

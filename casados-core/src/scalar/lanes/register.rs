@@ -193,6 +193,11 @@ macro_rules! register {
             fn vectorize<P: Piece>(piece: P) {
                 $ops::enter::<functions::Run, _>(piece);
             }
+            // All bits are zero, which the compiler sees where it may not use the register.
+            #[inline(always)]
+            fn zeros<const LENGTH: usize>() -> [Self; LENGTH] {
+                [Zeroable::zeroed(); LENGTH]
+            }
 
             #[inline(always)]
             fn sqrt(self) -> Self {
