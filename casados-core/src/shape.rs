@@ -88,8 +88,16 @@ pub(crate) fn assign<V: Copy>(to: &mut V, from: &V) {
     core::slice::from_mut(to).copy_from_slice(core::slice::from_ref(from));
 }
 
+mod sealed {
+    /// There is no other [`Array`](super::Array).
+    pub trait Sealed {}
+    impl<T, const N: usize> Sealed for [T; N] {}
+}
+
 /// `[T; N]` of a length that the model knows.
-pub trait Array<T>: Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[T]> + AsMut<[T]> {
+pub trait Array<T>:
+    sealed::Sealed + Plain + Index<usize, Output = T> + IndexMut<usize> + AsRef<[T]> + AsMut<[T]>
+{
     /// The number of elements.
     const LEN: usize;
     /// `[f(0), f(1), ...]`

@@ -3,11 +3,12 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
 //! has registers of that many numbers, one call of the model computes them all.
 
-use super::record::{Coefficients, Stage, Times, Work};
+use super::record::{Coefficients, Times, Work};
+use super::stages::Stages;
 use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
-use crate::scalar::{Field, Lanes, Real, SideBySide};
+use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};
 use crate::shape::{Matrix, Plain, Shape};
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
@@ -41,84 +42,70 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The residual and the Jacobian at all stages.
     pub(crate) fn evaluate_jacobian(&mut self) {
         self.evaluate::<true>();
+        self.complete();
+    }
+
+    /// The same for the mean of the stages, for which one is enough if all are alike.
+    pub(crate) fn evaluate_mean(&mut self) {
+        self.evaluate::<true>();
+    }
+
+    /// The Jacobian at all stages, if it is there for the first one only.
+    pub(crate) fn complete(&mut self) {
+        if core::mem::take(&mut self.first_only) {
+            dispatch(Spread { cells: self.linear.jacobian.as_mut() });
+        }
     }
 
     #[inline(always)]
     fn evaluate<const JACOBIAN: bool>(&mut self) {
         // Of stages that are all alike one is evaluated.
-        let all = core::mem::take(&mut self.alike);
-        let Self { points, f, stage, linear, .. } = self;
-        let call = Evaluate::<M, E, S, JACOBIAN> { points, f, jacobian: &mut linear.jacobian, stage };
-        if let Err(call) = E::side_by_side(call) {
-            let Evaluate { points, f, jacobian, stage } = call;
-            for i in 0..if all { 1 } else { S } {
-                dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
+        let alike = core::mem::take(&mut self.alike);
+        let Self { points, f, linear, first_only, .. } = self;
+        if JACOBIAN {
+            *first_only = false;
+        }
+        let call = Evaluate::<M, E, S, JACOBIAN> { points, f, jacobian: &mut linear.jacobian };
+        if let Err(Evaluate { points, f, jacobian }) = E::side_by_side(call) {
+            for i in 0..if alike { 1 } else { S } {
                 if JACOBIAN {
-                    M::residual_jacobian::<E>(&stage.v, &mut stage.f, &mut stage.jacobian);
-                    dispatch(Give { cells: stage.jacobian.as_ref(), to: jacobian.as_mut(), i, all });
+                    let (f, jacobian) = (f.from_mut(i), jacobian.from_mut(i));
+                    M::residual_jacobian::<Strided<E, S>>(points.from(i), f, jacobian);
                 } else {
-                    M::residual::<E>(&stage.v, &mut stage.f);
+                    M::residual::<Strided<E, S>>(points.from(i), f.from_mut(i));
                 }
-                dispatch(Give { cells: stage.f.as_ref(), to: f.as_mut(), i, all });
+            }
+            if alike {
+                dispatch(Spread { cells: f.as_mut() });
+                if JACOBIAN {
+                    *first_only = true;
+                }
             }
         }
     }
 }
 
-/// The value of every variable at stage `i`.
-pub(crate) struct Take<'a, E: Lanes, const S: usize> {
-    pub cells: &'a mut [E::Cell],
-    pub from: &'a [[E; S]],
-    pub i: usize,
+/// What was computed at the first stage, for all of them.
+struct Spread<'a, E, const S: usize> {
+    cells: &'a mut [[E; S]],
 }
 
-impl<E: Lanes, const S: usize> Kernel for Take<'_, E, S> {
+impl<E: Lanes, const S: usize> Kernel for Spread<'_, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        for (cell, from) in self.cells.iter_mut().zip(self.from) {
-            if let Some(from) = from.get(self.i) {
-                from.store(cell);
-            }
-        }
-    }
-}
-
-/// What was computed at stage `i`, for this one or for all.
-pub(crate) struct Give<'a, E: Lanes, const S: usize> {
-    pub cells: &'a [E::Cell],
-    pub to: &'a mut [[E; S]],
-    pub i: usize,
-    pub all: bool,
-}
-
-impl<E: Lanes, const S: usize> Kernel for Give<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { cells, to, i, all } = self;
-        if all {
-            for (cell, to) in cells.iter().zip(to) {
-                *to = [E::load(cell); S];
-            }
-            return;
-        }
-        for (cell, to) in cells.iter().zip(to) {
-            if let Some(to) = to.get_mut(i) {
-                *to = E::load(cell);
-            }
+        for cell in self.cells {
+            *cell = [cell[0]; S];
         }
     }
 }
 
 /// `f`, and its Jacobian if it is asked for, at all stages in one call.
 struct Evaluate<'a, M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> {
-    points: &'a ArrayV<M, [E; S]>,
-    f: &'a mut ArrayK<M, [E; S]>,
-    jacobian: &'a mut M::Jacobian<[E; S]>,
-    stage: &'a mut Stage<M, E::Cell>,
+    points: &'a Stages<ArrayV<M, [E; S]>, E, S>,
+    f: &'a mut Stages<ArrayK<M, [E; S]>, E, S>,
+    jacobian: &'a mut Stages<M::Jacobian<[E; S]>, E, S>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>

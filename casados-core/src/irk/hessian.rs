@@ -11,15 +11,16 @@ use super::adjoint::Backward;
 use super::along::Along;
 use super::curvature::{COLUMNS, Subtract};
 use super::directions::Identity;
-use super::evaluate::{Give, Take, not_finite};
-use super::record::{Coefficients, Linearization, Stage, Step, Work, copy};
+use super::evaluate::not_finite;
+use super::record::{Coefficients, Linearization, Step, Work, copy};
+use super::stages::Stages;
 use super::step::check;
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
-use crate::scalar::{Lanes, Real, SideBySide};
+use crate::scalar::{Lanes, Real, SideBySide, Strided};
 use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
@@ -36,9 +37,9 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     /// The Hessian over the directions that have any influence, its lower triangle.
     sum: ArrayW<M, ArrayW<M, T>>,
     /// `μ` at all stages, in the order of the equations.
-    mu: Aligned<ArrayK<M, [T; S]>>,
+    mu: Aligned<Stages<ArrayK<M, [T; S]>, T, S>>,
     /// Entries of `∇²(μᵀ f)` at all stages.
-    entries: Aligned<M::Hessian<[T; S]>>,
+    entries: Aligned<Stages<M::Hessian<[T; S]>, T, S>>,
 }
 copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
 
@@ -128,14 +129,10 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
             }
         }
         work.place(coefficients, n, &step.x, &step.y);
-        let Work { points, stage, .. } = work;
-        if let Err(call) = E::side_by_side(Curvature::<M, E, S> { points, mu, entries, stage }) {
-            let Curvature { points, mu, entries, stage } = call;
+        if let Err(call) = E::side_by_side(Curvature::<M, E, S> { points: &work.points, mu, entries }) {
+            let Curvature { points, mu, entries } = call;
             for i in 0..S {
-                dispatch(Take { cells: stage.v.as_mut(), from: points.as_ref(), i });
-                dispatch(Take { cells: stage.mu.as_mut(), from: mu.as_ref(), i });
-                M::hessian::<E>(&stage.v, &stage.mu, &mut stage.hessian);
-                dispatch(Give { cells: stage.hessian.as_ref(), to: entries.as_mut(), i, all: false });
+                M::hessian::<Strided<E, S>>(points.from(i), mu.from(i), entries.from_mut(i));
             }
         }
     }
@@ -156,10 +153,9 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
 
 /// `∇²(μᵀ f)` at all stages in one call.
 struct Curvature<'a, M: Dae, E: Lanes, const S: usize> {
-    points: &'a ArrayV<M, [E; S]>,
-    mu: &'a ArrayK<M, [E; S]>,
-    entries: &'a mut M::Hessian<[E; S]>,
-    stage: &'a mut Stage<M, E::Cell>,
+    points: &'a Stages<ArrayV<M, [E; S]>, E, S>,
+    mu: &'a Stages<ArrayK<M, [E; S]>, E, S>,
+    entries: &'a mut Stages<M::Hessian<[E; S]>, E, S>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, S> {

@@ -36,6 +36,7 @@ mod refine;
 mod right_side;
 mod run;
 mod sensitivities;
+mod stages;
 mod step;
 mod sweep;
 mod verify;

@@ -153,12 +153,18 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             if renew || early {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
-                self.evaluate_jacobian();
                 // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
                 mean = basis.is_some() && !near && (simplified || renewals < MEANS);
                 renewals += usize::from(renew);
+                if mean && !*compensated {
+                    self.evaluate_mean();
+                } else {
+                    self.evaluate_jacobian();
+                }
                 match (basis, self.mean.get_mut()) {
-                    (Some(basis), Some(factors)) if mean => factors.factor(&self.linear.jacobian, basis, h),
+                    (Some(basis), Some(factors)) if mean => {
+                        factors.factor(&self.linear.jacobian, self.first_only, basis, h);
+                    }
                     _ => self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h),
                 }
             }

@@ -1,10 +1,11 @@
 //! What is remembered about steps, and the memory that all calls work in.
 
+use super::stages::Stages;
 use crate::linalg::{Eigenbasis, Factors, MeanFactors};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
-use crate::scalar::Lanes;
+use crate::scalar::{Lanes, Strided};
 use crate::shape::{Aligned, Plain, assign};
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
@@ -97,7 +98,7 @@ pub(crate) struct Times<T> {
 #[zeroable(bound = "")]
 pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     /// Entries of the Jacobian of the model, each at all stages.
-    pub jacobian: Aligned<M::Jacobian<[T; S]>>,
+    pub jacobian: Aligned<Stages<M::Jacobian<[T; S]>, T, S>>,
     /// Factors of the Newton matrix.
     pub factors: Factors<M, T, S, F>,
 }
@@ -123,9 +124,9 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// What was rounded off from it, if sums are compensated.
     pub(crate) rest: ArrayX<M, T>,
     /// Variables of the model, each at all stages.
-    pub(crate) points: Aligned<ArrayV<M, [T; S]>>,
+    pub(crate) points: Aligned<Stages<ArrayV<M, [T; S]>, T, S>>,
     /// The residual at all stages.
-    pub(crate) f: Aligned<ArrayK<M, [T; S]>>,
+    pub(crate) f: Aligned<Stages<ArrayK<M, [T; S]>, T, S>>,
     /// The residual in the slots of the equations, then the increment.
     pub(crate) increment: Aligned<ArrayK<M, [[T; 1]; S]>>,
     /// Reciprocals of the sizes of the unknowns, which increments are measured by.
@@ -139,8 +140,6 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// compensated sums, what they are beyond their digits.
     pub(crate) probe: [Aligned<ArrayV<M, [T; S]>>; 2],
     pub(crate) terms: Aligned<ArrayK<M, [T; S]>>,
-    /// One stage, for machines whose registers do not hold all of them.
-    pub(crate) stage: Stage<M, T::Cell>,
     /// What the factors that are there are good for.
     pub(crate) validity: Validity,
     /// Whether the constant entries of the Jacobian are there.
@@ -149,17 +148,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     pub(crate) near: bool,
     /// Whether the model has the same values at all stages when it is evaluated next.
     pub(crate) alike: bool,
-}
-
-/// What the model is given and gives back at one stage.
-#[derive(Zeroable)]
-#[zeroable(bound = "")]
-pub(crate) struct Stage<M: Dae, T: Plain> {
-    pub v: ArrayV<M, T>,
-    pub f: ArrayK<M, T>,
-    pub mu: ArrayK<M, T>,
-    pub jacobian: M::Jacobian<T>,
-    pub hessian: M::Hessian<T>,
+    /// Whether its Jacobian, the same at all stages, is there for the first one only.
+    pub(crate) first_only: bool,
 }
 
 /// What factors that are there are good for.
@@ -173,7 +163,6 @@ pub(crate) struct Validity {
     pub rate: f64,
 }
 
-copy!([M: Dae, T: Plain] Stage<M, T>);
 copy!([M: Dae, T: Plain, const S: usize] Step<M, T, S>);
 copy!([M: Dae, T: Plain] Inputs<M, T>);
 copy!([M: Dae, T: Plain, const S: usize, F: Fallback] Linearization<M, T, S, F>);
@@ -191,10 +180,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// To be called before anything else.
     pub(crate) fn prepare(&mut self) {
         if !self.ready {
-            M::jacobian_constants::<E>(&mut self.stage.jacobian);
-            let values = self.stage.jacobian.as_ref();
-            for (entry, value) in self.linear.jacobian.as_mut().iter_mut().zip(values) {
-                *entry = [E::load(value); S];
+            for stage in 0..S {
+                M::jacobian_constants::<Strided<E, S>>(self.linear.jacobian.from_mut(stage));
             }
             self.ready = true;
         }

@@ -82,6 +82,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Whether the residual is at the level of the rounding errors of its terms, `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`,
     /// lane by lane.
     pub(crate) fn is_satisfied(&mut self) -> E::Mask {
+        self.complete();
         dispatch(Satisfied::<M, E, S> {
             f: self.f.as_ref(),
             points: &self.points,

@@ -29,10 +29,23 @@ impl<M: Dae, E: Plain, const S: usize> Clone for MeanFactors<M, E, S> {
 impl<M: Dae, E: Plain, const S: usize> Copy for MeanFactors<M, E, S> {}
 
 impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
-    /// Factors; a pivot that vanishes leaves elements that are not finite.
-    pub fn factor(&mut self, jacobian: &M::Jacobian<[E; S]>, basis: &Eigenbasis<E, S, S>, h: E) {
-        let scale = basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 }));
-        dispatch(AssembleMean::<M, E, S> { jacobian, scale, blocks: &mut self.blocks });
+    /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be there for the `first_only` of stages that
+    /// are alike.
+    pub fn factor(
+        &mut self,
+        jacobian: &M::Jacobian<[E; S]>,
+        first_only: bool,
+        basis: &Eigenbasis<E, S, S>,
+        h: E,
+    ) {
+        let blocks = &mut self.blocks;
+        if first_only {
+            let scale = basis.values.scaled(h);
+            dispatch(AssembleMean::<M, E, S, true> { jacobian, scale, blocks });
+        } else {
+            let scale = basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 }));
+            dispatch(AssembleMean::<M, E, S, false> { jacobian, scale, blocks });
+        }
         sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
 
@@ -50,14 +63,16 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
 }
 
 /// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, each block written once.
-struct AssembleMean<'a, M: Dae, E: Plain, const S: usize> {
+struct AssembleMean<'a, M: Dae, E: Plain, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
-    /// `hμ/s`
+    /// `hμ` of what is added up
     scale: Complex<E, S>,
     blocks: &'a mut M::Factors<[[Complex<E, S>; 1]; 1]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for AssembleMean<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
+    for AssembleMean<'_, M, E, S, FIRST_ONLY>
+{
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -66,7 +81,9 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for AssembleMean<'_, M, E, S> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for AssembleMean<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
+    for AssembleMean<'_, M, E, S, FIRST_ONLY>
+{
     const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
     const SIMPLE: usize = M::STRUCTURE.elimination.fill();
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
@@ -77,11 +94,12 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for AssembleMean<'_, M, E, S> {
         let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
         let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
         let mut element = match state {
-            Some(state) => self.scale.scaled(total(state)),
+            Some(state) => self.scale.scaled(Self::total(state)),
             None => Complex::zero(),
         };
         if let Some(direct) = direct {
-            element = element.plus(E::from_f64(const { 1.0 / S as f64 }) * total(direct));
+            let share = E::from_f64(const { if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 } });
+            element = element.plus(share * Self::total(direct));
         }
         *to = element;
     }
@@ -95,14 +113,19 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for AssembleMean<'_, M, E, S> {
     }
 }
 
-/// The sum over the stages.
-#[inline(always)]
-fn total<E: Lanes, const S: usize>(stages: &[E; S]) -> E {
-    let mut total = E::from_f64(0.0);
-    for &stage in stages {
-        total = total + stage;
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AssembleMean<'_, M, E, S, FIRST_ONLY> {
+    /// The sum over the stages.
+    #[inline(always)]
+    fn total(stages: &[E; S]) -> E {
+        if FIRST_ONLY {
+            return stages[0];
+        }
+        let mut total = E::from_f64(0.0);
+        for &stage in stages {
+            total = total + stage;
+        }
+        total
     }
-    total
 }
 
 struct Split<'a, T, const S: usize> {

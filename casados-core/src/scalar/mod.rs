@@ -16,12 +16,14 @@ pub(crate) mod lanes;
 mod real;
 #[cfg(all(feature = "libm", any(test, not(feature = "std"))))]
 mod single;
+mod strided;
 mod tangent;
 
 #[doc(hidden)]
 pub use float::Float;
 #[doc(hidden)]
 pub use lanes::functions as elementary;
+pub(crate) use strided::Strided;
 pub use tangent::Tangent;
 
 use crate::shape::Plain;
