@@ -68,12 +68,14 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
             return;
         }
         let mut stage = 0;
-        while stage + 2 <= S {
+        // Rows that go through their columns together fit the registers with pairs of stages, or with wider panels.
+        while const { W <= 4 } && stage + 2 <= S {
             self.stages::<A, 1, 2, W, P>(stage, column);
             stage += 2;
         }
-        if const { S % 2 == 1 } {
+        while stage < S {
             self.stages::<A, 1, 1, W, P>(stage, column);
+            stage += 1;
         }
     }
 
@@ -110,7 +112,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
             if row >= column {
                 let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
                 let (sum, fresh) = (&mut *self.sum, self.fresh && of_d == 0);
-                if const { size_of::<E>() > 8 && V > 2 && A::WIDE } {
+                if const { size_of::<E>() > 8 && V > 2 && W <= 4 && A::WIDE } {
                     tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
                 } else if const { size_of::<E>() > 8 && V > 2 } {
                     tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
