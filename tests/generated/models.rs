@@ -22,9 +22,7 @@ pub fn random0(x: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 1] {
     let a7 = (inner) * (a6);
     let inner = ((x[0]) * (x[0])).ln_1p();
     let a8 = (inner) * (a5);
-    [
-        ((a0 + a1 + a2 + a3 + a4 + a5 + a6 + a7 + a8) - (a1)),
-    ]
+    [((a0 + a1 + a2 + a3 + a4 + a5 + a6 + a7 + a8) - (a1))]
 }
 
 #[dae]
@@ -95,15 +93,16 @@ pub fn random3(x: [f64; 1], u: [f64; 1], p: [f64; 2]) -> [f64; 1] {
     let a4 = (inner) / (1.5 + (u[0]).sin());
     let inner = (u[0]).clamp(-0.6, 0.8);
     let a5 = (inner) + (a4);
-    let inner = { let (s, c) = (a5).sin_cos(); s - 0.5 * c };
+    let inner = {
+        let (s, c) = (a5).sin_cos();
+        s - 0.5 * c
+    };
     let a6 = (inner) - (p[1]);
     let inner = (a6) + (a6);
     let a7 = (inner) - (x[0]);
     let inner = (a6) - (a5);
     let a8 = (inner) - (x[0]);
-    [
-        ((a0 + a1 + a2 + a3 + a4 + a5 + a6 + a7 + a8) + (a2)),
-    ]
+    [((a0 + a1 + a2 + a3 + a4 + a5 + a6 + a7 + a8) + (a2))]
 }
 
 #[dae]
@@ -182,10 +181,7 @@ pub fn random6(x: [f64; 2], u: [f64; 2], p: [f64; 1]) -> [f64; 2] {
     let a7 = (inner) * (u[0]);
     let inner = (u[0]).cos();
     let a8 = (inner) * (a7);
-    [
-        ((a0 + a2 + a4 + a6 + a8) / (1.0 + (u[1]) * (u[1]))),
-        ((a1 + a3 + a5 + a7) / (1.0 + (a3) * (a3))),
-    ]
+    [((a0 + a2 + a4 + a6 + a8) / (1.0 + (u[1]) * (u[1]))), ((a1 + a3 + a5 + a7) / (1.0 + (a3) * (a3)))]
 }
 
 #[dae]
@@ -247,7 +243,10 @@ pub fn random9(x: [f64; 3], u: [f64; 1], t: f64) -> [f64; 3] {
     let a0 = (inner) / (1.0 + (x[1]) * (x[1]));
     let inner = (a0).clamp(-0.6, 0.8);
     let a1 = (inner) - (x[2]);
-    let inner = { let (s, c) = (a0).sin_cos(); s - 0.5 * c };
+    let inner = {
+        let (s, c) = (a0).sin_cos();
+        s - 0.5 * c
+    };
     let a2 = (inner) / (1.5 + (x[1]).sin());
     let inner = (t) + (a2);
     let a3 = (inner) + (a1);
@@ -261,11 +260,7 @@ pub fn random9(x: [f64; 3], u: [f64; 1], t: f64) -> [f64; 3] {
     let a7 = (inner) + (x[2]);
     let inner = (x[1]) / (1.0 + (a5) * (a5));
     let a8 = (inner) - (a6);
-    [
-        ((a0 + a3 + a6) / (1.0 + (t) * (t))),
-        ((a1 + a4 + a7) + (a5)),
-        ((a2 + a5 + a8) / (1.0 + (a4) * (a4))),
-    ]
+    [((a0 + a3 + a6) / (1.0 + (t) * (t))), ((a1 + a4 + a7) + (a5)), ((a2 + a5 + a8) / (1.0 + (a4) * (a4)))]
 }
 
 #[dae]
@@ -296,7 +291,11 @@ pub fn random10(xdot: [f64; 2], x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
 
 #[dae]
 pub fn random11(xdot: [f64; 3], x: [f64; 3], z: [f64; 2], u: [f64; 2], p: [f64; 2]) -> [f64; 5] {
-    let inner = if (xdot[2]) <= -0.3 || !((xdot[2]) > 0.1) { (xdot[2]) * (xdot[2]) } else { (xdot[2]) + 1.5 * (xdot[2]) };
+    let inner = if (xdot[2]) <= -0.3 || !((xdot[2]) > 0.1) {
+        (xdot[2]) * (xdot[2])
+    } else {
+        (xdot[2]) + 1.5 * (xdot[2])
+    };
     let a0 = (inner) / (1.0 + (z[1]) * (z[1]));
     let inner = -(a0);
     let a1 = (inner) / (1.5 + (a0).sin());

@@ -111,8 +111,8 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send {
     /// The same with a number for each lane.
     type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
 
-    /// Bytes of the right-hand sides.
-    fn columns<E: Lanes, const S: usize>() -> usize;
+    /// Bytes of the factors and of their right-hand sides.
+    fn working_set<E: Lanes, const S: usize>() -> usize;
 
     /// For several intervals at once.
     fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
@@ -132,8 +132,14 @@ macro_rules! answer {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
 
-            fn columns<E: Lanes, const S: usize>() -> usize {
-                size_of::<ArrayK<M, [E; S]>>() * $columns
+            fn working_set<E: Lanes, const S: usize>() -> usize {
+                let factors = if const { $columns == 0 && S > 2 } {
+                    // Those of mean Jacobians.
+                    size_of::<M::Factors<[E; S]>>()
+                } else {
+                    size_of::<M::Factors<[[E; S]; S]>>()
+                };
+                factors + size_of::<ArrayK<M, [E; S]>>() * ($columns).max(1)
             }
             fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
                 group: &mut Group<M, E, S>,
@@ -151,7 +157,7 @@ macro_rules! answer {
         }
     };
 }
-answer!(Nominal, solve, 1, |irk, at, u| irk.solve(at.x0, &u, at.h));
+answer!(Nominal, solve, 0, |irk, at, u| irk.solve(at.x0, &u, at.h));
 answer!(Forward, forward, M::Shape::NW, |irk, at, u| irk.forward(at.x0, &u, at.h));
 answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |irk, at, u| {
     irk.forward_adjoint(at.x0, &u, at.h, &vector(at.lambda))

@@ -12,13 +12,14 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae};
 use crate::options::{Options, Start};
+use crate::result::Nominal;
 use crate::scalar::lanes::second_level_cache;
 use crate::scalar::{Lanes, Real, Widest};
 use crate::shape::{Shape, assign};
 use crate::tableau::Tableau;
 use alloc::boxed::Box;
-#[cfg(feature = "parallel")]
 use alloc::vec::Vec;
+use bytemuck::Zeroable;
 use core::any::Any;
 use core::marker::PhantomData;
 
@@ -45,8 +46,7 @@ struct Fits<M, R, const S: usize>(PhantomData<(M, R)>);
 impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Fits<M, R, S> {
     type Output = (usize, bool);
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> (usize, bool) {
-        let bytes = size_of::<M::Factors<[[E; S]; S]>>() + R::columns::<E, S>();
-        let fits = bytes as f64 <= WORKING_SET * second_level_cache() as f64;
+        let fits = R::working_set::<E, S>() as f64 <= WORKING_SET * second_level_cache() as f64;
         // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
         (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && fits)
     }
@@ -58,7 +58,17 @@ pub struct Work<'a, M: Dae, T: Real, const S: usize> {
     pub options: &'a Options,
     pub tableau: &'a Tableau<S>,
     pub given: Option<[&'a [T]; 2]>,
+    /// How many intervals are computed together.
     pub lanes: usize,
+    /// How many are simulated together before each is differentiated alone.
+    pub simulated: usize,
+}
+
+impl<M: Dae, T: Real, const S: usize> Work<'_, M, T, S> {
+    /// How many intervals a group has.
+    fn size(&self) -> usize {
+        self.lanes.max(self.simulated)
+    }
 }
 
 /// Consecutive intervals, and where what is found out about them belongs.
@@ -103,7 +113,7 @@ pub fn parallel<M: Dae, B, R: Answer<M, T>, T: Real, const S: usize>(
     threads: usize,
     mut share: Share<'_, M, T, R, S>,
 ) -> Result<(), BatchError> {
-    let groups = share.results.len().div_ceil(work.lanes);
+    let groups = share.results.len().div_ceil(work.size());
     let threads = threads.min(groups).max(1);
     while workers.len() < threads {
         let worker = Worker::new(*work.options, *work.tableau);
@@ -117,7 +127,7 @@ pub fn parallel<M: Dae, B, R: Answer<M, T>, T: Real, const S: usize>(
         worker.run(work, share);
         return Ok(());
     }
-    let most = groups.div_ceil(threads).saturating_mul(work.lanes);
+    let most = groups.div_ceil(threads).saturating_mul(work.size());
     rayon::scope(|scope| {
         for worker in workers.iter_mut().take(threads) {
             let share = share.take(most, work.options.steps);
@@ -135,18 +145,22 @@ pub struct Worker<M: Dae, B, const S: usize, T: Real> {
     single: irk::Integrator<M, B, S, T, Heap>,
     /// A [`Group`] for each kind of register: results of several kinds may need different ones.
     groups: Groups,
+    /// Stages of the steps of intervals that are simulated together, and where they lead.
+    stages: Vec<ArrayK<M, [T; S]>>,
+    ends: Vec<Nominal<M, T>>,
     pub statistics: BatchStatistics,
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
     pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         let single = irk::Integrator::build(options, tableau)?;
-        Ok(Self { single, groups: [None, None], statistics: BatchStatistics::default() })
+        let (stages, ends) = (Vec::new(), Vec::new());
+        Ok(Self { single, groups: [None, None], stages, ends, statistics: BatchStatistics::default() })
     }
 
     pub fn run<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
         while !share.results.is_empty() {
-            let group = share.take(work.lanes, work.options.steps);
+            let group = share.take(work.size(), work.options.steps);
             self.group(work, group);
         }
     }
@@ -161,30 +175,70 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
             }
         }
         let several = intervals.iter().flatten().count() > 1;
-        let mut done = [false; MOST_LANES];
-        if several {
+        let (mut done, mut solved) = ([false; MOST_LANES], [false; MOST_LANES]);
+        if several && work.lanes > 1 {
             let (groups, statistics, share) = (&mut self.groups, &mut self.statistics, &mut share);
             let together = Together { work, groups, statistics, intervals: &intervals, share };
             // What did not get memory side by side may get it alone.
             done = T::widest(work.lanes, together).ok().and_then(Result::ok).unwrap_or_default();
+        } else if several && work.simulated > 1 {
+            solved = self.simulate(work, &intervals, &share).unwrap_or_default();
         }
-        for (i, (interval, done)) in intervals.iter().zip(done).enumerate() {
-            let (Some(interval), false) = (interval, done) else { continue };
-            *(if several { &mut self.statistics.redone } else { &mut self.statistics.alone }) += 1;
-            let outcome = self.alone(work, interval, i, &mut share);
+        for (i, interval) in intervals.iter().enumerate() {
+            let (Some(interval), false) = (interval, done[i]) else { continue };
+            let again = several && !solved[i];
+            *(if again { &mut self.statistics.redone } else { &mut self.statistics.alone }) += 1;
+            let mut outcome = self.alone(work, interval, i, solved[i], &mut share);
             self.statistics.add_work(self.single.statistics());
+            if solved[i] && outcome.is_err() {
+                outcome = self.alone(work, interval, i, false, &mut share);
+                self.statistics.add_work(self.single.statistics());
+            }
             if let Some(status) = share.status.get_mut(i) {
                 *status = outcome;
             }
         }
     }
 
-    /// One interval.
+    /// The stages of all intervals of a group, for those that arrive.
+    fn simulate<R>(
+        &mut self,
+        work: &Work<'_, M, T, S>,
+        intervals: &[Option<Interval<'_, M, T>>; MOST_LANES],
+        share: &Share<'_, M, T, R, S>,
+    ) -> Option<[bool; MOST_LANES]> {
+        let Self { groups, stages, ends, statistics, .. } = self;
+        let (count, steps) = (MOST_LANES.min(share.results.len()), work.options.steps);
+        let length = MOST_LANES.saturating_mul(steps);
+        stages.try_reserve(length.saturating_sub(stages.len())).ok()?;
+        stages.resize(length, Zeroable::zeroed());
+        ends.try_reserve(MOST_LANES - ends.len()).ok()?;
+        ends.resize(MOST_LANES, Zeroable::zeroed());
+        let mut warm = [false; MOST_LANES];
+        for (to, from) in stages.iter_mut().zip(share.records.iter()) {
+            assign(to, from);
+        }
+        for (to, from) in warm.iter_mut().zip(share.warm.iter()) {
+            *to = *from;
+        }
+        let mut share = Share {
+            first: share.first,
+            results: ends.get_mut(..count)?,
+            status: &mut [],
+            records: stages,
+            warm: &mut warm,
+        };
+        let together = Together { work, groups, statistics, intervals, share: &mut share };
+        T::widest(work.simulated, together).ok().and_then(Result::ok)
+    }
+
+    /// One interval; its stages may be known.
     fn alone<R: Answer<M, T>>(
         &mut self,
         work: &Work<'_, M, T, S>,
         interval: &Interval<'_, M, T>,
         index: usize,
+        solved: bool,
         share: &mut Share<'_, M, T, R, S>,
     ) -> Result<(), Error> {
         let irk = &mut self.single;
@@ -198,8 +252,9 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
         let steps = work.options.steps;
         let record = share.records.chunks_exact_mut(steps).nth(index);
         let warm = share.warm.get_mut(index);
-        match (&record, &warm) {
-            (Some(record), Some(true)) => irk.set_record(record)?,
+        match (&record, &warm, self.stages.chunks_exact(steps).nth(index)) {
+            (_, _, Some(stages)) if solved => irk.set_solution(stages)?,
+            (Some(record), Some(true), _) => irk.set_record(record)?,
             _ => irk.reset(),
         }
         let answer = R::alone(irk, interval)?;

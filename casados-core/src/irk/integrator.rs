@@ -181,6 +181,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.set_record(record)
     }
 
+    /// The stages of every step of the next call, which has only to differentiate them.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        self.run.set_solution(record)
+    }
+
     /// Copies the stages of every step of the last successful call.
     #[cfg(feature = "alloc")]
     pub(crate) fn record(&mut self, record: &mut [crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {

@@ -28,6 +28,8 @@ pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
     any: bool,
     /// Whether the record is a warm start.
     warm: bool,
+    /// Whether that record is the solution of the next call.
+    solved: bool,
     given: bool,
     parameters: bool,
     time: T,
@@ -75,6 +77,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             kept: 0,
             any: false,
             warm: false,
+            solved: false,
             given: false,
             parameters: false,
             time: T::ZERO,
@@ -150,6 +153,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         let steps = W::tape(running, options.steps)?;
         let kept = W::tape(kept, options.steps)?;
         let from = match options.start {
+            _ if core::mem::take(&mut self.solved) => From::Solved(kept),
             Start::Zero => From::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
             Start::Warm if self.warm => From::Record(kept),
@@ -205,6 +209,14 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             crate::shape::assign(&mut *step.y, y);
         }
         self.warm = true;
+        Ok(())
+    }
+
+    /// The stages of every step of the next call.
+    #[cfg(feature = "alloc")]
+    pub fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        self.set_record(record)?;
+        self.solved = true;
         Ok(())
     }
 

@@ -25,7 +25,7 @@ mod points;
 mod report;
 mod sensitivities;
 
-pub use crate::scalar::lanes::{Level, limit};
+pub use crate::scalar::lanes::{Level, limit, limit_cache};
 pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};

@@ -6,11 +6,22 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 /// What machines have that do not tell: half a megabyte or more.
 const USUAL: usize = 1 << 19;
 
+/// What the processor said: asking takes long, above all in a virtual machine. Zero until somebody does.
+#[cfg(target_arch = "x86_64")]
+static BYTES: AtomicUsize = AtomicUsize::new(0);
+
+/// For tests: from now on the second-level cache has so many bytes, if machines of this kind are asked for it.
+#[cfg(feature = "testing")]
+pub fn limit_cache(bytes: usize) {
+    #[cfg(target_arch = "x86_64")]
+    BYTES.store(bytes, Ordering::Relaxed);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = bytes;
+}
+
 /// Bytes of the second-level cache.
 #[cfg(target_arch = "x86_64")]
 pub fn second_level_cache() -> usize {
-    // Asking takes long, above all in a virtual machine.
-    static BYTES: AtomicUsize = AtomicUsize::new(0);
     match BYTES.load(Ordering::Relaxed) {
         0 => {
             let bytes = if cfg!(miri) { USUAL } else { ask().unwrap_or(USUAL) };

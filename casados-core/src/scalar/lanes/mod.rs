@@ -372,6 +372,8 @@ macro_rules! blocks {
 }
 pub(crate) use blocks;
 
+#[cfg(feature = "testing")]
+pub use cache::limit_cache;
 #[cfg(feature = "alloc")]
 pub(crate) use cache::second_level_cache;
 
