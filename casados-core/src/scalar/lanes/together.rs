@@ -105,9 +105,8 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithFou
     fn call([a, b, c, d]: [D; 4]) -> Self::Output {
         let results = F::inside(arguments(Two(a, c), Two(b, d)));
         let mut apart = [[a; R]; 2];
-        for (r, result) in results.into_iter().enumerate() {
-            apart[0][r] = result.0;
-            apart[1][r] = result.1;
+        for (r, Two(first, second)) in results.into_iter().enumerate() {
+            [apart[0][r], apart[1][r]] = [first, second];
         }
         apart
     }
@@ -119,11 +118,8 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithEig
     fn call([a, b, c, d, e, f, g, h]: [D; 8]) -> Self::Output {
         let results = F::inside(arguments(Two(Two(a, c), Two(e, g)), Two(Two(b, d), Two(f, h))));
         let mut apart = [[a; R]; 4];
-        for (r, result) in results.into_iter().enumerate() {
-            apart[0][r] = result.0.0;
-            apart[1][r] = result.0.1;
-            apart[2][r] = result.1.0;
-            apart[3][r] = result.1.1;
+        for (r, Two(Two(first, second), Two(third, fourth))) in results.into_iter().enumerate() {
+            [apart[0][r], apart[1][r], apart[2][r], apart[3][r]] = [first, second, third, fourth];
         }
         apart
     }
@@ -149,12 +145,11 @@ impl<F: Elementary<K, R>, const K: usize, const R: usize> CallWithEight<F64x4<4>
     type Output = [[F64x4<4>; R]; 4];
     #[inline(always)]
     fn call([a, b, c, d, e, f, g, h]: [F64x4<4>; 8]) -> Self::Output {
-        let first = F::inside(arguments(join(a, c), join(b, d)));
-        let second = F::inside(arguments(join(e, g), join(f, h)));
+        let joined = F::inside(arguments(Two(join(a, c), join(e, g)), Two(join(b, d), join(f, h))));
         let mut results = [[a; R]; 4];
-        for r in 0..R {
-            [results[0][r], results[1][r]] = apart(first[r]);
-            [results[2][r], results[3][r]] = apart(second[r]);
+        for (r, Two(first, second)) in joined.into_iter().enumerate() {
+            [results[0][r], results[1][r]] = apart(first);
+            [results[2][r], results[3][r]] = apart(second);
         }
         results
     }
