@@ -69,10 +69,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if let Err(Evaluate { points, f, jacobian }) = E::side_by_side(call) {
             for i in 0..if alike { 1 } else { S } {
                 if JACOBIAN {
-                    let (f, jacobian) = (f.from_mut(i), jacobian.from_mut(i));
-                    M::residual_jacobian::<Strided<E, S>>(points.from(i), f, jacobian);
+                    let (f, jacobian) = (f.seen_from_mut(i), jacobian.seen_from_mut(i));
+                    M::residual_jacobian::<Strided<E, S>>(points.seen_from(i), f, jacobian);
                 } else {
-                    M::residual::<Strided<E, S>>(points.from(i), f.from_mut(i));
+                    M::residual::<Strided<E, S>>(points.seen_from(i), f.seen_from_mut(i));
                 }
             }
             if alike {

@@ -132,7 +132,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         if let Err(call) = E::side_by_side(Curvature::<M, E, S> { points: &work.points, mu, entries }) {
             let Curvature { points, mu, entries } = call;
             for i in 0..S {
-                M::hessian::<Strided<E, S>>(points.from(i), mu.from(i), entries.from_mut(i));
+                M::hessian::<Strided<E, S>>(points.seen_from(i), mu.seen_from(i), entries.seen_from_mut(i));
             }
         }
     }

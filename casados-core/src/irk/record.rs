@@ -181,7 +181,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     pub(crate) fn prepare(&mut self) {
         if !self.ready {
             for stage in 0..S {
-                M::jacobian_constants::<Strided<E, S>>(self.linear.jacobian.from_mut(stage));
+                M::jacobian_constants::<Strided<E, S>>(self.linear.jacobian.seen_from_mut(stage));
             }
             self.ready = true;
         }

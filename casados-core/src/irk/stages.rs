@@ -33,7 +33,7 @@ impl<A, T, const S: usize> DerefMut for Stages<A, T, S> {
 impl<A: Array<[T; S]>, T: Plain, const S: usize> Stages<A, T, S> {
     /// Cells that begin with the number of a stage.
     #[inline(always)]
-    pub fn from(&self, stage: usize) -> &A {
+    pub fn seen_from(&self, stage: usize) -> &A {
         let stage = stage.min(S);
         // SAFETY: `A` is an array of `[T; S]`, the only type that is an `Array` of these; behind it, in the same struct and without a
         // gap, as both are aligned as `T` is, lie `S` more of `T`. So from its number `stage ≤ S` on there are as many as it has, which
@@ -43,9 +43,33 @@ impl<A: Array<[T; S]>, T: Plain, const S: usize> Stages<A, T, S> {
 
     /// Cells that begin with the number of a stage.
     #[inline(always)]
-    pub fn from_mut(&mut self, stage: usize) -> &mut A {
+    pub fn seen_from_mut(&mut self, stage: usize) -> &mut A {
         let stage = stage.min(S);
         // SAFETY: as above.
         unsafe { &mut *core::ptr::from_mut(self).cast::<T>().add(stage).cast::<A>() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is seen from a stage are its numbers, in the order of the cells, and nothing else is written.
+    #[test]
+    fn first_numbers_are_those_of_the_stage() {
+        let mut stages: Stages<[[f64; 4]; 3], f64, 4> = Zeroable::zeroed();
+        for stage in 0..4 {
+            for (cell, first) in stages.seen_from_mut(stage).iter_mut().enumerate() {
+                first[0] = (10 * cell + stage) as f64;
+            }
+        }
+        assert_eq!(*stages, [[0.0, 1.0, 2.0, 3.0], [10.0, 11.0, 12.0, 13.0], [20.0, 21.0, 22.0, 23.0]]);
+        assert_eq!(stages.beyond, [0.0; 4]);
+        for stage in 0..4 {
+            let seen = stages.seen_from(stage);
+            assert_eq!(seen.map(|cell| cell[0]), [0.0, 10.0, 20.0].map(|first| first + stage as f64));
+        }
+        // Beyond the last stage there is one cell more, and no further.
+        assert_eq!(stages.seen_from(9)[2], [0.0; 4]);
     }
 }
