@@ -10,7 +10,6 @@ mod chain;
 use casados::batch::BatchStatistics;
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, Hessian, Nominal};
-use casados::shape::Matrix;
 use casados::testing::limit_cache;
 use chain::{Chain, stretched};
 use nalgebra::SVector;
