@@ -175,7 +175,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             return;
         }
         // Directions that have not reached this unknown, as at the start of an interval. Of registers the memory is asked: a packet of
-        // which single elements are looked at is not kept in registers.
+        // which single elements are looked at is not kept in registers. Of numbers the packet is, all of it at once: one after the other
+        // in memory took up to 7 % of a call more (chains of 3 and 5 masses).
         if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
