@@ -12,7 +12,7 @@
 //! iteration took. `z` at the ends of an interval is the polynomial through the stages; for stiffly
 //! accurate methods its value at the end is the last stage.
 //!
-//! One file for each thing: `evaluate` the model at the stages, `newton`, its `increment` and its `progress`, and, where that does
+//! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its `progress`, and, where that does
 //! not arrive, `pivoted`, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`,
 //! `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
 //! `sensitivities` what users see.

@@ -93,7 +93,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn reset(&mut self) {
-        self.warm = false;
+        (self.warm, self.solved) = (false, false);
     }
 
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
@@ -208,7 +208,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         for (step, y) in steps.iter_mut().zip(record) {
             crate::shape::assign(&mut *step.y, y);
         }
-        self.warm = true;
+        (self.warm, self.solved) = (true, false);
         Ok(())
     }
 
