@@ -225,9 +225,10 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
             fill(&mut self.records, count.saturating_mul(steps), Zeroable::zeroed())?;
         }
         let missing = self.options.start == Start::Given && self.given.is_none();
-        let lanes = if missing { 1 } else { width::<M, T, R, S>() };
+        let lanes = if missing { 1 } else { width::<M, T, R, S>(&self.options.newton) };
         // Stages of models that are too large to be differentiated side by side may still be found so.
-        let simulated = if missing || lanes > 1 { 1 } else { width::<M, T, Nominal<M, T>, S>() };
+        let simulated =
+            if missing || lanes > 1 { 1 } else { width::<M, T, Nominal<M, T>, S>(&self.options.newton) };
         let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
         let (options, tableau) = (&self.options, &self.tableau);
         let work = Work { inputs, options, tableau, given, lanes, simulated };

@@ -11,7 +11,7 @@ use crate::irk;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae};
-use crate::options::{Options, Start};
+use crate::options::{Jacobian, Newton, Options, Start};
 use crate::result::Nominal;
 use crate::scalar::lanes::second_level_cache;
 use crate::scalar::{Lanes, Real, Widest};
@@ -29,10 +29,14 @@ use core::marker::PhantomData;
 const WORKING_SET: f64 = 7.0 / 8.0;
 
 /// How many intervals are computed together: as many as the widest register has whose group fits into the cache.
-pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>() -> usize {
+pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton) -> usize {
+    let mean = S > 2
+        && options.fixed_iterations.is_none()
+        && matches!(options.jacobian, Jacobian::Auto | Jacobian::Simplified)
+        && !M::STRUCTURE.linear_in_state;
     let mut most = MOST_LANES;
     loop {
-        match T::widest(most, Fits::<M, R, S>(PhantomData)) {
+        match T::widest(most, Fits::<M, R, S> { mean, of: PhantomData }) {
             Ok((lanes, true)) => return lanes,
             Ok((lanes, false)) => most = lanes.saturating_sub(1),
             Err(_) => return 1,
@@ -41,12 +45,16 @@ pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>() -> usize {
 }
 
 /// The lanes of a register, and whether they are to be used.
-struct Fits<M, R, const S: usize>(PhantomData<(M, R)>);
+struct Fits<M, R, const S: usize> {
+    /// Whether Newton's method takes the mean Jacobian of the stages.
+    mean: bool,
+    of: PhantomData<(M, R)>,
+}
 
 impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Fits<M, R, S> {
     type Output = (usize, bool);
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> (usize, bool) {
-        let fits = R::working_set::<E, S>() as f64 <= WORKING_SET * second_level_cache() as f64;
+        let fits = R::working_set::<E, S>(self.mean) as f64 <= WORKING_SET * second_level_cache() as f64;
         // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
         (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && fits)
     }
