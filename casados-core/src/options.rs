@@ -63,6 +63,13 @@ pub enum Jacobian {
     Frozen,
 }
 
+impl Jacobian {
+    /// Whether old factors, and those of the mean of the stages, do as long as they cost less than new ones.
+    pub(crate) fn is_adaptive(self) -> bool {
+        matches!(self, Self::Auto | Self::Simplified)
+    }
+}
+
 /// Where Newton's method starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {

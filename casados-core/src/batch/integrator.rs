@@ -6,7 +6,7 @@ use super::intervals::{Inputs, Intervals};
 use super::statistics::BatchStatistics;
 #[cfg(feature = "parallel")]
 use super::work::parallel;
-use super::work::{Share, Work, Worker, width};
+use super::work::{Share, Work, Worker, fill, width};
 use crate::error::{Argument, Error};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorX, VectorZ};
@@ -258,12 +258,4 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
             None => Ok(()),
         }
     }
-}
-
-/// Makes a vector as long as that.
-fn fill<V: Clone>(vector: &mut Vec<V>, length: usize, value: V) -> Result<(), BatchError> {
-    let bytes = length.saturating_mul(size_of::<V>());
-    vector.try_reserve(length.saturating_sub(vector.len())).map_err(|_| BatchError::OutOfMemory { bytes })?;
-    vector.resize(length, value);
-    Ok(())
 }

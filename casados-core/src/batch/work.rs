@@ -1,7 +1,6 @@
 //! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a result for.
 
 use super::answer::{Answer, Wide};
-#[cfg(feature = "parallel")]
 use super::error::BatchError;
 use super::group::{Group, MOST_LANES};
 use super::intervals::{Inputs, Interval, vector};
@@ -11,7 +10,7 @@ use crate::irk;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae};
-use crate::options::{Jacobian, Newton, Options, Start};
+use crate::options::{Newton, Options, Start};
 use crate::result::Nominal;
 use crate::scalar::lanes::second_level_cache;
 use crate::scalar::{Lanes, Real, Widest};
@@ -32,7 +31,7 @@ const WORKING_SET: f64 = 7.0 / 8.0;
 pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton) -> usize {
     let mean = S > 2
         && options.fixed_iterations.is_none()
-        && matches!(options.jacobian, Jacobian::Auto | Jacobian::Simplified)
+        && options.jacobian.is_adaptive()
         && !M::STRUCTURE.linear_in_state;
     let mut most = MOST_LANES;
     loop {
@@ -103,6 +102,14 @@ impl<'a, M: Dae, T: Real, R, const S: usize> Share<'a, M, T, R, S> {
             warm: split(&mut self.warm, count),
         }
     }
+}
+
+/// Makes a vector as long as that.
+pub fn fill<V: Clone>(vector: &mut Vec<V>, length: usize, value: V) -> Result<(), BatchError> {
+    let bytes = length.saturating_mul(size_of::<V>());
+    vector.try_reserve(length.saturating_sub(vector.len())).map_err(|_| BatchError::OutOfMemory { bytes })?;
+    vector.resize(length, value);
+    Ok(())
 }
 
 /// The first elements, which are taken away.
@@ -217,11 +224,8 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
     ) -> Option<[bool; MOST_LANES]> {
         let Self { groups, stages, ends, statistics, .. } = self;
         let (count, steps) = (MOST_LANES.min(share.results.len()), work.options.steps);
-        let length = MOST_LANES.saturating_mul(steps);
-        stages.try_reserve(length.saturating_sub(stages.len())).ok()?;
-        stages.resize(length, Zeroable::zeroed());
-        ends.try_reserve(MOST_LANES - ends.len()).ok()?;
-        ends.resize(MOST_LANES, Zeroable::zeroed());
+        fill(stages, MOST_LANES.saturating_mul(steps), Zeroable::zeroed()).ok()?;
+        fill(ends, MOST_LANES, Zeroable::zeroed()).ok()?;
         let mut warm = [false; MOST_LANES];
         for (to, from) in stages.iter_mut().zip(share.records.iter()) {
             assign(to, from);

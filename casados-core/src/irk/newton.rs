@@ -119,7 +119,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let mut progress = Progress::<E>::start(tolerance, self.validity.rate, exact);
         let mut verdict = Verdict::default();
         let simplified = options.jacobian == Jacobian::Simplified;
-        let adaptive = simplified || options.jacobian == Jacobian::Auto;
+        let adaptive = options.jacobian.is_adaptive();
         let basis = coefficients.basis.as_ref().filter(|_| F::KEPT && adaptive && !exact);
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
