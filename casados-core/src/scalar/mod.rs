@@ -151,14 +151,16 @@ pub trait Field:
         a: &[Self; N],
         b: &[Self; N],
     ) {
+        let mut sum = *target;
         for l in 0..const { N / 2 } {
             let m = const { N / 2 } + l;
-            target[l] = target[l].subtract_product(a[l], b[l]).subtract_product(-a[m], b[m]);
-            target[m] = target[m].subtract_product(a[l], b[m]).subtract_product(a[m], b[l]);
+            sum[l] = sum[l].subtract_product(a[l], b[l]).subtract_product(-a[m], b[m]);
+            sum[m] = sum[m].subtract_product(a[l], b[m]).subtract_product(a[m], b[l]);
         }
         if const { N % 2 == 1 } {
-            target[N - 1] = target[N - 1].subtract_product(a[N - 1], b[N - 1]);
+            sum[N - 1] = sum[N - 1].subtract_product(a[N - 1], b[N - 1]);
         }
+        *target = sum;
     }
 
     /// `|a| < |b|`
