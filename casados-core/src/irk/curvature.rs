@@ -180,52 +180,119 @@ struct Multiply<'a, E, const S: usize, const L: usize, const N: usize, const W: 
 impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize>
     Multiply<'_, E, S, L, N, W, P>
 {
-    /// `R` rows of `G` whose terms alternate, all of them in registers or one by one; the terms of the others.
+    /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied with is fetched once for all of them, so many
+    /// columns and stages at a time that it fits registers beside them.
     #[inline(always)]
     fn rows<A: Arithmetic, M: Dae, const R: usize>(
         &self,
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
-        let register = if A::WIDE { 64 } else { 32 };
-        if R * L * N * P * (W * size_of::<E>()).div_ceil(register) <= if A::WIDE { 24 } else { 12 } {
-            return self.some_rows::<A, M, R, R>(terms, g, 0);
+        if const { R == 1 } {
+            return self.row::<A, M>(terms, g);
         }
-        let mut others = terms;
-        for row in 0..R {
-            others = self.some_rows::<A, M, R, 1>(terms, g, row);
+        if const { size_of::<E>() > 8 && W > 4 && A::WIDE } {
+            self.in_parts::<A, M, R, 1, 4>(terms, g)
+        } else if const { size_of::<E>() > 8 && W > 2 && !A::WIDE } {
+            self.in_parts::<A, M, R, 1, 2>(terms, g)
+        } else if const { size_of::<E>() > 8 || L % 2 == 1 || !A::WIDE } {
+            self.in_parts::<A, M, R, 1, W>(terms, g)
+        } else {
+            self.in_parts::<A, M, R, 2, W>(terms, g)
         }
-        others
     }
 
-    /// `T` of these, from one of them on.
+    /// One row at all stages.
     #[inline(always)]
-    fn some_rows<A: Arithmetic, M: Dae, const R: usize, const T: usize>(
+    fn row<A: Arithmetic, M: Dae>(
         &self,
         mut terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
-        from_row: usize,
     ) -> &'static [Term] {
-        let mut packets = [[[[[E::from_f64(0.0); W]; P]; L]; N]; T];
-        let Some((&rows, _)) = terms.split_first_chunk::<R>() else { return &[] };
-        while let Some((now, rest)) = terms.split_first_chunk::<R>()
-            && now[0].row == rows[0].row
+        let mut packets = [[[[E::from_f64(0.0); W]; P]; L]; N];
+        let Some(&first) = terms.first() else { return &[] };
+        while let Some((term, rest)) = terms.split_first()
+            && term.row == first.row
         {
-            for (term, packets) in from(now, from_row).iter().zip(&mut packets) {
-                let Some(values) = self.entries.get(term.entry as usize) else { continue };
+            if let Some(values) = self.entries.get(term.entry as usize) {
                 for (group, (packet, of_d)) in packets.iter_mut().zip(self.d).enumerate() {
                     for (p, d) in of_d.iter().enumerate() {
-                        let Some(d) = d.get(now[0].column as usize) else { continue };
+                        let Some(d) = d.get(term.column as usize) else { continue };
                         subtract_stages::<A, E, L, W, P>(packet, p, from(values, self.stage + group * L), d);
                     }
                 }
             }
             terms = rest;
         }
-        for (term, packets) in from(&rows, from_row).iter().zip(&packets) {
-            for (group, packet) in packets.iter().enumerate() {
-                if let Some(to) = g.get_mut(group * M::STRUCTURE.curved.len() + term.row as usize) {
-                    *to = *packet;
+        for (group, packet) in packets.iter().enumerate() {
+            if let Some(to) = g.get_mut(group * M::STRUCTURE.curved.len() + first.row as usize) {
+                *to = *packet;
+            }
+        }
+        terms
+    }
+
+    /// `R` rows, `K` stages and `C` columns at a time.
+    #[inline(always)]
+    fn in_parts<A: Arithmetic, M: Dae, const R: usize, const K: usize, const C: usize>(
+        &self,
+        terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+    ) -> &'static [Term] {
+        let mut others = terms;
+        for (group, of_d) in self.d.iter().enumerate() {
+            let g = g.get_mut(group * M::STRUCTURE.curved.len()..).unwrap_or_default();
+            for stage in 0..L / K {
+                for part in 0..W / C {
+                    let values = self.stage + group * L + stage * K;
+                    others = self.part::<A, R, K, C>(terms, g, of_d, [stage, part, values]);
+                }
+            }
+        }
+        others
+    }
+
+    #[inline(always)]
+    fn part<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
+        &self,
+        mut terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+        of_d: &[&[[[E; W]; L]]; P],
+        [stage, part, of_values]: [usize; 3],
+    ) -> &'static [Term] {
+        let mut packets = [[[[E::from_f64(0.0); C]; P]; K]; R];
+        let Some((&rows, _)) = terms.split_first_chunk::<R>() else { return &[] };
+        while let Some((now, rest)) = terms.split_first_chunk::<R>()
+            && now[0].row == rows[0].row
+        {
+            let mut factors = [[[E::from_f64(0.0); C]; P]; K];
+            for (p, of_d) in of_d.iter().enumerate() {
+                let Some(d) = of_d.get(now[0].column as usize) else { continue };
+                let Some(d) = d.as_chunks::<K>().0.get(stage) else { continue };
+                for (factors, d) in factors.iter_mut().zip(d) {
+                    if let Some(d) = d.as_chunks::<C>().0.get(part) {
+                        factors[p] = *d;
+                    }
+                }
+            }
+            for (term, packets) in now.iter().zip(&mut packets) {
+                let Some(values) = self.entries.get(term.entry as usize) else { continue };
+                for ((packets, &value), factors) in
+                    packets.iter_mut().zip(from(values, of_values)).zip(&factors)
+                {
+                    for (packet, factors) in packets.iter_mut().zip(factors) {
+                        A::subtract_row(packet, value, factors);
+                    }
+                }
+            }
+            terms = rest;
+        }
+        for (term, packets) in rows.iter().zip(&packets) {
+            let Some(to) = g.get_mut(term.row as usize) else { continue };
+            let Some(to) = to.as_chunks_mut::<K>().0.get_mut(stage) else { continue };
+            for (to, packets) in to.as_flattened_mut().iter_mut().zip(packets.as_flattened()) {
+                if let Some(to) = to.as_chunks_mut::<C>().0.get_mut(part) {
+                    *to = *packets;
                 }
             }
         }
