@@ -357,10 +357,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         let next = panel_mut::<E, W>(self.next, column, nx);
         if unit {
             for (to, dk) in next.iter_mut().zip(dy.iter()) {
-                *to = [E::from_f64(0.0); W];
+                let mut row = [E::from_f64(0.0); W];
                 for (&b, dk) in b.iter().zip(dk) {
-                    A::subtract_row(to, b, dk);
+                    A::subtract_row(&mut row, b, dk);
                 }
+                *to = row;
             }
             for c in 0..W {
                 let direction = M::STRUCTURE.directions.get(column + c);
