@@ -7,7 +7,7 @@ use super::record::{Coefficients, Work, copy};
 use super::right_side::{Inputs, Later, Scatter, place};
 use crate::linalg::{
     Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, each_row, is_long, is_short,
-    solve_packets, solve_two,
+    solve_packets,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -260,16 +260,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
             let (jacobian, dy) = (self.jacobian, &mut *self.dy);
             each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, dy, directions: PhantomData });
         }
-        let mut start = 0;
-        if const { A::WIDE && size_of::<E>() <= 8 && S <= 2 && !is_short::<A, Scatter<'_, M, E, D, S>>() }
-            && self.phase == Phase::Whole
-        {
-            while start + 16 <= const { D::COUNT } {
-                self.two_panels::<A>(start);
-                start += 16;
-            }
-        }
-        panels!(D::COUNT, E, S, column from start, W => self.panel::<A, W>(column));
+        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column));
     }
 }
 
@@ -288,21 +279,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             solve_packets::<A, M, E, [E; W], S, W>(self.factors, dy, 0);
         }
         self.after::<A, W>(column);
-    }
-
-    /// Two panels of a long plan at a time: most of its instructions find blocks and rows.
-    #[inline(always)]
-    fn two_panels<A: Arithmetic>(&mut self, column: usize) {
-        const W: usize = 8;
-        self.before::<A, W>(column);
-        self.before::<A, W>(column + W);
-        let rows = M::Shape::NK * S;
-        let (first, second) = self.dy.split_at_mut((column + W) * rows);
-        let first = panel_mut::<E, W>(first, column, rows).as_chunks_mut::<S>().0;
-        let second = panel_mut::<E, W>(second, 0, rows).as_chunks_mut::<S>().0;
-        solve_two::<A, M, E, S, W>(self.factors, [first, second]);
-        self.after::<A, W>(column);
-        self.after::<A, W>(column + W);
     }
 
     /// The right-hand side of a panel.

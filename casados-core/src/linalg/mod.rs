@@ -23,7 +23,6 @@ mod sparse;
 mod straight;
 mod substitution;
 mod twice;
-mod two_panels;
 
 pub(crate) use block::{Block, Packet, coupling};
 #[cfg(feature = "alloc")]
@@ -39,4 +38,3 @@ pub(crate) use sparse::Planned;
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};
 pub(crate) use substitution::solve_packets;
 pub(crate) use twice::{dot_compensated, moved, two_product};
-pub(crate) use two_panels::solve_two;
