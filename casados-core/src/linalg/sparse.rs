@@ -67,7 +67,7 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [u32]) {
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [u32]) {
         let Self { coupling, blocks, .. } = self;
         if is_scaled::<S>(pivot) {
             let width = pivot.upper().len();

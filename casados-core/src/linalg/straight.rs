@@ -94,16 +94,16 @@ pub trait AtPivot {
     const INSTRUCTIONS: usize;
     /// Whether it is done for each update, or for each block.
     const UPDATES: bool = false;
-    /// To be `#[inline(always)]`.
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, updates: &'static [u32]);
+    /// With the pivots that follow in the plan. To be `#[inline(always)]`.
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], updates: &'static [u32]);
 }
 
 /// A pivot.
 macro_rules! pivot {
     ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
         $(if const { $n < <$M>::STRUCTURE.elimination.pivots.len() } {
-            let (pivot, updates) = const { nth(&<$M>::STRUCTURE.elimination, $n) };
-            $visit.at::<$A>(pivot, updates);
+            let (pivot, others, updates) = const { nth(&<$M>::STRUCTURE.elimination, $n) };
+            $visit.at::<$A>(pivot, others, updates);
         })*
     };
 }
@@ -115,15 +115,15 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         pivots_in_line::<A, M, V>(visit);
         return;
     }
-    let mut rest = M::STRUCTURE.elimination.updates;
-    for pivot in M::STRUCTURE.elimination.pivots {
-        let Some((own, others)) = rest.split_at_checked(updates_of(pivot)) else { return };
-        rest = others;
-        visit.at::<A>(pivot, own);
+    let (mut pivots, mut updates) = (M::STRUCTURE.elimination.pivots, M::STRUCTURE.elimination.updates);
+    while let Some((pivot, others)) = pivots.split_first() {
+        let Some((own, rest)) = updates.split_at_checked(updates_of(pivot)) else { return };
+        (pivots, updates) = (others, rest);
+        visit.at::<A>(pivot, others, own);
     }
 }
 
-/// From the last pivot to the first, without updates.
+/// From the last pivot to the first, without what follows and without updates.
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     if const { is_short_plan::<A, M, V>() } {
@@ -131,7 +131,7 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         return;
     }
     for pivot in M::STRUCTURE.elimination.pivots.iter().rev() {
-        visit.at::<A>(pivot, &[]);
+        visit.at::<A>(pivot, &[], &[]);
     }
 }
 
@@ -157,12 +157,20 @@ const fn is_short_plan<A: Arithmetic, M: Dae, V: AtPivot>() -> bool {
     WANTED && A::FUSED && plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= MOST_INSTRUCTIONS
 }
 
-/// A pivot and its updates; beyond the last, where nobody looks, any.
-const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [u32]) {
+/// A pivot, those that follow, and its updates; beyond the last, where nobody looks, any.
+const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [Pivot], &'static [u32]) {
     if n >= plan.pivots.len() {
-        const NONE: Pivot =
-            Pivot { slot: 0, block: 0, upper: 1, end: 1, left: [0; 3], identity: true, scaled: false };
-        return (&NONE, &[]);
+        const NONE: Pivot = Pivot {
+            slot: 0,
+            block: 0,
+            upper: 1,
+            end: 1,
+            left: [0; 3],
+            identity: true,
+            scaled: false,
+            beside: 1,
+        };
+        return (&NONE, &[], &[]);
     }
     let (mut begin, mut index) = (0, 0);
     while index < n {
@@ -170,7 +178,7 @@ const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [u32]) {
         index += 1;
     }
     let pivot = &plan.pivots[n];
-    (pivot, plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0)
+    (pivot, plan.pivots.split_at(n + 1).1, plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0)
 }
 
 /// How many blocks a pivot updates.

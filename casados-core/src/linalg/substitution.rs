@@ -143,9 +143,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
     };
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [u32]) {
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [u32]) {
         match SYSTEM {
-            DOWN => self.down::<A>(pivot),
+            DOWN => self.down::<A>(pivot, others),
             UP => self.up::<A>(pivot),
             TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
             _ => self.transposed_up::<A>(pivot),
@@ -157,13 +157,68 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     Sweep<'_, M, E, R, S, W, SYSTEM>
 {
     #[inline(always)]
-    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
         // What is added to a row is added in registers where one column fills them; but large blocks come from the second cache
         // fastest as they lie, column by column.
         if const { align_of::<E>() > 8 && size_of::<Block<E, S>>() <= 256 } {
             self.down_by_rows::<A>(pivot);
-        } else {
-            self.down_by_columns::<A>(pivot);
+            if !is_scaled::<S>(pivot) {
+                return;
+            }
+        }
+        if const { W > 1 } && is_scaled::<S>(pivot) {
+            match (pivot.beside, others) {
+                (0, _) => return,
+                (2, [second, ..]) => return self.down_beside::<A, 2>([pivot, second]),
+                (3, [second, third, ..]) => return self.down_beside::<A, 3>([pivot, second, third]),
+                _ => {}
+            }
+        }
+        self.down_by_columns::<A>(pivot);
+    }
+
+    /// Scaled pivots with the same rows below them, stage by stage: what is subtracted from a row for all of them stays in registers.
+    #[inline(always)]
+    fn down_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
+        let Self { factors, rows, column } = self;
+        let mut zero = true;
+        for pivot in pivots {
+            zero &= pivot.slot as usize >= rows.len()
+                || is_zero::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        }
+        if zero {
+            return;
+        }
+        let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
+        let below = pivots.map(|pivot| factors.blocks.get(pivot.lower()).unwrap_or_default());
+        // As many, but the optimiser does not know.
+        if below.iter().any(|below| below.len() != slots.len()) {
+            return;
+        }
+        for stage in 0..S {
+            let mut products = [[E::from_f64(0.0); W]; P];
+            for (product, pivot) in products.iter_mut().zip(pivots) {
+                let Some(row) = rows.get(pivot.slot as usize) else { continue };
+                for (ha, row) in factors.coupling.iter().zip(row) {
+                    let Some(row) = row.as_ref().get(*column..).and_then(|row| row.first_chunk()) else {
+                        continue;
+                    };
+                    A::subtract_row(product, ha[stage], row);
+                }
+            }
+            for (index, &other) in slots.iter().enumerate() {
+                let Some(target) = rows.get_mut(other as usize).and_then(|row| row.get_mut(stage)) else {
+                    continue;
+                };
+                let target = target.as_mut().get_mut(*column..).and_then(|row| row.first_chunk_mut());
+                let Some(target) = target else { continue };
+                let mut sum = *target;
+                for (product, below) in products.iter().zip(below) {
+                    let Some(scale) = below.get(index).and_then(|block| block.first()) else { continue };
+                    A::subtract_row(&mut sum, scale[stage], product);
+                }
+                *target = sum;
+            }
         }
     }
 
@@ -210,7 +265,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         }
     }
 
-    /// The same, but for the columns of scaled pivots.
+    /// What pivots before this one that are not scaled subtract from its row.
     #[inline(always)]
     fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column } = self;
@@ -226,9 +281,6 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
                 subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
             }
             store(rows, slot, *column, &packet);
-        }
-        if is_scaled::<S>(pivot) {
-            self.down_by_columns::<A>(pivot);
         }
     }
 

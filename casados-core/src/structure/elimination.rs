@@ -67,6 +67,9 @@ pub struct Pivot {
     /// The pivot is the identity, and nothing has been added to the blocks of its column, three or more, which are
     /// `h diag(state) A`: with two stages or more only `state` is stored, and `hA` is applied once for all of them.
     pub scaled: bool,
+    /// How many pivots from this one on are scaled and have the same rows below them, as those of the coordinates of a point: at most
+    /// three, which go through these rows together; zero if one before this one has counted it.
+    pub beside: u32,
 }
 
 impl Pivot {

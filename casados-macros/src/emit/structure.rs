@@ -134,8 +134,9 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         }
     }
     let (mut left, mut pivots) = (Vec::new(), Vec::new());
-    for (((&(_, slot), range), identity), scaled) in
-        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled)
+    let beside = beside(&plan.ranges, &slots, scaled);
+    for ((((&(_, slot), range), identity), scaled), beside) in
+        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled).zip(beside)
     {
         let mut ends = [left.len(); 3];
         for (kind, end) in rows[slot as usize].iter().zip(&mut ends[1..]) {
@@ -147,7 +148,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         }
         let ends = ends.map(Literal::usize_unsuffixed);
         let [slot, block, upper, end] = [slot, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
-        pivots.push(quote!(pivot(#slot, #block, #upper, #end, [#(#ends),*], #identity, #scaled)));
+        let beside = Literal::u32_unsuffixed(beside);
+        pivots.push(quote!(pivot(#slot, [#block, #upper, #end], [#(#ends),*], #identity, #scaled, #beside)));
     }
     let scaled: HashSet<u32> = plan
         .ranges
@@ -182,14 +184,13 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         use #krate::model::{Assembly, Left, Pivot};
         const fn pivot(
             slot: u32,
-            block: u32,
-            upper: u32,
-            end: u32,
+            [block, upper, end]: [u32; 3],
             left: [u32; 3],
             identity: bool,
             scaled: bool,
+            beside: u32,
         ) -> Pivot {
-            Pivot { slot, block, upper, end, left, identity, scaled }
+            Pivot { slot, block, upper, end, left, identity, scaled, beside }
         }
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }
@@ -206,6 +207,26 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             slot_of_equation: &[#(#slot_of_equation),*],
         }
     }}
+}
+
+/// How many scaled pivots from each on have the same rows below them; zero for all but the first of them.
+fn beside(ranges: &[[u32; 3]], slots: &[u32], scaled: &[bool]) -> Vec<u32> {
+    /// So many at most does the engine take together.
+    const MOST: usize = 3;
+    let below = |pivot: usize| {
+        let [block, upper, _] = ranges[pivot];
+        &slots[block as usize + 1..upper as usize]
+    };
+    let mut beside = vec![1; ranges.len()];
+    let mut first = 0;
+    while first < ranges.len() {
+        let same = |&pivot: &usize| pivot == first || scaled[pivot] && below(pivot) == below(first);
+        let count = if scaled[first] { (first..ranges.len()).take(MOST).take_while(same).count() } else { 1 };
+        beside[first] = count as u32;
+        beside[first + 1..first + count].fill(0);
+        first += count;
+    }
+    beside
 }
 
 fn numbers(list: &[u32]) -> Vec<Literal> {
