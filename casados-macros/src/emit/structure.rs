@@ -240,3 +240,27 @@ fn pattern(krate: &syn::Path, entries: &[(u32, u32, Node)]) -> TokenStream {
         #krate::model::Pattern { rows: &[#(#rows),*], columns: &[#(#columns),*] }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::beside;
+
+    /// Pivots with so many rows below each, from a first one on.
+    fn of(rows: &[(u32, u32)], scaled: &[bool]) -> Vec<u32> {
+        let (mut ranges, mut slots) = (Vec::new(), Vec::new());
+        for (first, count) in rows {
+            let block = slots.len() as u32;
+            slots.push(u32::MAX);
+            slots.extend(*first..first + count);
+            ranges.push([block, slots.len() as u32, slots.len() as u32]);
+        }
+        beside(&ranges, &slots, scaled)
+    }
+
+    #[test]
+    fn scaled_pivots_with_the_same_rows_go_together() {
+        assert_eq!(of(&[(7, 3); 5], &[true; 5]), [3, 0, 0, 2, 0]);
+        assert_eq!(of(&[(7, 3), (7, 3), (8, 3), (8, 4)], &[true; 4]), [2, 0, 1, 1]);
+        assert_eq!(of(&[(7, 3); 4], &[true, false, true, true]), [1, 1, 2, 0]);
+    }
+}
