@@ -181,37 +181,43 @@ impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, c
     Multiply<'_, E, S, L, N, W, P>
 {
     /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied with is fetched once for all of them, so many
-    /// columns and stages at a time that it fits registers beside them.
+    /// columns and stages at a time that it fits registers beside them; of sixteen registers it seldom does.
     #[inline(always)]
     fn rows<A: Arithmetic, M: Dae, const R: usize>(
         &self,
         terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
     ) -> &'static [Term] {
-        if const { R == 1 } {
-            return self.row::<A, M>(terms, g);
+        if const { R == 1 || !A::WIDE && (size_of::<E>() > 8 || L > 2) } {
+            let mut others = terms;
+            for row in 0..R {
+                others = self.row::<A, M, R>(terms, g, row);
+            }
+            return others;
         }
-        if const { size_of::<E>() > 8 && W > 4 && A::WIDE } {
+        if const { size_of::<E>() > 8 && W > 4 } {
             self.in_parts::<A, M, R, 1, 4>(terms, g)
-        } else if const { size_of::<E>() > 8 && W > 2 && !A::WIDE } {
-            self.in_parts::<A, M, R, 1, 2>(terms, g)
-        } else if const { size_of::<E>() > 8 || L % 2 == 1 || !A::WIDE } {
+        } else if const { size_of::<E>() > 8 || A::WIDE && L % 2 == 1 } {
             self.in_parts::<A, M, R, 1, W>(terms, g)
-        } else {
+        } else if const { A::WIDE } {
             self.in_parts::<A, M, R, 2, W>(terms, g)
+        } else {
+            self.in_parts::<A, M, R, L, W>(terms, g)
         }
     }
 
-    /// One row at all stages.
+    /// One of `R` rows, at all stages.
     #[inline(always)]
-    fn row<A: Arithmetic, M: Dae>(
+    fn row<A: Arithmetic, M: Dae, const R: usize>(
         &self,
         mut terms: &'static [Term],
         g: &mut [[[[E; W]; P]; L]],
+        row: usize,
     ) -> &'static [Term] {
         let mut packets = [[[[E::from_f64(0.0); W]; P]; L]; N];
-        let Some(&first) = terms.first() else { return &[] };
-        while let Some((term, rest)) = terms.split_first()
+        let Some(&first) = terms.get(row) else { return &[] };
+        while let Some((now, rest)) = terms.split_first_chunk::<R>()
+            && let Some(term) = now.get(row)
             && term.row == first.row
         {
             if let Some(values) = self.entries.get(term.entry as usize) {
