@@ -134,7 +134,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         }
     }
     let (mut left, mut pivots) = (Vec::new(), Vec::new());
-    let beside = beside(&plan.ranges, &slots, scaled);
+    let is_free: Vec<bool> = plan.pivots.iter().map(|&(_, slot)| rows[slot as usize][0].is_empty()).collect();
+    let beside = beside(&plan.ranges, &slots, scaled, &is_free);
     for ((((&(_, slot), range), identity), scaled), beside) in
         plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled).zip(beside)
     {
@@ -209,8 +210,9 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     }}
 }
 
-/// How many scaled pivots from each on have the same rows below them; zero for all but the first of them.
-fn beside(ranges: &[[u32; 3]], slots: &[u32], scaled: &[bool]) -> Vec<u32> {
+/// How many scaled pivots from each on have the same rows below them; zero for all but the first of them. Their own rows must be
+/// finished at the turn of the first: those of the others are free of blocks of `L` that are subtracted at their turn.
+fn beside(ranges: &[[u32; 3]], slots: &[u32], scaled: &[bool], is_free: &[bool]) -> Vec<u32> {
     /// So many at most does the engine take together.
     const MOST: usize = 3;
     let below = |pivot: usize| {
@@ -220,7 +222,9 @@ fn beside(ranges: &[[u32; 3]], slots: &[u32], scaled: &[bool]) -> Vec<u32> {
     let mut beside = vec![1; ranges.len()];
     let mut first = 0;
     while first < ranges.len() {
-        let same = |&pivot: &usize| pivot == first || scaled[pivot] && below(pivot) == below(first);
+        let same = |&pivot: &usize| {
+            pivot == first || scaled[pivot] && is_free[pivot] && below(pivot) == below(first)
+        };
         let count = if scaled[first] { (first..ranges.len()).take(MOST).take_while(same).count() } else { 1 };
         beside[first] = count as u32;
         beside[first + 1..first + count].fill(0);
@@ -246,7 +250,7 @@ mod tests {
     use super::beside;
 
     /// Pivots with so many rows below each, from a first one on.
-    fn of(rows: &[(u32, u32)], scaled: &[bool]) -> Vec<u32> {
+    fn of(rows: &[(u32, u32)], scaled: &[bool], is_free: &[bool]) -> Vec<u32> {
         let (mut ranges, mut slots) = (Vec::new(), Vec::new());
         for (first, count) in rows {
             let block = slots.len() as u32;
@@ -254,13 +258,14 @@ mod tests {
             slots.extend(*first..first + count);
             ranges.push([block, slots.len() as u32, slots.len() as u32]);
         }
-        beside(&ranges, &slots, scaled)
+        beside(&ranges, &slots, scaled, is_free)
     }
 
     #[test]
     fn scaled_pivots_with_the_same_rows_go_together() {
-        assert_eq!(of(&[(7, 3); 5], &[true; 5]), [3, 0, 0, 2, 0]);
-        assert_eq!(of(&[(7, 3), (7, 3), (8, 3), (8, 4)], &[true; 4]), [2, 0, 1, 1]);
-        assert_eq!(of(&[(7, 3); 4], &[true, false, true, true]), [1, 1, 2, 0]);
+        assert_eq!(of(&[(7, 3); 5], &[true; 5], &[true; 5]), [3, 0, 0, 2, 0]);
+        assert_eq!(of(&[(7, 3), (7, 3), (8, 3), (8, 4)], &[true; 4], &[true; 4]), [2, 0, 1, 1]);
+        assert_eq!(of(&[(7, 3); 4], &[true, false, true, true], &[true; 4]), [1, 1, 2, 0]);
+        assert_eq!(of(&[(7, 3); 4], &[true; 4], &[false, true, false, true]), [2, 0, 2, 0]);
     }
 }
