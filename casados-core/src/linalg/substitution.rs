@@ -167,7 +167,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             }
         }
         // Where nothing is optimised this would only take long to compile.
-        if const { W > 1 && A::FUSED } && is_scaled::<S>(pivot) {
+        if const { W > 1 && S > 2 && A::FUSED } && is_scaled::<S>(pivot) {
             match (pivot.beside, others) {
                 (0, _) => return,
                 (2, [second, ..]) => return self.down_beside::<A, 2>([pivot, second]),
