@@ -8,7 +8,7 @@ use crate::scalar::{Lanes, Scalar, Tangent};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
-    Assembly, Cost, Elimination, Left, NO_COLUMN, Operations, Pattern, Pivot, Structure, Term, all,
+    Assembly, Cost, Elimination, Left, NO_COLUMN, Operations, Pattern, Pivot, Steady, Structure, Term, all,
     by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;

@@ -3,14 +3,35 @@
 use super::directions::{Directions, panel_of};
 use super::evaluate::entry;
 use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, slot};
-use crate::model::Dae;
+use crate::model::{Dae, Steady};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
 
-/// `−(f_x,i V_0 + f_w,i)`, where every direction is an element of `w`: entries of the Jacobian go to their places in all panels.
+/// What is known of a [steady](Steady) state, if a state is.
+#[inline(always)]
+fn steady<M: Dae>(state: usize) -> Option<Steady> {
+    let steady = *M::STRUCTURE.elimination.steady.get(state)?;
+    (steady.entry != Steady::NONE).then_some(steady)
+}
+
+/// `h c_i`, as sums of the rows of `hA`.
+#[inline(always)]
+pub(super) fn nodes<E: Lanes, const S: usize>(a: &[[E; S]; S], h: E) -> [E; S] {
+    let mut nodes = [E::from_f64(0.0); S];
+    for (node, row) in nodes.iter_mut().zip(a) {
+        for &a in row {
+            *node = *node + h * a;
+        }
+    }
+    nodes
+}
+
+/// `−(f_x,i V_0 + f_w,i)`, where every direction is an element of `w`: entries of the Jacobian go to their places in all panels. Steady
+/// states have been subtracted.
 pub(super) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
+    pub nodes: &'a [E; S],
     pub dy: &'a mut [E],
     pub directions: PhantomData<D>,
 }
@@ -25,40 +46,110 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
         let Some(column) = direction::<M, E, D>(c) else { return };
         let (begin, width) = panel_of::<E>(column, D::COUNT, S);
-        let place = begin * nk * S + slot::<M>(r) * S * width + (column - begin);
-        for (stage, &value) in values.iter().enumerate() {
-            if let Some(to) = self.dy.get_mut(place + stage * width) {
-                *to = *to - value;
+        let place = begin * nk * S + (column - begin);
+        let of = slot::<M>(r);
+        let Some(steady) = steady::<M>(of) else {
+            for (stage, &value) in values.iter().enumerate() {
+                if let Some(to) = self.dy.get_mut(place + (of * S + stage) * width) {
+                    *to = *to - value;
+                }
+            }
+            return;
+        };
+        // All stages are the first.
+        if let Some(to) = self.dy.get_mut(place + of * S * width) {
+            *to = -values[0];
+        }
+        for index in steady.first..steady.end {
+            let Some((r, _, felt)) = by_column::<M, _>(self.jacobian, index as usize) else { continue };
+            for (stage, (&felt, &node)) in felt.iter().zip(self.nodes).enumerate() {
+                if let Some(to) = self.dy.get_mut(place + (slot::<M>(r) * S + stage) * width) {
+                    *to = *to + felt * node * values[0];
+                }
             }
         }
     }
+}
+
+/// An entry of the Jacobian, by columns.
+#[inline(always)]
+fn by_column<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Option<(usize, usize, &V)> {
+    entry::<M, V>(jacobian, *M::STRUCTURE.by_column.get(index)? as usize)
 }
 
 /// The same of a panel that begins with a column: entries column by column, from one of them on. Where the next panel begins.
 #[inline(always)]
 pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
     jacobian: &M::Jacobian<[E; S]>,
+    nodes: &[E; S],
     mut placed: usize,
     dy: &mut [Packet<E, S, W>],
     begin: usize,
 ) -> usize {
-    while let Some(&index) = M::STRUCTURE.by_column.get(placed) {
-        let Some((r, c, values)) = entry::<M, _>(jacobian, index as usize) else { break };
-        if let Some(column) = direction::<M, E, D>(c) {
-            if column >= begin + W {
-                break;
-            }
-            if let Some(packet) = dy.get_mut(slot::<M>(r)) {
-                for (row, &value) in packet.iter_mut().zip(values) {
-                    if let Some(to) = row.get_mut(column - begin) {
-                        *to = *to - value;
-                    }
-                }
-            }
-        }
+    while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed) {
         placed += 1;
+        let Some(column) = direction::<M, E, D>(c) else { continue };
+        if column >= begin + W {
+            return placed - 1;
+        }
+        let of = slot::<M>(r);
+        let Some(steady) = steady::<M>(of) else {
+            subtract_at(dy, of, column - begin, values);
+            continue;
+        };
+        // All stages are the first.
+        if let Some(to) = dy.get_mut(of).and_then(|packet| packet.first_mut()?.get_mut(column - begin)) {
+            *to = -values[0];
+        }
+        for index in steady.first..steady.end {
+            let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
+            let mut products = *felt;
+            for (product, &node) in products.iter_mut().zip(nodes) {
+                *product = -(*product * node * values[0]);
+            }
+            subtract_at(dy, slot::<M>(r), column - begin, &products);
+        }
     }
     placed
+}
+
+/// Subtracts from one column of a row.
+#[inline(always)]
+fn subtract_at<E: Lanes, const S: usize, const W: usize>(
+    dy: &mut [Packet<E, S, W>],
+    slot: usize,
+    column: usize,
+    values: &[E; S],
+) {
+    let Some(packet) = dy.get_mut(slot) else { return };
+    for (row, &value) in packet.iter_mut().zip(values) {
+        if let Some(to) = row.get_mut(column) {
+            *to = *to - value;
+        }
+    }
+}
+
+/// Makes a right-hand side of which steady states have been subtracted that of the whole system again.
+#[inline(always)]
+pub(super) fn restore<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
+    jacobian: &M::Jacobian<[E; S]>,
+    nodes: &[E; S],
+    dy: &mut [Packet<E, S, W>],
+) {
+    for state in 0..M::Shape::NX {
+        let Some(steady) = steady::<M>(state) else { continue };
+        let Some(&own) = dy.get(state).and_then(|packet| packet.first()) else { continue };
+        for index in steady.first..steady.end {
+            let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
+            let Some(packet) = dy.get_mut(slot::<M>(r)) else { continue };
+            for ((row, &felt), &node) in packet.iter_mut().zip(felt).zip(nodes) {
+                A::subtract_row(row, -(felt * node), &own);
+            }
+        }
+        if let Some(packet) = dy.get_mut(state) {
+            *packet = [own; S];
+        }
+    }
 }
 
 /// The direction that a variable other than `ẋ` is, if it is one.
@@ -74,14 +165,17 @@ fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
     }
 }
 
-/// `−f_x,i V_n` of a panel.
-pub(super) struct Later<'a, M: Dae, E: Plain, const S: usize, const W: usize> {
+/// `−(f_x,i V_n + f_w,i)` of a panel; steady states have been subtracted.
+pub(super) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
+    pub nodes: &'a [E; S],
     pub v: &'a [[E; W]],
+    pub directions: &'a D,
     pub dy: &'a mut [Packet<E, S, W>],
+    pub column: usize,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
     /// The first entry of `f_x`.
     const FIRST: usize = M::STRUCTURE.blocks[1];
 
@@ -89,10 +183,46 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
     pub fn all<A: Arithmetic>(mut self) {
         if const { is_short::<A, Self>() } {
             self.dy.fill([[E::from_f64(0.0); W]; S]);
+        }
+        // What multiplies `f_x` lies where their right-hand sides do, until all others are there.
+        for state in 0..M::STRUCTURE.elimination.steady.len() {
+            if let (Some(own), Some(v), Some(to)) =
+                (self.own::<A>(state), self.v.get(state), self.dy.get_mut(state))
+            {
+                for (to, &node) in to.iter_mut().zip(self.nodes) {
+                    let mut row = *v;
+                    A::subtract_row(&mut row, -node, &own);
+                    *to = row;
+                }
+            }
+        }
+        if const { is_short::<A, Self>() } {
             each_row::<A, _>(&mut self);
         } else {
             self.row_by_row::<A>();
         }
+        let Self { jacobian, directions, column, .. } = self;
+        each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy: &mut *self.dy, column });
+        for state in 0..M::STRUCTURE.elimination.steady.len() {
+            let Some(own) = self.own::<A>(state) else { continue };
+            if let Some(to) = self.dy.get_mut(state).and_then(|packet| packet.first_mut()) {
+                *to = own;
+            }
+        }
+    }
+
+    /// The right-hand side of a steady state.
+    #[inline(always)]
+    fn own<A: Arithmetic>(&self, state: usize) -> Option<[E; W]> {
+        let (_, c, values) = entry::<M, _>(self.jacobian, steady::<M>(state)?.entry as usize)?;
+        let value = *values.first()?;
+        let mut row = [E::from_f64(0.0); W];
+        if c < 2 * M::Shape::NX {
+            A::subtract_row(&mut row, value, self.v.get(c - M::Shape::NX)?);
+        } else {
+            self.directions.add(c - M::Shape::NX - M::Shape::NZ, -value, self.column, &mut row);
+        }
+        Some(row)
     }
 
     /// Each row in registers, and written once; zeros where equations have no states.
@@ -106,19 +236,39 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
                 self.clear(last + 1, r);
                 (packet, last) = ([[E::from_f64(0.0); W]; S], r);
             }
-            let Some(v) = self.v.get(c - M::Shape::NX) else { return };
-            for (row, &value) in packet.iter_mut().zip(values) {
-                A::subtract_row(row, value, v);
+            if !self.subtract::<A>(&mut packet, c - M::Shape::NX, values) {
+                return;
             }
         }
         self.put(last, &packet);
         self.clear(last + 1, M::Shape::NK);
     }
 
+    /// `packet − f_x,i V`, of one state. Whether there is one.
+    #[inline(always)]
+    fn subtract<A: Arithmetic>(&self, packet: &mut Packet<E, S, W>, state: usize, values: &[E; S]) -> bool {
+        if steady::<M>(state).is_some() {
+            let Some(x) = self.dy.get(state) else { return false };
+            for ((row, &value), x) in packet.iter_mut().zip(values).zip(x) {
+                A::subtract_row(row, value, x);
+            }
+            return true;
+        }
+        let Some(v) = self.v.get(state) else { return false };
+        for (row, &value) in packet.iter_mut().zip(values) {
+            A::subtract_row(row, value, v);
+        }
+        true
+    }
+
     /// The row of an equation.
     #[inline(always)]
     fn put(&mut self, equation: usize, packet: &Packet<E, S, W>) {
-        if let Some(to) = self.dy.get_mut(slot::<M>(equation)) {
+        let slot = slot::<M>(equation);
+        if steady::<M>(slot).is_some() {
+            return;
+        }
+        if let Some(to) = self.dy.get_mut(slot) {
             *to = *packet;
         }
     }
@@ -132,27 +282,28 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize> Later<'_, M, E, S, W> {
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const W: usize> AtRow for Later<'_, M, E, S, W> {
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Later<'_, M, E, D, S, W> {
     const ROWS: usize = M::STRUCTURE.blocks[2] - M::STRUCTURE.blocks[1];
     const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
-        let (Some(packet), Some(v)) = (self.dy.get_mut(slot::<M>(r)), self.v.get(c - M::Shape::NX)) else {
-            return;
-        };
-        for (row, &value) in packet.iter_mut().zip(values) {
-            A::subtract_row(row, value, v);
+        let slot = slot::<M>(r);
+        let Some(&(mut packet)) = self.dy.get(slot) else { return };
+        if steady::<M>(slot).is_none() && self.subtract::<A>(&mut packet, c - M::Shape::NX, values) {
+            if let Some(to) = self.dy.get_mut(slot) {
+                *to = packet;
+            }
         }
     }
 }
 
-/// `−f_w,i` of a panel, of controls and parameters.
-pub(super) struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
-    pub jacobian: &'a M::Jacobian<[E; S]>,
-    pub directions: &'a D,
-    pub dy: &'a mut [Packet<E, S, W>],
-    pub column: usize,
+/// `−f_w,i` of a panel, of controls and parameters, but for steady states.
+struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    directions: &'a D,
+    dy: &'a mut [Packet<E, S, W>],
+    column: usize,
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow for Inputs<'_, M, E, D, S, W> {
@@ -162,7 +313,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let shift = M::Shape::NX + M::Shape::NZ;
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row) else { return };
-        let Some(packet) = self.dy.get_mut(slot::<M>(r)) else { return };
+        let slot = slot::<M>(r);
+        let (None, Some(packet)) = (steady::<M>(slot), self.dy.get_mut(slot)) else { return };
         for (row, &value) in packet.iter_mut().zip(values) {
             self.directions.add(c - shift, -value, self.column, row);
         }

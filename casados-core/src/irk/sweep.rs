@@ -4,10 +4,9 @@
 use super::curvature::row_of;
 use super::directions::{Directions, NEAREST, panel, panel_mut, panels, weight};
 use super::record::{Coefficients, Work, copy};
-use super::right_side::{Inputs, Later, Scatter, place};
+use super::right_side::{Later, Scatter, nodes, place, restore};
 use crate::linalg::{
-    Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, each_row, is_long, is_short,
-    solve_packets,
+    Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, each_row, is_long, is_short, solve_steady,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -132,6 +131,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             curved,
             second,
             placed: 0,
+            nodes: [work.inputs.time.step; S],
             model: PhantomData,
         });
     }
@@ -236,6 +236,8 @@ struct Step<'a, M: Dae, E: Plain, D, const S: usize> {
     second: bool,
     /// How many entries of the Jacobian, column by column, are in their panels.
     placed: usize,
+    /// `h c_i`
+    nodes: [E; S],
     model: PhantomData<M>,
 }
 
@@ -245,6 +247,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
+        self.nodes = nodes(&self.coefficients.a, self.h);
         if self.phase != Phase::Before {
             for strands in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
                 clear(strands);
@@ -257,8 +260,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
         }
         if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
             self.dy.fill(E::from_f64(0.0));
-            let (jacobian, dy) = (self.jacobian, &mut *self.dy);
-            each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, dy, directions: PhantomData });
+            let (jacobian, nodes, dy) = (self.jacobian, &self.nodes, &mut *self.dy);
+            each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, nodes, dy, directions: PhantomData });
         }
         panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column));
     }
@@ -276,7 +279,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         self.before::<A, W>(column);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         if self.phase == Phase::Whole {
-            solve_packets::<A, M, E, [E; W], S, W>(self.factors, dy, 0);
+            solve_steady::<A, M, E, [E; W], S, W>(self.factors, dy);
         }
         self.after::<A, W>(column);
     }
@@ -292,12 +295,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             return;
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
+        let nodes = &self.nodes;
         if !(self.first && D::SPARSE) {
-            Later::<M, E, S, W> { jacobian, v, dy }.all::<A>();
-            each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy, column });
+            Later::<M, E, D, S, W> { jacobian, nodes, v, directions, dy: &mut *dy, column }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
             dy.fill([[E::from_f64(0.0); W]; S]);
-            self.placed = place::<M, E, D, S, W>(jacobian, self.placed, dy, column);
+            self.placed = place::<M, E, D, S, W>(jacobian, nodes, self.placed, dy, column);
+        }
+        // Factors of the whole matrix know of no order.
+        if self.phase == Phase::Before {
+            restore::<A, M, E, S, W>(jacobian, nodes, dy);
         }
     }
 

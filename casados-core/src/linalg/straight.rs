@@ -168,6 +168,7 @@ const fn nth(plan: &Elimination, n: usize) -> (&'static Pivot, &'static [Pivot],
             left: [0; 3],
             identity: true,
             scaled: false,
+            steady: false,
             beside: 1,
         };
         return (&NONE, &[], &[]);

@@ -86,18 +86,22 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTran
 
 /// The part of [`solve`] for `W` columns, inside of a kernel.
 #[inline(always)]
-pub fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
     column: usize,
 ) {
-    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
-        return;
-    }
-    let mut down = Sweep::<M, E, R, S, W, DOWN> { factors, rows, column };
-    from_first::<A, M, _>(&mut down);
-    let mut up = Sweep::<M, E, R, S, W, UP> { factors, rows: down.rows, column };
-    from_last::<A, M, _>(&mut up);
+    sweeps::<A, M, E, R, S, W, DOWN, UP>(factors, rows, column);
+}
+
+/// The same, where what [steady](crate::model::Steady) states subtract from the equations below them has been subtracted; of their own
+/// right-hand sides the first stage has that of all.
+#[inline(always)]
+pub fn solve_steady<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
+    sweeps::<A, M, E, R, S, W, STEADY_DOWN, STEADY_UP>(factors, rows, 0);
 }
 
 #[inline(always)]
@@ -113,20 +117,40 @@ fn solve_packet_transposed<
     rows: &mut [[R; S]],
     column: usize,
 ) {
+    sweeps::<A, M, E, R, S, W, TRANSPOSED_DOWN, TRANSPOSED_UP>(factors, rows, column);
+}
+
+#[inline(always)]
+fn sweeps<
+    A: Arithmetic,
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    const S: usize,
+    const W: usize,
+    const FIRST: usize,
+    const SECOND: usize,
+>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+    column: usize,
+) {
     if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
         return;
     }
-    let mut down = Sweep::<M, E, R, S, W, TRANSPOSED_DOWN> { factors, rows, column };
+    let mut down = Sweep::<M, E, R, S, W, FIRST> { factors, rows, column };
     from_first::<A, M, _>(&mut down);
-    let mut up = Sweep::<M, E, R, S, W, TRANSPOSED_UP> { factors, rows: down.rows, column };
+    let mut up = Sweep::<M, E, R, S, W, SECOND> { factors, rows: down.rows, column };
     from_last::<A, M, _>(&mut up);
 }
 
-/// The triangular systems: `I + L`, `P + U`, and both transposed.
+/// The triangular systems: `I + L`, `P + U`, both transposed, and the former two where steady states are done.
 const DOWN: usize = 0;
 const UP: usize = 1;
 const TRANSPOSED_DOWN: usize = 2;
 const TRANSPOSED_UP: usize = 3;
+const STEADY_DOWN: usize = 4;
+const STEADY_UP: usize = 5;
 
 /// One of them, for `W` columns.
 struct Sweep<'a, M, E, R, const S: usize, const W: usize, const SYSTEM: usize> {
@@ -146,7 +170,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [u32]) {
         match SYSTEM {
             DOWN => self.down::<A>(pivot, others),
-            UP => self.up::<A>(pivot),
+            STEADY_DOWN if pivot.steady => {}
+            STEADY_DOWN => self.down::<A>(pivot, others),
+            UP | STEADY_UP => self.up::<A>(pivot),
             TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
             _ => self.transposed_up::<A>(pivot),
         }
@@ -292,6 +318,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if const { SYSTEM == STEADY_UP } && pivot.steady {
+            packet = [packet[0]; S];
+        }
         for (block, other) in beside(*factors, pivot.upper()) {
             if other >= rows.len() {
                 continue;

@@ -18,12 +18,21 @@ pub struct Elimination {
     pub assembly: &'static [Assembly],
     /// For each equation its slot.
     pub slot_of_equation: &'static [u32],
+    /// For each state whether right-hand sides of its pivot are the same at all stages; empty if of none.
+    pub steady: &'static [Steady],
 }
 
 impl Elimination {
     /// No plan: the matrix is eliminated as a dense one.
-    pub const NONE: Self =
-        Self { pivots: &[], slots: &[], left: &[], updates: &[], assembly: &[], slot_of_equation: &[] };
+    pub const NONE: Self = Self {
+        pivots: &[],
+        slots: &[],
+        left: &[],
+        updates: &[],
+        assembly: &[],
+        slot_of_equation: &[],
+        steady: &[],
+    };
 
     /// How many blocks are fill.
     #[must_use]
@@ -67,9 +76,34 @@ pub struct Pivot {
     /// The pivot is the identity, and nothing has been added to the blocks of its column, three or more, which are
     /// `h diag(state) A`: with two stages or more only `state` is stored, and `hA` is applied once for all of them.
     pub scaled: bool,
+    /// Its state is [`steady`](Steady).
+    pub steady: bool,
     /// How many pivots from this one on are scaled and have the same rows below them, as those of the coordinates of a point: at most
     /// three, which go through these rows together; zero if one before this one has counted it.
     pub beside: u32,
+}
+
+/// A state `x_j` with a pivot `ẋ_j − c v = 0` that is the first thing done to it, where `v` is a state, a control or a parameter: right-hand
+/// sides `r_j = c dv` of linearised equations are the same at all stages then, and so is what they add to `x_j` but for the nodes,
+///
+/// ```text
+/// f_x,i (dx_j + h Σ_l a_il r_j) = f_x,i (dx_j + h c_i r_j)
+/// ```
+///
+/// which goes into the right-hand sides of the other equations at once: nothing is left to be subtracted below the pivot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Steady {
+    /// The entry of the Jacobian that is `−c`, or [`Steady::NONE`].
+    pub entry: u32,
+    /// Where in the [entries by column](super::Structure::by_column) those of `x_j` begin
+    pub first: u32,
+    /// and end.
+    pub end: u32,
+}
+
+impl Steady {
+    /// No entry: the state has no such pivot.
+    pub const NONE: u32 = u32::MAX;
 }
 
 impl Pivot {

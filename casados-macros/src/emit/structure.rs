@@ -112,7 +112,7 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
 /// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that is its pivot.
 fn elimination(analysis: &Analysis) -> TokenStream {
     let krate = &analysis.model.krate;
-    let Elimination { plan, positions, identity, scaled } = &analysis.elimination;
+    let Elimination { plan, positions, identity, scaled, steady } = &analysis.elimination;
     let mut slot_of_equation = vec![0; plan.pivots.len()];
     for &(row, column) in &plan.pivots {
         slot_of_equation[row as usize] = column;
@@ -135,9 +135,11 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     }
     let (mut left, mut pivots) = (Vec::new(), Vec::new());
     let is_free: Vec<bool> = plan.pivots.iter().map(|&(_, slot)| rows[slot as usize][0].is_empty()).collect();
-    let beside = beside(&plan.ranges, &slots, scaled, &is_free);
-    for ((((&(_, slot), range), identity), scaled), beside) in
-        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled).zip(beside)
+    let is_steady: Vec<bool> =
+        plan.pivots.iter().map(|&(_, slot)| matches!(steady.get(slot as usize), Some(Some(_)))).collect();
+    let beside = beside(&plan.ranges, &slots, scaled, &is_free, &is_steady);
+    for (((((&(_, slot), range), identity), scaled), beside), steady) in
+        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled).zip(beside).zip(&is_steady)
     {
         let mut ends = [left.len(); 3];
         for (kind, end) in rows[slot as usize].iter().zip(&mut ends[1..]) {
@@ -150,7 +152,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         let ends = ends.map(Literal::usize_unsuffixed);
         let [slot, block, upper, end] = [slot, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
         let beside = Literal::u32_unsuffixed(beside);
-        pivots.push(quote!(pivot(#slot, [#block, #upper, #end], [#(#ends),*], #identity, #scaled, #beside)));
+        let kinds = [identity, scaled, steady];
+        pivots.push(quote!(pivot(#slot, [#block, #upper, #end], [#(#ends),*], [#(#kinds),*], #beside)));
     }
     let scaled: HashSet<u32> = plan
         .ranges
@@ -179,19 +182,27 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         let (direct, state, block) = (entry(direct), entry(state), Literal::u32_unsuffixed(block));
         quote!(assembly(#block, #direct, #state, #scaled))
     });
+    // Nothing where no state is.
+    let some = if steady.iter().any(Option::is_some) { steady.as_slice() } else { &[] };
+    let steady = some.iter().map(|steady| {
+        let [entry, first, end] = steady.unwrap_or([u32::MAX, 0, 0]).map(Literal::u32_unsuffixed);
+        quote!(steady(#entry, #first, #end))
+    });
     let [slots, updates, slot_of_equation] =
         [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Left, Pivot};
+        use #krate::model::{Assembly, Left, Pivot, Steady};
         const fn pivot(
             slot: u32,
             [block, upper, end]: [u32; 3],
             left: [u32; 3],
-            identity: bool,
-            scaled: bool,
+            [identity, scaled, steady]: [bool; 3],
             beside: u32,
         ) -> Pivot {
-            Pivot { slot, block, upper, end, left, identity, scaled, beside }
+            Pivot { slot, block, upper, end, left, identity, scaled, steady, beside }
+        }
+        const fn steady(entry: u32, first: u32, end: u32) -> Steady {
+            Steady { entry, first, end }
         }
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }
@@ -206,13 +217,20 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             updates: &[#(#updates),*],
             assembly: &const { [#(#assembly),*] },
             slot_of_equation: &[#(#slot_of_equation),*],
+            steady: &const { [#(#steady),*] },
         }
     }}
 }
 
 /// How many scaled pivots from each on have the same rows below them; zero for all but the first of them. Their own rows must be
 /// finished at the turn of the first: those of the others are free of blocks of `L` that are subtracted at their turn.
-fn beside(ranges: &[[u32; 3]], slots: &[u32], scaled: &[bool], is_free: &[bool]) -> Vec<u32> {
+fn beside(
+    ranges: &[[u32; 3]],
+    slots: &[u32],
+    scaled: &[bool],
+    is_free: &[bool],
+    is_steady: &[bool],
+) -> Vec<u32> {
     /// So many at most does the engine take together.
     const MOST: usize = 3;
     let below = |pivot: usize| {
@@ -223,7 +241,8 @@ fn beside(ranges: &[[u32; 3]], slots: &[u32], scaled: &[bool], is_free: &[bool])
     let mut first = 0;
     while first < ranges.len() {
         let same = |&pivot: &usize| {
-            pivot == first || scaled[pivot] && is_free[pivot] && below(pivot) == below(first)
+            let like = scaled[pivot] && is_free[pivot] && is_steady[pivot] == is_steady[first];
+            pivot == first || like && below(pivot) == below(first)
         };
         let count = if scaled[first] { (first..ranges.len()).take(MOST).take_while(same).count() } else { 1 };
         beside[first] = count as u32;
@@ -258,7 +277,7 @@ mod tests {
             slots.extend(*first..first + count);
             ranges.push([block, slots.len() as u32, slots.len() as u32]);
         }
-        beside(&ranges, &slots, scaled, is_free)
+        beside(&ranges, &slots, scaled, is_free, &vec![false; rows.len()])
     }
 
     #[test]

@@ -67,6 +67,9 @@ pub struct Elimination {
     pub identity: Vec<bool>,
     /// Of these the ones of whose column all blocks are `h diag(f_x) A`, with nothing added when the pivot's turn comes.
     pub scaled: Vec<bool>,
+    /// For each state, if right-hand sides of its pivot are the same at all stages: the entry of the Jacobian they are made of, and
+    /// where in the entries by column those of its `f_x` begin and end.
+    pub steady: Vec<Option<[u32; 3]>>,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -92,7 +95,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     let facts =
         facts::find(&model.graph, &model.residual, (jacobian, *blocks, constant), hessian, linear, ends);
     let explicit = explicit(&model, jacobian, ends);
-    let elimination = elimination(&model, jacobian, *blocks);
+    let elimination = elimination(&model, jacobian, *blocks, &facts.trivial);
     Ok(Analysis { model, derivatives, facts, explicit, elimination })
 }
 
@@ -154,7 +157,12 @@ fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
 const SHARED: usize = 3;
 
 /// Plans the elimination of the Newton matrix.
-fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6]) -> Elimination {
+fn elimination(
+    model: &Model,
+    jacobian: &[(u32, u32, Node)],
+    blocks: [usize; 6],
+    trivial: &[u32],
+) -> Elimination {
     let Variables { x, z, u, p } = &model.variables;
     let positions = samples::pattern(jacobian, blocks, x.len() as u32);
     let mut samplings = model.samplings.clone();
@@ -183,7 +191,31 @@ fn elimination(model: &Model, jacobian: &[(u32, u32, Node)], blocks: [usize; 6])
                 && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
-    Elimination { plan, positions, identity, scaled }
+    let free = |row: u32| {
+        let mut lower = plan.ranges.iter().flat_map(|&[block, upper, _]| block + 1..upper);
+        lower.all(|block| plan.blocks[block as usize].0 != row)
+    };
+    let mut steady = vec![None; x.len()];
+    for ((&(row, column), &[block, upper, _]), identity) in
+        plan.pivots.iter().zip(&plan.ranges).zip(&identity)
+    {
+        let Some(to) = steady.get_mut(column as usize) else { continue };
+        // What its row consists of beside the derivative: a state, a control or a parameter.
+        let mut others = (blocks[1]..blocks[5]).filter(|&entry| jacobian[entry].0 == row);
+        let Some(entry) = others.next().filter(|entry| !(blocks[2]..blocks[3]).contains(entry)) else {
+            continue;
+        };
+        let before =
+            |variable: u32| jacobian[blocks[1]..].iter().filter(|entry| entry.1 < variable).count() as u32;
+        let felt = [0, 1].map(|more| before(column + x.len() as u32 + more));
+        // All that the state is felt by comes later, and is `h diag(f_x) A` at its turn.
+        let below = (block + 1..upper).all(|block| original(block).is_some_and(|p| p.direct.is_none()));
+        let all = upper - block > 1 && upper - block - 1 == felt[1] - felt[0];
+        if *identity && others.next().is_none() && trivial.contains(&row) && free(row) && below && all {
+            *to = Some([entry as u32, felt[0], felt[1]]);
+        }
+    }
+    Elimination { plan, positions, identity, scaled, steady }
 }
 
 /// As many equations as unknowns.
