@@ -71,11 +71,6 @@ impl Structure {
         let assembly = s * s * of_x + s * shared.count() as u64;
         let curved_states =
             self.curved.iter().filter(|&&v| (nx..2 * nx).contains(&u64::from(v))).count() as u64;
-        let diagonal = (0..self.hessian.len()).filter(|&e| {
-            let (row, column) = self.hessian.at(e);
-            row == column
-        });
-        let (diagonal, hessian) = (diagonal.count() as u64, self.hessian.len() as u64);
         Cost {
             factorisation,
             solve,
@@ -86,7 +81,7 @@ impl Structure {
             adjoint: s * nx + solve + 2 * s * (of_x + of_w),
             hessian: s * u64::from(self.operations.hessian)
                 + directions * 2 * s * s * curved_states
-                + directions * 2 * s * (2 * hessian - diagonal)
+                + directions * 2 * s * self.symmetric.len() as u64
                 + directions * (directions + 1) / 2 * 2 * s * curved,
         }
     }

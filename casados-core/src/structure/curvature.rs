@@ -19,11 +19,32 @@ pub struct Term {
     pub rows: u32,
 }
 
+/// The second derivative in `ẋ_j`, where a [trivial](super::Structure::trivial) equation says that `ẋ_j = c v` at every stage, and no other one
+/// knows `ẋ_j`: `c²` times as much in `v` is the same.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fold {
+    /// The entry of the Hessian on the diagonal of `ẋ_j`.
+    pub entry: u32,
+    /// That on the diagonal of `v`.
+    pub into: u32,
+    /// `c²`
+    pub factor: f64,
+}
+
+/// The second derivative in a control or a parameter that no other one knows. Its row of `D_i` has one element.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lone {
+    /// The entry of the Hessian on its diagonal.
+    pub entry: u32,
+    /// The direction.
+    pub direction: u32,
+}
+
 /// So many rows at most have their terms beside each other; in firmware memory is dearer than time.
 pub const MOST_ROWS: usize = if cfg!(feature = "std") { 3 } else { 1 };
 
-/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern; `curved` are the `C` variables
-/// that occur in it. Row by row; but rows with the same columns, as those of the coordinates of a point, go through these together, so
+/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern, of the `C` variables `curved`:
+/// entries of others are left out. Row by row; but rows with the same columns, as those of the coordinates of a point, go through these together, so
 /// that what is multiplied is fetched once.
 #[must_use]
 pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved: &[u32; C]) -> [Term; N] {
@@ -33,12 +54,12 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     let mut entry = 0;
     while entry < hessian.len() {
         let (row, column) = hessian.at(entry);
-        let (row, column) = (position(curved, row), position(curved, column));
+        entry += 1;
+        let (Some(row), Some(column)) = (position(curved, row), position(curved, column)) else { continue };
         next[row] += 1;
         if row != column {
             next[column] += 1;
         }
-        entry += 1;
     }
     let (mut row, mut sum) = (0, 0);
     while row < C {
@@ -49,15 +70,15 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     let mut entry = 0;
     while entry < hessian.len() {
         let (row, column) = hessian.at(entry);
-        let (row, column) = (position(curved, row), position(curved, column));
-        terms[next[row]] = Term { row: row as u32, column: column as u32, entry: entry as u32, rows: 1 };
+        let term = Term { row: 0, column: 0, entry: entry as u32, rows: 1 };
+        entry += 1;
+        let (Some(row), Some(column)) = (position(curved, row), position(curved, column)) else { continue };
+        terms[next[row]] = Term { row: row as u32, column: column as u32, ..term };
         next[row] += 1;
         if row != column {
-            terms[next[column]] =
-                Term { row: column as u32, column: row as u32, entry: entry as u32, rows: 1 };
+            terms[next[column]] = Term { row: column as u32, column: row as u32, ..term };
             next[column] += 1;
         }
-        entry += 1;
     }
     beside(&terms, &next)
 }
@@ -183,7 +204,7 @@ pub const fn columns<const N: usize>(directions: &[u32]) -> [u32; N] {
 }
 
 /// Where a number is in an ascending list that has it.
-const fn position<const C: usize>(list: &[u32; C], number: usize) -> usize {
+const fn position<const C: usize>(list: &[u32; C], number: usize) -> Option<usize> {
     let (mut low, mut high) = (0, C);
     while low + 1 < high {
         let middle = low.midpoint(high);
@@ -193,7 +214,7 @@ const fn position<const C: usize>(list: &[u32; C], number: usize) -> usize {
             high = middle;
         }
     }
-    low
+    if low < C && list[low] as usize == number { Some(low) } else { None }
 }
 
 #[cfg(test)]

@@ -132,6 +132,8 @@ pub fn write(model: &Model) -> TokenStream {
                                 &#krate::model::all(),
                             )
                         },
+                        folded: &[],
+                        lone: &[],
                         operations: #krate::model::Operations {
                             residual: 0,
                             residual_jacobian: 0,

@@ -15,7 +15,17 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let name = model.name.to_string();
     let Variables { x, z, u, p } = &model.variables;
     let width = Literal::usize_unsuffixed(x.len() + u.len() + p.len());
-    let terms = hessian.iter().map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum::<usize>();
+    let of_curved = hessian.iter().filter(|entry| facts.curved.contains(&entry.0));
+    let terms = of_curved.map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum::<usize>();
+    let folded = facts.folded.iter().map(|&(entry, into, factor)| {
+        let [entry, into] = [entry, into].map(Literal::u32_unsuffixed);
+        let factor = Literal::f64_unsuffixed(factor);
+        quote!(#krate::model::Fold { entry: #entry, into: #into, factor: #factor })
+    });
+    let lone = facts.lone.iter().map(|&(entry, direction)| {
+        let [entry, direction] = [entry, direction].map(Literal::u32_unsuffixed);
+        quote!(#krate::model::Lone { entry: #entry, direction: #direction })
+    });
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let variables = Literal::usize_unsuffixed(2 * x.len() + z.len() + u.len() + p.len());
     let [begin, inputs] = [blocks[1], blocks[5] - blocks[1]].map(Literal::usize_unsuffixed);
@@ -53,6 +63,8 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             column_of_direction: &const { #krate::model::columns::<#width>(DIRECTIONS) },
             curved: CURVED,
             symmetric: &const { #krate::model::symmetric::<#count, #terms>(&HESSIAN, CURVED) },
+            folded: &[#(#folded),*],
+            lone: &[#(#lone),*],
             operations: #operations,
             elimination: #elimination,
         }

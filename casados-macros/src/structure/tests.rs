@@ -136,6 +136,8 @@ fn facts() {
         // x₀, x₁, u₀ and p₀; neither x₂ nor u₁.
         directions: vec![0, 1, 3, 5],
         curved: vec![3, 9],
+        folded: vec![],
+        lone: vec![],
     };
     assert_eq!(build(true, true), expected);
     let straight = Facts { linear_in_state: true, ..expected.clone() };
@@ -163,6 +165,64 @@ fn trivial_rows() {
     assert!(trivial(|g, v| sub(g, v[2], v[3])).is_empty());
     assert!(trivial(|g, v| mul(g, v[2], v[3])).is_empty());
     assert!(trivial(|g, v| mul(g, v[4], v[1])).is_empty());
+}
+
+/// `ẋ₀ = 2 x₁`, `ẋ₁ = u`, and squares of all of them in `z`: of these only that of `x₁` needs its row of `D`.
+#[test]
+fn squares_of_what_is_a_multiple_of_others() {
+    let build = |product: bool| {
+        accepted(model([2, 1, 1, 0], move |g, v| {
+            let two = g.constant(2.0);
+            let twice = mul(g, two, v[3]);
+            let mut third = v[4];
+            for square in [0, 1, 3, 5] {
+                let square = mul(g, v[square], v[square]);
+                third = sub(g, third, square);
+            }
+            if product {
+                let product = mul(g, v[0], v[2]);
+                third = sub(g, third, product);
+            }
+            vec![sub(g, v[0], twice), sub(g, v[1], v[5]), third]
+        }))
+        .facts
+    };
+    let facts = build(false);
+    assert_eq!(facts.curved, [3]);
+    assert_eq!(facts.folded, [(0, 2, 4.0), (1, 3, 1.0)]);
+    assert_eq!(facts.lone, [(3, 2)]);
+    // ẋ₀ x₀ needs both.
+    let facts = build(true);
+    assert_eq!(facts.curved, [0, 2, 3]);
+    assert_eq!(facts.folded.len(), 1);
+}
+
+/// `q̇ = v` and an equation that feels `q`, or `q̇` too, or `v` by way of a control.
+#[test]
+fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
+    let steady = |own: fn(&[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
+        accepted(model([2, 0, 1, 0], move |g, v| {
+            let force = other(g, v);
+            let (first, second) = (own(v), sub(g, v[1], force));
+            vec![sub(g, v[0], first), second]
+        }))
+        .elimination
+        .steady
+    };
+    let sine = |g: &mut Graph, v: &[Node]| g.unary(Unary::Sin, v[2]);
+    // Entries f_x of (row, variable) (0, 3) and (1, 2), the second one first by columns.
+    assert_eq!(steady(|v| v[3], sine), [Some([2, 0, 1]), None]);
+    // (1, 2) and (0, 4).
+    assert_eq!(steady(|v| v[4], sine), [Some([3, 0, 1]), None]);
+    // The equation of q varies.
+    assert_eq!(steady(|v| v[2], sine), [None, None]);
+    let with_derivative = |g: &mut Graph, v: &[Node]| {
+        let sine = g.unary(Unary::Sin, v[2]);
+        sub(g, sine, v[0])
+    };
+    assert_eq!(steady(|v| v[3], with_derivative), [None, None]);
+    // Nobody feels q.
+    assert_eq!(steady(|v| v[3], |_, v| v[4]), [None, None]);
 }
 
 #[test]
