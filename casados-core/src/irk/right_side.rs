@@ -86,6 +86,13 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
     dy: &mut [Packet<E, S, W>],
     begin: usize,
 ) -> usize {
+    for (slot, packet) in dy.iter_mut().enumerate() {
+        // Of steady states the first stage is looked at.
+        let stages = if steady::<M>(slot).is_some() { 1 } else { S };
+        for row in packet.iter_mut().take(stages) {
+            *row = [E::from_f64(0.0); W];
+        }
+    }
     while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed) {
         placed += 1;
         let Some(column) = direction::<M, E, D>(c) else { continue };

@@ -299,7 +299,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         if !(self.first && D::SPARSE) {
             Later::<M, E, D, S, W> { jacobian, nodes, v, directions, dy: &mut *dy, column }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
-            dy.fill([[E::from_f64(0.0); W]; S]);
             self.placed = place::<M, E, D, S, W>(jacobian, nodes, self.placed, dy, column);
         }
         // Factors of the whole matrix know of no order.
