@@ -10,6 +10,7 @@
 use super::adjoint::Backward;
 use super::along::Along;
 use super::curvature::{COLUMNS, Subtract};
+use super::curved_adjoint::{Back, is_worth};
 use super::directions::Identity;
 use super::evaluate::not_finite;
 use super::record::{Coefficients, Linearization, Step, Work, copy};
@@ -102,7 +103,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(record, n + 1 == steps.len());
+            self.subtract(work, coefficients, record, n, n + 1 == steps.len());
         }
         Ok(())
     }
@@ -137,17 +138,31 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the `last` step.
-    pub(crate) fn subtract<F: Fallback>(&mut self, record: &HessianStep<M, E, S, F>, last: bool) {
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the `last` step, with the linearisation of this one there.
+    pub(crate) fn subtract<F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+        record: &HessianStep<M, E, S, F>,
+        n: usize,
+        last: bool,
+    ) {
         let Self { g, sum, entries, .. } = self;
-        dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
-            entries: entries.as_ref(),
-            d: Array::flat(record.d.as_ref().as_flattened()),
-            g: g.as_mut(),
-            sum: sum.as_mut(),
-            fresh: last,
-            model: PhantomData,
-        });
+        let (entries, d, sum) =
+            (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
+        if const { is_worth::<M, E, S>() } {
+            Back::<M, E, ArrayW<M, E>, S> { coefficients, entries, d, g, sum, first: n == 0, last }.run(work);
+        } else {
+            let g = g.as_mut();
+            dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
+                entries,
+                d,
+                g,
+                sum,
+                fresh: last,
+                model: PhantomData,
+            });
+        }
     }
 }
 

@@ -36,5 +36,5 @@ pub(crate) use kernels::{are_finite, axpy};
 pub(crate) use mean::MeanFactors;
 pub(crate) use sparse::Planned;
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};
-pub(crate) use substitution::solve_packets;
+pub(crate) use substitution::{solve_packet_transposed, solve_packets};
 pub(crate) use twice::{dot_compensated, moved, two_product};

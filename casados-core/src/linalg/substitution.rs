@@ -100,8 +100,9 @@ pub fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const
     from_last::<A, M, _>(&mut up);
 }
 
+/// The part of [`solve_transposed`] for `W` columns, inside of a kernel.
 #[inline(always)]
-fn solve_packet_transposed<
+pub fn solve_packet_transposed<
     A: Arithmetic,
     M: Dae,
     E: Field + Plain,
