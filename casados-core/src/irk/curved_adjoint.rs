@@ -198,47 +198,61 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
         let m = m.as_chunks::<W>().0.as_chunks::<S>().0;
         let begin = if self.first { column } else { 0 };
         let (mut place, mut c) = (self.placed, 0);
-        for (row, &direction) in M::STRUCTURE.directions.iter().enumerate().skip(begin) {
+        let mut row = begin;
+        while let Some(&direction) = M::STRUCTURE.directions.get(row) {
             let variable = variable_of::<M>(direction as usize);
-            let mut packet = [E::from_f64(0.0); W];
+            // One sum for each stage: an addition to one does not wait for that to another.
+            let mut sums = [[E::from_f64(0.0); W]; S];
             if !self.last
                 && let Some(sum) = columns::<E, R, W>(self.sum, row, column)
             {
-                packet = *sum;
+                sums[0] = *sum;
             }
             // Entries of algebraic states, and of rows above the triangle, are passed by.
-            while let Some(&index) = M::STRUCTURE.by_column.get(place)
-                && let Some((equation, of, values)) = entry::<M, _>(self.jacobian, index as usize)
-                && of <= variable
+            while let Some(of) = self.variable_at(place)
+                && of < variable
             {
                 place += 1;
-                if of == variable
-                    && let Some(m) = m.get(slot::<M>(equation))
-                {
-                    for (&value, m) in values.iter().zip(m) {
-                        A::subtract_row(&mut packet, value, m);
+            }
+            if row == begin && self.first {
+                self.placed = place;
+            }
+            while let Some(&index) = M::STRUCTURE.by_column.get(place)
+                && let Some((equation, of, values)) = entry::<M, _>(self.jacobian, index as usize)
+                && of == variable
+            {
+                place += 1;
+                if let Some(m) = m.get(slot::<M>(equation)) {
+                    for ((sum, &value), m) in sums.iter_mut().zip(values).zip(m) {
+                        A::subtract_row(sum, value, m);
                     }
-                }
-                if row == begin && of < variable {
-                    self.placed = place;
                 }
             }
             while let Some(&of) = curved.get(c)
                 && of as usize <= variable
             {
                 if of as usize == variable {
-                    add_stages::<A, M, E, S, W>(&mut packet, g, c);
+                    add_stages::<A, M, E, S, W>(&mut sums, g, c);
                 }
                 c += 1;
             }
+            let Some((packet, others)) = sums.split_first_mut() else { return };
+            for other in others {
+                A::subtract_row(packet, E::from_f64(-1.0), other);
+            }
             let to = self.sum.get_mut(row).and_then(|row| row.as_mut().get_mut(column..));
             if let Some(to) = to.and_then(|to| to.first_chunk_mut()) {
-                *to = packet;
+                *to = *packet;
             }
+            row += 1;
         }
-        if !self.first {
-            self.placed = 0;
-        }
+    }
+
+    /// The variable that an entry belongs to, in their order by columns.
+    #[inline(always)]
+    fn variable_at(&self, place: usize) -> Option<usize> {
+        let &entry = M::STRUCTURE.by_column.get(place)?;
+        M::STRUCTURE.jacobian.get(entry as usize).map(|(_, variable)| variable)
     }
 }
 
@@ -258,16 +272,16 @@ fn columns<E: Plain, R: Array<E>, const W: usize>(rows: &[R], row: usize, column
     }
 }
 
-/// `packet += Σ_i G_i` of a curved variable.
+/// `packet += G` of a curved variable.
 #[inline(always)]
 fn add_stages<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
-    packet: &mut [E; W],
+    packet: &mut Packet<E, S, W>,
     g: &[[E; W]],
     curved: usize,
 ) {
-    for stage in 0..S {
+    for (stage, row) in packet.iter_mut().enumerate() {
         if let Some(g) = g.get(row_of::<M, E, S>(curved, stage)) {
-            A::subtract_row(packet, E::from_f64(-1.0), g);
+            A::subtract_row(row, E::from_f64(-1.0), g);
         }
     }
 }
@@ -292,7 +306,7 @@ impl<E: Lanes, R: Array<E>, const S: usize, const W: usize> RightHandSide<'_, E,
             let mut packet = [[E::from_f64(0.0); W]; S];
             if unknown >= nx {
                 if is_at::<M>(algebraic, unknown + nx) {
-                    self.add::<A, M>(&mut packet, algebraic);
+                    add_stages::<A, M, E, S, W>(&mut packet, self.g, algebraic);
                     algebraic += 1;
                 }
                 *to = packet;
@@ -307,7 +321,7 @@ impl<E: Lanes, R: Array<E>, const S: usize, const W: usize> RightHandSide<'_, E,
                 }
             }
             if is_at::<M>(derivative, unknown) {
-                self.add::<A, M>(&mut packet, derivative);
+                add_stages::<A, M, E, S, W>(&mut packet, self.g, derivative);
                 derivative += 1;
             }
             if is_at::<M>(state, nx + unknown) {
@@ -320,16 +334,6 @@ impl<E: Lanes, R: Array<E>, const S: usize, const W: usize> RightHandSide<'_, E,
                 state += 1;
             }
             *to = packet;
-        }
-    }
-
-    /// `packet += G` of a curved variable.
-    #[inline(always)]
-    fn add<A: Arithmetic, M: Dae>(&self, packet: &mut Packet<E, S, W>, curved: usize) {
-        for (stage, row) in packet.iter_mut().enumerate() {
-            if let Some(g) = self.g.get(row_of::<M, E, S>(curved, stage)) {
-                A::subtract_row(row, E::from_f64(-1.0), g);
-            }
         }
     }
 }

@@ -149,7 +149,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             DOWN => self.down::<A>(pivot, others),
             UP => self.up::<A>(pivot),
             TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
-            _ => self.transposed_up::<A>(pivot),
+            _ => self.transposed_up::<A>(pivot, others),
         }
     }
 }
@@ -341,7 +341,19 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     }
 
     #[inline(always)]
-    fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
+        // Where nothing is optimised this would only take long to compile.
+        if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
+            if !is_scaled::<S>(pivot) {
+                return self.transposed_up_in_strands::<A>(pivot);
+            }
+            return match (pivot.beside, others) {
+                (0, _) => {}
+                (2, [second, ..]) => self.transposed_up_beside::<A, 2>([pivot, second]),
+                (3, [second, third, ..]) => self.transposed_up_beside::<A, 3>([pivot, second, third]),
+                _ => self.transposed_up_beside::<A, 1>([pivot]),
+            };
+        }
         let Self { factors, rows, column } = self;
         if pivot.slot as usize >= rows.len() {
             return;
@@ -369,6 +381,80 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             }
         }
         store(rows, pivot.slot as usize, *column, &packet);
+    }
+
+    /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
+    #[inline(always)]
+    fn transposed_up_in_strands<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() || pivot.lower().is_empty() {
+            return;
+        }
+        let mut slots = M::STRUCTURE.elimination.slots.get(pivot.lower()).unwrap_or_default();
+        let mut blocks = factors.blocks.get(pivot.lower()).unwrap_or_default();
+        let mut packet = load::<E, R, S, W>(rows, slot, *column);
+        let mut strand = [[E::from_f64(0.0); W]; S];
+        while let Some((rest, [block, last])) = blocks.split_last_chunk()
+            && let Some((rest_of_slots, &[other, of_last])) = slots.split_last_chunk()
+        {
+            (blocks, slots) = (rest, rest_of_slots);
+            if of_last as usize >= rows.len() || other as usize >= rows.len() {
+                continue;
+            }
+            let of_last = load(rows, of_last as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, last, &of_last);
+            let other = load(rows, other as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut strand, block, &other);
+        }
+        if let ([block], &[other]) = (blocks, slots)
+            && (other as usize) < rows.len()
+        {
+            let other = load(rows, other as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+        }
+        for (row, strand) in packet.iter_mut().zip(&strand) {
+            A::subtract_row(row, E::from_f64(-1.0), strand);
+        }
+        store(rows, slot, *column, &packet);
+    }
+
+    /// Scaled pivots with the same rows below them: a row is fetched once for all of them.
+    #[inline(always)]
+    fn transposed_up_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
+        let Self { factors, rows, column } = self;
+        let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
+        let mut below: [&[Block<E, S>]; P] = [&[]; P];
+        for (below, pivot) in below.iter_mut().zip(pivots) {
+            *below = factors.blocks.get(pivot.lower()).unwrap_or_default();
+            // As many, but the optimiser does not know.
+            if below.len() != slots.len() {
+                return;
+            }
+        }
+        let mut sums = [[[E::from_f64(0.0); W]; S]; P];
+        let mut index = slots.len();
+        while index > 0 {
+            index -= 1;
+            let Some(&other) = slots.get(index) else { return };
+            if other as usize >= rows.len() {
+                return;
+            }
+            let other = load::<E, R, S, W>(rows, other as usize, *column);
+            for (sum, below) in sums.iter_mut().zip(below) {
+                if let Some(block) = below.get(index) {
+                    subtract_scaled::<A, E, S, W>(sum, block, &other);
+                }
+            }
+        }
+        for (pivot, sum) in pivots.iter().zip(&sums) {
+            if pivot.slot as usize >= rows.len() {
+                return;
+            }
+            let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, sum);
+            store(rows, pivot.slot as usize, *column, &packet);
+        }
     }
 }
 
