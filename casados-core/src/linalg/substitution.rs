@@ -448,12 +448,16 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             }
         }
         for (pivot, sum) in pivots.iter().zip(&sums) {
-            if pivot.slot as usize >= rows.len() {
-                return;
+            let Some(row) = rows.get_mut(pivot.slot as usize) else { return };
+            for (ha, row) in factors.coupling.iter().zip(row) {
+                let columns = row.as_mut().get_mut(*column..).and_then(|row| row.first_chunk_mut());
+                let Some(columns) = columns else { continue };
+                let mut packet = *columns;
+                for (&ha, sum) in ha.iter().zip(sum) {
+                    A::subtract_row(&mut packet, ha, sum);
+                }
+                *columns = packet;
             }
-            let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, sum);
-            store(rows, pivot.slot as usize, *column, &packet);
         }
     }
 }
