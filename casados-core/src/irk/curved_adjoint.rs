@@ -11,13 +11,13 @@
 //! of directions; this takes a sparse solve for each direction, which is less where a model is large.
 
 use super::curvature::{COLUMNS, row_of};
+use super::curved_advance::{Advance, Inverse, add_stages, columns, is_direct, position};
 use super::directions::{Identity, panel_of, panels};
-use super::evaluate::entry;
 use super::multiply::multiply_panel;
 use super::record::{Coefficients, Work};
 use super::sweep::Phase;
 use crate::linalg::{
-    Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, is_long, slot, solve_packet_transposed,
+    Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, is_long, solve_packet_transposed,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
@@ -41,7 +41,8 @@ pub(super) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
         index += 1;
     }
     let blocks = &structure.blocks;
-    let entries = S * (blocks[2] - blocks[1] + blocks[5] - blocks[3]);
+    let of_x = if is_direct::<M>() { blocks[1] } else { blocks[2] - blocks[1] };
+    let entries = S * (of_x + blocks[5] - blocks[3]);
     let right = S * (structure.x.len() + S * structure.curved.len());
     let products = structure.curved.len() * S * structure.directions.len() / 2;
     4 * (solve + entries + right) < 3 * products
@@ -99,6 +100,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
             sum,
             first: *first,
             last: *last,
+            inverse: Inverse::new(coefficients, work.inputs.time.step),
             placed: 0,
             model: PhantomData,
         });
@@ -145,7 +147,8 @@ struct Panels<'a, M: Dae, E: Plain, R, const S: usize> {
     sum: &'a mut [R],
     first: bool,
     last: bool,
-    /// How many entries of the Jacobian, column by column, belong to rows above the triangle.
+    /// See [`Advance`].
+    inverse: Option<Inverse<E, S>>,
     placed: usize,
     model: PhantomData<M>,
 }
@@ -185,103 +188,19 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
             solve_packet_transposed::<A, M, E, [E; W], S, W>(self.factors, m, 0);
         }
         if self.phase != Phase::Before {
-            self.advance::<A, W>(column);
-        }
-    }
-
-    /// `Λ_n` of a panel, and `Λ_w`, each row in registers and written once.
-    #[inline(always)]
-    fn advance<A: Arithmetic, const W: usize>(&mut self, column: usize) {
-        let curved = M::STRUCTURE.curved;
-        let g = self.g.get(..curved.len() * S * W).unwrap_or_default().as_chunks::<W>().0;
-        let m = self.m.get(..M::Shape::NK * S * W).unwrap_or_default();
-        let m = m.as_chunks::<W>().0.as_chunks::<S>().0;
-        let begin = if self.first { column } else { 0 };
-        let (mut place, mut c) = (self.placed, 0);
-        let mut row = begin;
-        while let Some(&direction) = M::STRUCTURE.directions.get(row) {
-            let variable = variable_of::<M>(direction as usize);
-            // One sum for each stage: an addition to one does not wait for that to another.
-            let mut sums = [[E::from_f64(0.0); W]; S];
-            if !self.last
-                && let Some(sum) = columns::<E, R, W>(self.sum, row, column)
-            {
-                sums[0] = *sum;
+            let Self { jacobian, sum, first, last, inverse, placed, .. } = self;
+            Advance::<M, E, R, S, W> {
+                jacobian,
+                g,
+                m,
+                sum,
+                column,
+                first: *first,
+                last: *last,
+                inverse,
+                placed,
             }
-            // Entries of algebraic states, and of rows above the triangle, are passed by.
-            while let Some(of) = self.variable_at(place)
-                && of < variable
-            {
-                place += 1;
-            }
-            if row == begin && self.first {
-                self.placed = place;
-            }
-            while let Some(&index) = M::STRUCTURE.by_column.get(place)
-                && let Some((equation, of, values)) = entry::<M, _>(self.jacobian, index as usize)
-                && of == variable
-            {
-                place += 1;
-                if let Some(m) = m.get(slot::<M>(equation)) {
-                    for ((sum, &value), m) in sums.iter_mut().zip(values).zip(m) {
-                        A::subtract_row(sum, value, m);
-                    }
-                }
-            }
-            while let Some(&of) = curved.get(c)
-                && of as usize <= variable
-            {
-                if of as usize == variable {
-                    add_stages::<A, M, E, S, W>(&mut sums, g, c);
-                }
-                c += 1;
-            }
-            let Some((packet, others)) = sums.split_first_mut() else { return };
-            for other in others {
-                A::subtract_row(packet, E::from_f64(-1.0), other);
-            }
-            let to = self.sum.get_mut(row).and_then(|row| row.as_mut().get_mut(column..));
-            if let Some(to) = to.and_then(|to| to.first_chunk_mut()) {
-                *to = *packet;
-            }
-            row += 1;
-        }
-    }
-
-    /// The variable that an entry belongs to, in their order by columns.
-    #[inline(always)]
-    fn variable_at(&self, place: usize) -> Option<usize> {
-        let &entry = M::STRUCTURE.by_column.get(place)?;
-        M::STRUCTURE.jacobian.get(entry as usize).map(|(_, variable)| variable)
-    }
-}
-
-/// The variable that a direction is.
-#[inline(always)]
-const fn variable_of<M: Dae>(direction: usize) -> usize {
-    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-    nx + direction + if direction < nx { 0 } else { nz }
-}
-
-/// A few columns of a row.
-#[inline(always)]
-fn columns<E: Plain, R: Array<E>, const W: usize>(rows: &[R], row: usize, column: usize) -> Option<&[E; W]> {
-    match rows.get(row) {
-        Some(row) => row.as_ref().get(column..)?.first_chunk(),
-        None => None,
-    }
-}
-
-/// `packet += G` of a curved variable.
-#[inline(always)]
-fn add_stages<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
-    g: &[[E; W]],
-    curved: usize,
-) {
-    for (stage, row) in packet.iter_mut().enumerate() {
-        if let Some(g) = g.get(row_of::<M, E, S>(curved, stage)) {
-            A::subtract_row(row, E::from_f64(-1.0), g);
+            .all::<A>();
         }
     }
 }
@@ -336,15 +255,6 @@ impl<E: Lanes, R: Array<E>, const S: usize, const W: usize> RightHandSide<'_, E,
             *to = packet;
         }
     }
-}
-
-/// How many curved variables come before one.
-const fn position<M: Dae>(variable: usize) -> usize {
-    let (curved, mut count) = (M::STRUCTURE.curved, 0);
-    while count < curved.len() && (curved[count] as usize) < variable {
-        count += 1;
-    }
-    count
 }
 
 /// Whether the curved variable in a position is this one.

@@ -22,6 +22,7 @@ mod along;
 mod compensated;
 mod curvature;
 mod curved_adjoint;
+mod curved_advance;
 mod dense;
 mod directions;
 mod evaluate;
