@@ -1,23 +1,31 @@
 //! Second derivatives of a model with many directions, where the adjoint goes backwards in all of them: held against differences of
 //! gradients, and against a batch, whose registers take products of all directions with each other.
 
-use casados::Method;
 use casados::irk::Integrator;
 use casados::prelude::*;
 use casados::result::Hessian;
+use casados::{Custom, Method, Tableau};
 use nalgebra::{SVector, vector};
 
 const NX: usize = 43;
 
 /// A substance in a tube: it diffuses, grows, and heat and what it is stored in depend on it; its ends are a control and a function of
-/// algebraic states, whose pivot vanishes with `p[1]`. The last state measures, and nobody depends on it.
-#[dae]
-fn tube(xdot: [f64; 44], x: [f64; 44], z: [f64; 2], u: [f64; 2], p: [f64; 2]) -> [f64; 46] {
+/// algebraic states, whose pivot vanishes with `p[1]`. The last state measures, and nobody
+/// depends on it. With a `MASS` of its own each equation has the derivatives of two states.
+#[dae(MASS = [0, 1])]
+fn tube<const MASS: usize>(
+    xdot: [f64; 44],
+    x: [f64; 44],
+    z: [f64; 2],
+    u: [f64; 2],
+    p: [f64; 2],
+) -> [f64; 46] {
+    let neighbour = if MASS == 1 { 0.1 } else { 0.0 };
     let mut f = [0.0; 46];
     for i in 0..43 {
         let before = if i == 0 { u[0] } else { x[i - 1] };
         let after = if i == 42 { z[0] * x[41] } else { x[i + 1] };
-        f[i] = (1.0 + 0.1 * x[i] * x[i]) * xdot[i]
+        f[i] = (1.0 + 0.1 * x[i] * x[i]) * xdot[i] + neighbour * xdot[(i + 1) % 43]
             - 4.0 * (before - 2.0 * x[i] + after)
             - p[0] * x[i] * (1.0 - x[i])
             - u[1] * x[i] * before;
@@ -54,9 +62,18 @@ const LENGTH: f64 = 0.1;
 /// Stages are solved to rounding, and the condition of the Newton matrix is of order ten, over a few steps.
 const ROUNDING: f64 = 40.0 * f64::EPSILON;
 
+type Steps<M, B, const S: usize> = Integrator<M, B, S, f64, Heap>;
+
+/// An integrator of so many steps.
+fn steps<M: Dae, B: Method<S>, const S: usize>(steps: usize) -> Result<Steps<M, B, S>, casados::Error> {
+    Integrator::new(Options { steps, ..Default::default() })
+}
+
 /// The Hessian in a few directions is the derivative of the gradient: differences of order eight.
-fn against_differences<B: Method<S>, const S: usize>(steps: usize, p: SVector<f64, 2>, dense: bool) -> Test {
-    let mut irk = Integrator::<Tube, B, S, f64, Heap>::new(Options { steps, ..Default::default() })?;
+fn against_differences<M, B, const S: usize>(mut irk: Steps<M, B, S>, p: SVector<f64, 2>, dense: bool) -> Test
+where
+    M: Dae<Shape = <Tube<0> as Dae>::Shape>,
+{
     let at = Point { x: profile(0.0), u: vector![0.7, 0.4], p };
     let lambda = X::from_fn(|i, _| (0.7 * i as f64).cos());
     irk.set_parameters(&at.p)?;
@@ -99,25 +116,31 @@ fn against_differences<B: Method<S>, const S: usize>(steps: usize, p: SVector<f6
 
 #[test]
 fn hessian_is_the_derivative_of_the_gradient() -> Test {
-    against_differences::<Gauss<2>, 2>(3, vector![1.2, 0.4], false)?;
-    against_differences::<Gauss<4>, 4>(2, vector![1.2, 0.4], false)?;
-    against_differences::<RadauIIA<3>, 3>(1, vector![1.2, 0.4], false)
+    let p = vector![1.2, 0.4];
+    against_differences(steps::<Tube<0>, Gauss<2>, 2>(3)?, p, false)?;
+    against_differences(steps::<Tube<0>, Gauss<4>, 4>(2)?, p, false)?;
+    against_differences(steps::<Tube<0>, RadauIIA<3>, 3>(1)?, p, false)?;
+    against_differences(steps::<Tube<1>, Gauss<2>, 2>(2)?, p, false)?;
+    // The trapezoidal rule, whose matrix has no inverse.
+    let tableau = Tableau::new([[0.0, 0.0], [0.5, 0.5]], [0.5, 0.5], [0.0, 1.0])?;
+    let options = Options { steps: 2, ..Default::default() };
+    against_differences(Steps::<Tube<0>, Custom<2>, 2>::with_tableau(options, tableau)?, p, false)
 }
 
 /// The whole matrix pivoted.
 #[test]
 fn without_the_plan() -> Test {
-    against_differences::<Gauss<2>, 2>(2, vector![1.2, 0.0], true)
+    against_differences(steps::<Tube<0>, Gauss<2>, 2>(2)?, vector![1.2, 0.0], true)
 }
 
 /// Intervals side by side in registers.
 #[test]
 fn products_of_all_directions_are_the_same() -> Test {
-    let structure = <Tube as Dae>::STRUCTURE;
+    let structure = <Tube<0> as Dae>::STRUCTURE;
     assert_eq!((structure.directions.len(), structure.quadratures), (NX + 4, &[43][..]));
     let options = Options { steps: 3, ..Default::default() };
-    let mut single = Irk::<Tube, Gauss<2>>::new(options)?;
-    let mut batch = Batch::<Tube, Gauss<2>>::new(options)?;
+    let mut single = Irk::<Tube<0>, Gauss<2>>::new(options)?;
+    let mut batch = Batch::<Tube<0>, Gauss<2>>::new(options)?;
     let x0: Vec<X> = (0..8).map(|k| profile(f64::from(k))).collect();
     let (u, p) = (vec![vector![0.7, 0.4]; 8], vec![vector![1.2, 0.4]; 8]);
     let lambda: Vec<X> = (0..8).map(|k| X::from_fn(|i, _| ((i + k) as f64).cos())).collect();

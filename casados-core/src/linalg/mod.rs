@@ -5,7 +5,7 @@
 //! slot, all columns side by side; [`slot`] tells where the row of an equation is.
 //!
 //! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
-//! by the plan of the model (`sparse`, `substitution`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
+//! by the plan of the model (`sparse`, `substitution`, `transposed`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
 //! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
 //! iterations that need not be exact, `EigenFactors` for steps of variable size.
 
@@ -22,6 +22,7 @@ mod mean;
 mod sparse;
 mod straight;
 mod substitution;
+mod transposed;
 mod twice;
 
 pub(crate) use block::{Block, Packet, coupling};
