@@ -216,10 +216,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
 #[inline(always)]
 fn variable_at<M: Dae>(place: usize) -> Option<usize> {
     let &entry = M::STRUCTURE.by_column.get(place)?;
-    match M::STRUCTURE.jacobian.columns.get(entry as usize) {
-        Some(&variable) => Some(variable as usize),
-        None => None,
-    }
+    Some(*M::STRUCTURE.jacobian.columns.get(entry as usize)? as usize)
 }
 
 /// The variable that a direction is.
