@@ -256,7 +256,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             good = E::and(good, hessian.backward.stages(work, coefficients));
             hessian.backward.advance(&work.linear);
             hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(record, n + 1 == count);
+            hessian.subtract(work, coefficients, record, n, n + 1 == count);
         }
         let finite = hessian.collect(None) + finite;
         Ok((E::and(good, finite.is_finite()), &hessian.result))

@@ -10,8 +10,10 @@
 use super::adjoint::Backward;
 use super::along::Along;
 use super::curvature::{COLUMNS, Subtract};
+use super::curved_adjoint::{Back, is_worth};
 use super::directions::Identity;
 use super::evaluate::not_finite;
+use super::folds::{Fold, Lone};
 use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::stages::Stages;
 use super::step::check;
@@ -102,7 +104,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(record, n + 1 == steps.len());
+            self.subtract(work, coefficients, record, n, n + 1 == steps.len());
         }
         Ok(())
     }
@@ -137,73 +139,45 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the `last` step.
-    pub(crate) fn subtract<F: Fallback>(&mut self, record: &HessianStep<M, E, S, F>, last: bool) {
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the `last` step, with the linearisation of this one there.
+    pub(crate) fn subtract<F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+        record: &HessianStep<M, E, S, F>,
+        n: usize,
+        last: bool,
+    ) {
         let Self { g, sum, entries, .. } = self;
         if const { !M::STRUCTURE.folded.is_empty() } {
-            dispatch(Folds::<M, E, S> { entries: entries.as_mut(), model: PhantomData });
+            dispatch(Fold::<M, E, S> { entries: entries.as_mut(), model: PhantomData });
         }
-        dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
-            entries: entries.as_ref(),
-            d: Array::flat(record.d.as_ref().as_flattened()),
-            g: g.as_mut(),
-            sum: sum.as_mut(),
-            fresh: last,
-            model: PhantomData,
-        });
-        if const { !M::STRUCTURE.lone.is_empty() } {
-            dispatch(Lones::<M, E, ArrayW<M, E>, S> {
-                entries: entries.as_ref(),
-                sum: sum.as_mut(),
+        let (entries, d, sum) =
+            (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
+        if const { is_worth::<M, E, S>() } {
+            Back::<M, E, ArrayW<M, E>, S> {
+                coefficients,
+                entries,
+                d,
+                g,
+                sum: &mut *sum,
+                first: n == 0,
+                last,
+            }
+            .run(work);
+        } else {
+            let g = g.as_mut();
+            dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
+                entries,
+                d,
+                g,
+                sum: &mut *sum,
+                fresh: last,
                 model: PhantomData,
             });
         }
-    }
-}
-
-/// Second derivatives in `ẋ_j = c v` become those in `v`.
-struct Folds<'a, M, E, const S: usize> {
-    entries: &'a mut [[E; S]],
-    model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Folds<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for fold in M::STRUCTURE.folded {
-            let Some(&from) = self.entries.get(fold.entry as usize) else { continue };
-            if let Some(to) = self.entries.get_mut(fold.into as usize) {
-                A::subtract_row(to, E::from_f64(-fold.factor), &from);
-            }
-        }
-    }
-}
-
-/// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit matrix.
-struct Lones<'a, M, E, R, const S: usize> {
-    entries: &'a [[E; S]],
-    sum: &'a mut [R],
-    model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Lones<'_, M, E, R, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for lone in M::STRUCTURE.lone {
-            let Some(column) = Identity::<M>::column(lone.direction as usize) else { continue };
-            let (Some(entries), Some(row)) =
-                (self.entries.get(lone.entry as usize), self.sum.get_mut(column))
-            else {
-                continue;
-            };
-            let Some(to) = row.as_mut().get_mut(column) else { continue };
-            for &entry in entries {
-                *to = A::subtract(*to, E::from_f64(1.0), entry);
-            }
+        if const { !M::STRUCTURE.lone.is_empty() } {
+            dispatch(Lone::<M, E, ArrayW<M, E>, S> { entries, sum, model: PhantomData });
         }
     }
 }

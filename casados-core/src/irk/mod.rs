@@ -13,7 +13,8 @@
 //! accurate methods its value at the end is the last stage.
 //!
 //! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its `progress`, and, where that does
-//! not arrive, `pivoted`, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`,
+//! not arrive, `pivoted`, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`
+//! by products of panels (`curvature`) or by a `curved_adjoint` of large models,
 //! `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
 //! `sensitivities` what users see.
 
@@ -21,13 +22,17 @@ mod adjoint;
 mod along;
 mod compensated;
 mod curvature;
+mod curved_adjoint;
+mod curved_advance;
 mod dense;
 mod directions;
 mod evaluate;
+mod folds;
 mod forward;
 mod hessian;
 mod increment;
 mod integrator;
+mod multiply;
 mod newton;
 mod pivoted;
 mod progress;

@@ -38,7 +38,7 @@ copy!([M: Dae, T: Plain, R: Plain, const S: usize] Sweep<M, T, R, S>);
 
 /// What is done to a panel.
 #[derive(Clone, Copy, PartialEq)]
-enum Phase {
+pub(super) enum Phase {
     /// All of it.
     Whole,
     /// The right-hand side.

@@ -5,7 +5,7 @@
 //! slot, all columns side by side; [`slot`] tells where the row of an equation is.
 //!
 //! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
-//! by the plan of the model (`sparse`, `substitution`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
+//! by the plan of the model (`sparse`, `substitution`, `transposed`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
 //! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
 //! iterations that need not be exact, `EigenFactors` for steps of variable size.
 
@@ -22,6 +22,7 @@ mod mean;
 mod sparse;
 mod straight;
 mod substitution;
+mod transposed;
 mod twice;
 
 pub(crate) use block::{Block, Packet, coupling};
@@ -36,5 +37,5 @@ pub(crate) use kernels::{are_finite, axpy};
 pub(crate) use mean::MeanFactors;
 pub(crate) use sparse::Planned;
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};
-pub(crate) use substitution::solve_steady;
+pub(crate) use substitution::{solve_packet_transposed, solve_steady};
 pub(crate) use twice::{dot_compensated, moved, two_product};

@@ -123,15 +123,20 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     }
 }
 
-/// From the last pivot to the first, without what follows and without updates.
+/// From the last pivot to the first, without updates.
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     if const { is_short_plan::<A, M, V>() } {
         pivots_in_line_backwards::<A, M, V>(visit);
         return;
     }
-    for pivot in M::STRUCTURE.elimination.pivots.iter().rev() {
-        visit.at::<A>(pivot, &[], &[]);
+    let all = M::STRUCTURE.elimination.pivots;
+    let mut index = all.len();
+    while index > 0 {
+        index -= 1;
+        if let Some((pivot, others)) = all.get(index..).and_then(|pivots| pivots.split_first()) {
+            visit.at::<A>(pivot, others, &[]);
+        }
     }
 }
 

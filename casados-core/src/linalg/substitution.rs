@@ -3,7 +3,7 @@
 //! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each other. Where one column fills
 //! registers, what is added to a row is added in them instead, and stored once.
 
-use super::block::{Block, Packet, negate, subtract, subtract_scaled, subtract_transposed};
+use super::block::{Block, Packet, negate, subtract, subtract_scaled};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
@@ -104,8 +104,9 @@ pub fn solve_steady<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const 
     sweeps::<A, M, E, R, S, W, STEADY_DOWN, STEADY_UP>(factors, rows, 0);
 }
 
+/// The part of [`solve_transposed`] for `W` columns, inside of a kernel.
 #[inline(always)]
-fn solve_packet_transposed<
+pub fn solve_packet_transposed<
     A: Arithmetic,
     M: Dae,
     E: Field + Plain,
@@ -153,10 +154,10 @@ const STEADY_DOWN: usize = 4;
 const STEADY_UP: usize = 5;
 
 /// One of them, for `W` columns.
-struct Sweep<'a, M, E, R, const S: usize, const W: usize, const SYSTEM: usize> {
-    factors: Planned<'a, M, E, S>,
-    rows: &'a mut [[R; S]],
-    column: usize,
+pub(super) struct Sweep<'a, M, E, R, const S: usize, const W: usize, const SYSTEM: usize> {
+    pub factors: Planned<'a, M, E, S>,
+    pub rows: &'a mut [[R; S]],
+    pub column: usize,
 }
 
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize> AtPivot
@@ -174,7 +175,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             STEADY_DOWN => self.down::<A>(pivot, others),
             UP | STEADY_UP => self.up::<A>(pivot),
             TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
-            _ => self.transposed_up::<A>(pivot),
+            _ => self.transposed_up::<A>(pivot, others),
         }
     }
 }
@@ -343,76 +344,11 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         }
         store(rows, pivot.slot as usize, *column, &packet);
     }
-
-    #[inline(always)]
-    fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
-        if pivot.slot as usize >= rows.len() {
-            return;
-        }
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
-            let mut solution = [[E::from_f64(0.0); W]; S];
-            negate(&mut packet);
-            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
-            packet = solution;
-            store(rows, pivot.slot as usize, *column, &packet);
-        }
-        for (block, other) in beside(*factors, pivot.upper()) {
-            if other >= rows.len() {
-                continue;
-            }
-            let mut target = load(rows, other, *column);
-            subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
-            store(rows, other, *column, &target);
-        }
-    }
-
-    #[inline(always)]
-    fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
-        if pivot.slot as usize >= rows.len() {
-            return;
-        }
-        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        if is_scaled::<S>(pivot) {
-            let mut sum = [[E::from_f64(0.0); W]; S];
-            for index in pivot.lower().rev() {
-                let Some((block, other)) = one(*factors, index) else { continue };
-                if other >= rows.len() {
-                    continue;
-                }
-                let other = load(rows, other, *column);
-                subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
-            }
-            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
-        } else {
-            for index in pivot.lower().rev() {
-                let Some((block, other)) = one(*factors, index) else { continue };
-                if other >= rows.len() {
-                    continue;
-                }
-                let other = load(rows, other, *column);
-                subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
-            }
-        }
-        store(rows, pivot.slot as usize, *column, &packet);
-    }
-}
-
-/// One block, with the slot at its other end.
-#[inline(always)]
-fn one<'a, M: Dae, E, const S: usize>(
-    factors: Planned<'a, M, E, S>,
-    index: usize,
-) -> Option<(&'a Block<E, S>, usize)> {
-    let &slot = M::STRUCTURE.elimination.slots.get(index)?;
-    Some((factors.blocks.get(index)?, slot as usize))
 }
 
 /// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
 #[inline(always)]
-fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+pub(super) fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
     column: usize,
@@ -469,7 +405,7 @@ fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
 }
 
 #[inline(always)]
-fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+pub(super) fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &mut [[R; S]],
     slot: usize,
     column: usize,

@@ -1,0 +1,171 @@
+//! Right-hand sides by the transposed factors of a plan: what is done at a pivot on the way through `(P + U)ᵀ` and `(I + L)ᵀ`.
+//!
+//! A row of `(I + L)ᵀ` is a column of `L`, so that on the way back what is added to a row is added in registers, and stored once. Packets
+//! take two blocks at a time, or rows that several pivots share, so that additions need not wait for each other.
+
+use super::block::{Block, negate, subtract_scaled, subtract_transposed};
+use super::fused::Arithmetic;
+use super::sparse::{Planned, beside, is_scaled};
+use super::substitution::{Sweep, load, store};
+use crate::model::{Dae, Pivot};
+use crate::scalar::Field;
+use crate::shape::{Array, Plain};
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize>
+    Sweep<'_, M, E, R, S, W, SYSTEM>
+{
+    #[inline(always)]
+    pub(super) fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            negate(&mut packet);
+            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
+            packet = solution;
+            store(rows, pivot.slot as usize, *column, &packet);
+        }
+        for (block, other) in beside(*factors, pivot.upper()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
+            store(rows, other, *column, &target);
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
+        // Where nothing is optimised this would only take long to compile.
+        if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
+            if !is_scaled::<S>(pivot) {
+                return self.transposed_up_in_strands::<A>(pivot);
+            }
+            return match (pivot.beside, others) {
+                (0, _) => {}
+                (2, [second, ..]) => self.transposed_up_beside::<A, 2>([pivot, second]),
+                (3, [second, third, ..]) => self.transposed_up_beside::<A, 3>([pivot, second, third]),
+                _ => self.transposed_up_beside::<A, 1>([pivot]),
+            };
+        }
+        let Self { factors, rows, column } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if is_scaled::<S>(pivot) {
+            let mut sum = [[E::from_f64(0.0); W]; S];
+            for index in pivot.lower().rev() {
+                let Some((block, other)) = one(*factors, index) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let other = load(rows, other, *column);
+                subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
+            }
+            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
+        } else {
+            for index in pivot.lower().rev() {
+                let Some((block, other)) = one(*factors, index) else { continue };
+                if other >= rows.len() {
+                    continue;
+                }
+                let other = load(rows, other, *column);
+                subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+            }
+        }
+        store(rows, pivot.slot as usize, *column, &packet);
+    }
+
+    /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
+    #[inline(always)]
+    fn transposed_up_in_strands<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() || pivot.lower().is_empty() {
+            return;
+        }
+        let mut slots = M::STRUCTURE.elimination.slots.get(pivot.lower()).unwrap_or_default();
+        let mut blocks = factors.blocks.get(pivot.lower()).unwrap_or_default();
+        let mut packet = load::<E, R, S, W>(rows, slot, *column);
+        let mut strand = [[E::from_f64(0.0); W]; S];
+        while let Some((rest, [block, last])) = blocks.split_last_chunk()
+            && let Some((rest_of_slots, &[other, of_last])) = slots.split_last_chunk()
+        {
+            (blocks, slots) = (rest, rest_of_slots);
+            if of_last as usize >= rows.len() || other as usize >= rows.len() {
+                continue;
+            }
+            let of_last = load(rows, of_last as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, last, &of_last);
+            let other = load(rows, other as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut strand, block, &other);
+        }
+        if let ([block], &[other]) = (blocks, slots)
+            && (other as usize) < rows.len()
+        {
+            let other = load(rows, other as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+        }
+        for (row, strand) in packet.iter_mut().zip(&strand) {
+            A::subtract_row(row, E::from_f64(-1.0), strand);
+        }
+        store(rows, slot, *column, &packet);
+    }
+
+    /// Scaled pivots with the same rows below them: a row is fetched once for all of them.
+    #[inline(always)]
+    fn transposed_up_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
+        let Self { factors, rows, column } = self;
+        let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
+        let mut below: [&[Block<E, S>]; P] = [&[]; P];
+        for (below, pivot) in below.iter_mut().zip(pivots) {
+            *below = factors.blocks.get(pivot.lower()).unwrap_or_default();
+            // As many, but the optimiser does not know.
+            if below.len() != slots.len() {
+                return;
+            }
+        }
+        let mut sums = [[[E::from_f64(0.0); W]; S]; P];
+        let mut index = slots.len();
+        while index > 0 {
+            index -= 1;
+            let Some(&other) = slots.get(index) else { return };
+            if other as usize >= rows.len() {
+                return;
+            }
+            let other = load::<E, R, S, W>(rows, other as usize, *column);
+            for (sum, below) in sums.iter_mut().zip(below) {
+                if let Some(block) = below.get(index) {
+                    subtract_scaled::<A, E, S, W>(sum, block, &other);
+                }
+            }
+        }
+        for (pivot, sum) in pivots.iter().zip(&sums) {
+            let Some(row) = rows.get_mut(pivot.slot as usize) else { return };
+            for (ha, row) in factors.coupling.iter().zip(row) {
+                let columns = row.as_mut().get_mut(*column..).and_then(|row| row.first_chunk_mut());
+                let Some(columns) = columns else { continue };
+                let mut packet = *columns;
+                for (&ha, sum) in ha.iter().zip(sum) {
+                    A::subtract_row(&mut packet, ha, sum);
+                }
+                *columns = packet;
+            }
+        }
+    }
+}
+
+/// One block, with the slot at its other end.
+#[inline(always)]
+fn one<'a, M: Dae, E, const S: usize>(
+    factors: Planned<'a, M, E, S>,
+    index: usize,
+) -> Option<(&'a Block<E, S>, usize)> {
+    let &slot = M::STRUCTURE.elimination.slots.get(index)?;
+    Some((factors.blocks.get(index)?, slot as usize))
+}
