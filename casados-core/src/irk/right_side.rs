@@ -15,6 +15,12 @@ fn steady<M: Dae>(state: usize) -> Option<Steady> {
     (steady.entry != Steady::NONE).then_some(steady)
 }
 
+/// Whether a steady state is subtracted from the equation of a slot: one that comes later.
+#[inline(always)]
+fn is_later<M: Dae>(slot: usize, than: &Steady) -> bool {
+    matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.turn > than.turn)
+}
+
 /// `h c_i`, as sums of the rows of `hA`.
 #[inline(always)]
 pub(super) fn nodes<E: Lanes, const S: usize>(a: &[[E; S]; S], h: E) -> [E; S] {
@@ -62,8 +68,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
         }
         for index in steady.first..steady.end {
             let Some((r, _, felt)) = by_column::<M, _>(self.jacobian, index as usize) else { continue };
+            let of = slot::<M>(r);
+            if !is_later::<M>(of, &steady) {
+                continue;
+            }
             for (stage, (&felt, &node)) in felt.iter().zip(self.nodes).enumerate() {
-                if let Some(to) = self.dy.get_mut(place + (slot::<M>(r) * S + stage) * width) {
+                if let Some(to) = self.dy.get_mut(place + (of * S + stage) * width) {
                     *to = *to + felt * node * values[0];
                 }
             }
@@ -110,6 +120,9 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
         }
         for index in steady.first..steady.end {
             let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
+            if !is_later::<M>(slot::<M>(r), &steady) {
+                continue;
+            }
             let mut products = *felt;
             for (product, &node) in products.iter_mut().zip(nodes) {
                 *product = -(*product * node * values[0]);
@@ -148,7 +161,8 @@ pub(super) fn restore<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: 
         let Some(&own) = dy.get(state).and_then(|packet| packet.first()) else { continue };
         for index in steady.first..steady.end {
             let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
-            let Some(packet) = dy.get_mut(slot::<M>(r)) else { continue };
+            let of = slot::<M>(r);
+            let (true, Some(packet)) = (is_later::<M>(of, &steady), dy.get_mut(of)) else { continue };
             for ((row, &felt), &node) in packet.iter_mut().zip(felt).zip(nodes) {
                 A::subtract_row(row, -(felt * node), &own);
             }
@@ -243,7 +257,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
                 self.clear(last + 1, r);
                 (packet, last) = ([[E::from_f64(0.0); W]; S], r);
             }
-            if !self.subtract::<A>(&mut packet, c - M::Shape::NX, values) {
+            if !self.subtract::<A>(&mut packet, slot::<M>(r), c - M::Shape::NX, values) {
                 return;
             }
         }
@@ -251,10 +265,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         self.clear(last + 1, M::Shape::NK);
     }
 
-    /// `packet − f_x,i V`, of one state. Whether there is one.
+    /// `packet − f_x,i V`, of one state, in the equation of a slot. Whether there is one.
     #[inline(always)]
-    fn subtract<A: Arithmetic>(&self, packet: &mut Packet<E, S, W>, state: usize, values: &[E; S]) -> bool {
-        if steady::<M>(state).is_some() {
+    fn subtract<A: Arithmetic>(
+        &self,
+        packet: &mut Packet<E, S, W>,
+        slot: usize,
+        state: usize,
+        values: &[E; S],
+    ) -> bool {
+        if matches!(steady::<M>(state), Some(steady) if is_later::<M>(slot, &steady)) {
             let Some(x) = self.dy.get(state) else { return false };
             for ((row, &value), x) in packet.iter_mut().zip(values).zip(x) {
                 A::subtract_row(row, value, x);
@@ -297,7 +317,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
         let slot = slot::<M>(r);
         let Some(&(mut packet)) = self.dy.get(slot) else { return };
-        if steady::<M>(slot).is_none() && self.subtract::<A>(&mut packet, c - M::Shape::NX, values) {
+        if steady::<M>(slot).is_none() && self.subtract::<A>(&mut packet, slot, c - M::Shape::NX, values) {
             if let Some(to) = self.dy.get_mut(slot) {
                 *to = packet;
             }

@@ -18,7 +18,7 @@ pub struct Elimination {
     pub assembly: &'static [Assembly],
     /// For each equation its slot.
     pub slot_of_equation: &'static [u32],
-    /// For each state whether right-hand sides of its pivot are the same at all stages; empty if of none.
+    /// For each slot whether it is a state whose pivot has the same right-hand sides at all stages; empty if none is.
     pub steady: &'static [Steady],
 }
 
@@ -99,10 +99,12 @@ pub struct Steady {
     pub first: u32,
     /// and end.
     pub end: u32,
+    /// The position of the slot's pivot: states are subtracted from equations whose pivots come later.
+    pub turn: u32,
 }
 
 impl Steady {
-    /// No entry: the state has no such pivot.
+    /// No entry: the slot is no such state.
     pub const NONE: u32 = u32::MAX;
 }
 

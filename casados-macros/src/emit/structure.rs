@@ -195,11 +195,16 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         quote!(assembly(#block, #direct, #state, #scaled))
     });
     // Nothing where no state is.
-    let some = if steady.iter().any(Option::is_some) { steady.as_slice() } else { &[] };
-    let steady = some.iter().map(|steady| {
+    let some = steady.iter().any(Option::is_some);
+    let count = if some { plan.pivots.len() as u32 } else { 0 };
+    let steady = (0..count).map(|slot| {
+        let steady = steady.get(slot as usize).copied().flatten();
         let [entry, first, end] = steady.unwrap_or([u32::MAX, 0, 0]).map(Literal::u32_unsuffixed);
-        quote!(steady(#entry, #first, #end))
+        let turn = plan.pivots.iter().position(|pivot| pivot.1 == slot).unwrap_or_default();
+        let turn = Literal::usize_unsuffixed(turn);
+        quote!(steady(#entry, #first, #end, #turn))
     });
+    let steady: Vec<_> = steady.collect();
     let [slots, updates, slot_of_equation] =
         [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
     quote! {{
@@ -213,8 +218,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         ) -> Pivot {
             Pivot { slot, block, upper, end, left, identity, scaled, steady, beside }
         }
-        const fn steady(entry: u32, first: u32, end: u32) -> Steady {
-            Steady { entry, first, end }
+        const fn steady(entry: u32, first: u32, end: u32, turn: u32) -> Steady {
+            Steady { entry, first, end, turn }
         }
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }

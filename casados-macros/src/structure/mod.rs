@@ -196,23 +196,24 @@ fn elimination(
         lower.all(|block| plan.blocks[block as usize].0 != row)
     };
     let mut steady = vec![None; x.len()];
-    for ((&(row, column), &[block, upper, _]), identity) in
-        plan.pivots.iter().zip(&plan.ranges).zip(&identity)
-    {
+    for (k, (&(row, column), &[block, upper, _])) in plan.pivots.iter().zip(&plan.ranges).enumerate() {
         let Some(to) = steady.get_mut(column as usize) else { continue };
         // What its row consists of beside the derivative: a state, a control or a parameter.
         let mut others = (blocks[1]..blocks[5]).filter(|&entry| jacobian[entry].0 == row);
         let Some(entry) = others.next().filter(|entry| !(blocks[2]..blocks[3]).contains(entry)) else {
             continue;
         };
-        let before =
-            |variable: u32| jacobian[blocks[1]..].iter().filter(|entry| entry.1 < variable).count() as u32;
-        let felt = [0, 1].map(|more| before(column + x.len() as u32 + more));
-        // All that the state is felt by comes later, and is `h diag(f_x) A` at its turn.
+        // Equations that feel the state and come later; its blocks are `h diag(f_x) A` at its turn.
+        let variable = column + x.len() as u32;
+        let before = |row: u32| plan.pivots[..k].iter().any(|pivot| pivot.0 == row);
+        let felt =
+            jacobian[blocks[1]..blocks[2]].iter().filter(|entry| entry.1 == variable && !before(entry.0));
         let below = (block + 1..upper).all(|block| original(block).is_some_and(|p| p.direct.is_none()));
-        let all = upper - block > 1 && upper - block - 1 == felt[1] - felt[0];
-        if *identity && others.next().is_none() && trivial.contains(&row) && free(row) && below && all {
-            *to = Some([entry as u32, felt[0], felt[1]]);
+        let all = upper - block > 1 && (upper - block - 1) as usize == felt.count();
+        let first =
+            |variable: u32| jacobian[blocks[1]..].iter().filter(|entry| entry.1 < variable).count() as u32;
+        if identity[k] && others.next().is_none() && trivial.contains(&row) && free(row) && below && all {
+            *to = Some([entry as u32, first(variable), first(variable + 1)]);
         }
     }
     Elimination { plan, positions, identity, scaled, steady }

@@ -1,0 +1,148 @@
+//! What is left out where equations are trivial, `q̇ = c v`: below their pivots in forward sensitivities, and rows of `D` in second
+//! derivatives. Held against differences of what they are derivatives of, with the plan of elimination and without.
+
+use casados::Method;
+use casados::irk::Integrator;
+use casados::model::Steady;
+use casados::prelude::*;
+use casados::result::{Forward, Hessian};
+use lost::Lost;
+use nalgebra::{SMatrix, SVector, vector};
+
+#[allow(dead_code)]
+#[path = "../examples/firmware/src/lost.rs"]
+mod lost;
+
+/// Positions that follow a state, a multiple of one, and a control; two velocities; a cost, of positions or of their derivatives.
+#[dae(COST = [0, 1])]
+fn points<const COST: usize>(xdot: [f64; 6], x: [f64; 6], z: [f64; 2], u: [f64; 2], p: [f64; 2]) -> [f64; 8] {
+    let of = if COST == 1 { [xdot[0], xdot[1], xdot[2]] } else { [x[0], x[1], x[2]] };
+    [
+        xdot[0] - x[3],
+        xdot[1] + 2.0 * x[4],
+        xdot[2] - u[0],
+        xdot[3] + (x[0] - x[1]).sin() + (x[2] + 0.1 * x[3]) * x[4] + z[0],
+        xdot[4] - x[0].cos() * x[1] + 0.2 * x[3] * x[4] + 0.3 * z[1] * x[2] - u[0] * x[0],
+        xdot[5]
+            - (of[0] * of[0] + of[1] * of[1] + of[2] * of[2])
+            - (u[1] * u[1] + x[3] * x[3] + x[4] * x[4] + u[0] * u[0]),
+        p[1] * z[0] + p[0] * z[1] - x[0] * x[0],
+        p[0] * z[0] - p[1] * z[1] - x[1],
+    ]
+}
+
+type X = SVector<f64, 6>;
+/// Initial values, controls and parameters in one.
+type W = SVector<f64, 10>;
+type Test = Result<(), Box<dyn std::error::Error>>;
+type Steps<M, B, const S: usize> = Integrator<M, B, S, f64, Heap>;
+
+const LENGTH: f64 = 0.3;
+/// Condition of the Newton matrix of order ten, over three steps.
+const ROUNDING: f64 = 30.0 * f64::EPSILON;
+/// Of differences, and what their weights add up to.
+const STEP: f64 = 0.01;
+const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
+const SUM: f64 = 2.1;
+
+const BEGIN: [f64; 10] = [0.4, -0.3, 0.8, 0.5, -0.6, 0.1, 0.7, -0.2, 1.2, 0.4];
+
+fn split(w: &W) -> (X, SVector<f64, 2>, SVector<f64, 2>) {
+    (w.fixed_rows::<6>(0).into(), vector![w[6], w[7]], vector![w[8], w[9]])
+}
+
+fn steps<M: Dae, B: Method<S>, const S: usize>() -> Result<Steps<M, B, S>, casados::Error> {
+    Integrator::new(Options { steps: 3, ..Default::default() })
+}
+
+/// Differences of order eight in every direction.
+fn differences<const R: usize>(
+    at: &W,
+    mut of: impl FnMut(&W) -> Result<SVector<f64, R>, casados::Error>,
+) -> Result<SMatrix<f64, R, 10>, casados::Error> {
+    let mut all = SMatrix::<f64, R, 10>::zeros();
+    for c in 0..10 {
+        for (k, weight) in WEIGHTS.into_iter().enumerate() {
+            let mut by = W::zeros();
+            by[c] = STEP * (k + 1) as f64;
+            let change = (of(&(at + by))? - of(&(at - by))?) * (weight / STEP);
+            all.column_mut(c).zip_apply(&change, |to, change| *to += change);
+        }
+    }
+    Ok(all)
+}
+
+fn close<const R: usize>(found: &SMatrix<f64, R, 10>, expected: &SMatrix<f64, R, 10>, size: f64) {
+    let (worst, tolerance) = ((found - expected).amax(), SUM * ROUNDING * size / STEP);
+    assert!(worst <= tolerance, "{worst:e} is more than {tolerance:e}");
+}
+
+fn jacobian<M: Dae<Shape = <Points<0> as Dae>::Shape>>(of: &Forward<M>) -> SMatrix<f64, 6, 10> {
+    SMatrix::from_fn(|r, c| match c {
+        0..6 => of.dx_dx0[(r, c)],
+        6..8 => of.dx_du[(r, c - 6)],
+        _ => of.dx_dp[(r, c - 8)],
+    })
+}
+
+fn second<M: Dae<Shape = <Points<0> as Dae>::Shape>>(of: &Hessian<M>) -> SMatrix<f64, 10, 10> {
+    SMatrix::from_fn(|r, c| match (r.min(c), r.max(c)) {
+        (r, c @ 0..6) => of.h_xx[(r, c)],
+        (r @ 0..6, c @ 6..8) => of.h_xu[(r, c - 6)],
+        (r @ 0..6, c) => of.h_xp[(r, c - 8)],
+        (r, c @ 6..8) => of.h_uu[(r - 6, c - 6)],
+        (r @ 6..8, c) => of.h_up[(r - 6, c - 8)],
+        (r, c) => of.h_pp[(r - 8, c - 8)],
+    })
+}
+
+/// Forward, directional and second-order sensitivities.
+fn check<M, B, const S: usize>(mut irk: Steps<M, B, S>, dense: bool) -> Test
+where
+    M: Dae<Shape = <Points<0> as Dae>::Shape>,
+    B: Method<S>,
+{
+    let (at, lambda) = (W::from(BEGIN), X::from_fn(|i, _| (0.7 * i as f64).cos()));
+    let (x, u, p) = split(&at);
+    irk.set_parameters(&p)?;
+    let found = jacobian(irk.forward(&x, &u, LENGTH)?);
+    assert_eq!(irk.statistics().dense > 0, dense, "{:?}", irk.statistics());
+    let hessian = *irk.hessian(&x, &u, LENGTH, &lambda)?;
+    let expected = differences(&at, |w| {
+        let (x, u, p) = split(w);
+        irk.set_parameters(&p)?;
+        Ok(irk.solve(&x, &u, LENGTH)?.x)
+    })?;
+    let size = found.amax().max(1.0);
+    close(&found, &expected, size);
+    let expected = differences(&at, |w| {
+        let (x, u, p) = split(w);
+        irk.set_parameters(&p)?;
+        let adjoint = irk.adjoint(&x, &u, LENGTH, &lambda)?;
+        let parts = [adjoint.grad_x0.as_slice(), adjoint.grad_u.as_slice(), adjoint.grad_p.as_slice()];
+        Ok(W::from_iterator(parts.concat()))
+    })?;
+    close(&second(&hessian), &expected, expected.amax().max(1.0));
+    Ok(())
+}
+
+#[test]
+fn derivatives_are_those_of_the_solution() -> Test {
+    let plan = &<Points<0> as Dae>::STRUCTURE.elimination;
+    let steady: Vec<usize> = (0..8).filter(|&slot| plan.steady[slot].entry != Steady::NONE).collect();
+    assert_eq!(steady, [0, 1, 2]);
+    let structure = &<Points<1> as Dae>::STRUCTURE;
+    assert_eq!((structure.folded.len(), structure.lone.len()), (3, 1));
+    check(steps::<Points<0>, Gauss<2>, 2>()?, false)?;
+    check(steps::<Points<0>, Gauss<1>, 1>()?, false)?;
+    check(steps::<Points<0>, RadauIIA<3>, 3>()?, false)?;
+    check(steps::<Points<1>, Gauss<2>, 2>()?, false)?;
+    check(steps::<Points<1>, Gauss<4>, 4>()?, false)
+}
+
+/// The whole matrix pivoted.
+#[test]
+fn without_the_plan() -> Test {
+    check(steps::<Lost<Points<0>>, Gauss<2>, 2>()?, true)?;
+    check(steps::<Lost<Points<1>>, Gauss<2>, 2>()?, true)
+}
