@@ -5,6 +5,7 @@ mod elimination;
 mod facts;
 mod index;
 mod samples;
+mod steady;
 #[cfg(test)]
 mod tests;
 
@@ -191,31 +192,8 @@ fn elimination(
                 && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
-    let free = |row: u32| {
-        let mut lower = plan.ranges.iter().flat_map(|&[block, upper, _]| block + 1..upper);
-        lower.all(|block| plan.blocks[block as usize].0 != row)
-    };
-    let mut steady = vec![None; x.len()];
-    for (k, (&(row, column), &[block, upper, _])) in plan.pivots.iter().zip(&plan.ranges).enumerate() {
-        let Some(to) = steady.get_mut(column as usize) else { continue };
-        // What its row consists of beside the derivative: a state, a control or a parameter.
-        let mut others = (blocks[1]..blocks[5]).filter(|&entry| jacobian[entry].0 == row);
-        let Some(entry) = others.next().filter(|entry| !(blocks[2]..blocks[3]).contains(entry)) else {
-            continue;
-        };
-        // Equations that feel the state and come later; its blocks are `h diag(f_x) A` at its turn.
-        let variable = column + x.len() as u32;
-        let before = |row: u32| plan.pivots[..k].iter().any(|pivot| pivot.0 == row);
-        let felt =
-            jacobian[blocks[1]..blocks[2]].iter().filter(|entry| entry.1 == variable && !before(entry.0));
-        let below = (block + 1..upper).all(|block| original(block).is_some_and(|p| p.direct.is_none()));
-        let all = upper - block > 1 && (upper - block - 1) as usize == felt.count();
-        let first =
-            |variable: u32| jacobian[blocks[1]..].iter().filter(|entry| entry.1 < variable).count() as u32;
-        if identity[k] && others.next().is_none() && trivial.contains(&row) && free(row) && below && all {
-            *to = Some([entry as u32, first(variable), first(variable + 1)]);
-        }
-    }
+    let is_pure = |block: u32| original(block).is_some_and(|p| p.direct.is_none());
+    let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &identity, &is_pure);
     Elimination { plan, positions, identity, scaled, steady }
 }
 
