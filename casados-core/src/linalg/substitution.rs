@@ -7,7 +7,7 @@ use super::block::{Block, Packet, negate, subtract, subtract_scaled};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
-use crate::model::{Dae, Pivot};
+use crate::model::{Dae, Pivot, Steady};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 
@@ -304,6 +304,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         if !pivot.left(S).is_empty() {
             let mut packet = load(rows, slot, *column);
             for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
+                // What steady states subtract is subtracted.
+                if const { SYSTEM == STEADY_DOWN } && is_steady::<M>(left.slot as usize) {
+                    continue;
+                }
                 let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
                 let (Some(block), Some(other)) = (block, other) else { continue };
                 subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
@@ -344,6 +348,12 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         }
         store(rows, pivot.slot as usize, *column, &packet);
     }
+}
+
+/// Whether a slot is a [steady](Steady) state.
+#[inline(always)]
+fn is_steady<M: Dae>(slot: usize) -> bool {
+    matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
 }
 
 /// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
