@@ -181,7 +181,7 @@ fn elimination(
         .iter()
         .map(|&[block, ..]| original(block).is_some_and(|p| samples::is_identity(&model.graph, jacobian, p)))
         .collect();
-    let scaled = plan
+    let scaled: Vec<bool> = plan
         .ranges
         .iter()
         .zip(&identity)
@@ -192,8 +192,7 @@ fn elimination(
                 && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
-    let is_pure = |block: u32| original(block).is_some_and(|p| p.direct.is_none());
-    let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &identity, &is_pure);
+    let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &scaled);
     Elimination { plan, positions, identity, scaled, steady }
 }
 

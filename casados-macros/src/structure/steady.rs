@@ -4,15 +4,13 @@ use super::elimination::Plan;
 use crate::graph::Entry;
 
 /// For each of `nx` states, if it is such: the entry of the Jacobian that its right-hand sides are made of, and where in the entries by
-/// column those of its `f_x` begin and end. Equations `trivial` and pivots `identity` are known; a block is pure if it is
-/// `h diag(f_x) A` at the turn of its pivot.
+/// column those of its `f_x` begin and end. Pivots are `scaled`: with fewer equations below them there is nothing to be gained.
 pub fn find(
     nx: u32,
     (jacobian, blocks): (&[Entry], [usize; 6]),
     trivial: &[u32],
     plan: &Plan,
-    identity: &[bool],
-    is_pure: &dyn Fn(u32) -> bool,
+    scaled: &[bool],
 ) -> Vec<Option<[u32; 3]>> {
     // Nothing was subtracted from its own equation.
     let is_free = |row: u32| {
@@ -24,7 +22,7 @@ pub fn find(
     let mut steady = vec![None; nx as usize];
     for (k, (&(row, column), &[block, upper, _])) in plan.pivots.iter().zip(&plan.ranges).enumerate() {
         let Some(to) = steady.get_mut(column as usize) else { continue };
-        if !(identity[k] && trivial.contains(&row) && is_free(row)) {
+        if !(scaled[k] && trivial.contains(&row) && is_free(row)) {
             continue;
         }
         // What its equation consists of beside the derivative: a state, a control or a parameter.
@@ -32,13 +30,12 @@ pub fn find(
         let Some(entry) = others.next().filter(|entry| !(blocks[2]..blocks[3]).contains(entry)) else {
             continue;
         };
-        // All that is below its pivot feels the state, and the state alone.
+        // All that is below its pivot feels the state.
         let variable = nx + column;
         let is_done = |row: u32| plan.pivots[..k].iter().any(|pivot| pivot.0 == row);
         let felt = jacobian[blocks[1]..blocks[2]].iter().filter(|entry| entry.1 == variable);
         let later = felt.filter(|entry| !is_done(entry.0)).count();
-        let mut below = block + 1..upper;
-        if !below.is_empty() && below.len() == later && below.all(is_pure) {
+        if (upper - block - 1) as usize == later {
             *to = Some([entry as u32, place(variable), place(variable + 1)]);
         }
     }

@@ -201,28 +201,33 @@ fn squares_of_what_is_a_multiple_of_others() {
 #[test]
 fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
     let steady = |own: fn(&[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
-        accepted(model([2, 0, 1, 0], move |g, v| {
-            let force = other(g, v);
-            let (first, second) = (own(v), sub(g, v[1], force));
-            vec![sub(g, v[0], first), second]
+        accepted(model([4, 0, 1, 0], move |g, v| {
+            let first = own(v);
+            let mut f = vec![sub(g, v[0], first)];
+            for derivative in &v[1..4] {
+                let (force, product) = (other(g, v), mul(g, v[5], v[6]));
+                let (rest, product) = (sub(g, *derivative, force), mul(g, product, v[7]));
+                f.push(sub(g, rest, product));
+            }
+            f
         }))
         .elimination
         .steady
     };
-    let sine = |g: &mut Graph, v: &[Node]| g.unary(Unary::Sin, v[2]);
-    // Entries f_x of (row, variable) (0, 3) and (1, 2), the second one first by columns.
-    assert_eq!(steady(|v| v[3], sine), [Some([2, 0, 1]), None]);
-    // (1, 2) and (0, 4).
-    assert_eq!(steady(|v| v[4], sine), [Some([3, 0, 1]), None]);
+    let sine = |g: &mut Graph, v: &[Node]| g.unary(Unary::Sin, v[4]);
+    // Behind four entries of f_ẋ (0, 5); q is first by columns, felt by three.
+    assert_eq!(steady(|v| v[5], sine), [Some([4, 0, 3]), None, None, None]);
+    // The control, behind the entries of f_x.
+    assert_eq!(steady(|v| v[8], sine), [Some([16, 0, 3]), None, None, None]);
     // The equation of q varies.
-    assert_eq!(steady(|v| v[2], sine), [None, None]);
+    assert_eq!(steady(|v| v[4], sine), [None; 4]);
     let with_derivative = |g: &mut Graph, v: &[Node]| {
-        let sine = g.unary(Unary::Sin, v[2]);
+        let sine = g.unary(Unary::Sin, v[4]);
         sub(g, sine, v[0])
     };
-    assert_eq!(steady(|v| v[3], with_derivative), [None, None]);
+    assert_eq!(steady(|v| v[5], with_derivative), [None; 4]);
     // Nobody feels q.
-    assert_eq!(steady(|v| v[3], |_, v| v[4]), [None, None]);
+    assert_eq!(steady(|v| v[5], |_, v| v[8]), [None; 4]);
 }
 
 #[test]
