@@ -317,10 +317,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
         let slot = slot::<M>(r);
         let Some(&(mut packet)) = self.dy.get(slot) else { return };
-        if steady::<M>(slot).is_none() && self.subtract::<A>(&mut packet, slot, c - M::Shape::NX, values) {
-            if let Some(to) = self.dy.get_mut(slot) {
-                *to = packet;
-            }
+        if steady::<M>(slot).is_some() || !self.subtract::<A>(&mut packet, slot, c - M::Shape::NX, values) {
+            return;
+        }
+        if let Some(to) = self.dy.get_mut(slot) {
+            *to = packet;
         }
     }
 }
