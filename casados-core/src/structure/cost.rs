@@ -30,7 +30,8 @@ pub struct Cost {
     pub iteration: u64,
     /// Forward sensitivities in the directions that count, of [`Structure::directions`]: right-hand sides `f_x V + f_w`, `2s` for each
     /// entry of `f_x` in each direction and `s` for each of `f_u`, `f_p`; a solve for each; and
-    /// `2s nx` for each for the sum over the stages. The factors are those of Newton's method.
+    /// `2s nx` for each for the sum over the stages; less what [`Steady`](super::Steady) states spare of the solve, for `2s` in each direction. The
+    /// factors are those of Newton's method.
     pub forward: u64,
     /// An adjoint: the right-hand side, `s nx`; a solve; and `2s` for each entry of `f_x`, `f_u`, `f_p`.
     pub adjoint: u64,
@@ -77,13 +78,20 @@ impl Structure {
             residual,
             residual_jacobian,
             iteration: 2 * s * s * nx + residual_jacobian + assembly + factorisation + solve + s * nk,
-            forward: directions * (2 * s * of_x + solve + 2 * s * nx) + s * of_w,
+            forward: directions * (2 * s * of_x + solve + 2 * s * nx - self.spared(s)) + s * of_w,
             adjoint: s * nx + solve + 2 * s * (of_x + of_w),
             hessian: s * u64::from(self.operations.hessian)
                 + directions * 2 * s * s * curved_states
                 + directions * 2 * s * self.symmetric.len() as u64
                 + directions * (directions + 1) / 2 * 2 * s * curved,
         }
+    }
+
+    /// What is not done below the pivots of steady states.
+    fn spared(&self, s: u64) -> u64 {
+        let steady = self.elimination.pivots.iter().filter(|pivot| pivot.steady);
+        let shared = if s > 1 { 2 * s * s } else { 0 };
+        steady.map(|pivot| 2 * s * (pivot.lower().len() as u64 - 1) + shared).sum()
     }
 
     /// Of a factorisation, and of a solve.
