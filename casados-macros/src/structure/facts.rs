@@ -105,8 +105,8 @@ impl Curved {
             else {
                 continue;
             };
-            if own.1 < nx && other.1 >= nx && factor.is_normal() {
-                variables.remove(&own.1);
+            // Two equations may say what one derivative is.
+            if own.1 < nx && other.1 >= nx && factor.is_normal() && variables.remove(&own.1) {
                 folded.push((entry, into, factor));
             }
         }

@@ -191,6 +191,16 @@ fn squares_of_what_is_a_multiple_of_others() {
     assert_eq!(facts.curved, [3]);
     assert_eq!(facts.folded, [(0, 2, 4.0), (1, 3, 1.0)]);
     assert_eq!(facts.lone, [(3, 2)]);
+    // Twice ẋ₀ = z₀: folded once.
+    let twice = accepted(model([1, 2, 0, 0], |g, v| {
+        let (square, other) = (mul(g, v[0], v[0]), mul(g, v[2], v[2]));
+        let squares = g.binary(Binary::Add, square, other);
+        let lengths = mul(g, v[1], v[1]);
+        let third = sub(g, squares, lengths);
+        vec![sub(g, v[0], v[2]), sub(g, v[0], v[1]), sub(g, v[3], third)]
+    }));
+    assert_eq!(twice.facts.trivial, [0, 1]);
+    assert_eq!((twice.facts.folded, twice.facts.curved), (vec![(0, 2, 1.0)], vec![1, 2]));
     // ẋ₀ x₀ needs both.
     let facts = build(true);
     assert_eq!(facts.curved, [0, 2, 3]);
