@@ -131,7 +131,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             curved,
             second,
             placed: 0,
-            nodes: [work.inputs.time.step; S],
             model: PhantomData,
         });
     }
@@ -236,8 +235,6 @@ struct Step<'a, M: Dae, E: Plain, D, const S: usize> {
     second: bool,
     /// How many entries of the Jacobian, column by column, are in their panels.
     placed: usize,
-    /// `h c_i`
-    nodes: [E; S],
     model: PhantomData<M>,
 }
 
@@ -247,7 +244,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
-        self.nodes = nodes(&self.coefficients.a, self.h);
+        let nodes = &nodes(&self.coefficients.a, self.h);
         if self.phase != Phase::Before {
             for strands in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
                 clear(strands);
@@ -260,10 +257,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Step<'_, M, 
         }
         if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
             self.dy.fill(E::from_f64(0.0));
-            let (jacobian, nodes, dy) = (self.jacobian, &self.nodes, &mut *self.dy);
+            let (jacobian, dy) = (self.jacobian, &mut *self.dy);
             each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, nodes, dy, directions: PhantomData });
         }
-        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column));
+        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column, nodes));
     }
 }
 
@@ -275,8 +272,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
     }
 
     #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize) {
-        self.before::<A, W>(column);
+    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
+        self.before::<A, W>(column, nodes);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         if self.phase == Phase::Whole {
             solve_steady::<A, M, E, [E; W], S, W>(self.factors, dy);
@@ -284,9 +281,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
         self.after::<A, W>(column);
     }
 
-    /// The right-hand side of a panel.
+    /// The right-hand side of a panel, with `h c_i`.
     #[inline(always)]
-    fn before<A: Arithmetic, const W: usize>(&mut self, column: usize) {
+    fn before<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
@@ -295,7 +292,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Step<'_, M, E, D, S> {
             return;
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
-        let nodes = &self.nodes;
         if !(self.first && D::SPARSE) {
             Later::<M, E, D, S, W> { jacobian, nodes, v, directions, dy: &mut *dy, column }.all::<A>();
         } else if const { !Self::is_small::<A>() } {

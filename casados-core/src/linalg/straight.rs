@@ -94,6 +94,8 @@ pub trait AtPivot {
     const INSTRUCTIONS: usize;
     /// Whether it is done for each update, or for each block.
     const UPDATES: bool = false;
+    /// Whether it looks at the pivots that follow, on the way from the last to the first.
+    const OTHERS: bool = false;
     /// With the pivots that follow in the plan. To be `#[inline(always)]`.
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], updates: &'static [u32]);
 }
@@ -123,7 +125,7 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     }
 }
 
-/// From the last pivot to the first, without updates.
+/// From the last pivot to the first, without updates; with those that follow where they are asked for.
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     if const { is_short_plan::<A, M, V>() } {
@@ -131,6 +133,12 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         return;
     }
     let all = M::STRUCTURE.elimination.pivots;
+    if const { !V::OTHERS } {
+        for pivot in all.iter().rev() {
+            visit.at::<A>(pivot, &[], &[]);
+        }
+        return;
+    }
     let mut index = all.len();
     while index > 0 {
         index -= 1;

@@ -167,6 +167,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
         4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
     };
+    const OTHERS: bool = SYSTEM == TRANSPOSED_UP;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [u32]) {
         match SYSTEM {
