@@ -185,12 +185,13 @@ pub fn copy_sign<D: Double>(magnitude: D, a: D) -> D {
 #[inline(always)]
 pub fn powf<D: Double>((a, b): (D, D)) -> D {
     let usual = D::and(c::<D>(f64::MIN_POSITIVE).le(a), a.le(c(f64::MAX)));
-    let logarithm = super::logarithm::ln_pair(D::select(usual, a, c(1.0)));
+    // Whatever comes out of what is not usual, or does not fit, is mended.
+    let logarithm = super::logarithm::ln_pair(a);
     let exponent = product(logarithm.high, b);
     let low = logarithm.low.mul_add(b, exponent.low);
     // The product of a logarithm of zero and a large number has no lower part.
     let fits = D::and(exponent.high.abs().lt(c(700.0)), b.abs().lt(c(1e100)));
-    let (n, r) = reduce(clamp(exponent.high, -700.0, 700.0));
+    let (n, r) = reduce(exponent.high);
     let r = ordered_sum(r.high, r.low + low);
     let mut result = near_one(r).round() * power_of_two(n);
     repair2(D::not(D::and(usual, fits)), a, b, &mut result, <f64 as Scalar>::powf);

@@ -116,6 +116,17 @@ impl<D: Double> Pair<D> {
     pub fn shift(self, power: D) -> Self {
         Self { high: self.high * power, low: self.low * power }
     }
+    /// The quotient of a double.
+    #[inline(always)]
+    pub fn quotient(a: D, b: Self) -> Self {
+        if D::FUSED {
+            let reciprocal = c::<D>(1.0) / b.high;
+            let quotient = a * reciprocal;
+            let rest = (-quotient).mul_add(b.low, (-quotient).mul_add(b.high, a));
+            return Self { high: quotient, low: rest * reciprocal };
+        }
+        Self::new(a).div(b)
+    }
     /// The quotient.
     #[inline(always)]
     pub fn div(self, other: Self) -> Self {
