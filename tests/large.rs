@@ -9,7 +9,7 @@ mod chain;
 
 use casados::batch::BatchStatistics;
 use casados::prelude::*;
-use casados::result::{Adjoint, Forward, Hessian, Nominal};
+use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use casados::testing::limit_cache;
 use chain::{Chain, stretched};
 use nalgebra::SVector;
@@ -63,23 +63,26 @@ fn stages_side_by_side_derivatives_alone() -> Test {
         let mut nominal = vec![Nominal::default(); COUNT];
         let mut forward = vec![Forward::default(); COUNT];
         let mut adjoint = vec![Adjoint::default(); COUNT];
+        let mut both = vec![ForwardAdjoint::default(); COUNT];
         let mut hessian = vec![Hessian::default(); COUNT];
         let intervals = Intervals { x0: &x0, u: &u, h: &[h], ..Default::default() };
         batch.solve(&intervals, &mut nominal)?;
         batch.adjoint(&intervals, &lambda, &mut adjoint)?;
         batch.forward(&intervals, &mut forward)?;
         check(batch.statistics(), COUNT, 0);
+        batch.forward_adjoint(&intervals, &lambda, &mut both)?;
+        check(batch.statistics(), COUNT, 0);
         batch.hessian(&intervals, &lambda, &mut hessian)?;
         check(batch.statistics(), COUNT, 0);
         for k in 0..COUNT {
             let expected = single.hessian(&x0[k], &u[k], h, &lambda[k])?;
             close("x", nominal[k].x.as_slice(), expected.x.as_slice());
-            for found in [&forward[k], &hessian[k].first.forward] {
+            for found in [&forward[k], &both[k].forward, &hessian[k].first.forward] {
                 close("x", found.x.as_slice(), expected.x.as_slice());
                 close("dx/dx0", found.dx_dx0.as_slice(), expected.dx_dx0.as_slice());
                 close("dx/du", found.dx_du.as_slice(), expected.dx_du.as_slice());
             }
-            for found in [&adjoint[k].grad_x0, &hessian[k].grad_x0] {
+            for found in [&adjoint[k].grad_x0, &both[k].grad_x0, &hessian[k].grad_x0] {
                 close("gradient", found.as_slice(), expected.grad_x0.as_slice());
             }
             close("h_xx", hessian[k].h_xx.as_slice(), expected.h_xx.as_slice());

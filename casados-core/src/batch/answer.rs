@@ -3,12 +3,12 @@
 use super::group::{Group, MOST_LANES, Verdict};
 use super::intervals::{Interval, vector};
 use crate::error::Error;
-use crate::irk::Integrator;
+use crate::irk::{Arguments, Integrator};
 use crate::memory::Heap;
-use crate::model::{ArrayK, Dae, VectorU};
+use crate::model::{ArrayK, Dae};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Matrix, Plain, Shape, assign};
 use bytemuck::Zeroable;
 
 /// A result of several intervals, with a number for each of them in the lanes of its registers. All of it is inlined
@@ -120,15 +120,16 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send {
         warm: bool,
     ) -> Verdict<'_, E, Self::Wide<E>>;
 
-    /// For one interval.
-    fn alone<'a, B, const S: usize>(
-        irk: &'a mut Integrator<M, B, S, T, Heap>,
+    /// For one interval, where it belongs: results that are large are written once.
+    fn alone<B, const S: usize>(
+        &mut self,
+        irk: &mut Integrator<M, B, S, T, Heap>,
         interval: &Interval<'_, M, T>,
-    ) -> Result<&'a Self, Error>;
+    ) -> Result<(), Error>;
 }
 
 macro_rules! answer {
-    ($type:ident, $together:ident, $columns:expr, |$irk:ident, $interval:ident, $u:ident| $alone:expr) => {
+    ($type:ident, $together:ident, $columns:expr, |$to:ident, $irk:ident, $at:ident, $of:ident| $alone:expr) => {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
 
@@ -147,22 +148,30 @@ macro_rules! answer {
             ) -> Verdict<'_, E, Self::Wide<E>> {
                 group.$together(warm)
             }
-            fn alone<'a, B, const S: usize>(
-                $irk: &'a mut Integrator<M, B, S, T, Heap>,
-                $interval: &Interval<'_, M, T>,
-            ) -> Result<&'a Self, Error> {
-                let $u: VectorU<M, T> = vector($interval.u);
+            fn alone<B, const S: usize>(
+                &mut self,
+                $irk: &mut Integrator<M, B, S, T, Heap>,
+                $at: &Interval<'_, M, T>,
+            ) -> Result<(), Error> {
+                let ($to, u) = (self, &vector($at.u));
+                let $of: &Arguments<'_, M, T> = &Arguments { x0: $at.x0, u, h: $at.h };
                 $alone
             }
         }
     };
 }
-answer!(Nominal, solve, 0, |irk, at, u| irk.solve(at.x0, &u, at.h));
-answer!(Forward, forward, M::Shape::NW, |irk, at, u| irk.forward(at.x0, &u, at.h));
-answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |irk, at, u| {
-    irk.forward_adjoint(at.x0, &u, at.h, &vector(at.lambda))
+answer!(Nominal, solve, 0, |to, irk, _at, of| {
+    assign(to, irk.solve(of.x0, of.u, of.h)?);
+    Ok(())
 });
-answer!(Adjoint, adjoint, 1, |irk, at, u| irk.adjoint(at.x0, &u, at.h, &vector(at.lambda)));
-answer!(Hessian, hessian, M::Shape::NW, |irk, at, u| {
-    irk.hessian_along(at.x0, &u, at.h, &vector(at.lambda), at.nu, None)
+answer!(Forward, forward, M::Shape::NW, |to, irk, _at, of| irk.forward_to(of, to));
+answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |to, irk, at, of| {
+    irk.forward_adjoint_to(of, at.lambda, to)
+});
+answer!(Adjoint, adjoint, 1, |to, irk, at, of| {
+    assign(to, irk.adjoint(of.x0, of.u, of.h, &vector(at.lambda))?);
+    Ok(())
+});
+answer!(Hessian, hessian, M::Shape::NW, |to, irk, at, of| {
+    irk.hessian_to(of, at.lambda, at.nu, None, Some(to))
 });

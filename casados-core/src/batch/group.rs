@@ -6,7 +6,10 @@
 use super::answer::{unpack, yes};
 use super::intervals::Interval;
 use crate::error::Error;
-use crate::irk::{AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Step, Work};
+use crate::irk::{
+    AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Step, StepOf, Work,
+    multiply,
+};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::{Heap, Memory, WithForward, WithHessian};
 use crate::model::{ArrayK, ArrayX, Dae, VectorZ};
@@ -187,17 +190,23 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
 
     fn differentiate(&mut self, warm: bool, adjoint: bool) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
         let mut pass = pass!(self, warm);
-        let forward = Heap::forward(&mut self.forward)?;
+        let ForwardMemory { result, pass: forward, .. } = Heap::forward(&mut self.forward)?;
         let count = pass.steps.len();
         let good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
-            pass.forward(forward, n, count, None)
+            forward.advance(
+                pass.work,
+                pass.coefficients,
+                StepOf { n, count, distant: false },
+                None,
+                &mut result.forward,
+            )
         });
-        let good = E::and(good, forward.write(&pass.work.result, None).is_finite());
+        let good = E::and(good, forward.end(&pass.work.result, &mut result.forward).is_finite());
         if adjoint {
-            forward.multiply(Heap::nominal(&mut self.lambda)?.as_ref());
+            multiply(result, Heap::nominal(&mut self.lambda)?.as_ref());
         }
-        Ok((good, &forward.result))
+        Ok((good, result))
     }
 
     pub fn adjoint(&mut self, warm: bool) -> Verdict<'_, E, Adjoint<M, E>> {
@@ -227,8 +236,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
 
     pub fn hessian(&mut self, warm: bool) -> Verdict<'_, E, Hessian<M, E>> {
         let mut pass = pass!(self, warm);
-        let forward = Heap::forward(&mut self.forward)?;
-        let hessian = Heap::hessian(&mut self.hessian)?;
+        let forward = &mut Heap::forward(&mut self.forward)?.pass;
+        let HessianMemory { result, pass: hessian } = Heap::hessian(&mut self.hessian)?;
         let lambda = Heap::nominal(&mut self.lambda)?;
         let nu = if self.weighted { Heap::nominal(&mut self.nu)?.as_slice() } else { &[] };
         let count = pass.steps.len();
@@ -236,14 +245,15 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let mut good = pass.run(|pass, n, step, exact| {
             pass.linearize(n, step, exact);
             let Some(record) = records.get_mut(n) else { return yes::<E>() };
-            let good = pass.forward(forward, n, count, Some(record.curved()));
+            let (curved, at) = (Some(record.curved()), StepOf { n, count, distant: false });
+            let good = forward.advance(pass.work, pass.coefficients, at, curved, &mut result.first.forward);
             // That of the last step is still there on the way back.
             if n + 1 < count {
                 record.record(pass.work);
             }
             good
         });
-        let finite = forward.write(&pass.work.result, Some(&mut hessian.result.first.forward));
+        let finite = forward.end(&pass.work.result, &mut result.first.forward);
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref(), nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
@@ -256,10 +266,10 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             good = E::and(good, hessian.backward.stages(work, coefficients));
             hessian.backward.advance(&work.linear);
             hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(work, coefficients, record, n, n + 1 == count);
+            hessian.subtract(work, coefficients, record, [n, count], &[]);
         }
-        let finite = hessian.collect(None) + finite;
-        Ok((E::and(good, finite.is_finite()), &hessian.result))
+        let finite = hessian.collect(None, result) + finite;
+        Ok((E::and(good, finite.is_finite()), result))
     }
 }
 
@@ -290,18 +300,6 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
 
     fn linearize(&mut self, n: usize, step: &Step<M, E, S>, exact: bool) {
         self.work.linearize_planned(self.coefficients, n, step, exact, self.statistics);
-    }
-
-    fn forward(
-        &mut self,
-        forward: &mut ForwardMemory<M, E, S>,
-        n: usize,
-        count: usize,
-        curved: Option<&mut [E]>,
-    ) -> E::Mask {
-        let good = forward.advance(self.work, self.coefficients, n, curved);
-        forward.collect(self.coefficients, n, count);
-        good
     }
 }
 

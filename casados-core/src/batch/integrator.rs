@@ -21,7 +21,7 @@ use bytemuck::Zeroable;
 /// Integrates many intervals of one model with `S` stages of the method `B`; see [`Batch`](super::Batch).
 ///
 /// Every call writes one result for each interval into the caller's slice. An interval that fails is reported with
-/// the error that a single call would return, leaves its element of the slice as it was, and has no influence on the others.
+/// the error that a single call would return, leaves no result in its element of the slice, and has no influence on the others.
 ///
 /// # Errors
 /// Of every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;

@@ -269,9 +269,8 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
             (Some(record), Some(true), _) => irk.set_record(record)?,
             _ => irk.reset(),
         }
-        let answer = R::alone(irk, interval)?;
         if let Some(result) = share.results.get_mut(index) {
-            assign(result, answer);
+            result.alone(irk, interval)?;
         }
         if let (Some(record), Some(warm)) = (record, warm) {
             irk.record(record)?;

@@ -17,7 +17,8 @@ use super::multiply::multiply_panel;
 use super::record::{Coefficients, Work};
 use super::sweep::Phase;
 use crate::linalg::{
-    Arithmetic, Block, Kernel, Packet, Planned, coupling, dispatch, is_long, solve_packet_transposed,
+    Ahead, Arithmetic, Block, Kernel, Packet, Planned, Viewer, coupling, dispatch, is_long,
+    solve_packet_transposed,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
@@ -64,6 +65,8 @@ pub(super) struct Back<'a, M: Dae, E: Plain, R, const S: usize> {
     pub first: bool,
     /// Whether it is the last one: `Λ_N = 0`.
     pub last: bool,
+    /// Where the result will be written, if that is far away.
+    pub ahead: &'a [E],
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
@@ -85,7 +88,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
 
     /// All panels, or a part of what is done to one of them.
     fn phase<F: Fallback>(&mut self, work: &Work<M, E, S, F>, phase: Phase, only: usize) {
-        let Self { coefficients, entries, d, g, sum, first, last } = self;
+        let Self { coefficients, entries, d, g, sum, first, last, ahead } = self;
         let (g, m) = halves::<M, E, S>(g);
         dispatch(Panels::<M, E, R, S> {
             phase,
@@ -101,6 +104,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
             sum,
             first: *first,
             last: *last,
+            ahead,
             inverse: Inverse::new(coefficients, work.inputs.time.step),
             placed: 0,
             model: PhantomData,
@@ -148,6 +152,7 @@ struct Panels<'a, M: Dae, E: Plain, R, const S: usize> {
     sum: &'a mut [R],
     first: bool,
     last: bool,
+    ahead: &'a [E],
     /// See [`Advance`].
     inverse: Option<Inverse<E, S>>,
     placed: usize,
@@ -186,7 +191,10 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
                 .all::<A, M>(m);
         }
         if self.phase == Phase::Whole {
-            solve_packet_transposed::<A, M, E, [E; W], S, W>(self.factors, m, 0);
+            let own = self.ahead.get(column * M::Shape::NX..).unwrap_or_default();
+            let own = own.get(..W * M::Shape::NX).unwrap_or(own);
+            let ahead = &mut Waiting(Ahead(own));
+            solve_packet_transposed::<A, M, E, [E; W], S, W>(self.factors, m, 0, ahead);
         }
         if self.phase != Phase::Before {
             let Self { jacobian, sum, first, last, inverse, placed, .. } = self;
@@ -203,6 +211,16 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
             }
             .all::<A>();
         }
+    }
+}
+
+/// Who asks for memory meanwhile.
+struct Waiting<'a, E>(Ahead<'a, E>);
+
+impl<E, const S: usize, const W: usize> Viewer<E, S, W> for Waiting<'_, E> {
+    #[inline(always)]
+    fn pass(&mut self) {
+        self.0.next();
     }
 }
 

@@ -67,13 +67,13 @@ pub(super) const fn panel_of<E>(column: usize, count: usize, stages: usize) -> (
 }
 
 /// The rows of a panel that begins with a column, of a matrix with so many rows.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn panel<E, const W: usize>(panels: &[E], column: usize, rows: usize) -> &[[E; W]] {
     panels.get(column * rows..(column + W) * rows).unwrap_or_default().as_chunks().0
 }
 
 /// The rows of a panel that begins with a column, of a matrix with so many rows.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn panel_mut<E, const W: usize>(panels: &mut [E], column: usize, rows: usize) -> &mut [[E; W]] {
     panels.get_mut(column * rows..(column + W) * rows).unwrap_or_default().as_chunks_mut().0
 }
@@ -119,7 +119,7 @@ impl<M: Dae, E: Lanes> Directions<E> for Identity<M> {
         Self::column(index)
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
         let Some(of_index) = Self::column(index) else { return };
         if let Some(element) = row.get_mut(of_index.wrapping_sub(column)) {
@@ -139,7 +139,7 @@ pub(crate) struct Seeded<'a, E, const C: usize>(pub &'a [[E; C]]);
 impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
     const COUNT: usize = C;
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn add<const W: usize>(&self, index: usize, factor: E, column: usize, row: &mut [E; W]) {
         let seeds = self.0.get(index).and_then(|row| row.get(column..)).unwrap_or_default();
         for (element, &seed) in row.iter_mut().zip(seeds) {
@@ -159,7 +159,7 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
 
 /// The weight of a direction in the first sum over all of them, or in the second: neither equal nor alternating, so that
 /// no structure hides an error.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn weight<E: Field>(direction: usize, second: bool) -> E {
     let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;
     E::from_f64(1.0) + E::from_f64(0.25) * E::from_whole(rank)

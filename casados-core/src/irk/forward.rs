@@ -9,7 +9,7 @@
 use super::directions::{Identity, Seeded};
 use super::record::{Coefficients, Work, copy};
 use super::step::check;
-use super::sweep::Sweep;
+use super::sweep::{Outputs, Sweep};
 use super::write::Target;
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
@@ -23,6 +23,7 @@ use crate::shape::{Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
+use core::mem::take;
 
 /// Memory of forward sensitivities.
 #[derive(Zeroable)]
@@ -30,65 +31,89 @@ use core::marker::PhantomData;
 pub struct ForwardMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: ForwardAdjoint<M, T>,
     pub(crate) dense: DenseForward<M, T>,
-    pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
-    /// Zero if all derivatives of `z` are finite, else NaN.
-    pub(crate) finite: [T; 1],
+    pub(crate) pass: ForwardPass<M, T, S>,
 }
 copy!([M: Dae, T: Plain, const S: usize] ForwardMemory<M, T, S>);
 
-impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
-    /// A step that is linearised, by the factors that are there; whether the derivatives satisfy their equations.
+/// A pass over the steps, which writes to results elsewhere.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
+    pub(crate) sweep: Sweep<M, T, ArrayW<M, T>, S>,
+    /// Zero if all derivatives of `z` are finite, else NaN.
+    finite: [T; 1],
+}
+copy!([M: Dae, T: Plain, const S: usize] ForwardPass<M, T, S>);
+
+impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
+    /// A step that is linearised, by the factors that are there, as [`ForwardPass::step`]; whether the derivatives satisfy their equations.
     pub(crate) fn advance<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
-        n: usize,
+        at: StepOf,
         curved: Option<&mut [E]>,
+        to: &mut Forward<M, E>,
     ) -> E::Mask {
         let directions = &Identity::<M>::ALL;
-        if n == 0 {
+        if at.n == 0 {
             self.sweep.start(directions);
         }
-        self.sweep.step(work, coefficients, directions, n == 0, curved)
+        let good = self.sweep.step(work, coefficients, directions, at.n == 0, &mut at.outputs(curved, to));
+        self.collect(coefficients, at, to);
+        good
     }
 
     /// What a step contributes to derivatives of `z`.
-    pub(crate) fn collect(&mut self, coefficients: &Coefficients<E, S>, n: usize, count: usize) {
-        let Self { result: ForwardAdjoint { forward, .. }, sweep, finite: [finite], .. } = self;
-        if n == 0 {
-            let to = &mut Split::<M, _>::new(&mut forward.dz0_dx0, &mut forward.dz0_du, &mut forward.dz0_dp);
+    fn collect(&mut self, coefficients: &Coefficients<E, S>, at: StepOf, to: &mut Forward<M, E>) {
+        let Self { sweep, finite: [finite] } = self;
+        if at.n == 0 {
+            let to = &mut Split::<M, _>::new(&mut to.dz0_dx0, &mut to.dz0_du, &mut to.dz0_dp);
             *finite = sweep.write_algebraic::<Identity<M>>(&coefficients.start, to);
         }
-        if n + 1 == count {
-            let to = &mut Split::<M, _>::new(&mut forward.dz_dx0, &mut forward.dz_du, &mut forward.dz_dp);
+        if at.is_last() {
+            let to = &mut Split::<M, _>::new(&mut to.dz_dx0, &mut to.dz_du, &mut to.dz_dp);
             *finite = *finite + sweep.write_algebraic::<Identity<M>>(&coefficients.end, to);
         }
     }
 
-    /// The result, after the last step: that of this memory, or one `elsewhere`. Zero if all derivatives are finite, else NaN.
-    pub(crate) fn write(&mut self, nominal: &Nominal<M, E>, elsewhere: Option<&mut Forward<M, E>>) -> E {
-        let Self { result: ForwardAdjoint { forward: own, .. }, sweep, finite: [finite], .. } = self;
-        let forward = match elsewhere {
-            Some(forward) => {
-                forward.dz_dx0 = own.dz_dx0;
-                forward.dz_du = own.dz_du;
-                forward.dz_dp = own.dz_dp;
-                forward.dz0_dx0 = own.dz0_dx0;
-                forward.dz0_du = own.dz0_du;
-                forward.dz0_dp = own.dz0_dp;
-                forward
-            }
-            None => own,
-        };
-        forward.nominal = *nominal;
-        let to = &mut Split::<M, _>::new(&mut forward.dx_dx0, &mut forward.dx_du, &mut forward.dx_dp);
-        to.fill_others();
-        *finite + sweep.write_end::<Identity<M>>(to)
+    /// What is left to be written after the last step. Zero if all derivatives are finite, else NaN.
+    pub(crate) fn end(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
+        to.nominal = *nominal;
+        Split::<M, _>::new(&mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp).fill_others();
+        let ([of_x], [of_z]) = (self.sweep.finite, self.finite);
+        of_x + of_z
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
-    /// After a step that is linearised; refined where digits were lost, if that is asked for.
+/// Which step of how many.
+#[derive(Clone, Copy)]
+pub(crate) struct StepOf {
+    pub n: usize,
+    pub count: usize,
+    /// Whether the result may be in no cache.
+    pub distant: bool,
+}
+
+impl StepOf {
+    fn is_last(self) -> bool {
+        self.n + 1 == self.count
+    }
+
+    /// What the step writes.
+    fn outputs<'a, M: Dae, E: Lanes>(
+        self,
+        curved: Option<&'a mut [E]>,
+        to: &'a mut Forward<M, E>,
+    ) -> Outputs<'a, E, Split<'a, M, E>> {
+        let end = self.is_last().then(|| Split::new(&mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp));
+        Outputs { curved, end, distant: self.distant }
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
+    /// After a step that is linearised; refined where digits were lost, if that is asked for. The last one writes derivatives of `x` to
+    /// the result, the first and the last those of `z`.
     ///
     /// # Errors
     /// [`Error::Singular`]
@@ -97,31 +122,39 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         &mut self,
         work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
-        n: usize,
-        count: usize,
+        at: StepOf,
         statistics: &mut Statistics,
         mut curved: Option<&mut [T]>,
+        to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
-        let good = self.advance(work, coefficients, n, curved.as_deref_mut());
+        let (directions, first) = (&Identity::<M>::ALL, at.n == 0);
+        let good = self.advance(work, coefficients, at, curved.as_deref_mut(), to);
+        if good && !REFINED {
+            return Ok(());
+        }
         if !good && work.linear.factors.is_planned() {
-            work.factor_pivoted(coefficients, n, 0, statistics)?;
-            self.sweep.repeat(work, coefficients, &Identity::<M>::ALL, n == 0, curved);
+            work.factor_pivoted(coefficients, at.n, 0, statistics)?;
+            self.sweep.repeat(work, coefficients, directions, first, &mut at.outputs(curved, to));
         }
         if const { REFINED } {
-            self.sweep.refine(work, coefficients, &Identity::<M>::ALL, n == 0);
+            self.sweep.refine(work, coefficients, directions, first, &mut at.outputs(None, to));
         }
-        self.collect(coefficients, n, count);
+        self.collect(coefficients, at, to);
         Ok(())
     }
 
-    /// Derivatives at a point of the last step.
-    pub(crate) fn interpolate(&mut self, weights: &[T; S], lagrange: &[T; S]) {
-        let Self { dense, sweep, .. } = self;
-        let to = &mut Split::<M, _>::new(&mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
-        to.fill_others();
-        sweep.write_differential::<Identity<M>>(weights, to);
-        let to = &mut Split::<M, _>::new(&mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
-        sweep.write_algebraic::<Identity<M>>(lagrange, to);
+    /// What is left to be written after the last step.
+    ///
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(
+        &self,
+        nominal: &Nominal<M, T>,
+        step: usize,
+        to: &mut Forward<M, T>,
+    ) -> Result<(), Error> {
+        // Only where one is not finite it is looked for.
+        if self.end(nominal, to).is_finite() { Ok(()) } else { check_result(to, step) }
     }
 
     /// The derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
@@ -132,23 +165,17 @@ impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
         }
         self.sweep.write_slopes::<Identity<M>>(weights, &mut Rows::<M, T> { rows: to });
     }
+}
 
-    /// Writes the result to that of this memory, or to one `elsewhere`.
-    ///
-    /// # Errors
-    /// [`Error::Overflow`]
-    pub(crate) fn finish(
-        &mut self,
-        nominal: &Nominal<M, T>,
-        step: usize,
-        mut elsewhere: Option<&mut Forward<M, T>>,
-    ) -> Result<(), Error> {
-        let finite = self.write(nominal, elsewhere.as_deref_mut());
-        // Only where one is not finite it is looked for.
-        if finite.is_finite() {
-            return Ok(());
-        }
-        check_result(elsewhere.unwrap_or(&mut self.result.forward), step)
+impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
+    /// Derivatives at a point of the last step.
+    pub(crate) fn interpolate(&mut self, weights: &[T; S], lagrange: &[T; S]) {
+        let Self { dense, pass: ForwardPass { sweep, .. }, .. } = self;
+        let to = &mut Split::<M, _>::new(&mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);
+        to.fill_others();
+        sweep.write_differential::<Identity<M>>(weights, to);
+        let to = &mut Split::<M, _>::new(&mut dense.dz_dx0, &mut dense.dz_du, &mut dense.dz_dp);
+        sweep.write_algebraic::<Identity<M>>(lagrange, to);
     }
 }
 
@@ -171,32 +198,30 @@ pub(crate) fn check_result<M: Dae, T: Real>(result: &Forward<M, T>, step: usize)
     Ok(())
 }
 
-impl<M: Dae, E: Lanes, const S: usize> ForwardMemory<M, E, S> {
-    /// `∇(λᵀx)` from the derivatives of `x`.
-    pub(crate) fn multiply(&mut self, lambda: &[E]) {
-        let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = &mut self.result;
-        for (matrix, gradient) in [
-            (forward.dx_dx0.as_slice(), grad_x0.as_mut_slice()),
-            (forward.dx_du.as_slice(), grad_u.as_mut_slice()),
-            (forward.dx_dp.as_slice(), grad_p.as_mut_slice()),
-        ] {
-            dispatch(Product { lambda, matrix, gradient });
-        }
+/// `∇(λᵀx)` from the derivatives of `x`.
+pub(crate) fn multiply<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lambda: &[E]) {
+    let ForwardAdjoint { forward, grad_x0, grad_u, grad_p } = result;
+    for (matrix, gradient) in [
+        (forward.dx_dx0.as_slice(), grad_x0.as_mut_slice()),
+        (forward.dx_du.as_slice(), grad_u.as_mut_slice()),
+        (forward.dx_dp.as_slice(), grad_p.as_mut_slice()),
+    ] {
+        dispatch(Product { lambda, matrix, gradient });
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
-    /// `∇(λᵀx)` from the derivatives of `x`.
-    ///
-    /// # Errors
-    /// [`Error::Overflow`]
-    pub(crate) fn gradient(&mut self, lambda: &[T]) -> Result<(), Error> {
-        self.multiply(lambda);
-        let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &self.result;
-        check(grad_x0.as_slice(), 0)?;
-        check(grad_u.as_slice(), 0)?;
-        check(grad_p.as_slice(), 0)
-    }
+/// `∇(λᵀx)` from the derivatives of `x`.
+///
+/// # Errors
+/// [`Error::Overflow`]
+pub(crate) fn gradient<M: Dae, T: Real>(
+    result: &mut ForwardAdjoint<M, T>,
+    lambda: &[T],
+) -> Result<(), Error> {
+    multiply(result, lambda);
+    check(result.grad_x0.as_slice(), 0)?;
+    check(result.grad_u.as_slice(), 0)?;
+    check(result.grad_p.as_slice(), 0)
 }
 
 /// `gradientᵀ = λᵀ S`, with `S` column after column.
@@ -236,26 +261,27 @@ impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
         Self { matrices, rows: X::ROWS, model: PhantomData }
     }
 
-    /// The column of `dw_index`.
+    /// To which matrix `dw_index` belongs, and its column there.
     #[inline(always)]
-    fn direction(&mut self, index: usize) -> &mut [T] {
+    fn place(index: usize) -> (usize, usize) {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-        let [x, u, p] = &mut self.matrices;
-        let (matrix, column) = if index < nx {
-            (x, index)
+        if index < nx {
+            (0, index)
         } else if index < nx + nu {
-            (u, index - nx)
+            (1, index - nx)
         } else {
-            (p, index - nx - nu)
-        };
-        matrix.get_mut(column * self.rows..(column + 1) * self.rows).unwrap_or_default()
+            (2, index - nx - nu)
+        }
     }
 
     /// The columns of `dx₊` in directions that have no influence.
     fn fill_others(&mut self) {
         for (index, &column) in M::STRUCTURE.column_of_direction.iter().enumerate() {
             if column == NO_COLUMN {
-                let column = self.direction(index);
+                let ((part, column), rows) = (Self::place(index), self.rows);
+                let matrix = self.matrices.get_mut(part);
+                let column = matrix.and_then(|matrix| matrix.get_mut(column * rows..(column + 1) * rows));
+                let column = column.unwrap_or_default();
                 column.fill(T::from_f64(0.0));
                 if let Some(element) = column.get_mut(index) {
                     *element = T::from_f64(1.0);
@@ -266,9 +292,30 @@ impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
 }
 
 impl<M: Dae, T: Lanes> Target<T> for Split<'_, M, T> {
-    #[inline(always)]
-    fn column(&mut self, column: usize) -> &mut [T] {
-        self.direction(M::STRUCTURE.directions.get(column).map_or(0, |&index| index as usize))
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+        let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
+        // What is behind the last column of each: directions ascend.
+        let [x, u, p] = &mut self.matrices;
+        let mut rest = [(0, &mut **x), (0, &mut **u), (0, &mut **p)];
+        let directions = M::STRUCTURE.directions.get(column..).unwrap_or_default();
+        for (to, &direction) in columns.iter_mut().zip(directions) {
+            let (part, own) = Self::place(direction as usize);
+            let Some((next, rest)) = rest.get_mut(part) else { continue };
+            let from = take(rest).get_mut((own - *next) * self.rows..).unwrap_or_default();
+            (*to, *rest) = from.split_at_mut_checked(self.rows).unwrap_or_default();
+            *next = own + 1;
+        }
+        columns
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn following<const W: usize>(&self, column: usize) -> &[T] {
+        let Some(&first) = M::STRUCTURE.directions.get(column + W) else { return &[] };
+        let (part, own) = Self::place(first as usize);
+        let from = self.matrices.get(part).and_then(|matrix| matrix.get(own * self.rows..));
+        let from = from.unwrap_or_default();
+        from.get(..W * self.rows).unwrap_or(from)
     }
 }
 
@@ -280,10 +327,18 @@ struct Rows<'a, M: Dae, T: Plain> {
 
 #[cfg(feature = "alloc")]
 impl<M: Dae, T: Real> Target<T> for Rows<'_, M, T> {
-    #[inline(always)]
-    fn column(&mut self, column: usize) -> &mut [T] {
-        let direction = M::STRUCTURE.directions.get(column).map_or(0, |&index| index as usize);
-        self.rows.as_mut().get_mut(direction).map_or(&mut [], |row| row.as_mut())
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+        let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
+        let (mut next, mut rest) = (0, self.rows.as_mut());
+        let directions = M::STRUCTURE.directions.get(column..).unwrap_or_default();
+        for (to, &direction) in columns.iter_mut().zip(directions) {
+            let from = take(&mut rest).get_mut(direction as usize - next..).unwrap_or_default();
+            if let Some((own, behind)) = from.split_first_mut() {
+                (*to, rest, next) = (own.as_mut(), behind, direction as usize + 1);
+            }
+        }
+        columns
     }
 }
 
@@ -294,9 +349,15 @@ struct Single<'a, T> {
 }
 
 impl<T: Lanes> Target<T> for Single<'_, T> {
-    #[inline(always)]
-    fn column(&mut self, column: usize) -> &mut [T] {
-        self.matrix.get_mut(column * self.rows..(column + 1) * self.rows).unwrap_or_default()
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+        let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
+        let matrix = self.matrix.get_mut(column * self.rows..).unwrap_or_default();
+        // A model without states has no columns to go through.
+        for (to, own) in columns.iter_mut().zip(matrix.chunks_exact_mut(self.rows.max(1))) {
+            *to = own;
+        }
+        columns
     }
 }
 
@@ -344,11 +405,14 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         if n == 0 {
             sweep.start(directions);
         }
-        if !sweep.step(work, coefficients, directions, n == 0, None) && work.linear.factors.is_planned() {
+        let nx = M::Shape::NX;
+        let end = (n + 1 == count).then(|| Single { matrix: result.dx.as_mut_slice(), rows: nx });
+        let outputs = &mut Outputs { curved: None, end, distant: false };
+        if !sweep.step(work, coefficients, directions, n == 0, outputs) && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
-            sweep.repeat(work, coefficients, directions, n == 0, None);
+            sweep.repeat(work, coefficients, directions, n == 0, outputs);
         }
-        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        let nz = M::Shape::NZ;
         if n == 0 {
             let to = &mut Single { matrix: result.dz0.as_mut_slice(), rows: nz };
             sweep.write_algebraic::<Seeded<'_, T, C>>(&coefficients.start, to);
@@ -356,8 +420,6 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         if n + 1 == count {
             let to = &mut Single { matrix: result.dz.as_mut_slice(), rows: nz };
             sweep.write_algebraic::<Seeded<'_, T, C>>(&coefficients.end, to);
-            let to = &mut Single { matrix: result.dx.as_mut_slice(), rows: nx };
-            sweep.write_end::<Seeded<'_, T, C>>(to);
         }
         Ok(())
     }

@@ -11,14 +11,14 @@ use super::adjoint::Backward;
 use super::along::Along;
 use super::curvature::{COLUMNS, Subtract};
 use super::curved_adjoint::{Back, is_worth};
-use super::directions::Identity;
 use super::evaluate::not_finite;
 use super::folds::{Fold, Lone};
 use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::stages::Stages;
 use super::step::check;
+use super::triangle::Triangle;
 use crate::error::{Error, Place, Quantity};
-use crate::linalg::{Arithmetic, Kernel, dispatch, slot};
+use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
 use crate::result::{ForwardAdjoint, Hessian};
@@ -33,6 +33,14 @@ use core::marker::PhantomData;
 #[zeroable(bound = "")]
 pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     pub(crate) result: Hessian<M, T>,
+    pub(crate) pass: HessianPass<M, T, S>,
+}
+copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
+
+/// A pass over the steps, from the last to the first, which writes to a result elsewhere.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
     pub(crate) backward: Backward<M, T, S, 1>,
     /// `−H D` of a few columns at all stages.
     g: Aligned<ArrayV<M, [[T; COLUMNS]; S]>>,
@@ -43,7 +51,7 @@ pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
     /// Entries of `∇²(μᵀ f)` at all stages.
     entries: Aligned<Stages<M::Hessian<[T; S]>, T, S>>,
 }
-copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
+copy!([M: Dae, T: Plain, const S: usize] HessianPass<M, T, S>);
 
 /// What the way back needs of a step.
 #[derive(Zeroable)]
@@ -72,7 +80,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     }
 }
 
-impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
+impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
     /// The way back; the linearisation of the last step is still there.
     ///
     /// # Errors
@@ -87,6 +95,7 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
         lambda: &[T],
         nu: &[T],
         statistics: &mut Statistics,
+        ahead: &[T],
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(lambda, nu);
@@ -104,13 +113,13 @@ impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(work, coefficients, record, n, n + 1 == steps.len());
+            self.subtract(work, coefficients, record, [n, steps.len()], ahead);
         }
         Ok(())
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
     /// Before the last step, with `λ` and `ν`; the latter may be empty.
     pub(crate) fn begin(&mut self, lambda: &[E], nu: &[E]) {
         self.backward.start(lambda, nu);
@@ -139,15 +148,17 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the `last` step, with the linearisation of this one there.
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of this one there. After the first one the
+    /// result will be written, which may lie far `ahead`.
     pub(crate) fn subtract<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
         coefficients: &Coefficients<E, S>,
         record: &HessianStep<M, E, S, F>,
-        n: usize,
-        last: bool,
+        [n, count]: [usize; 2],
+        ahead: &[E],
     ) {
+        let last = n + 1 == count;
         let Self { g, sum, entries, .. } = self;
         if const { !M::STRUCTURE.folded.is_empty() } {
             dispatch(Fold::<M, E, S> { entries: entries.as_mut(), model: PhantomData });
@@ -163,6 +174,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
                 sum: &mut *sum,
                 first: n == 0,
                 last,
+                ahead: if n == 0 { ahead } else { &[] },
             }
             .run(work);
         } else {
@@ -196,12 +208,12 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, 
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
     /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if all of these are finite, else
     /// NaN.
-    pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>) -> E {
+    pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>, result: &mut Hessian<M, E>) -> E {
         let nx = M::Shape::NX;
-        let Self { result, backward, sum, .. } = self;
+        let Self { backward, sum, .. } = self;
         for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
             *to = *from;
         }
@@ -212,146 +224,21 @@ impl<M: Dae, E: Lanes, const S: usize> HessianMemory<M, E, S> {
         for (to, [from]) in result.first.grad_p.as_mut_slice().iter_mut().zip(gradient) {
             *to = *from;
         }
-        mirror::<E, _>(sum.as_mut());
-        let sum = Symmetric::<M, E> { sum: sum.as_ref(), more };
-        sum.write::<_, X, X>(&mut result.h_xx)
-            + sum.write::<_, U, U>(&mut result.h_uu)
-            + sum.write::<_, P, P>(&mut result.h_pp)
-            + sum.write::<_, X, U>(&mut result.h_xu)
-            + sum.write::<_, X, P>(&mut result.h_xp)
-            + sum.write::<_, U, P>(&mut result.h_up)
+        Triangle::<M, E> { rows: sum.as_ref(), more }.write(result)
     }
 }
 
-/// The parts of `w`.
-const X: usize = 0;
-const U: usize = 1;
-const P: usize = 2;
-
-/// Where a part of `w` begins.
-const fn begin<M: Dae>(part: usize) -> usize {
-    match part {
-        X => 0,
-        U => M::Shape::NX,
-        _ => M::Shape::NX + M::Shape::NU,
-    }
-}
-
-/// How many directions that have any influence come before one.
-const fn before<M: Dae>(direction: usize) -> usize {
-    let (directions, mut count) = (M::STRUCTURE.directions, 0);
-    while count < directions.len() && (directions[count] as usize) < direction {
-        count += 1;
-    }
-    count
-}
-
-/// A symmetric matrix over the directions that have any influence.
-struct Symmetric<'a, M: Dae, E: Plain> {
-    sum: &'a [ArrayW<M, E>],
-    /// What an integrand adds, over all directions: a lower triangle.
-    more: Option<&'a [ArrayW<M, E>]>,
-}
-
-/// Writes the lower triangle to the upper one: a few columns of it at a time, which are next to each other.
-fn mirror<V: Copy, R: Array<V>>(rows: &mut [R]) {
-    const FEW: usize = 8;
-    for begin in (0..rows.len()).step_by(FEW) {
-        let (before, rest) = rows.split_at_mut(begin);
-        let rest = rest.get_mut(..rest.len().min(FEW)).unwrap_or_default();
-        for (c, to) in before.iter_mut().enumerate() {
-            for (to, from) in to.as_mut().get_mut(begin..).unwrap_or_default().iter_mut().zip(rest.iter()) {
-                *to = from[c];
-            }
-        }
-        for r in 1..rest.len() {
-            for c in 0..r {
-                rest[c][begin + r] = rest[r][begin + c];
-            }
-        }
-    }
-}
-
-impl<M: Dae, E: Lanes> Symmetric<'_, M, E> {
-    /// Its part over the directions of one part of `w` and those of another, which is not before it.
-    fn write<B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, to: &mut B) -> E {
-        let columns = to.as_mut_slice();
-        if columns.is_empty() {
-            return E::from_f64(0.0);
-        }
-        dispatch(Part::<M, E, B, OF_ROWS, OF_COLUMNS> { of: self, columns, model: PhantomData })
-    }
-}
-
-/// See [`Symmetric::write`].
-struct Part<'a, M: Dae, E: Plain, B, const OF_ROWS: usize, const OF_COLUMNS: usize> {
-    of: &'a Symmetric<'a, M, E>,
-    columns: &'a mut [E],
-    model: PhantomData<B>,
-}
-
-impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize> Kernel
-    for Part<'_, M, E, B, OF_ROWS, OF_COLUMNS>
-{
-    type Number = E;
-    type Output = E;
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) -> E {
-        let Self { of: Symmetric { sum, more }, columns, .. } = self;
-        let zero = E::from_f64(0.0);
-        let (row, column) = const { (begin::<M>(OF_ROWS), begin::<M>(OF_COLUMNS)) };
-        let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
-        // The directions of these rows that have any influence.
-        let range = const { before::<M>(begin::<M>(OF_ROWS))..before::<M>(begin::<M>(OF_ROWS) + B::ROWS) };
-        let directions = M::STRUCTURE.directions.get(range.clone()).unwrap_or_default();
-        // Nothing times a number that is not finite is not a number.
-        let (mut nothing, mut others) = ([zero; 4], [zero; 4]);
-        for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {
-            let of_c =
-                Identity::<M>::column(column + c).and_then(|c| sum.get(c)?.as_ref().get(range.clone()));
-            let of_c = of_c.unwrap_or_default();
-            let (whole, rest) = of_c.as_chunks::<4>();
-            for few in whole {
-                A::subtract_row(&mut nothing, zero, few);
-            }
-            for (other, &value) in others.iter_mut().zip(rest) {
-                *other = A::subtract(*other, zero, value);
-            }
-            // As many as the optimiser knows.
-            match of_c.get(..B::ROWS) {
-                Some(of_c) if all => to.copy_from_slice(of_c),
-                _ => {
-                    to.fill(zero);
-                    for (&direction, &value) in directions.iter().zip(of_c) {
-                        if let Some(to) = to.get_mut((direction as usize).wrapping_sub(row)) {
-                            *to = value;
-                        }
-                    }
-                }
-            }
-            let Some(more) = more else { continue };
-            for (r, to) in to.iter_mut().enumerate() {
-                let (r, c) = (row + r, column + c);
-                if let Some(&more) = more.get(r.max(c)).and_then(|row| row.as_ref().get(r.min(c))) {
-                    *to = *to + more;
-                    others[3] = A::subtract(others[3], zero, *to);
-                }
-            }
-        }
-        for (nothing, other) in nothing.iter_mut().zip(others) {
-            *nothing = *nothing + other;
-        }
-        let [a, b, c, d] = nothing;
-        (a + b) + (c + d)
-    }
-}
-
-impl<M: Dae, T: Real, const S: usize> HessianMemory<M, T, S> {
+impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
+    /// Writes the result, as [`HessianPass::collect`].
+    ///
     /// # Errors
     /// [`Error::Overflow`]
-    pub(crate) fn finish(&mut self, more: Option<&[ArrayW<M, T>]>) -> Result<(), Error> {
-        let finite = self.collect(more).is_finite();
-        let result = &self.result;
+    pub(crate) fn finish(
+        &mut self,
+        more: Option<&[ArrayW<M, T>]>,
+        result: &mut Hessian<M, T>,
+    ) -> Result<(), Error> {
+        let finite = self.collect(more, result).is_finite();
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
         for values in [grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice()] {
             check(values, 0)?;

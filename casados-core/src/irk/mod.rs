@@ -44,6 +44,7 @@ mod sensitivities;
 mod stages;
 mod step;
 mod sweep;
+mod triangle;
 mod verify;
 mod write;
 
@@ -55,10 +56,10 @@ pub use integrator::Integrator;
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
     evaluate::dot,
-    forward::check_result,
+    forward::{StepOf, check_result, multiply},
     pivoted::unknown_name,
     record::{Coefficients, Step, Work},
-    run::check,
+    run::{Arguments, check},
     step::From,
 };
 #[cfg(feature = "alloc")]

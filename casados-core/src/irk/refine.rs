@@ -13,7 +13,8 @@
 
 use super::directions::{Directions, panel, panel_mut, panels};
 use super::record::{Coefficients, Work};
-use super::sweep::{Sweep, total};
+use super::sweep::{Outputs, Sweep, total};
+use super::write::Target;
 use crate::linalg::{Arithmetic, Kernel, Packet, dispatch, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
@@ -31,12 +32,13 @@ const REFINEMENTS: usize = 3;
 impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// After a step whose derivatives satisfy their equations as the Jacobian has them: mends them, and what follows from them,
     /// where those of the model are others.
-    pub(super) fn refine<D: Directions<T>, F: Fallback>(
+    pub(super) fn refine<D: Directions<T>, G: Target<T>, F: Fallback>(
         &mut self,
         work: &mut Work<M, T, S, F>,
         coefficients: &Coefficients<T, S>,
         directions: &D,
         first: bool,
+        outputs: &mut Outputs<'_, T, G>,
     ) {
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
@@ -47,7 +49,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
             }
             last = correction;
             self.refine_columns(work, coefficients, directions);
-            self.conclude(work, coefficients, directions, first);
+            self.conclude(work, coefficients, directions, first, outputs);
             // Each correction is that part of the one before.
             if correction * correction <= ROUNDING * T::EPSILON {
                 return;
@@ -103,7 +105,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                     *input = [row[0]; S];
                 }
                 dispatch(Aim::<M, T, S, W> {
-                    v: panel(self.v(false), column, nx),
+                    v: panel(self.v(), column, nx),
                     dy: panel(self.dy(), column, nk * S).as_chunks().0,
                     a: &coefficients.a,
                     h: work.inputs.time.step,

@@ -2,6 +2,8 @@
 
 use super::along::{Along, begin, finish, reborrow};
 use super::dense::Point;
+use super::forward::{ForwardMemory, StepOf, gradient};
+use super::hessian::HessianMemory;
 use super::integrator::Integrator;
 use super::run::{Arguments, check};
 use crate::error::{Argument, Error};
@@ -46,7 +48,22 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        Ok(&self.differentiate::<false>(&Arguments { x0, u, h }, None, along)?.forward)
+        self.differentiate::<false>(&Arguments { x0, u, h }, along, None)?;
+        self.keep_forward()
+    }
+
+    /// [`Integrator::forward`] into a result elsewhere, which is no result if there is an error.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn forward_to(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        to: &mut Forward<M, T>,
+    ) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
+        self.differentiate::<false>(arguments, None, Some(to))?;
+        self.keep_forward().map(|_| ())
     }
 
     /// The same, with derivatives refined where digits were lost.
@@ -61,7 +78,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        Ok(&self.differentiate::<true>(&Arguments { x0, u, h }, None, along)?.forward)
+        self.differentiate::<true>(&Arguments { x0, u, h }, along, None)?;
+        self.keep_forward()
     }
 
     /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the derivatives.
@@ -79,38 +97,67 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         check(Argument::Lambda, lambda.as_slice())?;
-        self.differentiate::<false>(&Arguments { x0, u, h }, Some(lambda.as_slice()), None)
+        self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
+        gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
+        self.keep_forward()?;
+        Ok(&W::forward(&mut self.forward)?.result)
     }
 
+    /// [`Integrator::forward_adjoint`] into a result elsewhere, which is no result if there is an error.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn forward_adjoint_to(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        lambda: &[T],
+        to: &mut ForwardAdjoint<M, T>,
+    ) -> Result<(), Error>
+    where
+        W: WithForward,
+    {
+        check(Argument::Lambda, lambda)?;
+        self.differentiate::<false>(arguments, None, Some(&mut to.forward))?;
+        gradient(to, lambda)?;
+        self.keep_forward().map(|_| ())
+    }
+
+    /// Derivatives, written to the memory of `forward` or elsewhere.
     fn differentiate<const REFINED: bool>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
-        lambda: Option<&[T]>,
         mut along: Along<'_, '_, M, T>,
-    ) -> Result<&ForwardAdjoint<M, T>, Error>
+        to: Option<&mut Forward<M, T>>,
+    ) -> Result<(), Error>
     where
         W: WithForward,
     {
         self.sweep = None;
         begin(&mut along);
-        let forward = W::forward(&mut self.forward)?;
+        let ForwardMemory { result, pass, .. } = W::forward(&mut self.forward)?;
+        let distant = to.is_some();
+        let to = to.unwrap_or(&mut result.forward);
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            forward.step::<_, REFINED>(parts.work, parts.coefficients, n, count, parts.statistics, None)?;
+            let (work, coefficients, at) =
+                (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
+            pass.step::<_, REFINED>(work, coefficients, at, parts.statistics, None, to)?;
             match &mut along {
-                Some(integrand) => parts.along_forward(n, step, &forward.sweep, false, &mut **integrand),
+                Some(integrand) => parts.along_forward(n, step, &pass.sweep, false, &mut **integrand),
                 None => Ok(()),
             }
         })?;
-        forward.finish(&parts.work.result, count - 1, None)?;
-        finish(&mut along)?;
-        if let Some(lambda) = lambda {
-            forward.gradient(lambda)?;
-        }
+        pass.finish(&parts.work.result, count - 1, to)?;
+        finish(&mut along)
+    }
+
+    /// After a successful call, whose stages and their derivatives are kept.
+    fn keep_forward(&mut self) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
         self.run.keep()?;
-        self.sweep = Some(count - 1);
-        Ok(&forward.result)
+        self.sweep = Some(self.run.options.steps - 1);
+        Ok(&W::forward(&mut self.forward)?.result.forward)
     }
 
     /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
@@ -127,7 +174,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         let weights: &[f64; S] = weights.first_chunk().ok_or(Error::NoResult)?;
-        W::forward(&mut self.forward)?.slopes(&weights.map(T::from_f64), to);
+        W::forward(&mut self.forward)?.pass.slopes(&weights.map(T::from_f64), to);
         Ok(())
     }
 
@@ -153,14 +200,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let first = done.map_or(0, |done| done + 1);
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;
-            forward.step::<_, false>(
-                parts.work,
-                parts.coefficients,
-                n,
-                usize::MAX,
-                parts.statistics,
-                None,
-            )?;
+            let ForwardMemory { result, pass, .. } = &mut *forward;
+            let (work, coefficients) = (&mut *parts.work, parts.coefficients);
+            // None of them is the last one: there is a result already.
+            let at = StepOf { n, count: usize::MAX, distant: false };
+            pass.step::<_, false>(work, coefficients, at, parts.statistics, None, &mut result.forward)?;
         }
         self.sweep = Some(point.step);
         let h = parts.work.kept.time.step;
@@ -381,24 +425,44 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         h: T,
         lambda: &VectorX<M, T>,
         nu: &[T],
-        mut along: Along<'_, '_, M, T>,
+        along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error>
     where
         W: WithHessian,
     {
-        check(Argument::Lambda, lambda.as_slice())?;
+        self.hessian_to(&Arguments { x0, u, h }, lambda.as_slice(), nu, along, None)?;
+        Ok(&W::hessian(&mut self.hessian)?.result)
+    }
+
+    /// The same, written to the memory of `hessian` or elsewhere, where there is no result if there is an error.
+    pub(crate) fn hessian_to(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        lambda: &[T],
+        nu: &[T],
+        mut along: Along<'_, '_, M, T>,
+        to: Option<&mut Hessian<M, T>>,
+    ) -> Result<(), Error>
+    where
+        W: WithHessian,
+    {
+        check(Argument::Lambda, lambda)?;
         check(Argument::Nu, nu)?;
         begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;
-        let forward = W::forward(&mut self.forward)?;
-        let memory = W::hessian(&mut self.hessian)?;
+        let forward = &mut W::forward(&mut self.forward)?.pass;
+        let HessianMemory { result, pass } = W::hessian(&mut self.hessian)?;
+        let distant = to.is_some();
+        let to = to.unwrap_or(result);
         let records = W::hessian_tape(&mut self.hessian_tape, count)?;
-        let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
+        let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };
-            let curved = Some(record.curved());
-            forward.step::<_, false>(parts.work, parts.coefficients, n, count, parts.statistics, curved)?;
+            let (work, coefficients, at) =
+                (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
+            let (curved, to) = (Some(record.curved()), &mut to.first.forward);
+            forward.step::<_, false>(work, coefficients, at, parts.statistics, curved, to)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
@@ -408,21 +472,22 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             }
             Ok(())
         })?;
-        forward.finish(&parts.work.result, count - 1, Some(&mut memory.result.first.forward))?;
+        forward.finish(&parts.work.result, count - 1, &mut to.first.forward)?;
         finish(&mut along)?;
-        memory.run(
+        pass.run(
             parts.work,
             parts.coefficients,
             parts.steps,
             records,
-            lambda.as_slice(),
+            lambda,
             nu,
             parts.statistics,
+            if distant { to.h_xx.as_slice() } else { &[] },
             reborrow(&mut along),
         )?;
-        memory.finish(along.as_ref().and_then(|integrand| integrand.second()))?;
+        pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
         self.run.keep()?;
         self.sweep = Some(count - 1);
-        Ok(&memory.result)
+        Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use super::directions::{Directions, Identity, panel, panels};
 use super::record::Coefficients;
 use super::sweep::Sweep;
-use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::linalg::{Arithmetic, Kernel, Packet, dispatch};
 use crate::model::{ArrayW, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Array, Shape};
@@ -11,41 +11,41 @@ use core::marker::PhantomData;
 
 /// Where derivatives are written.
 pub(crate) trait Target<E> {
-    /// The column of a matrix that belongs to a column of the panels.
-    fn column(&mut self, column: usize) -> &mut [E];
+    /// The columns of a matrix that belong to columns of the panels, from this one on.
+    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [E]; W];
+    /// Where the columns behind these are, if it is known.
+    fn following<const W: usize>(&self, _column: usize) -> &[E] {
+        &[]
+    }
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
-    /// Writes `V_{n+1}`. All of these say zero if all that is written is finite, else NaN.
-    pub(crate) fn write_end<D: Directions<E>>(&self, to: &mut impl Target<E>) -> E {
-        self.write::<D, _, false>(Some(self.v(true)), None, to)
-    }
-
-    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`.
+    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`. All of these say zero if all that is
+    /// written is finite, else NaN.
     pub(crate) fn write_differential<D: Directions<E>>(
         &self,
         weights: &[E; S],
         to: &mut impl Target<E>,
     ) -> E {
-        self.write::<D, _, false>(Some(self.v(false)), Some(weights), to)
+        self.write::<D, _, false>(Some(self.v()), weights, to)
     }
 
     /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
     pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) -> E {
-        self.write::<D, _, true>(None, Some(lagrange), to)
+        self.write::<D, _, true>(None, lagrange, to)
     }
 
     /// Writes the derivatives of `Σ_i weight_i k_i`.
     #[cfg(feature = "alloc")]
     pub(crate) fn write_slopes<D: Directions<E>>(&self, weights: &[E; S], to: &mut impl Target<E>) -> E {
-        self.write::<D, _, false>(None, Some(weights), to)
+        self.write::<D, _, false>(None, weights, to)
     }
 
     /// Writes `V + Σ_i weight_i dy_i`, of the states or of the algebraic ones.
     fn write<D: Directions<E>, G: Target<E>, const ALGEBRAIC: bool>(
         &self,
         v: Option<&[E]>,
-        weights: Option<&[E; S]>,
+        weights: &[E; S],
         to: &mut G,
     ) -> E {
         if ALGEBRAIC && M::Shape::NZ == 0 {
@@ -65,7 +65,7 @@ impl<M: Dae, E: Lanes, const S: usize> Sweep<M, E, ArrayW<M, E>, S> {
         variables: &[u32],
         d: &mut [ArrayW<M, E>],
     ) {
-        let (v, dy) = (self.v(false), self.dy());
+        let (v, dy) = (self.v(), self.dy());
         dispatch(WriteRows::<M, E, S> { v, dy, coefficients, h, stage, variables, d });
     }
 }
@@ -141,7 +141,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
 struct Write<'a, M, E, D, G, const S: usize, const ALGEBRAIC: bool> {
     v: Option<&'a [E]>,
     dy: &'a [E],
-    weights: Option<&'a [E; S]>,
+    weights: &'a [E; S],
     to: &'a mut G,
     of: PhantomData<(M, D)>,
 }
@@ -154,45 +154,103 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
         let Self { v, dy, weights, to, .. } = self;
-        let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let unknowns = if ALGEBRAIC { nx..nk } else { 0..nx };
-        // Nothing times a number that is not finite is not a number.
-        let (mut nothing, mut finite) = ([zero; 8], zero);
+        let mut minus_weights = *weights;
+        for weight in &mut minus_weights {
+            *weight = -*weight;
+        }
+        let mut sum = E::from_f64(0.0);
         panels!(D::COUNT, E, S, column, W => {
             let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
-            let (packets, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
-            let packets = packets.get(unknowns.clone()).unwrap_or_default();
-            if let (None, Some(nothing)) = (weights, nothing.first_chunk_mut::<W>()) {
-                // In registers.
-                let mut own = *nothing;
-                for row in v.unwrap_or_default() {
-                    A::subtract_row(&mut own, zero, row);
-                }
-                *nothing = own;
-            }
-            for c in 0..W {
-                // As many as the optimiser knows.
-                let Some(to) = to.column(column + c).get_mut(..unknowns.len()) else { return finite };
-                match v {
-                    Some(v) => {
-                        for (to, v) in to.iter_mut().zip(v) {
-                            *to = v[c];
-                        }
-                    }
-                    None => to.fill(zero),
-                }
-                let Some(weights) = weights else { continue };
-                for (to, packet) in to.iter_mut().zip(packets) {
-                    for (&weight, dy) in weights.iter().zip(packet) {
-                        *to = A::subtract(*to, -weight, dy[c]);
-                    }
-                    finite = A::subtract(finite, zero, *to);
-                }
-            }
+            let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
+            let dy = dy.get(unknowns.clone()).unwrap_or_default();
+            let columns = Columns { v, ones: &[], dy, minus_weights: &minus_weights };
+            sum = sum + columns.write::<A>(&mut to.columns::<W>(column));
         });
-        for nothing in nothing {
-            finite = finite + nothing;
+        // Nothing times what is not finite is not a number.
+        E::from_f64(0.0) * sum
+    }
+}
+
+/// `V + Σ_i weight_i dy_i` of a panel.
+pub(super) struct Columns<'a, E, const S: usize, const W: usize> {
+    /// Nothing stands for zero, or for the unit matrix.
+    pub v: Option<&'a [[E; W]]>,
+    /// In which row each column of the unit matrix has its one; empty without one.
+    pub ones: &'a [u32],
+    pub dy: &'a [Packet<E, S, W>],
+    pub minus_weights: &'a [E; S],
+}
+
+/// So many rows are computed before they are written, each number to its column.
+const ROWS: usize = 4;
+
+impl<E: Lanes, const S: usize, const W: usize> Columns<'_, E, S, W> {
+    /// Writes its columns; their sum, which is finite only if all of them are.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub fn write<A: Arithmetic>(&self, to: &mut [&mut [E]; W]) -> E {
+        let mut sums = [E::from_f64(0.0); W];
+        let (blocks, rest) = self.dy.as_chunks::<ROWS>();
+        for (n, dy) in blocks.iter().enumerate() {
+            self.rows::<A, ROWS>(n * ROWS, dy, to, &mut sums);
         }
-        finite
+        for (n, dy) in rest.iter().enumerate() {
+            self.rows::<A, 1>(blocks.len() * ROWS + n, core::array::from_ref(dy), to, &mut sums);
+        }
+        for (to, &row) in to.iter_mut().zip(self.ones) {
+            if let Some(one) = to.get_mut(row as usize) {
+                *one = *one + E::from_f64(1.0);
+            }
+        }
+        let mut sum = E::from_f64(0.0);
+        for element in sums {
+            sum = sum + element;
+        }
+        sum
+    }
+
+    /// Some rows.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn rows<A: Arithmetic, const R: usize>(
+        &self,
+        begin: usize,
+        dy: &[Packet<E, S, W>; R],
+        to: &mut [&mut [E]; W],
+        sums: &mut [E; W],
+    ) {
+        let v = self.v.and_then(|v| v.get(begin..)?.first_chunk::<R>());
+        let mut rows = v.copied().unwrap_or([[E::from_f64(0.0); W]; R]);
+        for (row, dy) in rows.iter_mut().zip(dy) {
+            for (&weight, dy) in self.minus_weights.iter().zip(dy) {
+                A::subtract_row(row, weight, dy);
+            }
+            for (sum, &element) in sums.iter_mut().zip(&*row) {
+                *sum = *sum + element;
+            }
+        }
+        // Of numbers that are not registers themselves four by four are exchanged in registers.
+        let squares = if const { size_of::<E>() <= 8 && R == ROWS } { W / ROWS } else { 0 };
+        for square in 0..squares {
+            let mut numbers = [[E::from_f64(0.0); ROWS]; ROWS];
+            for (to, row) in numbers.iter_mut().zip(&rows) {
+                if let Some(row) = row.as_chunks::<ROWS>().0.get(square) {
+                    *to = *row;
+                }
+            }
+            let numbers = A::transposed(&numbers);
+            for (to, numbers) in to.iter_mut().skip(square * ROWS).zip(&numbers) {
+                if let Some(to) = to.get_mut(begin..begin + ROWS) {
+                    to.copy_from_slice(numbers);
+                }
+            }
+        }
+        for (c, to) in to.iter_mut().enumerate().skip(squares * ROWS) {
+            if let Some(to) = to.get_mut(begin..begin + R) {
+                for (to, row) in to.iter_mut().zip(&rows) {
+                    *to = row[c];
+                }
+            }
+        }
     }
 }

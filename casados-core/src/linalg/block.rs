@@ -13,7 +13,7 @@ pub type Block<E, const S: usize> = [[E; S]; S];
 pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
 
 /// `−hA` of a tableau: what states at the stages have of the derivatives there, with another sign.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn coupling<E: Field, const S: usize>(a: &[[E; S]; S], h: E) -> Block<E, S> {
     let mut block = [[h; S]; S];
     for (i, row) in a.iter().enumerate() {
@@ -25,7 +25,7 @@ pub fn coupling<E: Field, const S: usize>(a: &[[E; S]; S], h: E) -> Block<E, S> 
 }
 
 /// `left · right`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn product<A: Arithmetic, E: Field, const S: usize>(
     left: &Block<E, S>,
     right: &Block<E, S>,
@@ -38,7 +38,7 @@ pub fn product<A: Arithmetic, E: Field, const S: usize>(
 }
 
 /// `−packet`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn negate<E: Field, const S: usize, const W: usize>(packet: &mut Packet<E, S, W>) {
     for row in packet {
         for element in row {
@@ -48,7 +48,7 @@ pub fn negate<E: Field, const S: usize, const W: usize>(packet: &mut Packet<E, S
 }
 
 /// `packet − block · other`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
@@ -70,7 +70,7 @@ pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
 }
 
 /// `packet − diag(first column of block) · other`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract_scaled<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
@@ -91,7 +91,7 @@ pub fn subtract_scaled<A: Arithmetic, E: Field, const S: usize, const W: usize>(
 }
 
 /// `packet − blockᵀ · other`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
@@ -106,7 +106,7 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
 
 /// The inverse by Gauss-Jordan elimination with partial pivoting: rows are exchanged lane by lane, where any lane
 /// wants it. A singular block gives elements that are not finite.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
     if const { S == 1 } {

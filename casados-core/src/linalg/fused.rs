@@ -5,9 +5,9 @@
 //! machine if this is one. Results differ by rounding only.
 
 use super::block::Block;
-use crate::scalar::Field;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::lanes::{Level, level};
+use crate::scalar::{Field, transposed};
 
 /// How `t − a b` is computed.
 pub trait Arithmetic {
@@ -18,7 +18,7 @@ pub trait Arithmetic {
     /// `t − a b`
     fn subtract<E: Field>(t: E, a: E, b: E) -> E;
     /// `target − left · right`
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_blocks<E: Field, const S: usize>(
         target: &mut Block<E, S>,
         left: &Block<E, S>,
@@ -29,7 +29,7 @@ pub trait Arithmetic {
         }
     }
     /// `target − block · x`
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
         for (column, &x) in block.iter().zip(x) {
             for (target, &element) in target.iter_mut().zip(column) {
@@ -38,14 +38,19 @@ pub trait Arithmetic {
         }
     }
     /// `target − factor · row`
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
         for (target, &element) in target.iter_mut().zip(row) {
             *target = Self::subtract(*target, factor, element);
         }
     }
+    /// Rows as columns.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
+        transposed(rows)
+    }
     /// `target − a b`, element by element
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
         for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
             *target = Self::subtract(*target, a, b);
@@ -59,7 +64,7 @@ pub struct Separate;
 
 #[cfg(any(test, not(target_arch = "aarch64")))]
 impl Arithmetic for Separate {
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t - a * b
     }
@@ -73,11 +78,11 @@ pub struct Fused<const WIDE: bool>;
 impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
     const FUSED: bool = true;
     const WIDE: bool = WIDE;
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract<E: Field>(t: E, a: E, b: E) -> E {
         t.subtract_product(a, b)
     }
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_blocks<E: Field, const S: usize>(
         target: &mut Block<E, S>,
         left: &Block<E, S>,
@@ -85,15 +90,19 @@ impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
     ) {
         E::subtract_blocks::<_, WIDE>(target, left, right);
     }
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
         E::subtract_columns::<_, WIDE>(target, block, x);
     }
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
         E::subtract_row::<_, WIDE>(target, factor, row);
     }
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
+        E::transposed(rows)
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
         E::subtract_products::<_, WIDE>(target, a, b);
     }

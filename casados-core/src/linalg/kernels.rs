@@ -3,7 +3,7 @@
 use crate::scalar::{Field, Real};
 
 /// `y += a x`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(crate) fn axpy<T: Field>(a: T, x: &[T], y: &mut [T]) {
     for (y, x) in y.iter_mut().zip(x) {
         *y = *y + a * *x;
@@ -11,7 +11,7 @@ pub(crate) fn axpy<T: Field>(a: T, x: &[T], y: &mut [T]) {
 }
 
 /// `x /= a`
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
     for x in x {
         *x = *x / a;
@@ -19,7 +19,7 @@ pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
 }
 
 /// Whether all elements are neither infinite nor NaN. Without an early exit, so that it is a SIMD loop.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(crate) fn are_finite<T: Real>(values: &[T]) -> bool {
     let mut finite = true;
     for value in values {

@@ -80,7 +80,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTran
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Solve { factors, rows } = self.0;
-        packets!(R::LEN, solve_packet_transposed(factors, rows));
+        packets!(R::LEN, solve_packets_transposed(factors, rows));
     }
 }
 
@@ -91,17 +91,48 @@ fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: 
     rows: &mut [[R; S]],
     column: usize,
 ) {
-    sweeps::<A, M, E, R, S, W, DOWN, UP>(factors, rows, column);
+    sweeps::<A, M, E, R, S, W, DOWN, UP>(factors, rows, column, &mut ());
 }
 
 /// The same, where what [steady](crate::model::Steady) states subtract from the equations below them has been subtracted; of their own
-/// right-hand sides the first stage has that of all.
+/// right-hand sides the first stage has that of all. What is solved is shown to somebody, while it is in registers.
 #[inline(always)]
 pub fn solve_steady<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
+    viewer: &mut impl Viewer<E, S, W>,
 ) {
-    sweeps::<A, M, E, R, S, W, STEADY_DOWN, STEADY_UP>(factors, rows, 0);
+    sweeps::<A, M, E, R, S, W, STEADY_DOWN, STEADY_UP>(factors, rows, 0, viewer);
+}
+
+/// Who is present while packets are solved. What is here is to be `#[inline(always)]`.
+pub trait Viewer<E, const S: usize, const W: usize> {
+    /// Sees an unknown that has just been found, but not of a transposed system.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn see<A: Arithmetic>(&mut self, _slot: usize, _packet: &Packet<E, S, W>) {}
+    /// A pivot of the second system is done.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn pass(&mut self) {}
+}
+
+/// Nobody.
+impl<E, const S: usize, const W: usize> Viewer<E, S, W> for () {}
+
+/// The part of [`solve_transposed`] for `W` columns.
+#[inline(always)]
+fn solve_packets_transposed<
+    A: Arithmetic,
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    const S: usize,
+    const W: usize,
+>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+    column: usize,
+) {
+    solve_packet_transposed::<A, M, E, R, S, W>(factors, rows, column, &mut ());
 }
 
 /// The part of [`solve_transposed`] for `W` columns, inside of a kernel.
@@ -117,8 +148,9 @@ pub fn solve_packet_transposed<
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
     column: usize,
+    viewer: &mut impl Viewer<E, S, W>,
 ) {
-    sweeps::<A, M, E, R, S, W, TRANSPOSED_DOWN, TRANSPOSED_UP>(factors, rows, column);
+    sweeps::<A, M, E, R, S, W, TRANSPOSED_DOWN, TRANSPOSED_UP>(factors, rows, column, viewer);
 }
 
 #[inline(always)]
@@ -135,13 +167,14 @@ fn sweeps<
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
     column: usize,
+    viewer: &mut impl Viewer<E, S, W>,
 ) {
     if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
         return;
     }
-    let mut down = Sweep::<M, E, R, S, W, FIRST> { factors, rows, column };
+    let mut down = Sweep::<M, E, R, _, S, W, FIRST> { factors, rows, column, viewer: &mut () };
     from_first::<A, M, _>(&mut down);
-    let mut up = Sweep::<M, E, R, S, W, SECOND> { factors, rows: down.rows, column };
+    let mut up = Sweep::<M, E, R, _, S, W, SECOND> { factors, rows: down.rows, column, viewer };
     from_last::<A, M, _>(&mut up);
 }
 
@@ -154,14 +187,23 @@ const STEADY_DOWN: usize = 4;
 const STEADY_UP: usize = 5;
 
 /// One of them, for `W` columns.
-pub(super) struct Sweep<'a, M, E, R, const S: usize, const W: usize, const SYSTEM: usize> {
+pub(super) struct Sweep<'a, M, E, R, V, const S: usize, const W: usize, const SYSTEM: usize> {
     pub factors: Planned<'a, M, E, S>,
     pub rows: &'a mut [[R; S]],
     pub column: usize,
+    /// Of what is solved through `P + U`.
+    pub viewer: &'a mut V,
 }
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize> AtPivot
-    for Sweep<'_, M, E, R, S, W, SYSTEM>
+impl<
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    V: Viewer<E, S, W>,
+    const S: usize,
+    const W: usize,
+    const SYSTEM: usize,
+> AtPivot for Sweep<'_, M, E, R, V, S, W, SYSTEM>
 {
     const INSTRUCTIONS: usize = {
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
@@ -178,11 +220,19 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
             _ => self.transposed_up::<A>(pivot, others),
         }
+        self.viewer.pass();
     }
 }
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize>
-    Sweep<'_, M, E, R, S, W, SYSTEM>
+impl<
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    V: Viewer<E, S, W>,
+    const S: usize,
+    const W: usize,
+    const SYSTEM: usize,
+> Sweep<'_, M, E, R, V, S, W, SYSTEM>
 {
     #[inline(always)]
     fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
@@ -207,9 +257,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     }
 
     /// Scaled pivots with the same rows below them, stage by stage: what is subtracted from a row for all of them stays in registers.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn down_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         let mut zero = true;
         for pivot in pivots {
             zero &= pivot.slot as usize >= rows.len()
@@ -251,9 +301,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn down_by_columns<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() {
             return;
@@ -295,9 +345,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     }
 
     /// What pivots before this one that are not scaled subtract from its row.
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() {
             return;
@@ -317,9 +367,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, viewer } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
@@ -348,17 +398,18 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
             packet = solution;
         }
         store(rows, pivot.slot as usize, *column, &packet);
+        viewer.see::<A>(pivot.slot as usize, &packet);
     }
 }
 
 /// Whether a slot is a [steady](Steady) state.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn is_steady<M: Dae>(slot: usize) -> bool {
     matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
 }
 
 /// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
@@ -376,7 +427,7 @@ pub(super) fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize
 }
 
 /// `packet − block · other`, with the other in the memory.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
     block: &Block<E, S>,
@@ -399,7 +450,7 @@ fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, con
 }
 
 /// In loops: a closure would be compiled for every machine.
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &[[R; S]],
     slot: usize,
@@ -415,7 +466,7 @@ fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     true
 }
 
-#[inline(always)]
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
     rows: &mut [[R; S]],
     slot: usize,

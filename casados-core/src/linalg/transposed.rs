@@ -11,12 +11,12 @@ use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, const SYSTEM: usize>
-    Sweep<'_, M, E, R, S, W, SYSTEM>
+impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize, const SYSTEM: usize>
+    Sweep<'_, M, E, R, V, S, W, SYSTEM>
 {
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
@@ -38,7 +38,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
         // Where nothing is optimised this would only take long to compile.
         if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
@@ -52,7 +52,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
                 _ => self.transposed_up_beside::<A, 1>([pivot]),
             };
         }
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
@@ -84,7 +84,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
     #[inline(always)]
     fn transposed_up_in_strands<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() || pivot.lower().is_empty() {
             return;
@@ -120,7 +120,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize, cons
     /// Scaled pivots with the same rows below them: a row is fetched once for all of them.
     #[inline(always)]
     fn transposed_up_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        let Self { factors, rows, column } = self;
+        let Self { factors, rows, column, .. } = self;
         let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
         let mut below: [&[Block<E, S>]; P] = [&[]; P];
         for (below, pivot) in below.iter_mut().zip(pivots) {

@@ -56,6 +56,18 @@ macro_rules! own_cell {
 }
 pub(crate) use own_cell;
 
+/// Rows as columns.
+#[inline(always)]
+pub(crate) fn transposed<T: Copy, const N: usize>(rows: &[[T; N]; N]) -> [[T; N]; N] {
+    let mut columns = *rows;
+    for (r, row) in rows.iter().enumerate() {
+        for (column, &number) in columns.iter_mut().zip(row) {
+            column[r] = number;
+        }
+    }
+    columns
+}
+
 /// What elimination is generic over: numbers that can be added, multiplied, divided, and compared in size.
 pub trait Field:
     Copy
@@ -132,6 +144,12 @@ pub trait Field:
         for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
             *target = target.subtract_product(a, b);
         }
+    }
+
+    /// Rows as columns. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    #[inline(always)]
+    fn transposed<const N: usize>(rows: &[[Self; N]; N]) -> [[Self; N]; N] {
+        transposed(rows)
     }
 
     /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the

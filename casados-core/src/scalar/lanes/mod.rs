@@ -315,6 +315,19 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
+        fn transposed<const N: usize>(rows: &[[Self; N]; N]) -> [[Self; N]; N] {
+            use crate::scalar::{Lanes, lanes::$avx2 as Register};
+            if const { N == $more } {
+                let (mut registers, mut columns) = ([Register::<N>::splat(0.0); N], *rows);
+                for (register, row) in registers.iter_mut().zip(rows) {
+                    *register = Register::load(row);
+                }
+                Register::transpose(&registers, &mut columns);
+                return columns;
+            }
+            crate::scalar::transposed(rows)
+        }
+        #[inline(always)]
         fn subtract_row<const W: usize, const WIDE: bool>(
             target: &mut [Self; W],
             factor: Self,
