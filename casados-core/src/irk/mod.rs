@@ -43,6 +43,7 @@ mod run;
 mod sensitivities;
 mod stages;
 mod step;
+mod sums;
 mod sweep;
 mod triangle;
 mod verify;

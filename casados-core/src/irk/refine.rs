@@ -13,7 +13,8 @@
 
 use super::directions::{Directions, panel, panel_mut, panels};
 use super::record::{Coefficients, Work};
-use super::sweep::{Outputs, Sweep, total};
+use super::sums::total;
+use super::sweep::{Outputs, Sweep};
 use super::write::Target;
 use crate::linalg::{Arithmetic, Kernel, Packet, dispatch, slot};
 use crate::memory::Fallback;

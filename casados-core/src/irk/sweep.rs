@@ -2,9 +2,10 @@
 //! result, and to what second derivatives need of both.
 
 use super::curvature::row_of;
-use super::directions::{Directions, NEAREST, panel, panel_mut, panels, weight};
+use super::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use super::record::{Coefficients, Work, copy};
 use super::right_side::{Later, Scatter, nodes, place, restore};
+use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
 use crate::linalg::{
     Ahead, Arithmetic, Block, Kernel, Packet, Planned, Viewer, coupling, dispatch, each_row, is_long,
@@ -12,13 +13,10 @@ use crate::linalg::{
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
-use crate::scalar::{Field, Lanes};
+use crate::scalar::Lanes;
 use crate::shape::{Aligned, Array, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
-
-/// So many strands a sum over all columns has; of numbers that are registers themselves only the first is used.
-pub(super) const STRANDS: usize = 4;
 
 /// Derivatives of one step in directions, as many as there are elements in `R`, in panels.
 #[derive(Zeroable)]
@@ -201,18 +199,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 }
 
-/// Whether sums have one strand: those of other rows are computed meanwhile, and its memory is written once for each row of a panel.
-const fn is_one<E>() -> bool {
-    size_of::<E>() > 8
-}
-
-/// The sum of all strands.
-#[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn total<E: Field>(strands: &[E; STRANDS]) -> E {
-    let [a, b, c, d] = *strands;
-    if const { is_one::<E>() } { a } else { (a + b) + (c + d) }
-}
-
 /// See [`Sweep::start`].
 struct Start<'a, E, D, const S: usize> {
     v: &'a mut [E],
@@ -305,10 +291,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
     fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
         self.before::<A, W>(column, nodes);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
-        let weights = &mut [E::from_f64(0.0); W];
-        for (w, to) in weights.iter_mut().enumerate() {
-            *to = -weight::<E>(column + w, self.second);
-        }
+        let minus_weights = &minus_weights::<E, W>(column, self.second);
         if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
             solve_steady::<A, M, E, [E; W], S, W>(self.factors, dy, &mut ());
         } else if self.phase == Phase::Whole {
@@ -317,9 +300,13 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
                 _ => Ahead(&[]),
             };
             let sums = &mut *self.sums;
-            solve_steady::<A, M, E, [E; W], S, W>(self.factors, dy, &mut Summed { sums, weights, ahead });
+            solve_steady::<A, M, E, [E; W], S, W>(
+                self.factors,
+                dy,
+                &mut Summed { sums, minus_weights, ahead },
+            );
         }
-        self.after::<A, W>(column, weights);
+        self.after::<A, W>(column, minus_weights);
     }
 
     /// The right-hand side of a panel, with `h c_i`.
@@ -346,7 +333,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
 
     /// What follows from the solution of a panel.
     #[inline(always)]
-    fn after<A: Arithmetic, const W: usize>(&mut self, column: usize, weights: &[E; W]) {
+    fn after<A: Arithmetic, const W: usize>(&mut self, column: usize, minus_weights: &[E; W]) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
@@ -354,7 +341,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             return;
         }
         if self.phase == Phase::After || const { Self::sums_late::<A>() } {
-            let mut sums = Summed { sums: &mut *self.sums, weights, ahead: Ahead(&[]) };
+            let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
             for (slot, packet) in dy.iter().enumerate() {
                 sums.see::<A>(slot, packet);
             }
@@ -362,7 +349,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         let unit = self.first && D::SPARSE;
         if !unit {
             for (strands, row) in self.start_sums.iter_mut().zip(v) {
-                accumulate::<A, E, W>(strands, weights, row);
+                accumulate::<A, E, W>(strands, minus_weights, row);
             }
         }
         let mut b = self.coefficients.b;
@@ -399,63 +386,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
                 .panel::<A, W>(v, dy, d, column);
         }
     }
-}
-
-/// Sums over all columns, of which some are shown.
-struct Summed<'a, E, const S: usize, const W: usize> {
-    sums: &'a mut [[[E; STRANDS]; S]],
-    weights: &'a [E; W],
-    /// Where the next panel will be written.
-    ahead: Ahead<'a, E>,
-}
-
-impl<E: Field, const S: usize, const W: usize> Viewer<E, S, W> for Summed<'_, E, S, W> {
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn see<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {
-        for (strands, row) in self.sums.get_mut(slot).into_iter().flatten().zip(packet) {
-            accumulate::<A, E, W>(strands, self.weights, row);
-        }
-    }
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn pass(&mut self) {
-        self.ahead.next();
-    }
-}
-
-/// A sum over no columns.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn clear<E: Field>(strands: &mut [E; STRANDS]) {
-    let [first, others @ ..] = strands;
-    *first = E::from_f64(0.0);
-    if const { !is_one::<E>() } {
-        *others = [E::from_f64(0.0); STRANDS - 1];
-    }
-}
-
-/// `strands −= weights · row`, as far apart as the strands are.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn accumulate<A: Arithmetic, E: Field, const W: usize>(
-    strands: &mut [E; STRANDS],
-    weights: &[E; W],
-    row: &[E; W],
-) {
-    if const { is_one::<E>() } {
-        let [sum, ..] = strands;
-        for (&weight, &element) in weights.iter().zip(row) {
-            *sum = A::subtract(*sum, weight, element);
-        }
-        return;
-    }
-    let ((weights, last_weights), (row, last)) = (weights.as_chunks(), row.as_chunks());
-    // In registers: the optimiser cannot know that they do not overlap.
-    let mut own = *strands;
-    for (weights, row) in weights.iter().zip(row) {
-        A::subtract_products(&mut own, weights, row);
-    }
-    for ((strand, &weight), &element) in own.iter_mut().zip(last_weights).zip(last) {
-        *strand = A::subtract(*strand, weight, element);
-    }
-    *strands = own;
 }
 
 /// The rows of `D` at all stages that enter second derivatives.

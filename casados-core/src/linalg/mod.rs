@@ -8,6 +8,9 @@
 //! by the plan of the model (`sparse`, `substitution`, `transposed`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
 //! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
 //! iterations that need not be exact, `EigenFactors` for steps of variable size.
+//!
+//! What a kernel consists of is inlined, so that it is compiled for the machine's instructions. Helpers that know nothing of a model are
+//! so only where there is optimisation: without it each kernel of each model would be slowed by no call less, and take minutes to compile.
 
 mod block;
 mod complex;
@@ -19,6 +22,7 @@ mod factors;
 mod fused;
 mod kernels;
 mod mean;
+mod packets;
 mod prefetch;
 mod sparse;
 mod straight;

@@ -5,6 +5,7 @@
 
 use super::block::{Block, Packet, negate, subtract, subtract_scaled};
 use super::fused::{Arithmetic, Kernel, dispatch};
+use super::packets::{is_zero, load, store, subtract_of};
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
 use crate::model::{Dae, Pivot, Steady};
@@ -406,79 +407,4 @@ impl<
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn is_steady<M: Dae>(slot: usize) -> bool {
     matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
-}
-
-/// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
-#[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    rows: &[[R; S]],
-    slot: usize,
-    column: usize,
-) -> Packet<E, S, W> {
-    let mut packet = [[E::from_f64(0.0); W]; S];
-    if let Some(row) = rows.get(slot) {
-        for (packet, row) in packet.iter_mut().zip(row) {
-            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
-                *packet = *columns;
-            }
-        }
-    }
-    packet
-}
-
-/// `packet − block · other`, with the other in the memory.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    packet: &mut Packet<E, S, W>,
-    block: &Block<E, S>,
-    other: &[R; S],
-    column: usize,
-) {
-    if const { W == 1 || size_of::<E>() <= 8 } {
-        let other = load(core::slice::from_ref(other), 0, column);
-        subtract::<A, E, S, W>(packet, block, &other);
-        return;
-    }
-    for (elements, other) in block.iter().zip(other) {
-        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else {
-            continue;
-        };
-        for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
-            A::subtract_row(packet, element, other);
-        }
-    }
-}
-
-/// In loops: a closure would be compiled for every machine.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    rows: &[[R; S]],
-    slot: usize,
-    column: usize,
-) -> bool {
-    for row in rows.get(slot).into_iter().flatten() {
-        for element in row.as_ref().get(column..).unwrap_or_default().iter().take(W) {
-            if *element != E::from_f64(0.0) {
-                return false;
-            }
-        }
-    }
-    true
-}
-
-#[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    rows: &mut [[R; S]],
-    slot: usize,
-    column: usize,
-    packet: &Packet<E, S, W>,
-) {
-    if let Some(row) = rows.get_mut(slot) {
-        for (packet, row) in packet.iter().zip(row) {
-            let columns = row.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut());
-            if let Some(columns) = columns {
-                *columns = *packet;
-            }
-        }
-    }
 }

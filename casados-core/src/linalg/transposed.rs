@@ -5,8 +5,9 @@
 
 use super::block::{Block, negate, subtract_scaled, subtract_transposed};
 use super::fused::Arithmetic;
+use super::packets::{load, store};
 use super::sparse::{Planned, beside, is_scaled};
-use super::substitution::{Sweep, load, store};
+use super::substitution::Sweep;
 use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
