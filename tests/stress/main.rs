@@ -21,8 +21,8 @@
 //! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `endpoints` |
 //! | 39 | rounding of the data | `stiffness` |
 //!
-//! Besides: random equations with known solutions (`properties`), anything into every entry (`fuzz`; into the macro in
-//! `casados-macros/src/fuzz.rs`), single precision (`precision`).
+//! Besides: random equations with known solutions (`properties`), anything into every entry (`tests/fuzz.rs`, which is compiled beside; into
+//! the macro in `casados-macros/src/fuzz.rs`), single precision (`precision`).
 
 #[allow(dead_code)]
 #[path = "../../examples/models/ivp/chemistry.rs"]
@@ -42,8 +42,8 @@ mod systems;
 mod adaptive;
 mod elimination;
 mod endpoints;
+mod everything;
 mod failures;
-mod fuzz;
 mod identities;
 mod invariants;
 mod orbit;

@@ -1,7 +1,7 @@
 //! Single precision is double precision with other roundings: the differences are those of the arguments, propagated by the
 //! derivatives, and of the steps.
 
-use super::identities::Everything;
+use super::everything::Everything;
 use casados::{Erk, Gauss, Irk, Options, RadauIIA, Rk4, ode};
 use nalgebra::vector;
 

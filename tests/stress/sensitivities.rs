@@ -2,7 +2,7 @@
 
 use super::chemistry::{AkzoNobel, Robertson};
 use super::data::Record;
-use super::identities::Everything;
+use super::everything::Everything;
 use super::oscillators::VanDerPol;
 use casados::options::Newton;
 use casados::{

@@ -1,7 +1,9 @@
 //! Anything at all into every public entry of every integrator: an answer that is finite or an error, never a panic, never an
 //! endless loop. What comes is drawn from a seed, so that a failure repeats.
 
-use super::identities::Everything;
+#[path = "stress/everything.rs"]
+mod everything;
+
 use casados::batch::BatchError;
 use casados::error::Error;
 use casados::options::{Jacobian, Newton, Start};
@@ -10,6 +12,7 @@ use casados::{
     Adaptive, AdaptiveOptions, Batch, DormandPrince5, DormandPrince8, Erk, Gauss, Intervals, Irk, Options,
     Radau, RadauIIA, Real, Rk4, dae, ode,
 };
+use everything::Everything;
 use nalgebra::SVector;
 
 /// Poles, roots and powers of anything.
