@@ -17,8 +17,8 @@ use super::multiply::multiply_panel;
 use super::record::{Coefficients, Work};
 use super::sweep::Phase;
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Kernel, Packet, Planned, Viewer, coupling, dispatch, is_long,
-    solve_packet_transposed,
+    Ahead, Arithmetic, Block, Kernel, Packet, Planned, TransposedDown, TransposedUp, coupling, dispatch,
+    is_long, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayV, Dae};
@@ -193,8 +193,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
         if self.phase == Phase::Whole {
             let own = self.ahead.get(column * M::Shape::NX..).unwrap_or_default();
             let own = own.get(..W * M::Shape::NX).unwrap_or(own);
-            let ahead = &mut Waiting(Ahead(own));
-            solve_packet_transposed::<A, M, E, [E; W], S, W>(self.factors, m, 0, ahead);
+            let ahead = &mut Ahead(own);
+            sweeps::<A, M, E, [E; W], S, W, TransposedDown, TransposedUp>(self.factors, m, 0, ahead);
         }
         if self.phase != Phase::Before {
             let Self { jacobian, sum, first, last, inverse, placed, .. } = self;
@@ -211,16 +211,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
             }
             .all::<A>();
         }
-    }
-}
-
-/// Who asks for memory meanwhile.
-struct Waiting<'a, E>(Ahead<'a, E>);
-
-impl<E, const S: usize, const W: usize> Viewer<E, S, W> for Waiting<'_, E> {
-    #[inline(always)]
-    fn pass(&mut self) {
-        self.0.next();
     }
 }
 

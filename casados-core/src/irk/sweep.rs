@@ -8,8 +8,8 @@ use super::right_side::{Later, Scatter, nodes, place, restore};
 use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Kernel, Packet, Planned, Viewer, coupling, dispatch, each_row, is_long,
-    is_short, solve_steady,
+    Ahead, Arithmetic, Block, Down, Kernel, Packet, Planned, Up, Viewer, coupling, dispatch, each_row,
+    is_long, is_short, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -293,18 +293,15 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         let minus_weights = &minus_weights::<E, W>(column, self.second);
         if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
-            solve_steady::<A, M, E, [E; W], S, W>(self.factors, dy, &mut ());
+            sweeps::<A, M, E, [E; W], S, W, Down<true>, Up<true>>(self.factors, dy, 0, &mut ());
         } else if self.phase == Phase::Whole {
             let ahead = match &self.result {
                 Some(to) if self.distant => Ahead(to.following::<W>(column)),
                 _ => Ahead(&[]),
             };
             let sums = &mut *self.sums;
-            solve_steady::<A, M, E, [E; W], S, W>(
-                self.factors,
-                dy,
-                &mut Summed { sums, minus_weights, ahead },
-            );
+            let viewer = &mut Summed { sums, minus_weights, ahead };
+            sweeps::<A, M, E, [E; W], S, W, Down<true>, Up<true>>(self.factors, dy, 0, viewer);
         }
         self.after::<A, W>(column, minus_weights);
     }

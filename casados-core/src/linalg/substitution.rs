@@ -6,33 +6,36 @@
 use super::block::{Block, Packet, negate, subtract, subtract_scaled};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::packets::{is_zero, load, store, subtract_of};
+use super::prefetch::Ahead;
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
 use crate::model::{Dae, Pivot, Steady};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
+use core::marker::PhantomData;
 
-/// Calls a function for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at
-/// a time, or the packet of all stages would not fit them.
+/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at a time, or the
+/// packet of all stages would not fit them.
 macro_rules! packets {
-    ($columns:expr, $function:ident($factors:ident, $rows:ident)) => {{
+    ($first:ty, $second:ty: $solve:expr) => {{
+        let Solve { factors, rows } = $solve;
         let mut column = 0;
         if const { size_of::<E>() <= 8 } {
-            while column + 8 <= $columns {
-                $function::<A, M, E, R, S, 8>($factors, $rows, column);
+            while column + 8 <= R::LEN {
+                sweeps::<A, M, E, R, S, 8, $first, $second>(factors, rows, column, &mut ());
                 column += 8;
             }
-            if column + 4 <= $columns {
-                $function::<A, M, E, R, S, 4>($factors, $rows, column);
+            if column + 4 <= R::LEN {
+                sweeps::<A, M, E, R, S, 4, $first, $second>(factors, rows, column, &mut ());
                 column += 4;
             }
         }
-        while column + 2 <= $columns {
-            $function::<A, M, E, R, S, 2>($factors, $rows, column);
+        while column + 2 <= R::LEN {
+            sweeps::<A, M, E, R, S, 2, $first, $second>(factors, rows, column, &mut ());
             column += 2;
         }
-        if column < $columns {
-            $function::<A, M, E, R, S, 1>($factors, $rows, column);
+        if column < R::LEN {
+            sweeps::<A, M, E, R, S, 1, $first, $second>(factors, rows, column, &mut ());
         }
     }};
 }
@@ -59,8 +62,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_,
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { factors, rows } = self;
-        packets!(R::LEN, solve_packets(factors, rows));
+        packets!(Down<false>, Up<false>: self);
     }
 }
 
@@ -80,30 +82,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTran
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Solve { factors, rows } = self.0;
-        packets!(R::LEN, solve_packets_transposed(factors, rows));
+        packets!(TransposedDown, TransposedUp: self.0);
     }
-}
-
-/// The part of [`solve`] for `W` columns, inside of a kernel.
-#[inline(always)]
-fn solve_packets<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    factors: Planned<'_, M, E, S>,
-    rows: &mut [[R; S]],
-    column: usize,
-) {
-    sweeps::<A, M, E, R, S, W, DOWN, UP>(factors, rows, column, &mut ());
-}
-
-/// The same, where what [steady](crate::model::Steady) states subtract from the equations below them has been subtracted; of their own
-/// right-hand sides the first stage has that of all. What is solved is shown to somebody, while it is in registers.
-#[inline(always)]
-pub fn solve_steady<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
-    factors: Planned<'_, M, E, S>,
-    rows: &mut [[R; S]],
-    viewer: &mut impl Viewer<E, S, W>,
-) {
-    sweeps::<A, M, E, R, S, W, STEADY_DOWN, STEADY_UP>(factors, rows, 0, viewer);
 }
 
 /// Who is present while packets are solved. What is here is to be `#[inline(always)]`.
@@ -119,51 +99,26 @@ pub trait Viewer<E, const S: usize, const W: usize> {
 /// Nobody.
 impl<E, const S: usize, const W: usize> Viewer<E, S, W> for () {}
 
-/// The part of [`solve_transposed`] for `W` columns.
-#[inline(always)]
-fn solve_packets_transposed<
-    A: Arithmetic,
-    M: Dae,
-    E: Field + Plain,
-    R: Array<E>,
-    const S: usize,
-    const W: usize,
->(
-    factors: Planned<'_, M, E, S>,
-    rows: &mut [[R; S]],
-    column: usize,
-) {
-    solve_packet_transposed::<A, M, E, R, S, W>(factors, rows, column, &mut ());
+/// Who asks for memory meanwhile, line by line.
+impl<E, const S: usize, const W: usize> Viewer<E, S, W> for Ahead<'_, E> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn pass(&mut self) {
+        self.next();
+    }
 }
 
-/// The part of [`solve_transposed`] for `W` columns, inside of a kernel.
+/// Solves two triangular systems in place for `W` columns, inside of a kernel. What is solved through the second is shown to somebody,
+/// while it is in registers.
 #[inline(always)]
-pub fn solve_packet_transposed<
+pub fn sweeps<
     A: Arithmetic,
     M: Dae,
     E: Field + Plain,
     R: Array<E>,
     const S: usize,
     const W: usize,
->(
-    factors: Planned<'_, M, E, S>,
-    rows: &mut [[R; S]],
-    column: usize,
-    viewer: &mut impl Viewer<E, S, W>,
-) {
-    sweeps::<A, M, E, R, S, W, TRANSPOSED_DOWN, TRANSPOSED_UP>(factors, rows, column, viewer);
-}
-
-#[inline(always)]
-fn sweeps<
-    A: Arithmetic,
-    M: Dae,
-    E: Field + Plain,
-    R: Array<E>,
-    const S: usize,
-    const W: usize,
-    const FIRST: usize,
-    const SECOND: usize,
+    First: System,
+    Second: System,
 >(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -173,22 +128,20 @@ fn sweeps<
     if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
         return;
     }
-    let mut down = Sweep::<M, E, R, _, S, W, FIRST> { factors, rows, column, viewer: &mut () };
-    from_first::<A, M, _>(&mut down);
-    let mut up = Sweep::<M, E, R, _, S, W, SECOND> { factors, rows: down.rows, column, viewer };
-    from_last::<A, M, _>(&mut up);
+    let viewer_of_first = &mut ();
+    let mut first = Along::<First, Sweep<'_, M, E, R, (), S, W>>(
+        Sweep { factors, rows, column, viewer: viewer_of_first },
+        PhantomData,
+    );
+    from_first::<A, M, _>(&mut first);
+    let rows = first.0.rows;
+    let mut second =
+        Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, viewer }, PhantomData);
+    from_last::<A, M, _>(&mut second);
 }
 
-/// The triangular systems: `I + L`, `P + U`, both transposed, and the former two where steady states are done.
-const DOWN: usize = 0;
-const UP: usize = 1;
-const TRANSPOSED_DOWN: usize = 2;
-const TRANSPOSED_UP: usize = 3;
-const STEADY_DOWN: usize = 4;
-const STEADY_UP: usize = 5;
-
-/// One of them, for `W` columns.
-pub(super) struct Sweep<'a, M, E, R, V, const S: usize, const W: usize, const SYSTEM: usize> {
+/// `W` columns of right-hand sides on their way.
+pub struct Sweep<'a, M, E, R, V, const S: usize, const W: usize> {
     pub factors: Planned<'a, M, E, S>,
     pub rows: &'a mut [[R; S]],
     pub column: usize,
@@ -196,51 +149,92 @@ pub(super) struct Sweep<'a, M, E, R, V, const S: usize, const W: usize, const SY
     pub viewer: &'a mut V,
 }
 
-impl<
-    M: Dae,
-    E: Field + Plain,
-    R: Array<E>,
-    V: Viewer<E, S, W>,
-    const S: usize,
-    const W: usize,
-    const SYSTEM: usize,
-> AtPivot for Sweep<'_, M, E, R, V, S, W, SYSTEM>
+/// A triangular system.
+pub trait System {
+    /// Whether it looks at the pivots that follow, on the way from the last to the first.
+    const OTHERS: bool = false;
+    /// What is done at a pivot.
+    fn at<
+        A: Arithmetic,
+        M: Dae,
+        E: Field + Plain,
+        R: Array<E>,
+        V: Viewer<E, S, W>,
+        const S: usize,
+        const W: usize,
+    >(
+        sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+        pivot: &'static Pivot,
+        others: &'static [Pivot],
+    );
+}
+
+/// A way through a system.
+struct Along<Y, T>(T, PhantomData<Y>);
+
+impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
+    AtPivot for Along<Y, Sweep<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
         4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
     };
-    const OTHERS: bool = SYSTEM == TRANSPOSED_UP;
+    const OTHERS: bool = Y::OTHERS;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [u32]) {
-        match SYSTEM {
-            DOWN => self.down::<A>(pivot, others),
-            STEADY_DOWN if pivot.steady => {}
-            STEADY_DOWN => self.down::<A>(pivot, others),
-            UP | STEADY_UP => self.up::<A>(pivot),
-            TRANSPOSED_DOWN => self.transposed_down::<A>(pivot),
-            _ => self.transposed_up::<A>(pivot, others),
-        }
-        self.viewer.pass();
+        Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot, others);
+        self.0.viewer.pass();
     }
 }
 
-impl<
-    M: Dae,
-    E: Field + Plain,
-    R: Array<E>,
-    V: Viewer<E, S, W>,
-    const S: usize,
-    const W: usize,
-    const SYSTEM: usize,
-> Sweep<'_, M, E, R, V, S, W, SYSTEM>
+/// One of the systems, of which each has its own instructions.
+macro_rules! system {
+    ($(#[$text:meta])* $name:ident $(<const $steady:ident>)?, $others:literal: |$sweep:ident, $pivot:ident, $of_others:ident| $what:expr) => {
+        $(#[$text])*
+        pub struct $name$(<const $steady: bool>)?;
+
+        impl$(<const $steady: bool>)? System for $name$(<$steady>)? {
+            const OTHERS: bool = $others;
+            #[inline(always)]
+            fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>(
+                $sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+                $pivot: &'static Pivot,
+                $of_others: &'static [Pivot],
+            ) {
+                $what
+            }
+        }
+    };
+}
+
+system!(
+    /// `I + L`; or where what [steady](crate::model::Steady) states subtract from the equations below them has been subtracted.
+    Down<const STEADY>, false: |sweep, pivot, others| if !(STEADY && pivot.steady) {
+        sweep.down::<A, STEADY>(pivot, others);
+    }
+);
+system!(
+    /// `P + U`; or where the first stage has the right-hand side that [steady](crate::model::Steady) states have at all of them.
+    Up<const STEADY>, false: |sweep, pivot, _others| sweep.up::<A, STEADY>(pivot)
+);
+system!(
+    /// `(P + U)ᵀ`
+    TransposedDown, false: |sweep, pivot, _others| sweep.transposed_down::<A>(pivot)
+);
+system!(
+    /// `(I + L)ᵀ`
+    TransposedUp, true: |sweep, pivot, others| sweep.transposed_up::<A>(pivot, others)
+);
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
+    Sweep<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
-    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
+    fn down<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
         // What is added to a row is added in registers where one column fills them; but large blocks come from the second cache
         // fastest as they lie, column by column.
         if const { align_of::<E>() > 8 && size_of::<Block<E, S>>() <= 256 } {
-            self.down_by_rows::<A>(pivot);
+            self.down_by_rows::<A, STEADY>(pivot);
             if !is_scaled::<S>(pivot) {
                 return;
             }
@@ -270,11 +264,7 @@ impl<
             return;
         }
         let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
-        let below = pivots.map(|pivot| factors.blocks.get(pivot.lower()).unwrap_or_default());
-        // As many, but the optimiser does not know.
-        if below.iter().any(|below| below.len() != slots.len()) {
-            return;
-        }
+        let Some(below) = below::<M, E, S, P>(*factors, &pivots, slots.len()) else { return };
         for stage in 0..S {
             let mut products = [[E::from_f64(0.0); W]; P];
             for (product, pivot) in products.iter_mut().zip(pivots) {
@@ -347,7 +337,7 @@ impl<
 
     /// What pivots before this one that are not scaled subtract from its row.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn down_by_rows<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() {
@@ -357,7 +347,7 @@ impl<
             let mut packet = load(rows, slot, *column);
             for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
                 // What steady states subtract is subtracted.
-                if const { SYSTEM == STEADY_DOWN } && is_steady::<M>(left.slot as usize) {
+                if STEADY && is_steady::<M>(left.slot as usize) {
                     continue;
                 }
                 let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
@@ -369,13 +359,13 @@ impl<
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+    fn up<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, viewer } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        if const { SYSTEM == STEADY_UP } && pivot.steady {
+        if STEADY && pivot.steady {
             packet = [packet[0]; S];
         }
         for (block, other) in beside(*factors, pivot.upper()) {
@@ -407,4 +397,21 @@ impl<
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn is_steady<M: Dae>(slot: usize) -> bool {
     matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
+}
+
+/// The blocks below pivots: so many below each, but the optimiser does not know.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(super) fn below<'a, M: Dae, E, const S: usize, const P: usize>(
+    factors: Planned<'a, M, E, S>,
+    pivots: &[&'static Pivot; P],
+    count: usize,
+) -> Option<[&'a [Block<E, S>]; P]> {
+    let mut below: [&[Block<E, S>]; P] = [&[]; P];
+    for (below, pivot) in below.iter_mut().zip(pivots) {
+        *below = factors.blocks.get(pivot.lower())?;
+        if below.len() != count {
+            return None;
+        }
+    }
+    Some(below)
 }

@@ -7,14 +7,12 @@ use super::block::{Block, negate, subtract_scaled, subtract_transposed};
 use super::fused::Arithmetic;
 use super::packets::{load, store};
 use super::sparse::{Planned, beside, is_scaled};
-use super::substitution::Sweep;
+use super::substitution::{Sweep, below};
 use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize, const SYSTEM: usize>
-    Sweep<'_, M, E, R, V, S, W, SYSTEM>
-{
+impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize> Sweep<'_, M, E, R, V, S, W> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
@@ -123,14 +121,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize, c
     fn transposed_up_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
         let Self { factors, rows, column, .. } = self;
         let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
-        let mut below: [&[Block<E, S>]; P] = [&[]; P];
-        for (below, pivot) in below.iter_mut().zip(pivots) {
-            *below = factors.blocks.get(pivot.lower()).unwrap_or_default();
-            // As many, but the optimiser does not know.
-            if below.len() != slots.len() {
-                return;
-            }
-        }
+        let Some(below) = below::<M, E, S, P>(*factors, &pivots, slots.len()) else { return };
         let mut sums = [[[E::from_f64(0.0); W]; S]; P];
         let mut index = slots.len();
         while index > 0 {
