@@ -11,8 +11,8 @@
 //! of directions; this takes a sparse solve for each direction, which is less where a model is large.
 
 use super::curvature::{COLUMNS, row_of};
-use super::curved_advance::{Advance, Inverse, add_stages, columns, is_direct, position};
-use super::directions::{Identity, panel_of, panels};
+use super::curved_advance::{Advance, Inverse, add_stages, columns, is_direct};
+use super::directions::{Identity, before, panel_of, panels};
 use super::multiply::multiply_panel;
 use super::record::{Coefficients, Work};
 use super::sweep::Phase;
@@ -30,18 +30,12 @@ use core::marker::PhantomData;
 /// as much again, which wait for memory while products of panels do not. Chains of masses on Zen 4 are even at 0.66 with two stages and
 /// at 0.85 with four; 33 masses are at 0.37 and 0.61. Only of single numbers: registers of them leave no room for packets.
 pub(super) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
-    let (structure, plan) = (&M::STRUCTURE, &M::STRUCTURE.elimination);
-    if COLUMNS < 16 || size_of::<E>() > 8 || plan.pivots.is_empty() {
+    let structure = &M::STRUCTURE;
+    if COLUMNS < 16 || size_of::<E>() > 8 || structure.elimination.pivots.is_empty() {
         return false;
     }
-    let (mut solve, mut index) = (0, 0);
-    while index < plan.pivots.len() {
-        let pivot = &plan.pivots[index];
-        let lower = (pivot.upper - pivot.block - 1) as usize;
-        let upper = (pivot.end - pivot.upper) as usize + !pivot.identity as usize;
-        solve += S * if pivot.scaled && S > 1 { lower + S + upper * S } else { (lower + upper) * S };
-        index += 1;
-    }
+    // Each of its products is an operation for the sum, too.
+    let solve = structure.elimination_cost(S as u64).1 as usize / 2;
     let blocks = &structure.blocks;
     let of_x = if is_direct::<M>() { blocks[1] } else { blocks[2] - blocks[1] };
     let entries = S * (of_x + blocks[5] - blocks[3]);
@@ -228,8 +222,8 @@ impl<E: Lanes, R: Array<E>, const S: usize, const W: usize> RightHandSide<'_, E,
     #[inline(always)]
     fn all<A: Arithmetic, M: Dae>(&self, m: &mut [Packet<E, S, W>]) {
         let nx = M::Shape::NX;
-        let (mut derivative, mut state, mut algebraic) =
-            (0, const { position::<M>(M::Shape::NX) }, const { position::<M>(2 * M::Shape::NX) });
+        let (mut derivative, mut state) = (0, const { before(M::STRUCTURE.curved, M::Shape::NX) });
+        let mut algebraic = const { before(M::STRUCTURE.curved, 2 * M::Shape::NX) };
         for (unknown, to) in m.iter_mut().enumerate() {
             let mut packet = [[E::from_f64(0.0); W]; S];
             if unknown >= nx {

@@ -8,6 +8,7 @@
 //! entries of `f_ẋ` alone, most often one for each state.
 
 use super::curvature::row_of;
+use super::directions::before;
 use super::evaluate::entry;
 use super::record::Coefficients;
 use crate::linalg::{Arithmetic, Packet, slot};
@@ -154,7 +155,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, 
     /// From a row on, from the entries of `f_x`, `f_u` and `f_p`.
     #[inline(always)]
     fn by_entries<A: Arithmetic>(&mut self, begin: usize) {
-        let (mut place, mut c, mut row) = (*self.placed, const { position::<M>(M::Shape::NX) }, begin);
+        let (mut place, mut c, mut row) =
+            (*self.placed, const { before(M::STRUCTURE.curved, M::Shape::NX) }, begin);
         while let Some(&direction) = M::STRUCTURE.directions.get(row) {
             let variable = variable_of::<M>(direction as usize);
             // One sum for each stage: an addition to one does not wait for that to another.
@@ -224,15 +226,6 @@ fn variable_at<M: Dae>(place: usize) -> Option<usize> {
 const fn variable_of<M: Dae>(direction: usize) -> usize {
     let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
     nx + direction + if direction < nx { 0 } else { nz }
-}
-
-/// How many curved variables come before one.
-pub(super) const fn position<M: Dae>(variable: usize) -> usize {
-    let (curved, mut count) = (M::STRUCTURE.curved, 0);
-    while count < curved.len() && (curved[count] as usize) < variable {
-        count += 1;
-    }
-    count
 }
 
 /// A few columns of a row.

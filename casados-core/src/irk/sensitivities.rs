@@ -486,8 +486,6 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             reborrow(&mut along),
         )?;
         pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
-        self.run.keep()?;
-        self.sweep = Some(count - 1);
-        Ok(())
+        self.keep_forward().map(|_| ())
     }
 }

@@ -1,7 +1,7 @@
 //! Second derivatives, which are found as the lower triangle of a matrix over all directions that have any influence, to the matrices of
 //! results: those over one part of `w = (x₀, u, p)` have both triangles, those over two parts lie whole in the one that was found.
 
-use super::directions::Identity;
+use super::directions::{Identity, before};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::model::{ArrayW, Dae};
 use crate::result::Hessian;
@@ -54,15 +54,6 @@ const fn begin<M: Dae>(part: usize) -> usize {
     }
 }
 
-/// How many directions that have any influence come before one.
-const fn before<M: Dae>(direction: usize) -> usize {
-    let (directions, mut count) = (M::STRUCTURE.directions, 0);
-    while count < directions.len() && (directions[count] as usize) < direction {
-        count += 1;
-    }
-    count
-}
-
 /// See [`Triangle::part`].
 struct Part<'a, M: Dae, E: Plain, B, const OF_ROWS: usize, const OF_COLUMNS: usize> {
     of: &'a Triangle<'a, M, E>,
@@ -82,7 +73,10 @@ impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usi
         let (row, column) = const { (begin::<M>(OF_ROWS), begin::<M>(OF_COLUMNS)) };
         let all = const { M::STRUCTURE.directions.len() == M::STRUCTURE.column_of_direction.len() };
         // The directions of these rows that have any influence.
-        let range = const { before::<M>(begin::<M>(OF_ROWS))..before::<M>(begin::<M>(OF_ROWS) + B::ROWS) };
+        let range = const {
+            let (directions, begin) = (M::STRUCTURE.directions, begin::<M>(OF_ROWS));
+            before(directions, begin)..before(directions, begin + B::ROWS)
+        };
         let directions = M::STRUCTURE.directions.get(range.clone()).unwrap_or_default();
         let mut total = zero;
         for (c, to) in columns.chunks_exact_mut(B::ROWS.max(1)).enumerate() {

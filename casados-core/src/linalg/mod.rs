@@ -9,8 +9,8 @@
 //! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
 //! iterations that need not be exact, `EigenFactors` for steps of variable size.
 //!
-//! What a kernel consists of is inlined, so that it is compiled for the machine's instructions. Helpers that know nothing of a model are
-//! so only where there is optimisation: without it each kernel of each model would be slowed by no call less, and take minutes to compile.
+//! What a kernel consists of is inlined, so that it is compiled for the machine's instructions. Without optimisation helpers that know
+//! nothing of a model are functions like others: inlined they would be no faster, and compiled once more for each kernel of each model.
 
 mod block;
 mod complex;

@@ -95,16 +95,18 @@ impl Structure {
     }
 
     /// Of a factorisation, and of a solve.
-    fn elimination_cost(&self, s: u64) -> (u64, u64) {
-        let plan = &self.elimination;
-        if plan.pivots.is_empty() {
+    pub(crate) const fn elimination_cost(&self, s: u64) -> (u64, u64) {
+        let mut pivots = self.elimination.pivots;
+        if pivots.is_empty() {
             let n = s * (self.x.len() + self.z.len()) as u64;
             return (n * n.saturating_sub(1) * (4 * n + 1) / 6, (2 * n * n).saturating_sub(n));
         }
         let (square, cube) = (s * s, s * s * s);
         let (mut factorisation, mut solve) = (0, 0);
-        for pivot in plan.pivots {
-            let (lower, upper) = (pivot.lower().len() as u64, pivot.upper().len() as u64);
+        while let [pivot, others @ ..] = pivots {
+            pivots = others;
+            let (lower, upper) = (pivot.lower(), pivot.upper());
+            let (lower, upper) = ((lower.end - lower.start) as u64, (upper.end - upper.start) as u64);
             if pivot.scaled && s > 1 {
                 factorisation += upper * (2 * cube - square + 2 * square * lower);
                 solve += 2 * square * (1 + upper) - s + 2 * s * lower;
