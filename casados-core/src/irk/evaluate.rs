@@ -45,9 +45,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.complete();
     }
 
-    /// The same for the mean of the stages, for which one is enough if all are alike.
+    /// The same for the mean of the stages, for which one is enough if all are alike. Of a single lane that is seldom known, as its stages are
+    /// evaluated side by side where a machine can, and so not worth compiling the mean of one.
     pub(crate) fn evaluate_mean(&mut self) {
         self.evaluate::<true>();
+        if const { E::LANES == 1 } {
+            self.complete();
+        }
     }
 
     /// The Jacobian at all stages, if it is there for the first one only.

@@ -30,7 +30,7 @@ impl<M: Dae, E: Plain, const S: usize> Copy for MeanFactors<M, E, S> {}
 
 impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be there for the `first_only` of stages that
-    /// are alike.
+    /// are alike, but not of a single lane.
     pub fn factor(
         &mut self,
         jacobian: &M::Jacobian<[E; S]>,
@@ -39,7 +39,7 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         h: E,
     ) {
         let blocks = &mut self.blocks;
-        if first_only {
+        if const { E::LANES > 1 } && first_only {
             let scale = basis.values.scaled(h);
             dispatch(AssembleMean::<M, E, S, true> { jacobian, scale, blocks });
         } else {
