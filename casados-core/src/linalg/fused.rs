@@ -121,58 +121,79 @@ pub trait Kernel {
     fn run<A: Arithmetic>(self) -> Self::Output;
 }
 
+/// What kernels are compiled for. Each has a module of its own, since the compiler works on modules side by side: with all kernels in one
+/// the aircraft would take half as long again.
+#[cfg(target_arch = "x86_64")]
+mod compiled {
+    pub mod base {
+        use super::super::{Kernel, Separate};
+
+        // Never inlined beside others, so that callers are small. Where it is the only one, the optimiser is to see from outside
+        // that nothing in it panics.
+        #[cfg_attr(feature = "std", inline(never))]
+        #[cfg_attr(not(feature = "std"), inline(always))]
+        pub fn run<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run::<Separate>()
+        }
+    }
+
+    pub mod avx2 {
+        use super::super::{Fused, Kernel};
+
+        #[target_feature(enable = "avx2,fma")]
+        pub fn run<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run::<Fused<false>>()
+        }
+    }
+
+    pub mod avx512 {
+        use super::super::{Fused, Kernel};
+
+        #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
+        pub fn run<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run::<Fused<true>>()
+        }
+    }
+}
+
 /// Runs a kernel as this machine does it best.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    // Never inlined beside others, so that callers are small. Where it is the only one, the optimiser is to see from outside
-    // that nothing in it panics.
-    #[cfg_attr(feature = "std", inline(never))]
-    #[cfg_attr(not(feature = "std"), inline(always))]
-    fn base<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run::<Separate>()
-    }
-    #[target_feature(enable = "avx2,fma")]
-    fn avx2<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run::<Fused<false>>()
-    }
-    #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
-    fn avx512<K: Kernel>(kernel: K) -> K::Output {
-        kernel.run::<Fused<true>>()
-    }
+    use compiled::{avx2, avx512, base};
     // Numbers that are registers, which are aligned to themselves, need what these are made of, and nothing else. Of other kernels short
     // ones are up to a tenth faster without AVX-512; and unoptimised programs, where each copy of a kernel is much to compile and
     // none is fast, have the one copy that runs everywhere.
     if const { align_of::<K::Number>() > 32 } {
         // SAFETY: the one condition of calling a function with target features is that the machine has them. Numbers that are
         // registers of AVX-512 are computed with only where it has; see the head of `lanes`.
-        unsafe { avx512(kernel) }
+        unsafe { avx512::run(kernel) }
     } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
         // SAFETY: the same of AVX2.
-        unsafe { avx2(kernel) }
+        unsafe { avx2::run(kernel) }
     } else if const { align_of::<K::Number>() == 32 } {
         match level() {
             // SAFETY: `level` says what the machine has.
-            Level::Avx512 => unsafe { avx512(kernel) },
+            Level::Avx512 => unsafe { avx512::run(kernel) },
             // SAFETY: as above.
-            _ => unsafe { avx2(kernel) },
+            _ => unsafe { avx2::run(kernel) },
         }
     } else if const { cfg!(debug_assertions) } {
-        base(kernel)
+        base::run(kernel)
     } else if const { K::WIDE } {
         match level() {
             // SAFETY: `level` says what the machine has.
-            Level::Avx512 => unsafe { avx512(kernel) },
+            Level::Avx512 => unsafe { avx512::run(kernel) },
             // SAFETY: as above.
-            Level::Avx2 => unsafe { avx2(kernel) },
-            _ => base(kernel),
+            Level::Avx2 => unsafe { avx2::run(kernel) },
+            _ => base::run(kernel),
         }
     } else {
         match level() {
             // SAFETY: as above.
-            Level::Avx512 | Level::Avx2 => unsafe { avx2(kernel) },
-            _ => base(kernel),
+            Level::Avx512 | Level::Avx2 => unsafe { avx2::run(kernel) },
+            _ => base::run(kernel),
         }
     }
 }
