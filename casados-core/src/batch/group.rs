@@ -227,7 +227,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             if n + 1 < count {
                 work.linearize_planned(coefficients, n, step, false, statistics);
             }
-            good = E::and(good, adjoint.backward.stages(work, coefficients));
+            good = E::and(good, adjoint.backward.stages(work, None, coefficients));
             adjoint.backward.advance(&work.linear);
         }
         adjoint.collect(work);
@@ -257,16 +257,14 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let Pass { steps, coefficients, work, .. } = pass;
         hessian.begin(lambda.as_ref(), nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            if n + 1 < count {
-                record.recall(work);
-            }
+            let kept = record.kept(n + 1 == count);
             if n == 0 {
                 hessian.backward.weigh(coefficients);
             }
-            good = E::and(good, hessian.backward.stages(work, coefficients));
-            hessian.backward.advance(&work.linear);
+            good = E::and(good, hessian.backward.stages(work, kept, coefficients));
+            hessian.backward.advance(work.linear(kept));
             hessian.curvature(work, coefficients, n, step);
-            hessian.subtract(work, coefficients, record, [n, count], &[]);
+            hessian.subtract(work, kept, coefficients, record, [n, count], &[]);
         }
         let finite = hessian.collect(None, result) + finite;
         Ok((E::and(good, finite.is_finite()), result))

@@ -71,14 +71,15 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         dispatch(Weigh { nu: self.nu.as_slice(), start: &coefficients.start, source });
     }
 
-    /// `μ` of a step that is linearised, by the factors that are there; whether it satisfies its equations.
+    /// `μ` of a step that is linearised, by the factors that were `kept` or are there; whether it satisfies its equations.
     pub(crate) fn stages<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
     ) -> E::Mask {
-        self.solve(&work.linear, coefficients, work.inputs.time.step);
-        work.verify_adjoint(self, coefficients)
+        self.solve(work.linear(kept), coefficients, work.inputs.time.step);
+        work.verify_adjoint(kept, self, coefficients)
     }
 
     /// `μ`
@@ -111,13 +112,16 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
 }
 
 impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
-    /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without.
+    /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without. What was `kept` of it is brought back where it
+    /// does not do, and is `None` then.
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn step<F: Fallback>(
         &mut self,
         work: &mut Work<M, T, S, F>,
+        kept: &mut Option<&Linearization<M, T, S, F>>,
         coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
@@ -130,11 +134,14 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
         if n == 0 {
             self.weigh(coefficients);
         }
-        if !self.stages(work, coefficients) && work.linear.factors.is_planned() {
+        if !self.stages(work, *kept, coefficients) && work.linear(*kept).factors.is_planned() {
+            if let Some(kept) = kept.take() {
+                work.linear.copy_from(kept);
+            }
             work.factor_pivoted(coefficients, n, 0, statistics)?;
-            self.stages(work, coefficients);
+            self.stages(work, None, coefficients);
         }
-        self.advance(&work.linear);
+        self.advance(work.linear(*kept));
         Ok(())
     }
 }

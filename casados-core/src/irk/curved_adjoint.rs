@@ -14,7 +14,7 @@ use super::curvature::{COLUMNS, row_of};
 use super::curved_advance::{Advance, Inverse, add_stages, columns, is_direct};
 use super::directions::{Identity, before, panel_of, panels};
 use super::multiply::multiply_panel;
-use super::record::{Coefficients, Work};
+use super::record::{Coefficients, Linearization, Work};
 use super::sweep::Phase;
 use crate::linalg::{
     Ahead, Arithmetic, Block, Kernel, Packet, Planned, TransposedDown, TransposedUp, coupling, dispatch,
@@ -64,33 +64,34 @@ pub(super) struct Back<'a, M: Dae, E: Plain, R, const S: usize> {
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
-    /// Over a step that is linearised, with its factors.
-    pub fn run<F: Fallback>(mut self, work: &mut Work<M, E, S, F>) {
-        if work.linear.factors.is_planned() {
-            self.phase(work, Phase::Whole, 0);
+    /// Over a step that is linearised, with its factors, which were `kept` or are there.
+    pub fn run<F: Fallback>(mut self, work: &mut Work<M, E, S, F>, kept: Option<&Linearization<M, E, S, F>>) {
+        let h = work.inputs.time.step;
+        if work.linear(kept).factors.is_planned() {
+            self.phase(work.linear(kept), h, Phase::Whole, 0);
             return;
         }
         let mut column = 0;
         while column < M::STRUCTURE.directions.len() {
             let (_, width) = panel_of::<E>(column, M::STRUCTURE.directions.len(), S);
-            self.phase(work, Phase::Before, column);
-            self.solve_columns(work, width);
-            self.phase(work, Phase::After, column);
+            self.phase(work.linear(kept), h, Phase::Before, column);
+            self.solve_columns(work, kept, width);
+            self.phase(work.linear(kept), h, Phase::After, column);
             column += width;
         }
     }
 
     /// All panels, or a part of what is done to one of them.
-    fn phase<F: Fallback>(&mut self, work: &Work<M, E, S, F>, phase: Phase, only: usize) {
+    fn phase<F: Fallback>(&mut self, linear: &Linearization<M, E, S, F>, h: E, phase: Phase, only: usize) {
         let Self { coefficients, entries, d, g, sum, first, last, ahead } = self;
         let (g, m) = halves::<M, E, S>(g);
         dispatch(Panels::<M, E, R, S> {
             phase,
             only,
-            jacobian: &work.linear.jacobian,
-            factors: work.linear.factors.planned(),
-            minus_ha: coupling(&coefficients.a, work.inputs.time.step),
-            minus_hb: coefficients.b.map(|b| -(work.inputs.time.step * b)),
+            jacobian: &linear.jacobian,
+            factors: linear.factors.planned(),
+            minus_ha: coupling(&coefficients.a, h),
+            minus_hb: coefficients.b.map(|b| -(h * b)),
             entries,
             d,
             g,
@@ -99,15 +100,21 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
             first: *first,
             last: *last,
             ahead,
-            inverse: Inverse::new(coefficients, work.inputs.time.step),
+            inverse: Inverse::new(coefficients, h),
             placed: 0,
             model: PhantomData,
         });
     }
 
     /// Solves by the factors of the whole matrix, column by column, of which the panel has so many.
-    fn solve_columns<F: Fallback>(&mut self, work: &mut Work<M, E, S, F>, width: usize) {
+    fn solve_columns<F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
+        width: usize,
+    ) {
         let Work { increment, linear, .. } = work;
+        let linear = kept.unwrap_or(linear);
         let (_, m) = halves::<M, E, S>(self.g);
         for column in 0..width {
             for (to, from) in increment.as_mut().as_flattened_mut().iter_mut().zip(m.chunks_exact(width)) {

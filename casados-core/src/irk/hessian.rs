@@ -74,9 +74,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
         self.linear.copy_from(&work.linear);
     }
 
-    /// Brings it back.
-    pub(crate) fn recall(&self, work: &mut Work<M, E, S, F>) {
-        work.linear.copy_from(&self.linear);
+    /// What was remembered, if the step is not the `last` one, whose linearisation is still where it was made.
+    pub(crate) fn kept(&self, last: bool) -> Option<&Linearization<M, E, S, F>> {
+        (!last).then_some(&self.linear)
     }
 }
 
@@ -100,10 +100,8 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
     ) -> Result<(), Error> {
         self.begin(lambda, nu);
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
-            if n + 1 < steps.len() {
-                record.recall(work);
-            }
-            self.backward.step(work, coefficients, n, step, statistics, &mut along)?;
+            let kept = &mut record.kept(n + 1 == steps.len());
+            self.backward.step(work, kept, coefficients, n, step, statistics, &mut along)?;
             self.curvature(work, coefficients, n, step);
             if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
                 return Err(Error::NonFiniteModel {
@@ -113,7 +111,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });
             }
-            self.subtract(work, coefficients, record, [n, steps.len()], ahead);
+            self.subtract(work, *kept, coefficients, record, [n, steps.len()], ahead);
         }
         Ok(())
     }
@@ -148,11 +146,12 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of this one there. After the first one the
-    /// result will be written, which may lie far `ahead`.
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of this one `kept` or there. After the first
+    /// one the result will be written, which may lie far `ahead`.
     pub(crate) fn subtract<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
         record: &HessianStep<M, E, S, F>,
         [n, count]: [usize; 2],
@@ -176,7 +175,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
                 last,
                 ahead: if n == 0 { ahead } else { &[] },
             }
-            .run(work);
+            .run(work, kept);
         } else {
             let g = g.as_mut();
             dispatch(Subtract::<M, E, ArrayW<M, E>, S> {

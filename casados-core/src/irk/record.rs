@@ -177,6 +177,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// The linearisation of a step that was remembered, or else the one that is here.
+    pub(crate) fn linear<'a>(
+        &'a self,
+        kept: Option<&'a Linearization<M, E, S, F>>,
+    ) -> &'a Linearization<M, E, S, F> {
+        kept.unwrap_or(&self.linear)
+    }
+
     /// To be called before anything else.
     pub(crate) fn prepare(&mut self) {
         if !self.ready {

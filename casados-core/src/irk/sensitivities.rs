@@ -345,7 +345,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
             }
-            memory.backward.step(parts.work, parts.coefficients, n, step, parts.statistics, &mut along)?;
+            memory.backward.step(
+                parts.work,
+                &mut None,
+                parts.coefficients,
+                n,
+                step,
+                parts.statistics,
+                &mut along,
+            )?;
         }
         memory.finish(parts.work)?;
         finish(&mut along)?;

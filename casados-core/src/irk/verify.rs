@@ -10,7 +10,7 @@
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
 use super::evaluate::entry;
-use super::record::{Coefficients, Work};
+use super::record::{Coefficients, Linearization, Work};
 use super::sums::{STRANDS, total};
 use super::sweep::Sweep;
 use crate::linalg::{Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, slot};
@@ -58,9 +58,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         })
     }
 
-    /// Whether the adjoints of a step satisfy their equations, lane by lane, with `λ` at the end of the step.
+    /// Whether the adjoints of a step satisfy their equations, which may have been `kept`, lane by lane, with `λ` at the end of the step.
     pub(crate) fn verify_adjoint<const C: usize>(
         &mut self,
+        kept: Option<&Linearization<M, E, S, F>>,
         backward: &Backward<M, E, S, C>,
         coefficients: &Coefficients<E, S>,
     ) -> E::Mask {
@@ -72,7 +73,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             a: &coefficients.a,
             b: &coefficients.b,
             h: self.inputs.time.step,
-            jacobian: &self.linear.jacobian,
+            jacobian: &kept.unwrap_or(&self.linear).jacobian,
             sums,
             sizes,
         })
