@@ -7,8 +7,8 @@ use super::answer::{unpack, yes};
 use super::intervals::Interval;
 use crate::error::Error;
 use crate::irk::{
-    AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Step, StepOf, Work,
-    multiply,
+    AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Linearization, Step,
+    StepOf, Work, multiply,
 };
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::{Heap, Memory, WithForward, WithHessian};
@@ -175,7 +175,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
 
     pub fn solve(&mut self, warm: bool) -> Verdict<'_, E, Nominal<M, E>> {
         let mut pass = pass!(self, warm);
-        let good = pass.run(|_, _, _, _| yes::<E>());
+        let good = pass.run(&mut [], |_, _, _, _, _| yes::<E>());
         Ok((good, &pass.work.result))
     }
 
@@ -192,10 +192,11 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let mut pass = pass!(self, warm);
         let ForwardMemory { result, pass: forward, .. } = Heap::forward(&mut self.forward)?;
         let count = pass.steps.len();
-        let good = pass.run(|pass, n, step, exact| {
-            pass.linearize(n, step, exact);
+        let good = pass.run(&mut [], |pass, n, step, exact, _| {
+            pass.linearize(None, n, step, exact);
             forward.advance(
                 pass.work,
+                None,
                 pass.coefficients,
                 StepOf { n, count, distant: false },
                 None,
@@ -215,9 +216,9 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let lambda = Heap::nominal(&mut self.lambda)?;
         let count = pass.steps.len();
         // On the way forth only the last step is linearised: it is where the way back begins.
-        let mut good = pass.run(|pass, n, step, exact| {
+        let mut good = pass.run(&mut [], |pass, n, step, exact, _| {
             if n + 1 == count {
-                pass.linearize(n, step, exact);
+                pass.linearize(None, n, step, exact);
             }
             yes::<E>()
         });
@@ -225,7 +226,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let Pass { steps, coefficients, work, statistics, .. } = pass;
         for (n, step) in steps.iter().enumerate().rev() {
             if n + 1 < count {
-                work.linearize_planned(coefficients, n, step, false, statistics);
+                work.linearize_planned(coefficients, None, n, step, false, statistics);
             }
             good = E::and(good, adjoint.backward.stages(work, None, coefficients));
             adjoint.backward.advance(&work.linear);
@@ -242,16 +243,20 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         let nu = if self.weighted { Heap::nominal(&mut self.nu)?.as_slice() } else { &[] };
         let count = pass.steps.len();
         let records = Heap::hessian_tape(&mut self.tape, count)?;
-        let mut good = pass.run(|pass, n, step, exact| {
-            pass.linearize(n, step, exact);
-            let Some(record) = records.get_mut(n) else { return yes::<E>() };
-            let (curved, at) = (Some(record.curved()), StepOf { n, count, distant: false });
-            let good = forward.advance(pass.work, pass.coefficients, at, curved, &mut result.first.forward);
+        let mut good = pass.run(records, |pass, n, step, exact, record| {
+            let Some(record) = record else { return yes::<E>() };
+            let at = StepOf { n, count, distant: false };
+            let last = at.is_last();
+            let (linear, _) = record.parts();
+            pass.linearize((HessianStep::<M, E, S>::DIRECT && !last).then_some(linear), n, step, exact);
             // That of the last step is still there on the way back.
-            if n + 1 < count {
+            if !(HessianStep::<M, E, S>::DIRECT || last) {
                 record.record(pass.work);
             }
-            good
+            let (linear, curved) = record.parts();
+            let kept = (!last).then_some(&*linear);
+            let to = &mut result.first.forward;
+            forward.advance(pass.work, kept, pass.coefficients, at, Some(curved), to)
         });
         let finite = forward.end(&pass.work.result, &mut result.first.forward);
         let Pass { steps, coefficients, work, .. } = pass;
@@ -272,10 +277,18 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
-    /// The steps of the interval, with `after` called after each; whether all went well, lane by lane.
+    /// The steps of the interval, with `after` called after each, with what is remembered of it, if anything is; whether all went well,
+    /// lane by lane.
     fn run(
         &mut self,
-        mut after: impl FnMut(&mut Pass<'_, M, E, S>, usize, &Step<M, E, S>, bool) -> E::Mask,
+        records: &mut [HessianStep<M, E, S>],
+        mut after: impl FnMut(
+            &mut Pass<'_, M, E, S>,
+            usize,
+            &Step<M, E, S>,
+            bool,
+            Option<&mut HessianStep<M, E, S>>,
+        ) -> E::Mask,
     ) -> E::Mask {
         self.work.begin();
         let (mut good, count) = (yes::<E>(), self.steps.len());
@@ -286,18 +299,26 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             step.x = work.x;
             work.start(coefficients, from, n, before, &mut step.y);
             let Step { x, y } = &mut *step;
-            let solved = work.newton(coefficients, options, n, x, y, statistics);
+            let (remembered, record) = records.split_at_mut_checked(n).unwrap_or_default();
+            let kept = remembered.last().and_then(|record| record.kept(!HessianStep::<M, E, S>::DIRECT));
+            let solved = work.newton(coefficients, kept, options, n, x, y, statistics);
             work.advance(coefficients, options.compensated, step, n, count);
             good = E::and(good, solved.converged);
             let mut pass = Pass { options, coefficients, statistics, work, steps: &mut [], from: From::Zero };
-            good = E::and(good, after(&mut pass, n, step, solved.exact));
+            good = E::and(good, after(&mut pass, n, step, solved.exact, record.first_mut()));
             self.statistics.steps += 1;
         }
         good
     }
 
-    fn linearize(&mut self, n: usize, step: &Step<M, E, S>, exact: bool) {
-        self.work.linearize_planned(self.coefficients, n, step, exact, self.statistics);
+    fn linearize(
+        &mut self,
+        to: Option<&mut Linearization<M, E, S>>,
+        n: usize,
+        step: &Step<M, E, S>,
+        exact: bool,
+    ) {
+        self.work.linearize_planned(self.coefficients, to, n, step, exact, self.statistics);
     }
 }
 

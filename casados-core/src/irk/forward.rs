@@ -7,7 +7,7 @@
 //! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
 
 use super::directions::{Identity, Seeded};
-use super::record::{Coefficients, Work, copy};
+use super::record::{Coefficients, Linearization, Work, copy};
 use super::step::check;
 use super::sweep::{Outputs, Sweep};
 use super::write::Target;
@@ -46,10 +46,11 @@ pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
 copy!([M: Dae, T: Plain, const S: usize] ForwardPass<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
-    /// A step that is linearised, by the factors that are there, as [`ForwardPass::step`]; whether the derivatives satisfy their equations.
+    /// A step that is linearised, by the factors that were `kept` or are there, as [`ForwardPass::step`]; whether the derivatives satisfy their equations.
     pub(crate) fn advance<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
         at: StepOf,
         curved: Option<&mut [E]>,
@@ -59,7 +60,8 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
         if at.n == 0 {
             self.sweep.start(directions);
         }
-        let good = self.sweep.step(work, coefficients, directions, at.n == 0, &mut at.outputs(curved, to));
+        let good =
+            self.sweep.step(work, kept, coefficients, directions, at.n == 0, &mut at.outputs(curved, to));
         self.collect(coefficients, at, to);
         good
     }
@@ -96,7 +98,7 @@ pub(crate) struct StepOf {
 }
 
 impl StepOf {
-    fn is_last(self) -> bool {
+    pub(crate) fn is_last(self) -> bool {
         self.n + 1 == self.count
     }
 
@@ -128,13 +130,13 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
         let (directions, first) = (&Identity::<M>::ALL, at.n == 0);
-        let good = self.advance(work, coefficients, at, curved.as_deref_mut(), to);
+        let good = self.advance(work, None, coefficients, at, curved.as_deref_mut(), to);
         if good && !REFINED {
             return Ok(());
         }
         if !good && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, at.n, 0, statistics)?;
-            self.sweep.repeat(work, coefficients, directions, first, &mut at.outputs(curved, to));
+            self.sweep.repeat(work, None, coefficients, directions, first, &mut at.outputs(curved, to));
         }
         if const { REFINED } {
             self.sweep.refine(work, coefficients, directions, first, &mut at.outputs(None, to));
@@ -408,9 +410,11 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         let nx = M::Shape::NX;
         let end = (n + 1 == count).then(|| Single { matrix: result.dx.as_mut_slice(), rows: nx });
         let outputs = &mut Outputs { curved: None, end, distant: false };
-        if !sweep.step(work, coefficients, directions, n == 0, outputs) && work.linear.factors.is_planned() {
+        if !sweep.step(work, None, coefficients, directions, n == 0, outputs)
+            && work.linear.factors.is_planned()
+        {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
-            sweep.repeat(work, coefficients, directions, n == 0, outputs);
+            sweep.repeat(work, None, coefficients, directions, n == 0, outputs);
         }
         let nz = M::Shape::NZ;
         if n == 0 {

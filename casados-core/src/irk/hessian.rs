@@ -64,9 +64,21 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting>
 copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
+    /// Whether the factors of every step are made where they will be kept: no other step has the same ones, nor does Newton's method leave
+    /// those of the solution.
+    pub(crate) const DIRECT: bool = {
+        let structure = &M::STRUCTURE;
+        !(structure.linear_in_state || structure.constant_matrix || structure.elimination.pivots.is_empty())
+    };
+
     /// Where the way forth writes `D`.
     pub(crate) fn curved(&mut self) -> &mut [E] {
-        Array::flat_mut(self.d.as_mut().as_flattened_mut())
+        self.parts().1
+    }
+
+    /// The linearisation, and where the way forth writes `D`.
+    pub(crate) fn parts(&mut self) -> (&mut Linearization<M, E, S, F>, &mut [E]) {
+        (&mut self.linear, Array::flat_mut(self.d.as_mut().as_flattened_mut()))
     }
 
     /// Remembers the linearisation on the way forth.

@@ -59,7 +59,7 @@ pub(crate) use self::{
     evaluate::dot,
     forward::{StepOf, check_result, multiply},
     pivoted::unknown_name,
-    record::{Coefficients, Step, Work},
+    record::{Coefficients, Linearization, Step, Work},
     run::{Arguments, check},
     step::From,
 };

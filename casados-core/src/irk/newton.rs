@@ -26,7 +26,7 @@
 
 use super::increment::{Largest, Measure, PlaceResidual, Subtract, Update};
 use super::progress::{Look, Progress, Verdict, remaining};
-use super::record::{Coefficients, Work};
+use super::record::{Coefficients, Linearization, Work};
 use crate::linalg::dispatch;
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -85,6 +85,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     pub(crate) fn newton(
         &mut self,
         coefficients: &Coefficients<E, S>,
+        kept: Option<&Linearization<M, E, S, F>>,
         options: &Options,
         step: usize,
         x: &ArrayX<M, E>,
@@ -93,17 +94,19 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     ) -> Solved<E> {
         let Newton { fixed_iterations, jacobian, .. } = options.newton;
         match fixed_iterations {
-            Some(count) => self.iterate(coefficients, jacobian, count, step, x, y, statistics),
-            None => self.converge(coefficients, options, step, x, y, statistics),
+            Some(count) => self.iterate(coefficients, kept, jacobian, count, step, x, y, statistics),
+            None => self.converge(coefficients, kept, options, step, x, y, statistics),
         }
     }
 
     /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is computed before it is known
     /// whether it is needed.
     #[inline(never)]
+    #[allow(clippy::too_many_arguments)]
     fn converge(
         &mut self,
         coefficients: &Coefficients<E, S>,
+        mut kept: Option<&Linearization<M, E, S, F>>,
         options: &Options,
         step: usize,
         x: &ArrayX<M, E>,
@@ -165,7 +168,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                     (Some(basis), Some(factors)) if mean => {
                         factors.factor(&self.linear.jacobian, self.first_only, basis, h);
                     }
-                    _ => self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h),
+                    _ => {
+                        kept = None;
+                        self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+                    }
                 }
             }
             if ask && iteration == 0 {
@@ -193,7 +199,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             self.place_residual();
             match (basis, self.mean.get_mut()) {
                 (Some(basis), Some(factors)) if mean => factors.solve(basis, &mut self.increment),
-                _ => self.linear.factors.solve(&mut self.increment),
+                _ => kept.unwrap_or(&self.linear).factors.solve(&mut self.increment),
             }
             let floor = E::from_f64(rounding / tolerance);
             let (size, next) = dispatch(Update::<M, E, S> {
@@ -245,6 +251,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     fn iterate(
         &mut self,
         coefficients: &Coefficients<E, S>,
+        mut kept: Option<&Linearization<M, E, S, F>>,
         jacobian: Jacobian,
         count: usize,
         step: usize,
@@ -252,12 +259,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         y: &mut ArrayK<M, [E; S]>,
         statistics: &mut Statistics,
     ) -> Solved<E> {
-        let kept = self.validity.factors
+        let valid = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
         for iteration in 0..count {
             self.place(coefficients, step, x, y);
-            if kept || iteration > 0 && jacobian == Jacobian::Frozen {
+            if valid || iteration > 0 && jacobian == Jacobian::Frozen {
                 statistics.residuals += 1;
                 self.evaluate_residual();
             } else {
@@ -265,11 +272,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 statistics.factorizations += 1;
                 self.evaluate_jacobian();
                 let h = self.inputs.time.step;
+                kept = None;
                 self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
             }
             statistics.iterations += 1;
             self.place_residual();
-            self.linear.factors.solve(&mut self.increment);
+            kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
         }
         let zero = E::from_f64(0.0);

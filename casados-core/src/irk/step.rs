@@ -2,7 +2,7 @@
 
 use super::compensated;
 use super::evaluate::{dot, not_finite};
-use super::record::{Coefficients, Step, Validity, Work};
+use super::record::{Coefficients, Linearization, Step, Validity, Work};
 use crate::error::Error;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
@@ -142,7 +142,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         }
         let Step { x, y } = step;
         if !M::STRUCTURE.elimination.pivots.is_empty() {
-            let solved = self.newton(coefficients, options, n, x, y, statistics);
+            let solved = self.newton(coefficients, None, options, n, x, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
@@ -168,7 +168,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         exact: bool,
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
-        self.linearize_planned(coefficients, n, step, exact, statistics);
+        self.linearize_planned(coefficients, None, n, step, exact, statistics);
         self.check_model(n, 0)?;
         if M::STRUCTURE.elimination.pivots.is_empty() {
             self.factor_pivoted(coefficients, n, 0, statistics)?;
@@ -178,10 +178,11 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
-    /// The linearisation at the solution of a step, by the plan if there is one.
+    /// The linearisation at the solution of a step, by the plan if there is one; its factors in `to` another place, if it is given.
     pub(crate) fn linearize_planned(
         &mut self,
         coefficients: &Coefficients<E, S>,
+        to: Option<&mut Linearization<M, E, S, F>>,
         n: usize,
         step: &Step<M, E, S>,
         exact: bool,
@@ -194,7 +195,15 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if !(holds || M::STRUCTURE.elimination.pivots.is_empty()) {
             statistics.factorizations += 1;
             let h = self.inputs.time.step;
-            self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+            let Linearization { jacobian, factors } = &mut self.linear;
+            let factors = match to {
+                Some(to) => {
+                    assign(&mut to.jacobian, jacobian);
+                    &mut to.factors
+                }
+                None => factors,
+            };
+            factors.factor_by_plan(jacobian, &coefficients.a, h);
             self.validity = Validity { factors: true, mean: false, rate: 0.0 };
         }
     }

@@ -3,7 +3,7 @@
 
 use super::curvature::row_of;
 use super::directions::{Directions, NEAREST, panel, panel_mut, panels};
-use super::record::{Coefficients, Work, copy};
+use super::record::{Coefficients, Linearization, Work, copy};
 use super::right_side::{Later, Scatter, nodes, place, restore};
 use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
@@ -73,31 +73,35 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
 
     /// The step that follows, which is linearised; the `first` of the interval or a later one. Whether the derivatives
     /// of the stages satisfy their equations.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn step<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
         directions: &D,
         first: bool,
         outputs: &mut Outputs<'_, E, G>,
     ) -> E::Mask {
         self.end = !self.end;
-        self.repeat(work, coefficients, directions, first, outputs)
+        self.repeat(work, kept, coefficients, directions, first, outputs)
     }
 
     /// The same step again.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn repeat<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
         directions: &D,
         first: bool,
         outputs: &mut Outputs<'_, E, G>,
     ) -> E::Mask {
         let mut run = |this: &mut Self, work: &Work<M, E, S, F>, phase, second| {
-            this.run(work, coefficients, directions, first, outputs, phase, second);
+            this.run(work, kept, coefficients, directions, first, outputs, phase, second);
         };
-        if work.linear.factors.is_planned() {
+        if work.linear(kept).factors.is_planned() {
             run(self, work, Phase::Whole, false);
         } else {
             run(self, work, Phase::Before, false);
@@ -116,6 +120,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     fn run<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
         coefficients: &Coefficients<E, S>,
         directions: &D,
         first: bool,
@@ -130,7 +135,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         *finite = [dispatch(Step::<M, E, D, G, S> {
             phase,
             jacobian: &work.linear.jacobian,
-            factors: work.linear.factors.planned(),
+            factors: work.linear(kept).factors.planned(),
             coefficients,
             h: work.inputs.time.step,
             directions,
@@ -159,7 +164,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         first: bool,
         outputs: &mut Outputs<'_, E, G>,
     ) {
-        self.run(work, coefficients, directions, first, outputs, Phase::After, false);
+        self.run(work, None, coefficients, directions, first, outputs, Phase::After, false);
     }
 
     /// `V` at the start of the step.
