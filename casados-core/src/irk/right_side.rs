@@ -199,10 +199,13 @@ pub(super) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize>
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
     /// The first entry of `f_x`.
     const FIRST: usize = M::STRUCTURE.blocks[1];
+    /// Whether a straight line begins with zeros everywhere. (Where numbers are registers, 3 masses with four stages take 2 % less when each
+    /// row begins with its first entry; of plain numbers they take 3 % more.)
+    const AT_ONCE: bool = size_of::<E>() <= 8;
 
     #[inline(always)]
     pub fn all<A: Arithmetic>(mut self) {
-        if const { is_short::<A, Self>() } {
+        if const { Self::AT_ONCE && is_short::<A, Self>() } {
             self.dy.fill([[E::from_f64(0.0); W]; S]);
         }
         // What multiplies `f_x` lies where their right-hand sides do, until all others are there.
@@ -219,6 +222,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         }
         if const { is_short::<A, Self>() } {
             each_row::<A, _>(&mut self);
+            if const { !Self::AT_ONCE } {
+                self.clear(const { Self::after(Self::ROWS) }, M::Shape::NK);
+            }
         } else {
             self.row_by_row::<A>();
         }
@@ -288,6 +294,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         true
     }
 
+    /// The equation that follows that of the entry before this one.
+    const fn after(row: usize) -> usize {
+        if row == 0 { 0 } else { M::STRUCTURE.jacobian.at(Self::FIRST + row - 1).0 + 1 }
+    }
+
     /// The row of an equation.
     #[inline(always)]
     fn put(&mut self, equation: usize, packet: &Packet<E, S, W>) {
@@ -316,7 +327,14 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
         let slot = slot::<M>(r);
-        let Some(&(mut packet)) = self.dy.get(slot) else { return };
+        let next = Self::after(row);
+        // The first entry of an equation has nothing to add to.
+        let mut packet = [[E::from_f64(0.0); W]; S];
+        if Self::AT_ONCE || r < next {
+            packet = *self.dy.get(slot).unwrap_or(&packet);
+        } else {
+            self.clear(next, r);
+        }
         if steady::<M>(slot).is_some() || !self.subtract::<A>(&mut packet, slot, c - M::Shape::NX, values) {
             return;
         }
