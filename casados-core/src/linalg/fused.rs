@@ -44,6 +44,12 @@ pub trait Arithmetic {
             *target = Self::subtract(*target, factor, element);
         }
     }
+    /// `target = block`, in as few instructions as the numbers will be read in: until all that it wants has arrived in the nearest cache, a
+    /// wider one would wait.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
+        *target = *block;
+    }
     /// Rows as columns.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
@@ -97,6 +103,10 @@ impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
         E::subtract_row::<_, WIDE>(target, factor, row);
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
+        E::write_block(target, block);
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {

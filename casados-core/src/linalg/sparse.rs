@@ -91,7 +91,7 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
         if !pivot.identity {
             let Some(block) = blocks.get_mut(pivot.block as usize) else { return };
             let inverse = inverse::<A, E, S>(block);
-            *block = inverse;
+            A::write(block, &inverse);
             for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
                 *block = product::<A, E, S>(block, &inverse);
             }

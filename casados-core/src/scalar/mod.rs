@@ -146,6 +146,12 @@ pub trait Field:
         }
     }
 
+    /// `target = block`, a register at a time. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    #[inline(always)]
+    fn write_block<const S: usize>(target: &mut [[Self; S]; S], block: &[[Self; S]; S]) {
+        *target = *block;
+    }
+
     /// Rows as columns. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
     #[inline(always)]
     fn transposed<const N: usize>(rows: &[[Self; N]; N]) -> [[Self; N]; N] {

@@ -257,6 +257,17 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
+        fn write_block<const S: usize>(target: &mut [[Self; S]; S], block: &[[Self; S]; S]) {
+            use crate::scalar::lanes::$avx2 as Register;
+            if let (&[a, b, c, d], [to]) =
+                (block.as_flattened(), target.as_flattened_mut().as_chunks_mut::<4>().0)
+            {
+                Register::<4>::load(&[a, b, c, d]).store(to);
+            } else {
+                *target = *block;
+            }
+        }
+        #[inline(always)]
         fn subtract_columns<const S: usize, const WIDE: bool>(
             target: &mut [Self; S],
             block: &[[Self; S]; S],

@@ -12,7 +12,7 @@ fn number<T: Real>(seed: &mut u64) -> T {
     T::from_f64(fraction * [1e-3, 1.0, 30.0][(*seed >> 20) as usize % 3])
 }
 
-/// `target − left right`, of blocks that lie column after column, of columns, of rows, element by element.
+/// `target − left right` and `target = left`, of blocks that lie column after column, of columns, of rows, element by element.
 fn blocks<T: Real, const S: usize, const WIDE: bool>() {
     let seed = &mut (S as u64);
     let [target, left, right]: [[[T; S]; S]; 3] = from_fn(|_| from_fn(|_| from_fn(|_| number(seed))));
@@ -23,6 +23,8 @@ fn blocks<T: Real, const S: usize, const WIDE: bool>() {
     let mut found = target;
     T::subtract_blocks::<S, WIDE>(&mut found, &left, &right);
     assert_eq!(found, columns, "blocks of {S}, {WIDE}");
+    T::write_block(&mut found, &left);
+    assert_eq!(found, left, "a block of {S}");
     for (c, column) in columns.iter().enumerate() {
         let mut found = target[c];
         T::subtract_columns::<S, WIDE>(&mut found, &left, &right[c]);
