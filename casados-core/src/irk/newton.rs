@@ -82,6 +82,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     const EXACT: bool = Self::RENEWAL[0] <= 10.0;
 
     /// Solves the stages of a step from the start values in `y`.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn newton(
         &mut self,
         coefficients: &Coefficients<E, S>,

@@ -97,9 +97,9 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
     block: &Block<E, S>,
     other: &Packet<E, S, W>,
 ) {
-    for (column, packet) in block.iter().zip(packet) {
-        for (&element, other) in column.iter().zip(other) {
-            A::subtract_row(packet, element, other);
+    for i in 0..S {
+        for j in 0..S {
+            A::subtract_row(&mut packet[i], block[i][j], &other[j]);
         }
     }
 }

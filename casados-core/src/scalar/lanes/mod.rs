@@ -284,9 +284,11 @@ macro_rules! blocks {
                 return;
             }
             if const { S > 1 && S <= $more } {
-                let mut sum = Register::<S>::load(target);
-                for (column, &x) in block.iter().zip(x) {
-                    sum = sum.subtract_product(Register::<S>::load(column), Register::<S>::splat(x));
+                // Two slices side by side are a loop that the optimiser may take for a long one.
+                let (mut sum, mut k) = (Register::<S>::load(target), 0);
+                while k < S {
+                    sum = sum.subtract_product(Register::<S>::load(&block[k]), Register::<S>::splat(x[k]));
+                    k += 1;
                 }
                 sum.store(target);
                 return;
