@@ -66,6 +66,7 @@ copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
     /// Whether the factors of every step are made where they will be kept: no other step has the same ones, nor does Newton's method leave
     /// those of the solution.
+    #[cfg(feature = "alloc")]
     pub(crate) const DIRECT: bool = {
         let structure = &M::STRUCTURE;
         !(structure.linear_in_state || structure.constant_matrix || structure.elimination.pivots.is_empty())
