@@ -193,9 +193,10 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
         return base::run(kernel);
     }
+    // One of those that follow takes it, and nobody after that.
     let mut kernel = ManuallyDrop::new(kernel);
     if const { align_of::<K::Number>() > 32 } {
-        // SAFETY: the one condition of calling a function with target features is that the machine has them. Numbers that are
+        // SAFETY: the other condition of calling a function with target features is that the machine has them. Numbers that are
         // registers of AVX-512 are computed with only where it has; see the head of `lanes`.
         unsafe { avx512::run(&mut kernel) }
     } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
