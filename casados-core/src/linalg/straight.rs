@@ -100,7 +100,9 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         return lines::from_last::<A, M, V>(visit);
     }
     let all = M::STRUCTURE.elimination.pivots;
-    if const { !V::OTHERS } {
+    // The optimiser makes a straight line of a loop over indices where a plan is short, as in firmware, but not of one that goes backwards
+    // through a slice, which is faster where it stays a loop.
+    if const { !V::OTHERS && cfg!(feature = "std") } {
         for pivot in all.iter().rev() {
             visit.at::<A>(pivot, &[], &[]);
         }
