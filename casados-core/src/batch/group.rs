@@ -300,7 +300,8 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             work.start(coefficients, from, n, before, &mut step.y);
             let Step { x, y } = &mut *step;
             let (remembered, record) = records.split_at_mut_checked(n).unwrap_or_default();
-            let kept = remembered.last().and_then(|record| record.kept(!HessianStep::<M, E, S>::DIRECT));
+            let kept = if HessianStep::<M, E, S>::DIRECT { remembered.last() } else { None };
+            let kept = kept.and_then(|record| record.kept(false));
             let solved = work.newton(coefficients, kept, options, n, x, y, statistics);
             work.advance(coefficients, options.compensated, step, n, count);
             good = E::and(good, solved.converged);

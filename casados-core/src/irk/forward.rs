@@ -46,7 +46,8 @@ pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
 copy!([M: Dae, T: Plain, const S: usize] ForwardPass<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
-    /// A step that is linearised, by the factors that were `kept` or are there, as [`ForwardPass::step`]; whether the derivatives satisfy their equations.
+    /// A step that is linearised, by the factors that were `kept` or are there, as [`ForwardPass::step`]; whether the derivatives satisfy
+    /// their equations.
     pub(crate) fn advance<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
