@@ -2,7 +2,8 @@
 
 use super::directions::{Directions, panel_of};
 use super::evaluate::entry;
-use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, slot};
+use super::implied::{implied, leader};
+use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_implied, is_short, slot};
 use crate::model::{Dae, Steady};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
@@ -63,7 +64,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
             return;
         };
         // All stages are the first.
-        if let Some(to) = self.dy.get_mut(place + of * S * width) {
+        if !is_implied::<E, S>(&steady)
+            && let Some(to) = self.dy.get_mut(place + of * S * width)
+        {
             *to = -values[0];
         }
         for index in steady.first..steady.end {
@@ -97,8 +100,11 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
     begin: usize,
 ) -> usize {
     for (slot, packet) in dy.iter_mut().enumerate() {
-        // Of steady states the first stage is looked at.
-        let stages = if steady::<M>(slot).is_some() { 1 } else { S };
+        // Of steady states the first stage is looked at, if any.
+        let stages = match steady::<M>(slot) {
+            Some(steady) => usize::from(!is_implied::<E, S>(&steady)),
+            None => S,
+        };
         for row in packet.iter_mut().take(stages) {
             *row = [E::from_f64(0.0); W];
         }
@@ -115,7 +121,9 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
             continue;
         };
         // All stages are the first.
-        if let Some(to) = dy.get_mut(of).and_then(|packet| packet.first_mut()?.get_mut(column - begin)) {
+        if !is_implied::<E, S>(&steady)
+            && let Some(to) = dy.get_mut(of).and_then(|packet| packet.first_mut()?.get_mut(column - begin))
+        {
             *to = -values[0];
         }
         for index in steady.first..steady.end {
@@ -149,16 +157,39 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
     }
 }
 
+/// The right-hand side that a steady state has at all stages.
+#[inline(always)]
+fn own<A: Arithmetic, M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
+    jacobian: &M::Jacobian<[E; S]>,
+    v: &[[E; W]],
+    directions: &D,
+    column: usize,
+    state: usize,
+) -> Option<[E; W]> {
+    let (_, c, values) = entry::<M, _>(jacobian, steady::<M>(state)?.entry as usize)?;
+    let value = *values.first()?;
+    let mut row = [E::from_f64(0.0); W];
+    if c < 2 * M::Shape::NX {
+        A::subtract_row(&mut row, value, v.get(c - M::Shape::NX)?);
+    } else {
+        directions.add(c - M::Shape::NX - M::Shape::NZ, -value, column, &mut row);
+    }
+    Some(row)
+}
+
 /// Makes a right-hand side of which steady states have been subtracted that of the whole system again.
 #[inline(always)]
-pub(super) fn restore<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
+pub(super) fn restore<A: Arithmetic, M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
     jacobian: &M::Jacobian<[E; S]>,
     nodes: &[E; S],
+    v: &[[E; W]],
+    (directions, column): (&D, usize),
     dy: &mut [Packet<E, S, W>],
 ) {
     for state in 0..M::Shape::NX {
         let Some(steady) = steady::<M>(state) else { continue };
-        let Some(&own) = dy.get(state).and_then(|packet| packet.first()) else { continue };
+        let own = own::<A, M, E, D, S, W>(jacobian, v, directions, column, state);
+        let Some(own) = own else { continue };
         for index in steady.first..steady.end {
             let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
             let of = slot::<M>(r);
@@ -210,7 +241,15 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         }
         // What multiplies `f_x` lies where their right-hand sides do, until all others are there.
         for state in 0..M::STRUCTURE.elimination.steady.len() {
-            if let (Some(own), Some(v), Some(to)) =
+            if let Some(leader) = leader::<M, E, S>(self.jacobian, state) {
+                let (Some(v), Some(to)) = (self.v.get(state), self.dy.get_mut(state)) else { continue };
+                for (to, &node) in to.iter_mut().zip(self.nodes) {
+                    let mut row = *v;
+                    leader.add_state::<A, M, W>(&mut row, node, self.v);
+                    *to = row;
+                    leader.add_input::<M, D, W>(to, node, self.directions, self.column);
+                }
+            } else if let (Some(own), Some(v), Some(to)) =
                 (self.own::<A>(state), self.v.get(state), self.dy.get_mut(state))
             {
                 for (to, &node) in to.iter_mut().zip(self.nodes) {
@@ -231,6 +270,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         let Self { jacobian, directions, column, .. } = self;
         each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy: &mut *self.dy, column });
         for state in 0..M::STRUCTURE.elimination.steady.len() {
+            if implied::<M, E, S>(state).is_some() {
+                continue;
+            }
             let Some(own) = self.own::<A>(state) else { continue };
             if let Some(to) = self.dy.get_mut(state).and_then(|packet| packet.first_mut()) {
                 *to = own;
@@ -241,15 +283,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     /// The right-hand side of a steady state.
     #[inline(always)]
     fn own<A: Arithmetic>(&self, state: usize) -> Option<[E; W]> {
-        let (_, c, values) = entry::<M, _>(self.jacobian, steady::<M>(state)?.entry as usize)?;
-        let value = *values.first()?;
-        let mut row = [E::from_f64(0.0); W];
-        if c < 2 * M::Shape::NX {
-            A::subtract_row(&mut row, value, self.v.get(c - M::Shape::NX)?);
-        } else {
-            self.directions.add(c - M::Shape::NX - M::Shape::NZ, -value, self.column, &mut row);
-        }
-        Some(row)
+        own::<A, M, E, D, S, W>(self.jacobian, self.v, self.directions, self.column, state)
     }
 
     /// Each row in registers, and written once; zeros where equations have no states.

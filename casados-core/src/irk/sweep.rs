@@ -1,15 +1,16 @@
 //! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to `V_{n+1}`, which after the last step is a
 //! result, and to what second derivatives need of both.
 
-use super::curvature::row_of;
+use super::curved_rows::CurvedRows;
 use super::directions::{Directions, NEAREST, panel, panel_mut, panels};
+use super::implied::{Weighted, implied, is_found};
 use super::record::{Coefficients, Linearization, Work, copy};
 use super::right_side::{Later, Scatter, nodes, place, restore};
 use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Packet, Planned, Up, Viewer, coupling, dispatch, each_row,
-    is_long, is_short, sweeps,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
+    is_short, product, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -28,7 +29,7 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     end: bool,
     /// The first of them is what it is at the start of an interval, where that is always the same.
     begun: bool,
-    /// `d(k, z)/dw` at its stages.
+    /// `d(k, z)/dw` at its stages, but for [implied](crate::model::Steady::implied) ones.
     dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in strands.
     pub(super) sums: Aligned<ArrayK<M, [[T; STRANDS]; S]>>,
@@ -177,6 +178,12 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         R::flat(self.dy.as_ref().as_flattened())
     }
 
+    /// `V` at the start of the step, and the derivatives of the stages.
+    pub(super) fn parts(&mut self) -> (&[E], &mut [E]) {
+        let v = self.v.get(usize::from(!self.end)).map_or(&[][..], |v| R::flat(v.as_ref()));
+        (v, R::flat_mut(self.dy.as_mut().as_flattened_mut()))
+    }
+
     /// The derivatives of the stages.
     pub(super) fn dy_mut(&mut self) -> &mut [R] {
         self.dy.as_mut().as_flattened_mut()
@@ -251,13 +258,22 @@ struct Step<'a, M: Dae, E: Plain, D, G, const S: usize> {
     model: PhantomData<M>,
 }
 
+/// What all panels share.
+struct Shared<'a, M: Dae, E: Plain, D, const S: usize> {
+    /// `h c_i`
+    nodes: [E; S],
+    weighted: Weighted<'a, M, E, D, S>,
+    /// `(hA)²`, where that is asked for.
+    square: Block<E, S>,
+}
+
 impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Step<'_, M, E, D, G, S> {
     type Number = E;
     type Output = E;
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) -> E {
-        let nodes = &nodes(&self.coefficients.a, self.h);
+        let nodes = nodes(&self.coefficients.a, self.h);
         if self.phase != Phase::Before {
             for strands in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
                 clear(strands);
@@ -271,15 +287,28 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
         if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
             self.dy.fill(E::from_f64(0.0));
             let (jacobian, dy) = (self.jacobian, &mut *self.dy);
-            each_row::<A, _>(&mut Scatter::<M, E, D, S> { jacobian, nodes, dy, directions: PhantomData });
+            each_row::<A, _>(&mut Scatter::<M, E, D, S> {
+                jacobian,
+                nodes: &nodes,
+                dy,
+                directions: PhantomData,
+            });
         }
-        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column, nodes));
+        let Self { jacobian, coefficients, h, directions, .. } = self;
+        let mut square = [[E::from_f64(0.0); S]; S];
+        if const { !is_found::<M, E, S>() } && self.curved.is_some() {
+            let minus_ha = &coupling(&coefficients.a, h);
+            square = product::<A, E, S>(minus_ha, minus_ha);
+        }
+        let weighted = Weighted::of_step(jacobian, (coefficients, h), directions);
+        let shared = &Shared { nodes, weighted, square };
+        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * self.sum
     }
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
+impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'a, M, E, D, G, S> {
     /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
         let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
@@ -293,8 +322,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
     }
 
     #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
-        self.before::<A, W>(column, nodes);
+    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, shared: &Shared<'a, M, E, D, S>) {
+        self.before::<A, W>(column, &shared.nodes);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         let minus_weights = &minus_weights::<E, W>(column, self.second);
         if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
@@ -308,7 +337,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             let viewer = &mut Summed { sums, minus_weights, ahead };
             sweeps::<A, M, E, [E; W], S, W, Down<true>, Up<true>>(self.factors, dy, 0, viewer);
         }
-        self.after::<A, W>(column, minus_weights);
+        self.after::<A, W>(column, minus_weights, shared);
     }
 
     /// The right-hand side of a panel, with `h c_i`.
@@ -329,13 +358,18 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         }
         // Factors of the whole matrix know of no order.
         if self.phase == Phase::Before {
-            restore::<A, M, E, S, W>(jacobian, nodes, dy);
+            restore::<A, M, E, D, S, W>(jacobian, nodes, v, (directions, column), dy);
         }
     }
 
     /// What follows from the solution of a panel.
     #[inline(always)]
-    fn after<A: Arithmetic, const W: usize>(&mut self, column: usize, minus_weights: &[E; W]) {
+    fn after<A: Arithmetic, const W: usize>(
+        &mut self,
+        column: usize,
+        minus_weights: &[E; W],
+        shared: &Shared<'a, M, E, D, S>,
+    ) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let v = panel::<E, W>(self.v, column, nx);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
@@ -345,7 +379,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         if self.phase == Phase::After || const { Self::sums_late::<A>() } {
             let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
             for (slot, packet) in dy.iter().enumerate() {
-                sums.see::<A>(slot, packet);
+                if implied::<M, E, S>(slot).is_none() {
+                    sums.see::<A>(slot, packet);
+                }
             }
         }
         let unit = self.first && D::SPARSE;
@@ -354,25 +390,26 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
                 accumulate::<A, E, W>(strands, minus_weights, row);
             }
         }
-        let mut b = self.coefficients.b;
-        for b in &mut b {
-            *b = -(self.h * *b);
-        }
         // The unit matrix need not be read.
         let from = if unit { None } else { Some(v) };
         let ones = if unit { M::STRUCTURE.directions.get(column..).unwrap_or_default() } else { &[] };
         if let Some(to) = &mut self.result {
-            let slopes = dy.get(..nx).unwrap_or_default();
-            let end = Columns { v: from, ones, dy: slopes, minus_weights: &b };
+            let end = Columns {
+                start: from,
+                ones,
+                of: (v, dy),
+                unknowns: 0..nx,
+                column,
+                weighted: &shared.weighted,
+            };
             self.sum = self.sum + end.write::<A>(&mut to.columns::<W>(column));
         } else {
             let next = panel_mut::<E, W>(self.next, column, nx);
             for (n, (to, dk)) in next.iter_mut().zip(dy.iter()).enumerate() {
                 let mut row = from.and_then(|v| v.get(n)).copied().unwrap_or([E::from_f64(0.0); W]);
-                for (&b, dk) in b.iter().zip(dk) {
-                    A::subtract_row(&mut row, b, dk);
-                }
+                shared.weighted.add::<A, W>(&mut row, (n, dk), (v, dy));
                 *to = row;
+                shared.weighted.add_input(to, n, column);
             }
             for (c, &state) in ones.iter().enumerate().take(W) {
                 if let Some(row) = next.get_mut(state as usize) {
@@ -384,57 +421,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
             let count = M::STRUCTURE.curved.len();
             let d = panel_mut::<E, W>(curved, column, count * S);
             let minus_ha = coupling(&self.coefficients.a, self.h);
-            Curved::<M, E, D, S> { minus_ha, directions: self.directions, model: PhantomData }
+            let Shared { nodes, square, .. } = shared;
+            let (jacobian, directions) = (self.jacobian, self.directions);
+            CurvedRows::<M, E, D, S> { jacobian, nodes, minus_ha, square, directions }
                 .panel::<A, W>(v, dy, d, column);
-        }
-    }
-}
-
-/// The rows of `D` at all stages that enter second derivatives.
-struct Curved<'a, M, E, D, const S: usize> {
-    /// `−hA`
-    minus_ha: Block<E, S>,
-    directions: &'a D,
-    model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Curved<'_, M, E, D, S> {
-    #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(
-        &self,
-        v: &[[E; W]],
-        dy: &[Packet<E, S, W>],
-        d: &mut [[E; W]],
-        column: usize,
-    ) {
-        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
-        for (c, &variable) in M::STRUCTURE.curved.iter().enumerate() {
-            let variable = variable as usize;
-            if (nx..2 * nx).contains(&variable) {
-                let (Some(dk), Some(v)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
-                for i in 0..S {
-                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
-                    let mut row = *v;
-                    for (column, dk) in self.minus_ha.iter().zip(dk) {
-                        A::subtract_row(&mut row, column[i], dk);
-                    }
-                    *d = row;
-                }
-            } else if variable < 2 * nx + nz {
-                let unknown = if variable < nx { variable } else { variable - nx };
-                let Some(dy) = dy.get(unknown) else { continue };
-                for (i, dy) in dy.iter().enumerate() {
-                    if let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) {
-                        *d = *dy;
-                    }
-                }
-            } else {
-                for i in 0..S {
-                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
-                    *d = [E::from_f64(0.0); W];
-                    self.directions.add(variable - nx - nz, E::from_f64(1.0), column, d);
-                }
-            }
         }
     }
 }

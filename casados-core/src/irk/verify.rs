@@ -10,10 +10,11 @@
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
 use super::evaluate::entry;
+use super::implied::{Leader, implied, leader};
 use super::record::{Coefficients, Linearization, Work};
 use super::sums::{STRANDS, total};
 use super::sweep::Sweep;
-use crate::linalg::{Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
@@ -167,6 +168,23 @@ fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
     sizes
 }
 
+/// `start + h Σ_l a_il dk_l`, and the sizes of the terms.
+#[inline(always)]
+fn moved<A: Arithmetic, E: Lanes, const S: usize>(
+    start: E,
+    minus_ha: &Block<E, S>,
+    (dk, dk_sizes): (&[E; S], &[E; S]),
+) -> ([E; S], [E; S]) {
+    let (mut xi, mut sizes) = ([start; S], [start.abs(); S]);
+    for ((column, &dk), &dk_size) in minus_ha.iter().zip(dk).zip(dk_sizes) {
+        for ((xi, size), &element) in xi.iter_mut().zip(&mut sizes).zip(column) {
+            *xi = A::subtract(*xi, element, dk);
+            *size = A::subtract(*size, -element.abs(), dk_size);
+        }
+    }
+    (xi, sizes)
+}
+
 struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
     start_sums: &'a [[E; STRANDS]],
     stage_sums: &'a [[[E; STRANDS]; S]],
@@ -194,29 +212,39 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
             return E::lt(zero, zero);
         }
         let minus_ha = coupling(a, h);
+        for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
+            *sizes = sizes_of(values);
+        }
         for (unknown, stages) in stage_sums.iter().enumerate() {
+            if implied::<M, E, S>(unknown).is_some() {
+                continue;
+            }
             let mut sum = [zero; S];
             for (sum, strands) in sum.iter_mut().zip(stages) {
                 *sum = total(strands);
             }
             let size = sizes_of(&sum);
             if unknown < nx {
-                let start = total(&start_sums[unknown]);
-                let (mut xi, mut xi_size) = ([start; S], [start.abs(); S]);
-                for ((column, &dk), &dk_size) in minus_ha.iter().zip(&sum).zip(&size) {
-                    for ((xi, xi_size), &element) in xi.iter_mut().zip(&mut xi_size).zip(column) {
-                        *xi = A::subtract(*xi, element, dk);
-                        *xi_size = A::subtract(*xi_size, -element.abs(), dk_size);
-                    }
-                }
+                let xi = moved::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
                 (probe[unknown], sizes[unknown]) = (sum, size);
-                (probe[nx + unknown], sizes[nx + unknown]) = (xi, xi_size);
+                (probe[nx + unknown], sizes[nx + unknown]) = xi;
             } else {
                 (probe[nx + unknown], sizes[nx + unknown]) = (sum, size);
             }
         }
-        for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
-            *sizes = sizes_of(values);
+        // Implied by what is there now.
+        for state in 0..M::STRUCTURE.elimination.steady.len() {
+            let Some(Leader { minus_c, variable }) = leader::<M, E, S>(jacobian, state) else { continue };
+            if variable >= nv {
+                continue;
+            }
+            let (mut sum, mut size) = (probe[variable], sizes[variable]);
+            for (sum, size) in sum.iter_mut().zip(&mut size) {
+                (*sum, *size) = (-(minus_c * *sum), minus_c.abs() * *size);
+            }
+            let xi = moved::<A, E, S>(total(&start_sums[state]), &minus_ha, (&sum, &size));
+            (probe[state], sizes[state]) = (sum, size);
+            (probe[nx + state], sizes[nx + state]) = xi;
         }
         sums.as_mut().fill([zero; S]);
         terms.as_mut().fill([zero; S]);

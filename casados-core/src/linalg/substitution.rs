@@ -214,8 +214,11 @@ system!(
     }
 );
 system!(
-    /// `P + U`; or where the first stage has the right-hand side that [steady](crate::model::Steady) states have at all of them.
-    Up<const STEADY>, false: |sweep, pivot, _others| sweep.up::<A, STEADY>(pivot)
+    /// `P + U`; or where the first stage has the right-hand side that [steady](crate::model::Steady) states have at all of them, and keeps it
+    /// where they are implied.
+    Up<const STEADY>, false: |sweep, pivot, _others| if !(STEADY && pivot.steady && leaves_out::<M, E, S>(pivot.slot as usize)) {
+        sweep.up::<A, STEADY>(pivot);
+    }
 );
 system!(
     /// `(P + U)ᵀ`
@@ -397,6 +400,19 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn is_steady<M: Dae>(slot: usize) -> bool {
     matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
+}
+
+/// Whether nobody solves for a steady state, as it is [implied](Steady::implied). Of plain numbers, of which a register holds a row, what is
+/// made of it would be as much work as it is.
+#[inline(always)]
+pub const fn is_implied<E, const S: usize>(steady: &Steady) -> bool {
+    size_of::<E>() > 8 && S > 2 && steady.implied
+}
+
+/// Whether a slot is such.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn leaves_out<M: Dae, E, const S: usize>(slot: usize) -> bool {
+    matches!(M::STRUCTURE.elimination.steady.get(slot), Some(steady) if is_implied::<E, S>(steady))
 }
 
 /// The blocks below pivots: so many below each, but the optimiser does not know.

@@ -91,6 +91,13 @@ pub struct Pivot {
 /// ```
 ///
 /// which goes into the right-hand sides of the other equations at once: nothing is left to be subtracted below the pivot.
+///
+/// If no other pivot has a block of `U` in its column, nobody asks for `dk_j` of such a state on the way back either. It is not found then,
+/// only [implied](Steady::implied): what is made of it is made of `r_j` and the `dk_v`,
+///
+/// ```text
+/// dk_ij = r_j + h Σ_l a_il c dk_lv        h Σ_i b_i dk_ij = h r_j + h² Σ_l (Σ_i b_i a_il) c dk_lv
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Steady {
     /// The entry of the Jacobian that is `−c`, or [`Steady::NONE`].
@@ -101,6 +108,8 @@ pub struct Steady {
     pub end: u32,
     /// The position of the slot's pivot: states are subtracted from equations whose pivots come later.
     pub turn: u32,
+    /// Whether no other pivot has a block of `U` in its column.
+    pub implied: bool,
 }
 
 impl Steady {

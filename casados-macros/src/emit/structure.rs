@@ -197,12 +197,15 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     // Nothing where no state is.
     let some = steady.iter().any(Option::is_some);
     let count = if some { plan.pivots.len() as u32 } else { 0 };
+    let upper = plan.ranges.iter().flat_map(|&[_, upper, end]| upper..end);
+    let asked: HashSet<u32> = upper.map(|block| plan.blocks[block as usize].1).collect();
     let steady = (0..count).map(|slot| {
         let steady = steady.get(slot as usize).copied().flatten();
+        let implied = steady.is_some() && !asked.contains(&slot);
         let [entry, first, end] = steady.unwrap_or([u32::MAX, 0, 0]).map(Literal::u32_unsuffixed);
         let turn = plan.pivots.iter().position(|pivot| pivot.1 == slot).unwrap_or_default();
         let turn = Literal::usize_unsuffixed(turn);
-        quote!(steady(#entry, #first, #end, #turn))
+        quote!(steady(#entry, #first, #end, #turn, #implied))
     });
     let steady: Vec<_> = steady.collect();
     let [slots, updates, slot_of_equation] =
@@ -218,8 +221,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         ) -> Pivot {
             Pivot { slot, block, upper, end, left, identity, scaled, steady, beside }
         }
-        const fn steady(entry: u32, first: u32, end: u32, turn: u32) -> Steady {
-            Steady { entry, first, end, turn }
+        const fn steady(entry: u32, first: u32, end: u32, turn: u32, implied: bool) -> Steady {
+            Steady { entry, first, end, turn, implied }
         }
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }

@@ -1,0 +1,89 @@
+//! The rows of `D` that enter second derivatives: of curved variables at all stages, from the derivatives of a step.
+
+use super::curvature::row_of;
+use super::directions::Directions;
+use super::implied::leader;
+use crate::linalg::{Arithmetic, Block, Packet};
+use crate::model::Dae;
+use crate::scalar::Lanes;
+use crate::shape::{Plain, Shape};
+
+/// What they are made by.
+pub(super) struct CurvedRows<'a, M: Dae, E: Plain, D, const S: usize> {
+    pub jacobian: &'a M::Jacobian<[E; S]>,
+    /// `h c_i`
+    pub nodes: &'a [E; S],
+    /// `−hA`
+    pub minus_ha: Block<E, S>,
+    /// `(hA)²`, if a state is [implied](crate::model::Steady::implied).
+    pub square: &'a Block<E, S>,
+    pub directions: &'a D,
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> CurvedRows<'_, M, E, D, S> {
+    /// Those of a panel, from the derivatives of its stages, without those of implied states.
+    #[inline(always)]
+    pub fn panel<A: Arithmetic, const W: usize>(
+        &self,
+        v: &[[E; W]],
+        dy: &[Packet<E, S, W>],
+        d: &mut [[E; W]],
+        column: usize,
+    ) {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        for (c, &variable) in M::STRUCTURE.curved.iter().enumerate() {
+            let variable = variable as usize;
+            if (nx..2 * nx).contains(&variable) {
+                let (Some(dk), Some(start)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
+                let leader = leader::<M, E, S>(self.jacobian, variable - nx);
+                for i in 0..S {
+                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
+                    let mut row = *start;
+                    if let Some(leader) = leader {
+                        leader.add_state::<A, M, W>(&mut row, self.nodes[i], v);
+                        if let Some(dk) = leader.state::<M>().and_then(|state| dy.get(state)) {
+                            for (column, dk) in self.square.iter().zip(dk) {
+                                A::subtract_row(&mut row, leader.minus_c * column[i], dk);
+                            }
+                        }
+                    } else {
+                        for (column, dk) in self.minus_ha.iter().zip(dk) {
+                            A::subtract_row(&mut row, column[i], dk);
+                        }
+                    }
+                    *d = row;
+                    if let Some(leader) = leader {
+                        leader.add_input::<M, D, W>(d, self.nodes[i], self.directions, column);
+                    }
+                }
+            } else if variable < 2 * nx + nz {
+                let unknown = if variable < nx { variable } else { variable - nx };
+                let Some(dy_of) = dy.get(unknown) else { continue };
+                let leader = leader::<M, E, S>(self.jacobian, unknown);
+                for (i, own) in dy_of.iter().enumerate() {
+                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
+                    let Some(leader) = leader else {
+                        *d = *own;
+                        continue;
+                    };
+                    let mut row = [E::from_f64(0.0); W];
+                    leader.add_state::<A, M, W>(&mut row, E::from_f64(1.0), v);
+                    if let Some(dk) = leader.state::<M>().and_then(|state| dy.get(state)) {
+                        for (column, dk) in self.minus_ha.iter().zip(dk) {
+                            // Twice another sign.
+                            A::subtract_row(&mut row, -(leader.minus_c * column[i]), dk);
+                        }
+                    }
+                    *d = row;
+                    leader.add_input::<M, D, W>(d, E::from_f64(1.0), self.directions, column);
+                }
+            } else {
+                for i in 0..S {
+                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
+                    *d = [E::from_f64(0.0); W];
+                    self.directions.add(variable - nx - nz, E::from_f64(1.0), column, d);
+                }
+            }
+        }
+    }
+}
