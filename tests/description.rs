@@ -201,8 +201,8 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
                 let products: Vec<Matrix> =
                     pivot.upper().map(|upper| product(&coupling, &blocks[upper])).collect();
                 for lower in pivot.lower() {
-                    for (product, &target) in products.iter().zip(&mut updates) {
-                        subtract_scaled(&mut blocks[target as usize], &scales[lower], product);
+                    for (product, target) in products.iter().zip(&mut updates) {
+                        subtract_scaled(&mut blocks[target.block as usize], &scales[lower], product);
                     }
                 }
                 continue;
@@ -213,9 +213,9 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
                 blocks[pivot.block as usize] = inverse;
             }
             for lower in pivot.lower() {
-                for (upper, &target) in pivot.upper().zip(&mut updates) {
+                for (upper, target) in pivot.upper().zip(&mut updates) {
                     let (left, right) = (blocks[lower].clone(), blocks[upper].clone());
-                    subtract(&mut blocks[target as usize], &left, &right);
+                    subtract(&mut blocks[target.block as usize], &left, &right);
                 }
             }
         }

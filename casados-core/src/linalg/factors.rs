@@ -124,6 +124,9 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        if const { sparse::begins_with_update::<E>() } && entry.is_fill() {
+            return;
+        }
         let Some(to) = blocks.get_mut(entry.block as usize) else { return };
         // An index that marks what is not there lies outside of the Jacobian.
         let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
@@ -148,6 +151,9 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     #[inline(always)]
     fn simple(&mut self, row: usize) {
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        if const { sparse::begins_with_update::<E>() } {
+            return;
+        }
         if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
             *block = [[E::from_f64(0.0); S]; S];
         }

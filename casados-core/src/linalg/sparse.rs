@@ -18,7 +18,7 @@
 use super::block::{Block, inverse, product};
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::straight::{AtPivot, from_first, is_long};
-use crate::model::{Dae, Pivot};
+use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
 use core::marker::PhantomData;
 
@@ -38,7 +38,7 @@ impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
 }
 impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
 
-/// Factorises in place: `blocks` holds the matrix (fill zero) and afterwards `P⁻¹`, `L`, `U`. A pivot block
+/// Factorises in place: `blocks` holds the matrix (fill zero, unless it [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot block
 /// that is singular leaves elements that are not finite.
 pub fn factor<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
     dispatch(Factor::<M, E, S> { coupling, blocks, model: PhantomData });
@@ -67,7 +67,7 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [u32]) {
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [Update]) {
         let Self { coupling, blocks, .. } = self;
         if is_scaled::<S>(pivot) {
             let width = pivot.upper().len();
@@ -76,14 +76,16 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
                 let mut product = [[E::from_f64(0.0); S]; S];
                 A::subtract_blocks(&mut product, coupling, upper);
                 let targets = updates.get(index..).unwrap_or_default().iter().step_by(width);
-                for (lower, &target) in pivot.lower().zip(targets) {
+                for (lower, target) in pivot.lower().zip(targets) {
                     let Some(Some(&scale)) = blocks.get(lower).map(|lower| lower.first()) else {
                         continue;
                     };
-                    let Some(target) = blocks.get_mut(target as usize) else { continue };
-                    for (column, product) in target.iter_mut().zip(&product) {
+                    let Some(block) = blocks.get_mut(target.block as usize) else { continue };
+                    let mut sum = before(block, target);
+                    for (column, product) in sum.iter_mut().zip(&product) {
                         A::subtract_products(column, &scale, product);
                     }
+                    *block = sum;
                 }
             }
             return;
@@ -99,13 +101,26 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
         let mut updates = updates.iter();
         for lower in pivot.lower() {
             let Some(&lower) = blocks.get(lower) else { continue };
-            for (upper, &target) in pivot.upper().zip(&mut updates) {
+            for (upper, target) in pivot.upper().zip(&mut updates) {
                 let Some(&upper) = blocks.get(upper) else { continue };
-                let Some(target) = blocks.get_mut(target as usize) else { continue };
-                A::subtract_blocks(target, &lower, &upper);
+                let Some(block) = blocks.get_mut(target.block as usize) else { continue };
+                let mut sum = before(block, target);
+                A::subtract_blocks(&mut sum, &lower, &upper);
+                *block = sum;
             }
         }
     }
+}
+
+/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less work than to ask.
+pub const fn begins_with_update<E>() -> bool {
+    size_of::<E>() > 8
+}
+
+/// What a block is before an update.
+#[inline(always)]
+fn before<E: Field, const S: usize>(block: &Block<E, S>, update: &Update) -> Block<E, S> {
+    if const { begins_with_update::<E>() } && update.first { [[E::from_f64(0.0); S]; S] } else { *block }
 }
 
 /// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.

@@ -5,7 +5,7 @@
 //! two stages takes a fifth of the instructions.
 
 use super::fused::Arithmetic;
-use crate::model::{Dae, Pivot};
+use crate::model::{Dae, Pivot, Update};
 
 // Where nothing is optimised straight lines would only be long, and in firmware memory is dearer than time.
 #[cfg(any(test, all(feature = "std", not(debug_assertions))))]
@@ -74,7 +74,12 @@ pub trait AtPivot {
     /// Whether it looks at the pivots that follow, on the way from the last to the first.
     const OTHERS: bool = false;
     /// With the pivots that follow in the plan. To be `#[inline(always)]`.
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], updates: &'static [u32]);
+    fn at<A: Arithmetic>(
+        &mut self,
+        pivot: &'static Pivot,
+        others: &'static [Pivot],
+        updates: &'static [Update],
+    );
 }
 
 /// From the first pivot to the last.

@@ -9,7 +9,7 @@ use super::packets::{is_zero, load, store, subtract_of};
 use super::prefetch::Ahead;
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
-use crate::model::{Dae, Pivot, Steady};
+use crate::model::{Dae, Pivot, Steady, Update};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
@@ -181,7 +181,7 @@ impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const
     };
     const OTHERS: bool = Y::OTHERS;
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [u32]) {
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [Update]) {
         Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot, others);
         self.0.viewer.pass();
     }

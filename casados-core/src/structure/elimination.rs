@@ -13,7 +13,7 @@ pub struct Elimination {
     /// For each pivot the blocks of `L` in its row: of pivots that are not scaled, then of those that are.
     pub left: &'static [Left],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
-    pub updates: &'static [u32],
+    pub updates: &'static [Update],
     /// For each block what it is made of before elimination, those of a kind one after the other, fill first.
     pub assembly: &'static [Assembly],
     /// For each equation its slot.
@@ -146,6 +146,15 @@ pub struct Left {
     pub block: u32,
     /// The slot of the pivot whose column it is in.
     pub slot: u32,
+}
+
+/// A block that is updated by the product of two others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Update {
+    /// The block.
+    pub block: u32,
+    /// Nothing is there before: the block is fill, and this is its first update.
+    pub first: bool,
 }
 
 /// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`; zero where there is only fill.

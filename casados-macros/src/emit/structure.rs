@@ -208,10 +208,21 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         quote!(steady(#entry, #first, #end, #turn, #implied))
     });
     let steady: Vec<_> = steady.collect();
-    let [slots, updates, slot_of_equation] =
-        [&slots, &plan.updates, &slot_of_equation].map(|table| numbers(table));
+    let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32)
+        .filter(|&block| !positions.contains_key(&plan.blocks[block as usize]))
+        .collect();
+    let updates: Vec<_> = plan
+        .updates
+        .iter()
+        .map(|&block| {
+            let first = empty.remove(&block);
+            let block = Literal::u32_unsuffixed(block);
+            quote!(update(#block, #first))
+        })
+        .collect();
+    let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Left, Pivot, Steady};
+        use #krate::model::{Assembly, Left, Pivot, Steady, Update};
         const fn pivot(
             slot: u32,
             [block, upper, end]: [u32; 3],
@@ -224,6 +235,9 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         const fn steady(entry: u32, first: u32, end: u32, turn: u32, implied: bool) -> Steady {
             Steady { entry, first, end, turn, implied }
         }
+        const fn update(block: u32, first: bool) -> Update {
+            Update { block, first }
+        }
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }
         }
@@ -234,7 +248,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             pivots: &const { [#(#pivots),*] },
             slots: &[#(#slots),*],
             left: &const { [#(#left),*] },
-            updates: &[#(#updates),*],
+            updates: &const { [#(#updates),*] },
             assembly: &const { [#(#assembly),*] },
             slot_of_equation: &[#(#slot_of_equation),*],
             steady: &const { [#(#steady),*] },

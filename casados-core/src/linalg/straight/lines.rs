@@ -6,7 +6,7 @@
 
 use super::super::fused::Arithmetic;
 use super::{AtPivot, AtRow, CHUNK, updates_of};
-use crate::model::{Dae, Elimination, Pivot};
+use crate::model::{Dae, Elimination, Pivot, Update};
 use core::marker::PhantomData;
 
 /// One expression for each number from zero on, or down to zero.
@@ -61,7 +61,7 @@ impl<M: Dae, const N: usize> Nth<M, N> {
 }
 
 /// A pivot, those that follow, and its updates.
-type At = (&'static Pivot, &'static [Pivot], &'static [u32]);
+type At = (&'static Pivot, &'static [Pivot], &'static [Update]);
 
 const fn nth(plan: &Elimination, n: usize) -> Option<At> {
     if n >= plan.pivots.len() {
