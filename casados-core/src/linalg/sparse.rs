@@ -81,11 +81,17 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
                         continue;
                     };
                     let Some(block) = blocks.get_mut(target.block as usize) else { continue };
-                    let mut sum = before(block, target);
-                    for (column, product) in sum.iter_mut().zip(&product) {
+                    if is_first::<E>(target) {
+                        let mut sum = [[E::from_f64(0.0); S]; S];
+                        for (column, product) in sum.iter_mut().zip(&product) {
+                            A::subtract_products(column, &scale, product);
+                        }
+                        *block = sum;
+                        continue;
+                    }
+                    for (column, product) in block.iter_mut().zip(&product) {
                         A::subtract_products(column, &scale, product);
                     }
-                    *block = sum;
                 }
             }
             return;
@@ -104,9 +110,13 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let Some(&upper) = blocks.get(upper) else { continue };
                 let Some(block) = blocks.get_mut(target.block as usize) else { continue };
-                let mut sum = before(block, target);
-                A::subtract_blocks(&mut sum, &lower, &upper);
-                *block = sum;
+                if is_first::<E>(target) {
+                    let mut sum = [[E::from_f64(0.0); S]; S];
+                    A::subtract_blocks(&mut sum, &lower, &upper);
+                    *block = sum;
+                    continue;
+                }
+                A::subtract_blocks(block, &lower, &upper);
             }
         }
     }
@@ -117,10 +127,10 @@ pub const fn begins_with_update<E>() -> bool {
     size_of::<E>() > 8
 }
 
-/// What a block is before an update.
+/// Whether nothing is there before an update.
 #[inline(always)]
-fn before<E: Field, const S: usize>(block: &Block<E, S>, update: &Update) -> Block<E, S> {
-    if const { begins_with_update::<E>() } && update.first { [[E::from_f64(0.0); S]; S] } else { *block }
+const fn is_first<E>(update: &Update) -> bool {
+    begins_with_update::<E>() && update.first
 }
 
 /// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.

@@ -234,9 +234,8 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
 {
     #[inline(always)]
     fn down<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
-        // What is added to a row is added in registers where one column fills them; but large blocks come from the second cache
-        // fastest as they lie, column by column.
-        if const { align_of::<E>() > 8 && size_of::<Block<E, S>>() <= 256 } {
+        // What is added to a row is added in registers where one column fills them.
+        if const { align_of::<E>() > 8 && goes_by_rows::<M>(size_of::<Block<E, S>>()) } {
             self.down_by_rows::<A, STEADY>(pivot);
             if !is_scaled::<S>(pivot) {
                 return;
@@ -400,6 +399,20 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn is_steady<M: Dae>(slot: usize) -> bool {
     matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
+}
+
+/// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in another column. Of large blocks that
+/// the second cache holds the processor fetches some columns ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
+/// aircraft, with up to seventeen blocks in a row, 6 % more.
+const fn goes_by_rows<M: Dae>(block: usize) -> bool {
+    let pivots = M::STRUCTURE.elimination.pivots;
+    let (mut longest, mut index) = (0, 0);
+    while index < pivots.len() {
+        let left = pivots[index].left[1] - pivots[index].left[0];
+        longest = if left > longest { left } else { longest };
+        index += 1;
+    }
+    block <= 256 || longest <= 8
 }
 
 /// Whether nobody solves for a steady state, as it is [implied](Steady::implied). Of plain numbers, of which a register holds a row, what is
