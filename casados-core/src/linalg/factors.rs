@@ -124,7 +124,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<E>() } && entry.is_fill() {
+        if const { sparse::begins_with_update::<M, E>() } && entry.is_fill() {
             return;
         }
         let Some(to) = blocks.get_mut(entry.block as usize) else { return };
@@ -151,7 +151,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
     #[inline(always)]
     fn simple(&mut self, row: usize) {
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<E>() } {
+        if const { sparse::begins_with_update::<M, E>() } {
             return;
         }
         if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {

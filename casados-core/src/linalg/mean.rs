@@ -91,7 +91,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<Complex<E, S>>() } && entry.is_fill() {
+        if const { sparse::begins_with_update::<M, Complex<E, S>>() } && entry.is_fill() {
             return;
         }
         let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
@@ -110,7 +110,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
     #[inline(always)]
     fn simple(&mut self, row: usize) {
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<Complex<E, S>>() } {
+        if const { sparse::begins_with_update::<M, Complex<E, S>>() } {
             return;
         }
         if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {

@@ -63,7 +63,7 @@ impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     }
 }
 
-impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
+impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
@@ -81,7 +81,7 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
                         continue;
                     };
                     let Some(block) = blocks.get_mut(target.block as usize) else { continue };
-                    if is_first::<E>(target) {
+                    if is_first::<M, E>(target) {
                         let mut sum = [[E::from_f64(0.0); S]; S];
                         for (column, product) in sum.iter_mut().zip(&product) {
                             A::subtract_products(column, &scale, product);
@@ -110,7 +110,7 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let Some(&upper) = blocks.get(upper) else { continue };
                 let Some(block) = blocks.get_mut(target.block as usize) else { continue };
-                if is_first::<E>(target) {
+                if is_first::<M, E>(target) {
                     let mut sum = [[E::from_f64(0.0); S]; S];
                     A::subtract_blocks(&mut sum, &lower, &upper);
                     *block = sum;
@@ -122,15 +122,16 @@ impl<M, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     }
 }
 
-/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less work than to ask.
-pub const fn begins_with_update<E>() -> bool {
-    size_of::<E>() > 8
+/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less work than to ask; and where it is little.
+pub const fn begins_with_update<M: Dae, E>() -> bool {
+    let plan = &M::STRUCTURE.elimination;
+    size_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
 }
 
 /// Whether nothing is there before an update.
 #[inline(always)]
-const fn is_first<E>(update: &Update) -> bool {
-    begins_with_update::<E>() && update.first
+const fn is_first<M: Dae, E>(update: &Update) -> bool {
+    begins_with_update::<M, E>() && update.first
 }
 
 /// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.
