@@ -116,6 +116,9 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
         }
         return inverse;
     }
+    if const { size_of::<E>() > 8 && S <= STEPS } {
+        return inverse_in_registers::<A, E, S>(block);
+    }
     // On the transposed matrix, so that what is done to rows is done to vectors of the memory.
     let mut a = *block;
     let mut inverse = [[zero; S]; S];
@@ -152,4 +155,73 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
         }
     }
     inverse
+}
+
+/// So many steps of an elimination can be written one after the other.
+const STEPS: usize = 4;
+
+/// The same in place: registers hold the block, but not the unit matrix beside it. The steps are written one after the other, or indices
+/// that the optimiser does not know would keep the block in the memory.
+#[inline(always)]
+fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
+    let zero = E::from_f64(0.0);
+    let mut a = *block;
+    let (mut exchanges, mut exchanged) = ([[zero.is_smaller(zero); S]; S], false);
+    macro_rules! steps {
+        ($($k:literal)*) => {
+            $(if const { $k < S } {
+                exchanged |= eliminate::<A, E, S>(&mut a, $k, &mut exchanges);
+            })*
+        };
+    }
+    const { assert!(STEPS == 4) };
+    steps!(0 1 2 3);
+    // What was done to rows is undone to columns of the inverse.
+    if exchanged {
+        for k in (0..S).rev() {
+            for i in (k + 1..S).rev() {
+                for row in &mut a {
+                    let (p, q) = (row[k], row[i]);
+                    row[k] = E::select(exchanges[k][i], q, p);
+                    row[i] = E::select(exchanges[k][i], p, q);
+                }
+            }
+        }
+    }
+    a
+}
+
+/// A step of it. Whether rows were exchanged.
+#[inline(always)]
+fn eliminate<A: Arithmetic, E: Field, const S: usize>(
+    a: &mut Block<E, S>,
+    k: usize,
+    exchanges: &mut [[E::Mask; S]; S],
+) -> bool {
+    let mut exchanged = false;
+    for i in k + 1..S {
+        let larger = a[k][k].is_smaller(a[i][k]);
+        if E::any(larger) {
+            (exchanges[k][i], exchanged) = (larger, true);
+            for j in 0..S {
+                let (p, q) = (a[k][j], a[i][j]);
+                a[k][j] = E::select(larger, q, p);
+                a[i][j] = E::select(larger, p, q);
+            }
+        }
+    }
+    // The column that is eliminated gives its place to one of the inverse.
+    let scale = a[k][k].reciprocal();
+    for j in 0..S {
+        a[k][j] = if j == k { scale } else { a[k][j] * scale };
+    }
+    for i in 0..S {
+        if i != k {
+            let factor = a[i][k];
+            for j in 0..S {
+                a[i][j] = if j == k { -(factor * scale) } else { A::subtract(a[i][j], factor, a[k][j]) };
+            }
+        }
+    }
+    exchanged
 }

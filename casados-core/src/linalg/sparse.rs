@@ -105,18 +105,20 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             }
         }
         let mut updates = updates.iter();
+        // What is updated comes later.
+        let Some((own, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
         for lower in pivot.lower() {
-            let Some(&lower) = blocks.get(lower) else { continue };
+            let Some(&lower) = own.get(lower) else { continue };
             for (upper, target) in pivot.upper().zip(&mut updates) {
-                let Some(&upper) = blocks.get(upper) else { continue };
-                let Some(block) = blocks.get_mut(target.block as usize) else { continue };
+                let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
+                let (Some(upper), Some(block)) = (upper, block) else { continue };
                 if is_first::<M, E>(target) {
                     let mut sum = [[E::from_f64(0.0); S]; S];
-                    A::subtract_blocks(&mut sum, &lower, &upper);
+                    A::subtract_blocks(&mut sum, &lower, upper);
                     *block = sum;
                     continue;
                 }
-                A::subtract_blocks(block, &lower, &upper);
+                A::subtract_blocks(block, &lower, upper);
             }
         }
     }
