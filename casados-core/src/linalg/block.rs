@@ -116,7 +116,7 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
         }
         return inverse;
     }
-    if const { size_of::<E>() > 8 && S <= STEPS } {
+    if const { size_of::<E>() > 8 && S > 2 && S <= STEPS } {
         return inverse_in_registers::<A, E, S>(block);
     }
     // On the transposed matrix, so that what is done to rows is done to vectors of the memory.

@@ -112,6 +112,14 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
                 let (Some(upper), Some(block)) = (upper, block) else { continue };
+                // In registers, if there are enough: the optimiser cannot know that nothing here overlaps.
+                let copy;
+                let upper = if const { S <= 2 } {
+                    copy = *upper;
+                    &copy
+                } else {
+                    upper
+                };
                 if is_first::<M, E>(target) {
                     let mut sum = [[E::from_f64(0.0); S]; S];
                     A::subtract_blocks(&mut sum, &lower, upper);
