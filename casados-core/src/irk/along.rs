@@ -7,13 +7,13 @@
 //! ```
 
 use super::adjoint::Backward;
-use super::forward::ForwardPass;
 use super::integrator::Integrator;
 use super::record::{Coefficients, Step, Work};
 use super::run::Parts;
+use super::sweep::Sweep;
 use crate::error::{Error, Place};
 use crate::memory::{Fallback, Memory, WithAdjoint, WithForward, WithHessian};
-use crate::model::{Dae, VectorU, VectorX, VectorZ};
+use crate::model::{ArrayW, Dae, VectorU, VectorX, VectorZ};
 pub(super) use crate::quadrature::{Along, begin, finish, reborrow};
 use crate::quadrature::{Integrand, With};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
@@ -102,19 +102,18 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
         &mut self,
         n: usize,
         step: &Step<M, T, S>,
-        pass: &mut ForwardPass<M, T, S>,
+        sweep: &Sweep<M, T, ArrayW<M, T>, S>,
         second: bool,
         integrand: &mut dyn Integrand<M, T>,
     ) -> Result<(), Error> {
         let Self { work, coefficients, .. } = self;
         let h = work.inputs.time.step;
         work.place(coefficients, n, &step.x, &step.y);
-        pass.complete(work, coefficients);
         for (stage, b) in coefficients.b.iter().enumerate() {
             let integrand = work.point_of(stage, integrand);
             let variables = integrand.variables();
             let (_, d) = integrand.point();
-            pass.sweep.write_rows(coefficients, h, stage, variables, d);
+            sweep.write_rows(coefficients, h, stage, variables, d);
             integrand.forward(h * *b, second, Place { step: n, stage, iteration: 0 })?;
         }
         Ok(())

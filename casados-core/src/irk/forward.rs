@@ -160,16 +160,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         if self.end(nominal, to).is_finite() { Ok(()) } else { check_result(to, step) }
     }
 
-    /// Finds all derivatives at the stages of the step that `work` is linearised at, for those who ask for single ones.
-    pub(crate) fn complete<F: Fallback>(
-        &mut self,
-        work: &Work<M, T, S, F>,
-        coefficients: &Coefficients<T, S>,
-    ) {
-        self.sweep.complete(work, coefficients, &Identity::<M>::ALL);
-    }
-
-    /// The derivatives of `Σ_i weight_i k_i` of the last step, which is [complete](Self::complete), a row for each direction.
+    /// The derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
     #[cfg(feature = "alloc")]
     pub(crate) fn slopes(&self, weights: &[T; S], to: &mut ArrayW<M, ArrayX<M, T>>) {
         for direction in to.as_mut() {
@@ -180,7 +171,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardMemory<M, T, S> {
-    /// Derivatives at a point of the last step, which is [complete](ForwardPass::complete).
+    /// Derivatives at a point of the last step.
     pub(crate) fn interpolate(&mut self, weights: &[T; S], lagrange: &[T; S]) {
         let Self { dense, pass: ForwardPass { sweep, .. }, .. } = self;
         let to = &mut Split::<M, _>::new(&mut dense.dx_dx0, &mut dense.dx_du, &mut dense.dx_dp);

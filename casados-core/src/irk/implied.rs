@@ -6,18 +6,16 @@
 //! dk_i = c (V_v + h Σ_l a_il dk_lv)        Σ_i w_i dk_i = c ((Σ_i w_i) V_v + h Σ_l (Σ_i w_i a_il) dk_lv)
 //! ```
 //!
-//! with `V_v` at the start of the step; with a control or a parameter `c dv` at all stages.
+//! with `V_v` at the start of the step; with a control or a parameter `c dv` at all stages. Only where numbers are registers: who asks for
+//! single stages (dense output, integrals, refinement) has plain ones.
 
-use super::directions::{Directions, panel, panel_mut, panels};
+use super::directions::Directions;
 use super::evaluate::entry;
-use super::record::{Coefficients, Work};
-use super::sweep::Sweep;
-use crate::linalg::{Arithmetic, Kernel, Packet, coupling, dispatch, is_implied};
-use crate::memory::Fallback;
+use super::record::Coefficients;
+use crate::linalg::{Arithmetic, Packet, is_implied};
 use crate::model::{Dae, Steady};
 use crate::scalar::Lanes;
-use crate::shape::{Array, Plain, Shape};
-use core::marker::PhantomData;
+use crate::shape::{Plain, Shape};
 
 /// What an implied state follows.
 #[derive(Clone, Copy)]
@@ -190,68 +188,5 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, const S: usize> Weighted<'a, M, E, 
         {
             leader.add_input::<M, D, W>(row, *total, *directions, column);
         }
-    }
-}
-
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
-    /// Finds what is implied, for those who ask for single stages; until [`Sweep::conclude`] or another step.
-    pub(super) fn complete<D: Directions<E>, F: Fallback>(
-        &mut self,
-        work: &Work<M, E, S, F>,
-        coefficients: &Coefficients<E, S>,
-        directions: &D,
-    ) {
-        let (v, dy) = self.parts();
-        dispatch(Complete::<M, E, D, S> {
-            jacobian: &work.linear.jacobian,
-            a: &coefficients.a,
-            h: work.inputs.time.step,
-            v,
-            dy,
-            directions,
-            model: PhantomData,
-        });
-    }
-}
-
-/// See [`Sweep::complete`].
-struct Complete<'a, M: Dae, E: Plain, D, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    a: &'a [[E; S]; S],
-    h: E,
-    v: &'a [E],
-    dy: &'a mut [E],
-    directions: &'a D,
-    model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Kernel for Complete<'_, M, E, D, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { jacobian, a, h, v, dy, directions, .. } = self;
-        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
-        let minus_ha = coupling(a, h);
-        panels!(D::COUNT, E, S, column, W => {
-            let v = panel::<E, W>(v, column, nx);
-            let (dy, _) = panel_mut::<E, W>(dy, column, nk * S).as_chunks_mut::<S>();
-            for state in 0..M::STRUCTURE.elimination.steady.len() {
-                let Some(leader) = leader::<M, E, S>(jacobian, state) else { continue };
-                let mut packet = [[E::from_f64(0.0); W]; S];
-                for (i, row) in packet.iter_mut().enumerate() {
-                    leader.add_state::<A, M, W>(row, E::from_f64(1.0), v);
-                    leader.add_input::<M, D, W>(row, E::from_f64(1.0), directions, column);
-                    if let Some(dk) = leader.state::<M>().and_then(|state| dy.get(state)) {
-                        for (minus_ha, dk) in minus_ha.iter().zip(dk) {
-                            A::subtract_row(row, -(leader.minus_c * minus_ha[i]), dk);
-                        }
-                    }
-                }
-                if let Some(to) = dy.get_mut(state) {
-                    *to = packet;
-                }
-            }
-        });
     }
 }

@@ -49,7 +49,6 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                 return;
             }
             last = correction;
-            self.complete(work, coefficients, directions);
             self.refine_columns(work, coefficients, directions);
             self.conclude(work, coefficients, directions, first, outputs);
             // Each correction is that part of the one before.

@@ -142,7 +142,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
                 (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
             pass.step::<_, REFINED>(work, coefficients, at, parts.statistics, None, to)?;
             match &mut along {
-                Some(integrand) => parts.along_forward(n, step, pass, false, &mut **integrand),
+                Some(integrand) => parts.along_forward(n, step, &pass.sweep, false, &mut **integrand),
                 None => Ok(()),
             }
         })?;
@@ -174,10 +174,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         let weights: &[f64; S] = weights.first_chunk().ok_or(Error::NoResult)?;
-        let pass = &mut W::forward(&mut self.forward)?.pass;
-        let last = self.run.last()?;
-        pass.complete(last.work, last.coefficients);
-        pass.slopes(&weights.map(T::from_f64), to);
+        W::forward(&mut self.forward)?.pass.slopes(&weights.map(T::from_f64), to);
         Ok(())
     }
 
@@ -210,7 +207,6 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             pass.step::<_, false>(work, coefficients, at, parts.statistics, None, &mut result.forward)?;
         }
         self.sweep = Some(point.step);
-        forward.pass.complete(parts.work, parts.coefficients);
         let h = parts.work.kept.time.step;
         if let Some(step) = parts.steps.get(point.step) {
             point.evaluate(step, h, &mut forward.dense.dense)?;
@@ -476,7 +472,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             let (curved, to) = (Some(record.curved()), &mut to.first.forward);
             forward.step::<_, false>(work, coefficients, at, parts.statistics, curved, to)?;
             if let Some(integrand) = &mut along {
-                parts.along_forward(n, step, forward, true, &mut **integrand)?;
+                parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
             // That of the last step is still there on the way back.
             if n + 1 < count {

@@ -178,12 +178,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         R::flat(self.dy.as_ref().as_flattened())
     }
 
-    /// `V` at the start of the step, and the derivatives of the stages.
-    pub(super) fn parts(&mut self) -> (&[E], &mut [E]) {
-        let v = self.v.get(usize::from(!self.end)).map_or(&[][..], |v| R::flat(v.as_ref()));
-        (v, R::flat_mut(self.dy.as_mut().as_flattened_mut()))
-    }
-
     /// The derivatives of the stages.
     pub(super) fn dy_mut(&mut self) -> &mut [R] {
         self.dy.as_mut().as_flattened_mut()
