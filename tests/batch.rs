@@ -141,15 +141,20 @@ fn check<M: Dae, B: Method<S>, T: Real, const S: usize>(
         let u = &horizon.u[k % horizon.u.len()];
         let h = horizon.h[k % horizon.h.len()];
         let lambda = &horizon.lambda[k % horizon.lambda.len()];
+        if let Some(p) = horizon.p.get(k) {
+            irk.set_parameters(p)?;
+        }
         let expected = irk.hessian(x0, u, h, lambda)?;
         close("nominal", bound, pairs!(nominal[k], expected; x z z0));
         for result in [&forward[k], &both[k].forward, &hessian[k].first.forward] {
-            let fields = pairs!(result, expected; x z z0 dx_dx0 dx_du dz_dx0 dz_du dz0_dx0 dz0_du);
+            let fields =
+                pairs!(result, expected; x z z0 dx_dx0 dx_du dx_dp dz_dx0 dz_du dz_dp dz0_dx0 dz0_du dz0_dp);
             close("forward", bound, fields);
         }
-        close("adjoint", bound, pairs!(adjoint[k], expected; x z z0 grad_x0 grad_u));
-        close("forward adjoint", bound, pairs!(both[k], expected; grad_x0 grad_u));
-        close("Hessian", bound, pairs!(hessian[k], expected; grad_x0 grad_u h_xx h_xu h_uu));
+        close("adjoint", bound, pairs!(adjoint[k], expected; x z z0 grad_x0 grad_u grad_p));
+        close("forward adjoint", bound, pairs!(both[k], expected; grad_x0 grad_u grad_p));
+        let fields = pairs!(hessian[k], expected; grad_x0 grad_u grad_p h_xx h_xu h_uu h_xp h_up h_pp);
+        close("Hessian", bound, fields);
     }
     Ok(())
 }
@@ -172,6 +177,42 @@ fn pendulums() -> Test {
     for count in COUNTS {
         check::<_, Gauss<2>, _, 2>(steps(1), &pendulum::<f64>(count), ORDINARY)?;
         check::<_, Gauss<4>, _, 4>(steps(4), &pendulum::<f64>(count), ORDINARY)?;
+    }
+    Ok(())
+}
+
+/// Three states that follow another one, the control and the parameter, and are felt by three more: registers leave the derivatives of their
+/// stages out.
+#[ode]
+fn followers(x: [f64; 6], u: f64, p: f64) -> [f64; 6] {
+    let [a, b, c, v, w, y] = x;
+    [
+        2.0 * y,
+        u,
+        -3.0 * p,
+        -(a + b).sin() - 0.3 * c * w,
+        (a - c).cos() * b - 0.1 * v * v,
+        a * b * c - w + 0.2 * v - 0.1 * y * y,
+    ]
+}
+
+#[test]
+fn implied_states() -> Test {
+    let steady = Followers::STRUCTURE.elimination.steady;
+    let implied: Vec<usize> = (0..steady.len()).filter(|&state| steady[state].implied).collect();
+    assert_eq!(implied, [0, 1, 2]);
+    for count in COUNTS {
+        let horizon = Horizon::<Followers> {
+            x0: (0..count).map(|k| SVector::from_fn(|i, _| ((3 * k + i) as f64).sin())).collect(),
+            u: (0..count).map(|k| Vector1::new((k as f64).cos())).collect(),
+            p: (0..count).map(|k| Vector1::new(0.1 * k as f64 - 1.0)).collect(),
+            h: vec![0.2],
+            lambda: vec![vector![1.0, -0.5, 0.25, 2.0, -1.0, 0.75]],
+        };
+        check::<_, Gauss<2>, _, 2>(steps(2), &horizon, ORDINARY)?;
+        check::<_, Gauss<3>, _, 3>(steps(1), &horizon, ORDINARY)?;
+        check::<_, Gauss<4>, _, 4>(steps(3), &horizon, ORDINARY)?;
+        check::<_, RadauIIA<3>, _, 3>(steps(2), &horizon, ORDINARY)?;
     }
     Ok(())
 }

@@ -58,24 +58,12 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> CurvedRows<'_, M, E, D,
                 }
             } else if variable < 2 * nx + nz {
                 let unknown = if variable < nx { variable } else { variable - nx };
-                let Some(dy_of) = dy.get(unknown) else { continue };
-                let leader = leader::<M, E, S>(self.jacobian, unknown);
-                for (i, own) in dy_of.iter().enumerate() {
-                    let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
-                    let Some(leader) = leader else {
+                let Some(own) = dy.get(unknown) else { continue };
+                // Of a state that is implied no equation feels the derivative but its own, which is linear.
+                for (i, own) in own.iter().enumerate() {
+                    if let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) {
                         *d = *own;
-                        continue;
-                    };
-                    let mut row = [E::from_f64(0.0); W];
-                    leader.add_state::<A, M, W>(&mut row, E::from_f64(1.0), v);
-                    if let Some(dk) = leader.state::<M>().and_then(|state| dy.get(state)) {
-                        for (column, dk) in self.minus_ha.iter().zip(dk) {
-                            // Twice another sign.
-                            A::subtract_row(&mut row, -(leader.minus_c * column[i]), dk);
-                        }
                     }
-                    *d = row;
-                    leader.add_input::<M, D, W>(d, E::from_f64(1.0), self.directions, column);
                 }
             } else {
                 for i in 0..S {

@@ -225,3 +225,74 @@ fn eliminate<A: Arithmetic, E: Field, const S: usize>(
     }
     exchanged
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::complex::Complex;
+    use super::super::fused::Separate;
+    use super::*;
+
+    /// Two complex numbers and a real one, each a system of its own.
+    type Three = Complex<f64, 5>;
+
+    /// Permutations, another one in each system, and a little of everything else: what is largest is never where the others have it.
+    fn block<const S: usize>(seed: usize) -> Block<Three, S> {
+        let wave = |k: usize| 0.05 * ((seed * 37 + k) as f64).sin();
+        let mut block = [[Complex { parts: [0.0; 5] }; S]; S];
+        for (j, column) in block.iter_mut().enumerate() {
+            for (i, element) in column.iter_mut().enumerate() {
+                let k = 5 * (i + S * j);
+                *element = Complex { parts: [wave(k), wave(k + 1), wave(k + 2), wave(k + 3), wave(k + 4)] };
+                // `i ↦ m i + n` modulo `S`, with `m = ±1`.
+                for (system, m) in [1, S - 1, S - 1].into_iter().enumerate() {
+                    if (m * i + seed + system) % S == j {
+                        let part = [2, 1, 4][system];
+                        element.parts[part] = element.parts[part] + 1.0;
+                    }
+                }
+            }
+        }
+        block
+    }
+
+    /// Blocks with conditions below two, in infinity norms: `S²` products and as many sums, rounded, both ways.
+    fn inverts<const S: usize>() {
+        for seed in 0..8 * S {
+            let block = block::<S>(seed);
+            let inverse = inverse::<Separate, _, S>(&block);
+            for (left, right) in [(&block, &inverse), (&inverse, &block)] {
+                for (j, column) in product::<Separate, _, S>(left, right).iter().enumerate() {
+                    for (i, element) in column.iter().enumerate() {
+                        let error = *element - Complex::real(if i == j { 1.0 } else { 0.0 });
+                        let bound = 2.0 * 4.0 * (S * S) as f64 * f64::EPSILON;
+                        assert!(
+                            error.parts.iter().all(|part| part.abs() <= bound),
+                            "{seed} {i} {j} {error:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_system_has_pivots_of_its_own() {
+        inverts::<2>();
+        inverts::<3>();
+        inverts::<4>();
+        inverts::<5>();
+    }
+
+    #[test]
+    fn singular_blocks_are_not_finite() {
+        let mut singular = block::<4>(1);
+        singular[2] = singular[0];
+        assert!(!inverse::<Separate, _, 4>(&singular).as_flattened().iter().all(Complex::is_finite));
+        assert!(
+            !inverse::<Separate, _, 4>(&[[Three::zero(); 4]; 4])
+                .as_flattened()
+                .iter()
+                .all(Complex::is_finite)
+        );
+    }
+}
