@@ -193,6 +193,8 @@ fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E
 
 /// A step of it. Whether rows were exchanged.
 #[inline(always)]
+// Loops over indices of a fixed number are unrolled more reliably.
+#[allow(clippy::needless_range_loop)]
 fn eliminate<A: Arithmetic, E: Field, const S: usize>(
     a: &mut Block<E, S>,
     k: usize,
@@ -247,7 +249,7 @@ mod tests {
                 for (system, m) in [1, S - 1, S - 1].into_iter().enumerate() {
                     if (m * i + seed + system) % S == j {
                         let part = [2, 1, 4][system];
-                        element.parts[part] = element.parts[part] + 1.0;
+                        element.parts[part] += 1.0;
                     }
                 }
             }
