@@ -139,8 +139,9 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
 /// (`ẋ = c u`, as far as [`Steady`] says so) something in that of the input and of its own start.
 struct Reach<M>(PhantomData<M>);
 
-/// So many columns are asked about at once, and so often.
+/// Columns of a group, about which one answer is given.
 const GROUP: usize = 4;
+/// Groups about which something is known: behind them all variables are needed.
 const GROUPS: usize = 64;
 
 impl<M: Dae> Reach<M> {

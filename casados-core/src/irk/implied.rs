@@ -173,6 +173,7 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, const S: usize> Weighted<'a, M, E, 
             A::subtract_row(row, weight, dk);
         }
     }
+
     /// Whether an unknown is implied by a control or a parameter.
     #[inline(always)]
     pub fn has_input(&self, unknown: usize) -> bool {
