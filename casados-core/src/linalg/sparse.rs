@@ -141,7 +141,7 @@ pub const fn begins_with_update<M: Dae, E>() -> bool {
 /// Whether nothing is there before an update.
 #[inline(always)]
 const fn is_first<M: Dae, E>(update: &Update) -> bool {
-    begins_with_update::<M, E>() && update.first
+    (const { begins_with_update::<M, E>() }) && update.first
 }
 
 /// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.
