@@ -105,31 +105,48 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             }
         }
         let mut updates = updates.iter();
+        // Small blocks go to registers: the optimiser cannot know that nothing here overlaps.
+        if const { S <= 2 } {
+            for lower in pivot.lower() {
+                let Some(&lower) = blocks.get(lower) else { continue };
+                for (upper, target) in pivot.upper().zip(&mut updates) {
+                    let Some(&upper) = blocks.get(upper) else { continue };
+                    if let Some(block) = blocks.get_mut(target.block as usize) {
+                        update::<A, M, E, S>(block, target, &lower, &upper);
+                    }
+                }
+            }
+            return;
+        }
         // What is updated comes later.
         let Some((own, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
         for lower in pivot.lower() {
             let Some(&lower) = own.get(lower) else { continue };
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
-                let (Some(upper), Some(block)) = (upper, block) else { continue };
-                // In registers, if there are enough: the optimiser cannot know that nothing here overlaps.
-                let copy;
-                let upper = if const { S <= 2 } {
-                    copy = *upper;
-                    &copy
-                } else {
-                    upper
-                };
-                if is_first::<M, E>(target) {
-                    let mut sum = [[E::from_f64(0.0); S]; S];
-                    A::subtract_blocks(&mut sum, &lower, upper);
-                    *block = sum;
-                    continue;
+                if let (Some(upper), Some(block)) = (upper, block) {
+                    update::<A, M, E, S>(block, target, &lower, upper);
                 }
-                A::subtract_blocks(block, &lower, upper);
             }
         }
     }
+}
+
+/// `block − lower · upper`
+#[inline(always)]
+fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
+    block: &mut Block<E, S>,
+    target: &Update,
+    lower: &Block<E, S>,
+    upper: &Block<E, S>,
+) {
+    if is_first::<M, E>(target) {
+        let mut sum = [[E::from_f64(0.0); S]; S];
+        A::subtract_blocks(&mut sum, lower, upper);
+        *block = sum;
+        return;
+    }
+    A::subtract_blocks(block, lower, upper);
 }
 
 /// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less work than to ask; and where it is little.
