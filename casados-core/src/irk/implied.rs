@@ -1,4 +1,4 @@
-//! States whose `dk` nobody solves for: it is [implied](Steady::implied) by what is there.
+//! States whose `dk` nobody solves for: it is [implied](crate::model::Steady::implied) by what is there.
 //!
 //! For `ẋ − c v = 0` with a state `v`
 //!
@@ -12,8 +12,8 @@
 use super::directions::Directions;
 use super::evaluate::entry;
 use super::record::Coefficients;
-use crate::linalg::{Arithmetic, Packet, is_implied};
-use crate::model::{Dae, Steady};
+use crate::linalg::{Arithmetic, Packet, implied, is_implied};
+use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
@@ -33,12 +33,6 @@ impl<E> Leader<E> {
         let nx = M::Shape::NX;
         if self.variable < 2 * nx { self.variable.checked_sub(nx) } else { None }
     }
-}
-
-/// What is known of an unknown that is implied, if it is.
-#[inline(always)]
-pub(super) fn implied<M: Dae, E, const S: usize>(unknown: usize) -> Option<&'static Steady> {
-    M::STRUCTURE.elimination.steady.get(unknown).filter(|steady| is_implied::<E, S>(steady))
 }
 
 /// What an unknown follows, if it is implied.

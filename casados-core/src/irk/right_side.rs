@@ -2,8 +2,8 @@
 
 use super::directions::{Directions, panel_of};
 use super::evaluate::entry;
-use super::implied::{implied, leader};
-use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_implied, is_short, slot};
+use super::implied::leader;
+use crate::linalg::{Arithmetic, AtRow, Packet, each_row, implied, is_implied, is_short, slot};
 use crate::model::{Dae, Steady};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};

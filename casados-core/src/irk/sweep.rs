@@ -3,14 +3,14 @@
 
 use super::curved_rows::CurvedRows;
 use super::directions::{Directions, NEAREST, panel, panel_mut, panels};
-use super::implied::{Weighted, implied, is_found};
+use super::implied::{Weighted, is_found};
 use super::record::{Coefficients, Linearization, Work, copy};
 use super::right_side::{Later, Scatter, nodes, place, restore};
 use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
-    is_short, product, sweeps,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, implied,
+    is_long, is_short, product, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};

@@ -10,11 +10,11 @@
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
 use super::evaluate::entry;
-use super::implied::{Leader, implied, leader};
+use super::implied::{Leader, leader};
 use super::record::{Coefficients, Linearization, Work};
 use super::sums::{STRANDS, total};
 use super::sweep::Sweep;
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, implied, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};

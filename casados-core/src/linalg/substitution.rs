@@ -214,9 +214,9 @@ system!(
     }
 );
 system!(
-    /// `P + U`; or where the first stage has the right-hand side that [steady](crate::model::Steady) states have at all of them, and keeps it
-    /// where they are implied.
-    Up<const STEADY>, false: |sweep, pivot, _others| if !(STEADY && pivot.steady && leaves_out::<M, E, S>(pivot.slot as usize)) {
+    /// `P + U`; or where the first stage has the right-hand side that [steady](crate::model::Steady) states have at all of them, without
+    /// those that are [implied](crate::model::Steady::implied).
+    Up<const STEADY>, false: |sweep, pivot, _others| if !(STEADY && pivot.steady && implied::<M, E, S>(pivot.slot as usize).is_some()) {
         sweep.up::<A, STEADY>(pivot);
     }
 );
@@ -403,7 +403,7 @@ fn is_steady<M: Dae>(slot: usize) -> bool {
 
 /// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in another column. Of large blocks that
 /// the second cache holds the processor fetches some columns ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
-/// aircraft, with up to seventeen blocks in a row, 6 % more.
+/// aircraft, with up to nineteen blocks in a row, 6 % more.
 const fn goes_by_rows<M: Dae>(block: usize) -> bool {
     let pivots = M::STRUCTURE.elimination.pivots;
     let (mut longest, mut index) = (0, 0);
@@ -422,10 +422,10 @@ pub const fn is_implied<E, const S: usize>(steady: &Steady) -> bool {
     size_of::<E>() > 8 && S > 2 && steady.implied
 }
 
-/// Whether a slot is such.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn leaves_out<M: Dae, E, const S: usize>(slot: usize) -> bool {
-    matches!(M::STRUCTURE.elimination.steady.get(slot), Some(steady) if is_implied::<E, S>(steady))
+/// What is known of the steady state of a slot, if it is such.
+#[inline(always)]
+pub fn implied<M: Dae, E, const S: usize>(slot: usize) -> Option<&'static Steady> {
+    M::STRUCTURE.elimination.steady.get(slot).filter(|steady| is_implied::<E, S>(steady))
 }
 
 /// The blocks below pivots: so many below each, but the optimiser does not know.
