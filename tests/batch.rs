@@ -217,6 +217,90 @@ fn implied_states() -> Test {
     Ok(())
 }
 
+/// The Jacobian changes by a multiple of itself from stage to stage, by the state, what is algebraic, and the time.
+#[dae]
+fn driven(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, t: f64) -> [f64; 3] {
+    let [a, b] = x;
+    [
+        xdot[0] - b,
+        xdot[1] + (2.0 + (5.0 * t).sin()) * a * (1.0 + a * a) - z * b - u,
+        z - 2.0 - (a * b + 0.1 * z * z).cos(),
+    ]
+}
+
+/// Of a batch one Jacobian in the middle of the stages is taken for all of them, of a single call the mean of theirs: iterations converge as
+/// fast.
+#[test]
+fn jacobian_in_the_middle() -> Test {
+    fn same<B: Method<S>, const S: usize>(options: Options) -> Test {
+        let mut batch = batch::Integrator::<Driven, B, S, f64>::new(options)?;
+        let mut single = irk::Integrator::<Driven, B, S, f64, Heap>::new(options)?;
+        single.set_time(0.7)?;
+        let (x0, u) = ([vector![1.5, -1.0]; 8], [Vector1::new(0.5)]);
+        let mut results = vec![Nominal::default(); 8];
+        batch.solve(
+            &Intervals { x0: &x0, u: &u, h: &[0.4], t0: &[0.7], ..Default::default() },
+            &mut results,
+        )?;
+        let expected = single.solve(&x0[0], &u[0], 0.4)?;
+        for result in &results {
+            close("nominal", ORDINARY, pairs!(result, expected; x z z0));
+        }
+        let work = batch.statistics().work;
+        let groups = work.steps / single.statistics().steps;
+        let iterations = [work.iterations, groups * single.statistics().iterations];
+        // One more in a step, where an increment is just above the tolerance.
+        assert!(iterations[0] <= iterations[1] + work.steps, "{iterations:?}");
+        Ok(())
+    }
+    for count in [1, 2, 5] {
+        same::<Gauss<3>, 3>(steps(count))?;
+        same::<Gauss<4>, 4>(steps(count))?;
+        same::<RadauIIA<3>, 3>(steps(count))?;
+    }
+    Ok(())
+}
+
+/// An equation and a state of a size that single precision does not have.
+#[dae]
+fn immense(xdot: [f64; 2], x: [f64; 2]) -> [f64; 2] {
+    [1e60 * (xdot[0] - x[1] * 1e-60), xdot[1] + 1e60 * x[0] * (1.0 + x[0] * x[0]).sqrt()]
+}
+
+/// Nine digits of the Newton matrix are those of a fast motion to `x₀ = x₁`, and the slow one is in the others.
+#[dae]
+fn coupled(xdot: [f64; 2], x: [f64; 2]) -> [f64; 2] {
+    [xdot[0] + 1e9 * (x[0] - x[1]) + x[0] * x[0], xdot[1] - 1e9 * (x[0] - x[1]) + x[1].sin()]
+}
+
+/// Where coarse factors are of no use results are those of single calls all the same.
+#[test]
+fn beyond_coarse_numbers() -> Test {
+    let x0: Vec<_> = (0..9).map(|k| vector![0.1 * k as f64 - 0.3, 1e60 * (0.2 + 0.1 * k as f64)]).collect();
+    let mut batch = Batch::<Immense, Gauss<4>>::new(steps(3))?;
+    let mut single = Irk::<Immense, Gauss<4>>::new(steps(3))?;
+    let mut results = vec![Nominal::default(); x0.len()];
+    batch.solve(&Intervals { x0: &x0, h: &[0.3], ..Default::default() }, &mut results)?;
+    for (x0, result) in x0.iter().zip(&results) {
+        let expected = single.solve(x0, &vector![], 0.3)?;
+        for i in 0..2 {
+            close("immense", ORDINARY, &[(&result.x.as_slice()[i..=i], &expected.x.as_slice()[i..=i])]);
+        }
+    }
+
+    let x0: Vec<_> = (0..9).map(|k| SVector::repeat(0.1 * k as f64 + 0.2)).collect();
+    let mut results = vec![Nominal::default(); x0.len()];
+    let mut batch = Batch::<Coupled, RadauIIA<3>>::new(steps(2))?;
+    let mut single = Irk::<Coupled, RadauIIA<3>>::new(steps(2))?;
+    batch.solve(&Intervals { x0: &x0, h: &[0.3], ..Default::default() }, &mut results)?;
+    for (x0, result) in x0.iter().zip(&results) {
+        let expected = single.solve(x0, &vector![], 0.3)?;
+        // A rounding error of a residual is 1e9 ε, and moves the slow motion by as much.
+        close("coupled", 1e9, pairs!(result, expected; x));
+    }
+    Ok(())
+}
+
 #[test]
 fn in_single_precision() -> Test {
     for count in COUNTS {

@@ -9,7 +9,8 @@ pub struct Statistics {
     pub iterations: usize,
     /// Evaluations of the residual alone at all stages; of an explicit method, of one stage.
     pub residuals: usize,
-    /// Evaluations of the residual and the Jacobian at all stages; of an explicit method, of one stage.
+    /// Evaluations of the residual and the Jacobian at all stages, or of the residual there and the Jacobian in their middle; of an explicit
+    /// method, of one stage.
     pub jacobians: usize,
     /// Factorisations of the Newton matrix.
     pub factorizations: usize,

@@ -136,7 +136,7 @@ macro_rules! answer {
             fn working_set<E: Lanes, const S: usize>(mean: bool) -> usize {
                 // Derivatives take the factors of each stage in any case.
                 let factors = if mean && const { $columns == 0 } {
-                    size_of::<M::Factors<[E; S]>>()
+                    size_of::<M::Factors<[E::Coarse; S]>>()
                 } else {
                     size_of::<M::Factors<[[E; S]; S]>>()
                 };

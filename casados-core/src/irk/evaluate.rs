@@ -45,12 +45,31 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.complete();
     }
 
-    /// The same for the mean of the stages, for which one is enough if all are alike. Of a single lane that is seldom known, as its stages are
-    /// evaluated side by side where a machine can, and so not worth compiling the mean of one.
-    pub(crate) fn evaluate_mean(&mut self) {
-        self.evaluate::<true>();
-        if const { E::LANES == 1 } {
-            self.complete();
+    /// The residual at all stages, which may be there, and one Jacobian for all of them: that in their middle. Of a single lane it is that of
+    /// each, as its stages are evaluated side by side where a machine can: the mean of those is taken.
+    pub(crate) fn evaluate_middle(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+        residual: bool,
+    ) {
+        if const { E::LANES == 1 } || self.alike {
+            self.evaluate::<true>();
+            if const { E::LANES == 1 } {
+                self.complete();
+            }
+            return;
+        }
+        dispatch(Middle::<M, E, S> { points: &mut self.points });
+        self.at_stage::<true>(0);
+        self.first_only = true;
+        self.place(coefficients, step, x, y);
+        if residual {
+            self.at_stage::<false>(0);
+        } else {
+            self.evaluate_residual();
         }
     }
 
@@ -70,21 +89,49 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             *first_only = false;
         }
         let call = Evaluate::<M, E, S, JACOBIAN> { points, f, jacobian: &mut linear.jacobian };
-        if let Err(Evaluate { points, f, jacobian }) = E::side_by_side(call) {
+        if E::side_by_side(call).is_err() {
             for i in 0..if alike { 1 } else { S } {
-                if JACOBIAN {
-                    let (f, jacobian) = (f.seen_from_mut(i), jacobian.seen_from_mut(i));
-                    M::residual_jacobian::<Strided<E, S>>(points.seen_from(i), f, jacobian);
-                } else {
-                    M::residual::<Strided<E, S>>(points.seen_from(i), f.seen_from_mut(i));
-                }
+                self.at_stage::<JACOBIAN>(i);
             }
             if alike {
-                dispatch(Spread { cells: f.as_mut() });
-                if JACOBIAN {
-                    *first_only = true;
-                }
+                dispatch(Spread { cells: self.f.as_mut() });
+                self.first_only |= JACOBIAN;
             }
+        }
+    }
+
+    /// The residual, and the Jacobian if it is asked for, at a stage.
+    #[inline(always)]
+    fn at_stage<const JACOBIAN: bool>(&mut self, i: usize) {
+        let Self { points, f, linear, .. } = self;
+        let (point, f) = (points.seen_from(i), f.seen_from_mut(i));
+        if JACOBIAN {
+            M::residual_jacobian::<Strided<E, S>>(point, f, linear.jacobian.seen_from_mut(i));
+        } else {
+            M::residual::<Strided<E, S>>(point, f);
+        }
+    }
+}
+
+/// The mean of the stages in place of the first one. (Inputs are the same at all of them.)
+struct Middle<'a, M: Dae, E: Plain, const S: usize> {
+    points: &'a mut ArrayV<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Middle<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let points = self.points.as_mut();
+        let (own, rest) = points.split_at_mut((2 * M::Shape::NX + M::Shape::NZ).min(points.len()));
+        let share = E::from_f64(const { 1.0 / S as f64 });
+        for stages in own.iter_mut().chain(rest.last_mut()) {
+            let mut total = stages[0];
+            for &stage in &stages[1..] {
+                total = total + stage;
+            }
+            stages[0] = share * total;
         }
     }
 }

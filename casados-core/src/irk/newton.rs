@@ -17,8 +17,9 @@
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
 //! values is kept as long as the iterations that are still expected with it cost less than a new one. How many that are is known from
 //! two increments; of the first one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new one, with
-//! three stages or more, is the mean of those of the stages, whose system is solved in the eigenbasis of the tableau: it
-//! costs a fraction of one with a Jacobian for each stage.
+//! three stages or more, is the mean of those of the stages, or that in their middle where they are not evaluated side by side. Its system is
+//! solved in the eigenbasis of the tableau, in numbers that may be [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for
+//! each stage.
 //!
 //! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost.
 //!
@@ -70,8 +71,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let (s, inverses) = (S as f64, 4.0 * plan.pivots.len() as f64);
         // A complex product is four real ones.
         let jacobian = operations.residual_jacobian as f64;
+        // One for all stages, where they are not evaluated side by side.
+        let middle = if E::LANES > 1 { jacobian / s } else { jacobian };
         let (updates, means) = (plan.products(s) + inverses, plan.products(1.0) + inverses);
-        [(jacobian + updates * s * s) / Self::ITERATION, (jacobian + means * 4.0) / Self::ITERATION]
+        [(jacobian + updates * s * s) / Self::ITERATION, (middle + means * 4.0) / Self::ITERATION]
     };
 
     /// The cost of a residual, in iterations.
@@ -161,7 +164,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 mean = basis.is_some() && !near && (simplified || renewals < MEANS);
                 renewals += usize::from(renew);
                 if mean && !*compensated {
-                    self.evaluate_mean();
+                    self.evaluate_middle(coefficients, step, x, y, asked);
                 } else {
                     self.evaluate_jacobian();
                 }

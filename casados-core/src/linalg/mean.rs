@@ -1,4 +1,5 @@
-//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau.
+//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau, of [coarse](Lanes::Coarse) numbers: increments that they
+//! give are corrected by the next iteration in any case.
 
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
@@ -8,7 +9,7 @@ use super::straight::{AtRow, each_row};
 use super::substitution;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
-use crate::shape::{Aligned, Plain};
+use crate::shape::Aligned;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -16,17 +17,20 @@ use core::marker::PhantomData;
 /// not be exact.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct MeanFactors<M: Dae, E: Plain, const S: usize> {
-    blocks: Aligned<M::Factors<[[Complex<E, S>; 1]; 1]>>,
-    rows: Aligned<ArrayK<M, [[Complex<E, S>; 1]; 1]>>,
+pub struct MeanFactors<M: Dae, E: Lanes, const S: usize> {
+    blocks: Aligned<M::Factors<[[Number<E, S>; 1]; 1]>>,
+    rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
 }
 
-impl<M: Dae, E: Plain, const S: usize> Clone for MeanFactors<M, E, S> {
+/// What systems in the eigenbasis are solved with.
+type Number<E, const S: usize> = Complex<<E as Lanes>::Coarse, S>;
+
+impl<M: Dae, E: Lanes, const S: usize> Clone for MeanFactors<M, E, S> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Dae, E: Plain, const S: usize> Copy for MeanFactors<M, E, S> {}
+impl<M: Dae, E: Lanes, const S: usize> Copy for MeanFactors<M, E, S> {}
 
 impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be there for the `first_only` of stages that
@@ -40,10 +44,10 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     ) {
         let blocks = &mut self.blocks;
         if const { E::LANES > 1 } && first_only {
-            let scale = basis.values.scaled(h);
+            let scale = coarse(basis.values.scaled(h));
             dispatch(AssembleMean::<M, E, S, true> { jacobian, scale, blocks });
         } else {
-            let scale = basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 }));
+            let scale = coarse(basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 })));
             dispatch(AssembleMean::<M, E, S, false> { jacobian, scale, blocks });
         }
         sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
@@ -63,11 +67,11 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
 }
 
 /// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, each block written once.
-struct AssembleMean<'a, M: Dae, E: Plain, const S: usize, const FIRST_ONLY: bool> {
+struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `hμ` of what is added up
-    scale: Complex<E, S>,
-    blocks: &'a mut M::Factors<[[Complex<E, S>; 1]; 1]>,
+    scale: Number<E, S>,
+    blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
@@ -91,18 +95,18 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<M, Complex<E, S>>() } && entry.is_fill() {
+        if const { sparse::begins_with_update::<M, Number<E, S>>() } && entry.is_fill() {
             return;
         }
         let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
         let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
         let mut element = match state {
-            Some(state) => self.scale.scaled(Self::total(state)),
+            Some(state) => self.scale.scaled(Self::total(state).coarse()),
             None => Complex::zero(),
         };
         if let Some(direct) = direct {
             let share = E::from_f64(const { if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 } });
-            element = element.plus(share * Self::total(direct));
+            element = element.plus((share * Self::total(direct)).coarse());
         }
         *to = element;
     }
@@ -110,7 +114,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
     #[inline(always)]
     fn simple(&mut self, row: usize) {
         let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<M, Complex<E, S>>() } {
+        if const { sparse::begins_with_update::<M, Number<E, S>>() } {
             return;
         }
         if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
@@ -134,10 +138,16 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AssembleMean<'_, 
     }
 }
 
-struct Split<'a, T, const S: usize> {
+/// With half of the digits.
+#[inline(always)]
+fn coarse<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
+    Complex { parts: number.parts.map(T::coarse) }
+}
+
+struct Split<'a, T: Lanes, const S: usize> {
     basis: &'a Eigenbasis<T, S, S>,
     b: &'a [[[T; 1]; S]],
-    rows: &'a mut [[[Complex<T, S>; 1]; 1]],
+    rows: &'a mut [[[Number<T, S>; 1]; 1]],
 }
 
 impl<T: Lanes, const S: usize> Kernel for Split<'_, T, S> {
@@ -148,15 +158,15 @@ impl<T: Lanes, const S: usize> Kernel for Split<'_, T, S> {
         for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
             let mut stages = [T::from_f64(0.0); S];
             stages.copy_from_slice(b.as_flattened());
-            *row = self.basis.split::<A>(&stages);
+            *row = coarse(self.basis.split::<A>(&stages));
         }
     }
 }
 
-struct Join<'a, T, const S: usize> {
+struct Join<'a, T: Lanes, const S: usize> {
     basis: &'a Eigenbasis<T, S, S>,
     b: &'a mut [[[T; 1]; S]],
-    rows: &'a [[[Complex<T, S>; 1]; 1]],
+    rows: &'a [[[Number<T, S>; 1]; 1]],
 }
 
 impl<T: Lanes, const S: usize> Kernel for Join<'_, T, S> {
@@ -165,7 +175,8 @@ impl<T: Lanes, const S: usize> Kernel for Join<'_, T, S> {
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         for ([[row]], b) in self.rows.iter().zip(self.b) {
-            b.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(row));
+            let row = Complex { parts: row.parts.map(T::fine) };
+            b.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&row));
         }
     }
 }

@@ -276,6 +276,12 @@ pub trait Scalar: Field {
     fn atanh(self) -> Self;
     /// `√(a² + b²)` without overflow
     fn hypot(self, other: Self) -> Self;
+    /// `a/c`. Where products are fused it is one, with the same bits, since [`dae`](https://docs.rs/casados-macros) asks for it only
+    /// if they are: of the sum `1/c` of these two numbers, the larger one rounded towards zero.
+    #[inline(always)]
+    fn over(self, c: f64, _reciprocal: [f64; 2]) -> Self {
+        self / Self::from_f64(c)
+    }
     /// `aⁿ`, `n` an integer
     fn powi(self, n: i32) -> Self;
     /// `aᵇ`
@@ -324,6 +330,12 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     const STAGNATION: f64;
     /// The smallest normal number: where numbers are smaller, rounding errors are not.
     const SMALLEST: f64;
+    /// As many numbers with half of the digits, where that saves half of the operations: for what need not be exact.
+    type Coarse: Lanes;
+    /// Rounded to these, infinite beyond their largest number.
+    fn coarse(self) -> Self::Coarse;
+    /// The same numbers.
+    fn fine(coarse: Self::Coarse) -> Self;
     /// One of them. `lane < LANES`
     fn lane(cell: &Self::Cell, lane: usize) -> f64;
     /// One of them set. `lane < LANES`

@@ -128,6 +128,10 @@ impl<E: Scalar + Plain, const S: usize> Scalar for Strided<E, S> {
         (Self(sin), Self(cos))
     }
     #[inline(always)]
+    fn over(self, c: f64, reciprocal: [f64; 2]) -> Self {
+        Self(self.0.over(c, reciprocal))
+    }
+    #[inline(always)]
     fn powi(self, n: i32) -> Self {
         Self(self.0.powi(n))
     }
@@ -148,6 +152,15 @@ impl<E: Lanes, const S: usize> Lanes for Strided<E, S> {
     const EPSILON: f64 = E::EPSILON;
     const STAGNATION: f64 = E::STAGNATION;
     const SMALLEST: f64 = E::SMALLEST;
+    type Coarse = Strided<E::Coarse, S>;
+    #[inline(always)]
+    fn coarse(self) -> Self::Coarse {
+        Strided(self.0.coarse())
+    }
+    #[inline(always)]
+    fn fine(coarse: Self::Coarse) -> Self {
+        Self(E::fine(coarse.0))
+    }
 
     #[inline(always)]
     fn lane(cell: &Self::Cell, lane: usize) -> f64 {

@@ -2,6 +2,7 @@
 
 mod chunk;
 mod code;
+mod divisor;
 mod documentation;
 mod dual;
 mod function;

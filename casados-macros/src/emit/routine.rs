@@ -1,6 +1,7 @@
 //! A list of expressions as Rust functions: straight-line code, generic over the scalar.
 
 use super::chunk::{self, Chunk, Plan};
+use super::divisor;
 use super::schedule::{self, Step};
 use super::together::{self, Function};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
@@ -223,6 +224,13 @@ impl Writer<'_> {
         }
     }
 
+    /// A constant by which a quotient is a product, and its reciprocal.
+    fn divisor(&self, node: Node) -> Option<[String; 3]> {
+        let Op::Constant(bits) = self.graph.op(node) else { return None };
+        let c = f64::from_bits(bits);
+        divisor::reciprocal(c).map(|[high, low]| [c, high, low].map(number))
+    }
+
     /// A node where it is computed.
     fn expression(&self, node: Node) -> String {
         let atom = |node: Node| self.atom(node);
@@ -230,6 +238,11 @@ impl Writer<'_> {
             Op::Unary(Unary::Neg, a) => format!("-{}", atom(a)),
             Op::Unary(function, a) => format!("{}.{}()", atom(a), unary(function)),
             Op::Binary(function, a, b) => {
+                if function == Binary::Div
+                    && let Some([c, high, low]) = self.divisor(b)
+                {
+                    return format!("{}.over({c}, [{high}, {low}])", atom(a));
+                }
                 let (a, b) = (atom(a), atom(b));
                 match function {
                     Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => {

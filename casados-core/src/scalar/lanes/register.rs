@@ -50,6 +50,14 @@ macro_rules! of_doubles {
             }
         )*
         #[inline(always)]
+        fn over(self, c: f64, [high, low]: [f64; 2]) -> Self {
+            if const { !$ops::FUSED } {
+                return self / Self::splat(c);
+            }
+            let low = $ops::mul(self.0, $ops::splat(low));
+            Self($ops::mul_add(self.0, $ops::splat(high), low))
+        }
+        #[inline(always)]
         fn sin_cos(self) -> (Self, Self) {
             let (sin, cos) = $ops::enter::<functions::sin_cos, _>(whole!($name, $ops, self));
             (Self(sin.0), Self(cos.0))
@@ -99,10 +107,41 @@ macro_rules! of_singles {
     };
 }
 
-/// A type of numbers: its documentation, its name, the type of one lane, the module of its instructions, and
-/// the macro of its elementary functions.
+/// Numbers that are their own coarse ones.
+macro_rules! as_it_is {
+    () => {
+        type Coarse = Self;
+        #[inline(always)]
+        fn coarse(self) -> Self {
+            self
+        }
+        #[inline(always)]
+        fn fine(coarse: Self) -> Self {
+            coarse
+        }
+    };
+}
+
+/// Eight `f64`, whose coarse numbers take half a register.
+#[cfg(target_arch = "x86_64")]
+macro_rules! in_half_a_register {
+    () => {
+        type Coarse = F32x8<N>;
+        #[inline(always)]
+        fn coarse(self) -> F32x8<N> {
+            F32x8(avx512_f64::coarse(self.0))
+        }
+        #[inline(always)]
+        fn fine(coarse: F32x8<N>) -> Self {
+            Self(avx512_f64::fine(coarse.0))
+        }
+    };
+}
+
+/// A type of numbers: its documentation, its name, the type of one lane, the module of its instructions,
+/// the macro of its elementary functions, and that of its coarse numbers.
 macro_rules! register {
-    ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident) => {
+    ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident, $coarse:ident) => {
         $(#[$attribute])*
         #[derive(Clone, Copy)]
         #[repr(transparent)]
@@ -284,6 +323,7 @@ macro_rules! register {
             const EPSILON: f64 = <$element as Lanes>::EPSILON;
             const STAGNATION: f64 = <$element as Lanes>::STAGNATION;
             const SMALLEST: f64 = <$element as Lanes>::SMALLEST;
+            $coarse!();
 
             #[inline(always)]
             fn lane(cell: &Self::Cell, lane: usize) -> f64 {
@@ -454,11 +494,11 @@ macro_rules! fours {
 
 register! {
     /// Up to two `f64`, in a register that every machine of the kind has.
-    F64x2, f64, base_f64, of_doubles
+    F64x2, f64, base_f64, of_doubles, as_it_is
 }
 register! {
     /// Up to four `f32`, in a register that every machine of the kind has.
-    F32x4, f32, base_f32, of_singles
+    F32x4, f32, base_f32, of_singles, as_it_is
 }
 double!(F64x2, base_f64);
 single!(F32x4, base_f32, F64x2);
@@ -466,12 +506,12 @@ single!(F32x4, base_f32, F64x2);
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to four `f64`, AVX2 and FMA.
-    F64x4, f64, avx2_f64, of_fours
+    F64x4, f64, avx2_f64, of_fours, as_it_is
 }
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to eight `f32`, AVX2 and FMA.
-    F32x8, f32, avx2_f32, of_singles
+    F32x8, f32, avx2_f32, of_singles, as_it_is
 }
 #[cfg(target_arch = "x86_64")]
 double!(F64x4, avx2_f64);
@@ -481,12 +521,12 @@ single!(F32x8, avx2_f32, F64x4);
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to eight `f64`, AVX-512.
-    F64x8, f64, avx512_f64, of_eights
+    F64x8, f64, avx512_f64, of_eights, in_half_a_register
 }
 #[cfg(target_arch = "x86_64")]
 register! {
     /// Up to sixteen `f32`, AVX-512.
-    F32x16, f32, avx512_f32, of_singles
+    F32x16, f32, avx512_f32, of_singles, as_it_is
 }
 #[cfg(target_arch = "x86_64")]
 double!(F64x8, avx512_f64);

@@ -5,7 +5,7 @@ mod products;
 mod reference;
 
 use super::*;
-use crate::scalar::{Lanes, Piece, Scalar};
+use crate::scalar::{Lanes, Piece, Scalar, Strided};
 use std::vec::Vec;
 
 /// Numbers in which something is special, and their neighbours.
@@ -126,6 +126,52 @@ fn products<L: Lanes>(fused: bool) {
     });
 }
 
+/// Quotients by constants have the bits of divisions, whatever they are made of.
+fn quotients<L: Lanes>() {
+    // `c`, and `1/c` as a sum that the macro has found to give them.
+    let constants = [
+        (3.0, [0.3333333333333333, 1.850371707708594e-17]),
+        (-100.0, [-0.009999999999999998, -1.5265566588595903e-18]),
+        (288.15, [0.0034704147145583897, 3.22005492639098e-19]),
+    ];
+    let mut values = specials();
+    values.extend((1..2000).map(|k| f64::from(k).powi(5).sin() * 1e3));
+    inside::<L>(|| {
+        for (c, reciprocal) in constants {
+            for start in (0..values.len()).step_by(L::LANES) {
+                let cell = cell::<L>(&values, start, 1);
+                let (mut found, mut expected) = (cell, cell);
+                L::load(&cell).over(c, reciprocal).store(&mut found);
+                (L::load(&cell) / L::from_f64(c)).store(&mut expected);
+                for lane in 0..L::LANES {
+                    let [a, found, expected] = [&cell, &found, &expected].map(|cell| L::lane(cell, lane));
+                    // Below the normal numbers of `h x` or `l x` there are fewer digits.
+                    let tiny = a.abs() < 1e-290 && (found - expected).abs() <= 5e-324;
+                    assert!(same(found, expected) || tiny, "{a:e} / {c}: {found:e}, not {expected:e}");
+                }
+            }
+        }
+    });
+}
+
+/// Coarse numbers are the same with fewer digits, or with all.
+fn coarse<L: Lanes>() {
+    let values = specials();
+    inside::<L>(|| {
+        for start in 0..values.len() {
+            let cell = cell::<L>(&values, start, 1);
+            let mut found = cell;
+            L::fine(L::load(&cell).coarse()).store(&mut found);
+            for lane in 0..L::LANES {
+                let [a, found] = [&cell, &found].map(|cell| L::lane(cell, lane));
+                let halved = size_of::<L::Coarse>() < size_of::<L>();
+                let expected = if halved { f64::from(a as f32) } else { a };
+                assert!(same(found, expected), "{a:e}: {found:e}, not {expected:e}");
+            }
+        }
+    });
+}
+
 /// Numbers of each lane beside each other are the same numbers, of any number of registers.
 fn transposed<L: Lanes>() {
     inside::<L>(|| {
@@ -216,4 +262,25 @@ fn transposes() {
     on_every_register!(check);
     transposed::<f64>();
     transposed::<f32>();
+}
+
+#[test]
+fn quotients_by_constants() {
+    macro_rules! check {
+        ($name:ident, f32, $($n:literal),*) => {};
+        ($name:ident, $element:ident, $($n:literal),*) => {$(quotients::<$name<$n>>();)*};
+    }
+    on_every_register!(check);
+    quotients::<f64>();
+    quotients::<Strided<f64, 3>>();
+}
+
+#[test]
+fn coarse_numbers() {
+    macro_rules! check {
+        ($name:ident, $element:ident, $($n:literal),*) => { $(coarse::<$name<$n>>();)* };
+    }
+    on_every_register!(check);
+    coarse::<f64>();
+    coarse::<Strided<f64, 3>>();
 }

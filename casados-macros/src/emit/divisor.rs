@@ -1,0 +1,150 @@
+//! Division by a constant in two operations, with the bits of a quotient.
+//!
+//! A division takes a processor as long as ten products. With `1/c ≈ h + l`, `h` not beyond `1/c`, so that both have one sign and
+//! infinities and zeros stay what they are,
+//!
+//! ```text
+//! x/c = RN(h x + RN(l x))
+//! ```
+//!
+//! by a fused product, for all `x` (but for results next to the least and the largest numbers), if it holds for the few whose quotient is
+//! so close to the middle of two doubles that the error of the sum before it is rounded may carry it over. These are found and tried, and if
+//! one of them fails, with the next `h` and `l`. N. Brisebarre, J.-M. Muller, S. K. Raina, "Accelerating correctly rounded floating-point
+//! division when the divisor is known in advance", IEEE Transactions on Computers 53 (2004).
+
+/// Significant bits of a double.
+const DIGITS: u32 = f64::MANTISSA_DIGITS;
+/// So many units of `1/(2ᵏ C)`, below, are close.
+const CLOSE: u128 = 64;
+
+/// `[h, l]`, if quotients by `c` are what is said above.
+pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
+    // Beyond these `l x` would often be less than the least number.
+    if !(1e-100..1e100).contains(&c.abs()) {
+        return None;
+    }
+    let nearest = 1.0 / c;
+    // What a quotient that is rounded to nearest or to zero leaves is a double.
+    let rest = |high: f64| (-high).mul_add(c, 1.0);
+    let below = u64::from(rest(nearest) < 0.0);
+    let hard: Vec<f64> = hard_cases(c).collect();
+    (below..below + 3).find_map(|below| {
+        let high = f64::from_bits(nearest.to_bits() - below);
+        let low = (rest(high) / c).to_bits();
+        [low, low + 1, low.saturating_sub(1)]
+            .into_iter()
+            .map(f64::from_bits)
+            .find_map(|low| hard.iter().all(|&x| x.mul_add(high, x * low) == x / c).then_some([high, low]))
+    })
+}
+
+/// All `x` of `2⁵² .. 2⁵³` whose quotient by `c` is within 2⁻¹⁰¹ of itself of the middle between two doubles, and some more.
+///
+/// (Where `h` is up to three units in the last place, 3 · 2⁻⁵² of itself, below `1/c`, and `l` one and a half of its own away from what is left,
+/// the sum lacks 4.5 · 2⁻¹⁰⁴ of itself, and rounding `l x` changes it by 1.5 · 2⁻¹⁰⁴.)
+///
+/// With the integers `X = x` and `C` of the significant digits such a middle is `M/2ᵏ`, `k = 53` if `X ≥ C` and else `k = 54`, and
+/// `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`: `2ᵏ X = d` modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a
+/// multiple of `2ᵏ`.)
+fn hard_cases(c: f64) -> impl Iterator<Item = f64> {
+    let digits = u128::from(c.to_bits() & ((1 << (DIGITS - 1)) - 1) | 1 << (DIGITS - 1));
+    let twos = digits.trailing_zeros();
+    let odd = digits >> twos;
+    [DIGITS, DIGITS + 1].into_iter().flat_map(move |k| {
+        let inverse = power(odd.div_ceil(2), k - twos, odd);
+        (1..=CLOSE).filter(move |d| d.trailing_zeros() >= twos).flat_map(move |d| {
+            let above = (d >> twos) * inverse % odd;
+            [above, odd - above].into_iter().flat_map(move |first| {
+                let least = 1_u128 << (DIGITS - 1);
+                let begin = first + least.saturating_sub(first).div_ceil(odd) * odd;
+                (begin..2 * least).step_by(odd as usize).map(|x| x as f64)
+            })
+        })
+    })
+}
+
+/// `base^exponent` modulo `modulus`.
+fn power(base: u128, exponent: u32, modulus: u128) -> u128 {
+    (0..exponent).fold(1 % modulus, |power, _| power * base % modulus)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// xorshift64*, Vigna 2016
+    fn random(state: &mut u64) -> u64 {
+        *state ^= *state << 13;
+        *state ^= *state >> 7;
+        *state ^= *state << 17;
+        state.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    }
+
+    /// Any number of moderate size.
+    fn number(state: &mut u64) -> f64 {
+        let (bits, exponent) = (random(state), random(state) % 200);
+        f64::from_bits(bits & (1 << 63 | ((1 << 52) - 1)) | (923 + exponent) << 52)
+    }
+
+    #[test]
+    fn quotients_have_the_same_bits() {
+        let mut state = 0x9E37_79B9_7F4A_7C15;
+        let mut kept = 0;
+        for _ in 0..2000 {
+            let c = number(&mut state);
+            let Some([high, low]) = reciprocal(c) else { continue };
+            kept += 1;
+            assert!(high.abs() <= (1.0 / c).abs() && low * c >= 0.0, "{c:e}");
+            for _ in 0..200 {
+                let x = number(&mut state);
+                assert_eq!(x.mul_add(high, x * low).to_bits(), (x / c).to_bits(), "{x:e} / {c:e}");
+            }
+        }
+        assert!(kept > 1950, "{kept} of 2000");
+    }
+
+    #[test]
+    fn numbers_of_models_are_divisors() {
+        for c in [3.0, 5.0, 10.0, 100.0, 288.15, 434.287, 0.1, -9.81] {
+            assert!(reciprocal(c).is_some(), "{c}");
+        }
+    }
+
+    /// The search is tried on its own definition.
+    #[test]
+    fn hard_cases_are_hard_and_others_are_not() {
+        let mut state = 0x2545_F491_4F6C_DD1D;
+        for _ in 0..200 {
+            let c = number(&mut state).abs();
+            let digits = u128::from(c.to_bits() & ((1 << 52) - 1) | 1 << 52);
+            let distance = |x: u128| {
+                [53, 54].map(|k| ((x << k) % digits).min(digits - (x << k) % digits)).into_iter().min()
+            };
+            let hard: Vec<f64> = hard_cases(c).collect();
+            for &x in &hard {
+                assert!(distance(x as u128) <= Some(CLOSE), "{x} / {c:e}");
+            }
+            for _ in 0..1000 {
+                let x = random(&mut state) >> 11 | 1 << 52;
+                assert!(hard.contains(&(x as f64)) || distance(u128::from(x)) > Some(CLOSE), "{x} / {c:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn infinities_and_zeros_stay() {
+        for c in [3.0, -7.0, 288.15, -434.287] {
+            let Some([high, low]) = reciprocal(c) else { panic!("{c}") };
+            for x in [0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY] {
+                assert_eq!(x.mul_add(high, x * low).to_bits(), (x / c).to_bits(), "{x} / {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_without_such_a_reciprocal() {
+        for c in [0.0, f64::NAN, f64::INFINITY, 1e-300, -1e200] {
+            assert_eq!(reciprocal(c), None, "{c}");
+        }
+    }
+}
