@@ -320,6 +320,22 @@ pub trait SideBySide<E, const S: usize> {
     fn call<R: Lanes<Cell = [E; S]>>(self);
 }
 
+/// Numbers that are their own coarse ones.
+macro_rules! as_it_is {
+    () => {
+        type Coarse = Self;
+        #[inline(always)]
+        fn coarse(self) -> Self {
+            self
+        }
+        #[inline(always)]
+        fn fine(coarse: Self) -> Self {
+            coarse
+        }
+    };
+}
+pub(crate) use as_it_is;
+
 /// One or more real numbers side by side.
 pub trait Lanes: Scalar<Cell: Plain> + Plain {
     /// How many.

@@ -137,15 +137,7 @@ macro_rules! real {
             const EPSILON: f64 = <$t>::EPSILON as f64;
             const STAGNATION: f64 = $stagnation;
             const SMALLEST: f64 = <$t>::MIN_POSITIVE as f64;
-            type Coarse = Self;
-            #[inline(always)]
-            fn coarse(self) -> Self {
-                self
-            }
-            #[inline(always)]
-            fn fine(coarse: Self) -> Self {
-                coarse
-            }
+            crate::scalar::as_it_is!();
             #[inline(always)]
             fn lane(cell: &Self, _: usize) -> f64 {
                 *cell as f64

@@ -210,13 +210,7 @@ impl Lanes for Bounded {
     const EPSILON: f64 = f64::EPSILON;
     const STAGNATION: f64 = <f64 as Lanes>::STAGNATION;
     const SMALLEST: f64 = <f64 as Lanes>::SMALLEST;
-    type Coarse = Self;
-    fn coarse(self) -> Self {
-        self
-    }
-    fn fine(coarse: Self) -> Self {
-        coarse
-    }
+    crate::scalar::as_it_is!();
     fn lane(cell: &Self, _: usize) -> f64 {
         cell.value
     }

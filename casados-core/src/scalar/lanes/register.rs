@@ -9,7 +9,7 @@ use super::together::{Abreast, Wider, abreast, ends, of_eights, of_fours, result
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::{Level, functions::Elementary, level};
-use crate::scalar::{Field, Lanes, Packed, Piece, Scalar};
+use crate::scalar::{Field, Lanes, Packed, Piece, Scalar, as_it_is};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -103,21 +103,6 @@ macro_rules! of_singles {
             let [low, high] = whole!($name, $ops, self).widen();
             let ((sin_low, cos_low), (sin_high, cos_high)) = (low.sin_cos(), high.sin_cos());
             (Self($name::narrow(sin_low, sin_high).0), Self($name::narrow(cos_low, cos_high).0))
-        }
-    };
-}
-
-/// Numbers that are their own coarse ones.
-macro_rules! as_it_is {
-    () => {
-        type Coarse = Self;
-        #[inline(always)]
-        fn coarse(self) -> Self {
-            self
-        }
-        #[inline(always)]
-        fn fine(coarse: Self) -> Self {
-            coarse
         }
     };
 }
