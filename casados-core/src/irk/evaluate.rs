@@ -3,9 +3,10 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
 //! has registers of that many numbers, one call of the model computes them all.
 
+use super::follow::{follower, has_followers};
 use super::record::{Coefficients, Times, Work};
 use super::stages::Stages;
-use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch};
+use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch, follows};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};
@@ -31,7 +32,25 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         y: &ArrayK<M, [E; S]>,
     ) {
         let Coefficients { a, c, .. } = coefficients;
-        dispatch(Place::<M, E, S> { points: &mut self.points, x, y, a, c, time: self.inputs.time, step });
+        let (jacobian, time) = (&self.linear.jacobian, self.inputs.time);
+        dispatch(Place::<M, E, S, false> { points: &mut self.points, jacobian, x, y, a, c, time, step });
+    }
+
+    /// The same, with the `k_i` of states that [follow](super::follow) those that they follow, whatever is in their places.
+    #[inline]
+    pub(crate) fn place_led(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+    ) {
+        if const { !has_followers::<M>() } {
+            return self.place(coefficients, step, x, y);
+        }
+        let Coefficients { a, c, .. } = coefficients;
+        let (jacobian, time) = (&self.linear.jacobian, self.inputs.time);
+        dispatch(Place::<M, E, S, true> { points: &mut self.points, jacobian, x, y, a, c, time, step });
     }
 
     /// The residual at all stages.
@@ -65,7 +84,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         dispatch(Middle::<M, E, S> { points: &mut self.points });
         self.at_stage::<true>(0);
         self.first_only = true;
-        self.place(coefficients, step, x, y);
+        self.place_led(coefficients, step, x, y);
         if residual {
             self.at_stage::<false>(0);
         } else {
@@ -172,9 +191,10 @@ impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
     }
 }
 
-/// See [`Work::place`].
-struct Place<'a, M: Dae, E: Plain, const S: usize> {
+/// See [`Work::place`] and [`Work::place_led`].
+struct Place<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     points: &'a mut ArrayV<M, [E; S]>,
+    jacobian: &'a M::Jacobian<[E; S]>,
     x: &'a ArrayX<M, E>,
     y: &'a ArrayK<M, [E; S]>,
     a: &'a [[E; S]; S],
@@ -183,12 +203,12 @@ struct Place<'a, M: Dae, E: Plain, const S: usize> {
     step: usize,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Place<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize, const LED: bool> Kernel for Place<'_, M, E, S, LED> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { points, x, y, a, c, time, step } = self;
+        let Self { points, jacobian, x, y, a, c, time, step } = self;
         let (points, x, y) = (points.as_mut(), x.as_ref(), y.as_ref());
         let (h, nx) = (time.step, x.len());
         if let Some(t) = points.last_mut() {
@@ -200,21 +220,40 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Place<'_, M, E, S> {
         if y.len() < nx || points.len() < nx + y.len() {
             return;
         }
-        let ((k, z), (xdot, points)) = (y.split_at(nx), points.split_at_mut(nx));
+        let ((k, z), (xdot, own)) = (y.split_at(nx), points.split_at_mut(nx));
         xdot.copy_from_slice(k);
-        let (xi, points) = points.split_at_mut(nx);
-        points[..z.len()].copy_from_slice(z);
+        let (xi, own) = own.split_at_mut(nx);
+        own[..z.len()].copy_from_slice(z);
         let minus_ha = coupling(a, h);
-        for ((xi, &x), k) in xi.iter_mut().zip(x).zip(k) {
-            let mut sum = [x; S];
-            for (column, &k) in minus_ha.iter().zip(k) {
-                for (sum, &element) in sum.iter_mut().zip(column) {
-                    *sum = A::subtract(*sum, element, k);
-                }
+        for (state, ((xi, &x), k)) in xi.iter_mut().zip(x).zip(k).enumerate() {
+            if !(LED && follows::<M>(state).is_some()) {
+                *xi = stages::<A, E, S>(x, &minus_ha, k);
             }
-            *xi = sum;
+        }
+        if LED {
+            for (state, &x) in x.iter().enumerate().take(M::STRUCTURE.elimination.steady.len()) {
+                let Some(k) = follower::<M, E, S>(state, jacobian, points) else { continue };
+                points[state] = k;
+                points[nx + state] = stages::<A, E, S>(x, &minus_ha, &k);
+            }
         }
     }
+}
+
+/// `x + h Σ_j a_ij k_j`
+#[inline(always)]
+pub(super) fn stages<A: Arithmetic, E: Field, const S: usize>(
+    x: E,
+    minus_ha: &[[E; S]; S],
+    k: &[E; S],
+) -> [E; S] {
+    let mut sum = [x; S];
+    for (column, &k) in minus_ha.iter().zip(k) {
+        for (sum, &element) in sum.iter_mut().zip(column) {
+            *sum = A::subtract(*sum, element, k);
+        }
+    }
+    sum
 }
 
 /// The entries from `begin` to `end` of a Jacobian: row, column, value.

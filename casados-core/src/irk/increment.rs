@@ -1,11 +1,11 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, follows, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Plain, Shape};
 
-/// The residual in the slots of the equations.
+/// The residual in the slots of the equations, zeros in those of states that follow others.
 pub(super) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
     pub f: &'a ArrayK<M, [E; S]>,
     pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
@@ -25,9 +25,10 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
     const INSTRUCTIONS: usize = 2 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
-        let to = self.increment.as_mut().get_mut(slot::<M>(equation));
-        if let (Some(to), Some(f)) = (to, self.f.as_ref().get(equation)) {
-            to.as_flattened_mut().copy_from_slice(f);
+        let slot = slot::<M>(equation);
+        if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
+            let zero = [E::from_f64(0.0); S];
+            to.as_flattened_mut().copy_from_slice(if follows::<M>(slot).is_some() { &zero } else { f });
         }
     }
 }

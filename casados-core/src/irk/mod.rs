@@ -29,6 +29,7 @@ mod dense;
 mod directions;
 mod evaluate;
 mod folds;
+mod follow;
 mod forward;
 mod hessian;
 mod implied;

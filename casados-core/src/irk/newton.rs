@@ -97,10 +97,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         statistics: &mut Statistics,
     ) -> Solved<E> {
         let Newton { fixed_iterations, jacobian, .. } = options.newton;
-        match fixed_iterations {
+        let solved = match fixed_iterations {
             Some(count) => self.iterate(coefficients, kept, jacobian, count, step, x, y, statistics),
             None => self.converge(coefficients, kept, options, step, x, y, statistics),
-        }
+        };
+        self.follow(coefficients, x, y);
+        solved
     }
 
     /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is computed before it is known
@@ -144,11 +146,18 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let ask = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
         let mut first = E::from_f64(0.0);
         let mut iteration = 0;
+        self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
+        let mut expect = self.expects_followers(renew);
         loop {
-            self.place(coefficients, step, x, y);
+            if expect {
+                self.place(coefficients, step, x, y);
+            } else {
+                self.place_led(coefficients, step, x, y);
+            }
             // The first iteration of nonlinear equations is far away in any case.
             let compensate = *compensated && (iteration > 0 || exact);
             if compensate {
+                self.follow(coefficients, x, y);
                 self.place_compensated(coefficients, x, y);
             }
             let asked = ask && iteration == 1;
@@ -178,6 +187,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                     }
                 }
             }
+            if core::mem::take(&mut expect) {
+                self.expect_followers(coefficients);
+            }
             if ask && iteration == 0 {
                 first = dispatch(Largest { residual: self.f.as_ref().as_flattened() });
             }
@@ -200,10 +212,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             iteration += 1;
             statistics.iterations += 1;
-            self.place_residual();
             match (basis, self.mean.get_mut()) {
-                (Some(basis), Some(factors)) if mean => factors.solve(basis, &mut self.increment),
-                _ => kept.unwrap_or(&self.linear).factors.solve(&mut self.increment),
+                (Some(basis), Some(factors)) if mean => factors.solve(basis, &self.f, &mut self.increment),
+                _ => {
+                    self.place_residual();
+                    kept.unwrap_or(&self.linear).factors.solve_led(&mut self.increment);
+                }
             }
             let floor = E::from_f64(rounding / tolerance);
             let (size, next) = dispatch(Update::<M, E, S> {
@@ -267,7 +281,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
         for iteration in 0..count {
-            self.place(coefficients, step, x, y);
+            let expect = self.expects_followers(!valid);
+            if expect {
+                self.place(coefficients, step, x, y);
+            } else {
+                self.place_led(coefficients, step, x, y);
+            }
             if valid || iteration > 0 && jacobian == Jacobian::Frozen {
                 statistics.residuals += 1;
                 self.evaluate_residual();
@@ -279,9 +298,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 kept = None;
                 self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
             }
+            if expect {
+                self.expect_followers(coefficients);
+            }
             statistics.iterations += 1;
             self.place_residual();
-            kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
+            kept.unwrap_or(&self.linear).factors.solve_led(&mut self.increment);
             dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
         }
         let zero = E::from_f64(0.0);

@@ -9,8 +9,8 @@ use super::right_side::{Later, Scatter, nodes, place, restore};
 use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, implied,
-    is_long, is_short, product, sweeps,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, STEADY, Up, Viewer, coupling, dispatch, each_row,
+    implied, is_long, is_short, product, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -321,7 +321,7 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         let minus_weights = &minus_weights::<E, W>(column, self.second);
         if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
-            sweeps::<A, M, E, [E; W], S, W, Down<true>, Up<true>>(self.factors, dy, 0, &mut ());
+            sweeps::<A, M, E, [E; W], S, W, Down<STEADY>, Up<STEADY>>(self.factors, dy, 0, &mut ());
         } else if self.phase == Phase::Whole {
             let ahead = match &self.result {
                 Some(to) if self.distant => Ahead(to.following::<W>(column)),
@@ -329,7 +329,7 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
             };
             let sums = &mut *self.sums;
             let viewer = &mut Summed { sums, minus_weights, ahead };
-            sweeps::<A, M, E, [E; W], S, W, Down<true>, Up<true>>(self.factors, dy, 0, viewer);
+            sweeps::<A, M, E, [E; W], S, W, Down<STEADY>, Up<STEADY>>(self.factors, dy, 0, viewer);
         }
         self.after::<A, W>(column, minus_weights, shared);
     }

@@ -60,6 +60,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         }
     }
 
+    /// Solves `J X = B` in place but for states that [follow](super::follows), where there is nothing.
+    pub fn solve_led<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        match self.dense() {
+            Some(dense) => {
+                dense.solve(b);
+                for (slot, row) in b.as_mut().iter_mut().enumerate() {
+                    if substitution::follows::<M>(slot).is_some() {
+                        *row = Zeroable::zeroed();
+                    }
+                }
+            }
+            None => substitution::solve_led(self.planned(), b.as_mut()),
+        }
+    }
+
     /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their slots.
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {

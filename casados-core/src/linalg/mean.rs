@@ -3,13 +3,14 @@
 
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
+use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
-use super::substitution;
+use super::substitution::{self, follows};
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
-use crate::shape::Aligned;
+use crate::shape::{Aligned, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -53,16 +54,22 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
 
-    /// Solves the Newton system of the stages in place, equations in their slots.
-    pub fn solve(&mut self, basis: &Eigenbasis<E, S, S>, b: &mut ArrayK<M, [[E; 1]; S]>) {
-        dispatch(Split { basis, b: b.as_ref(), rows: self.rows.as_mut() });
+    /// Solves the Newton system of the stages, but for states that [follow](super::follows): what is in the rows of the solution that belong to
+    /// them stays there.
+    pub fn solve(
+        &mut self,
+        basis: &Eigenbasis<E, S, S>,
+        f: &ArrayK<M, [E; S]>,
+        solution: &mut ArrayK<M, [[E; 1]; S]>,
+    ) {
+        dispatch(Split::<M, E, S> { basis, f, rows: &mut self.rows });
         let factors = Planned::<M, _, 1> {
             model: PhantomData,
             blocks: self.blocks.as_ref(),
             coupling: &[[Complex::zero()]],
         };
-        substitution::solve(factors, self.rows.as_mut());
-        dispatch(Join { basis, b: b.as_mut(), rows: self.rows.as_ref() });
+        substitution::solve_led(factors, self.rows.as_mut());
+        dispatch(Join::<M, E, S> { basis, solution, rows: &self.rows });
     }
 }
 
@@ -144,39 +151,58 @@ fn coarse<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
     Complex { parts: number.parts.map(T::coarse) }
 }
 
-struct Split<'a, T: Lanes, const S: usize> {
-    basis: &'a Eigenbasis<T, S, S>,
-    b: &'a [[[T; 1]; S]],
-    rows: &'a mut [[[Number<T, S>; 1]; 1]],
+/// Equations in their slots, in the eigenbasis.
+struct Split<'a, M: Dae, E: Lanes, const S: usize> {
+    basis: &'a Eigenbasis<E, S, S>,
+    f: &'a ArrayK<M, [E; S]>,
+    rows: &'a mut ArrayK<M, [[Number<E, S>; 1]; 1]>,
 }
 
-impl<T: Lanes, const S: usize> Kernel for Split<'_, T, S> {
-    type Number = T;
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Split<'_, M, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for ([[row]], b) in self.rows.iter_mut().zip(self.b) {
-            let mut stages = [T::from_f64(0.0); S];
-            stages.copy_from_slice(b.as_flattened());
-            *row = coarse(self.basis.split::<A>(&stages));
+    fn run<A: Arithmetic>(mut self) {
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Split<'_, M, E, S> {
+    const ROWS: usize = M::Shape::NK;
+    const INSTRUCTIONS: usize = PARTS_OF_ROW * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, equation: usize) {
+        let slot = slot::<M>(equation);
+        if follows::<M>(slot).is_some() {
+            return;
+        }
+        let (f, row) = (self.f.as_ref().get(equation), self.rows.as_mut().get_mut(slot));
+        if let (Some(f), Some([[row]])) = (f, row) {
+            *row = coarse(self.basis.split::<A>(f));
         }
     }
 }
 
-struct Join<'a, T: Lanes, const S: usize> {
-    basis: &'a Eigenbasis<T, S, S>,
-    b: &'a mut [[[T; 1]; S]],
-    rows: &'a [[[Number<T, S>; 1]; 1]],
+/// Instructions for each stage of a row.
+const PARTS_OF_ROW: usize = 3;
+
+/// Slots, back from the eigenbasis.
+struct Join<'a, M: Dae, E: Lanes, const S: usize> {
+    basis: &'a Eigenbasis<E, S, S>,
+    solution: &'a mut ArrayK<M, [[E; 1]; S]>,
+    rows: &'a ArrayK<M, [[Number<E, S>; 1]; 1]>,
 }
 
-impl<T: Lanes, const S: usize> Kernel for Join<'_, T, S> {
-    type Number = T;
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Join<'_, M, E, S> {
+    type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        for ([[row]], b) in self.rows.iter().zip(self.b) {
-            let row = Complex { parts: row.parts.map(T::fine) };
-            b.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&row));
+        for (slot, ([[row]], solution)) in self.rows.as_ref().iter().zip(self.solution.as_mut()).enumerate() {
+            if follows::<M>(slot).is_none() {
+                let row = Complex { parts: row.parts.map(E::fine) };
+                solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&row));
+            }
         }
     }
 }

@@ -43,5 +43,7 @@ pub(crate) use mean::MeanFactors;
 pub(crate) use prefetch::Ahead;
 pub(crate) use sparse::Planned;
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};
-pub(crate) use substitution::{Down, TransposedDown, TransposedUp, Up, Viewer, implied, is_implied, sweeps};
+pub(crate) use substitution::{
+    Down, STEADY, TransposedDown, TransposedUp, Up, Viewer, follows, implied, is_implied, sweeps,
+};
 pub(crate) use twice::{dot_compensated, moved, two_product};

@@ -51,6 +51,26 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     dispatch(Solve { factors, rows });
 }
 
+/// Solves `M X = R` in place, without states that [follow](follows).
+pub fn solve_led<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
+    dispatch(SolveLed(Solve { factors, rows }));
+}
+
+struct SolveLed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveLed<'_, M, E, R, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        packets!(Down<LED>, Up<LED>: self.0);
+    }
+}
+
 struct Solve<'a, M, E, R, const S: usize> {
     factors: Planned<'a, M, E, S>,
     rows: &'a mut [[R; S]],
@@ -62,7 +82,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_,
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        packets!(Down<false>, Up<false>: self);
+        packets!(Down<ALL>, Up<ALL>: self);
     }
 }
 
@@ -189,11 +209,11 @@ impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const
 
 /// One of the systems, of which each has its own instructions.
 macro_rules! system {
-    ($(#[$text:meta])* $name:ident $(<const $steady:ident>)?, $others:literal: |$sweep:ident, $pivot:ident, $of_others:ident| $what:expr) => {
+    ($(#[$text:meta])* $name:ident $(<const $pivots:ident>)?, $others:literal: |$sweep:ident, $pivot:ident, $of_others:ident| $what:expr) => {
         $(#[$text])*
-        pub struct $name$(<const $steady: bool>)?;
+        pub struct $name$(<const $pivots: u8>)?;
 
-        impl$(<const $steady: bool>)? System for $name$(<$steady>)? {
+        impl$(<const $pivots: u8>)? System for $name$(<$pivots>)? {
             const OTHERS: bool = $others;
             #[inline(always)]
             fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>(
@@ -207,17 +227,26 @@ macro_rules! system {
     };
 }
 
+/// Every pivot.
+pub const ALL: u8 = 0;
+/// What [steady](Steady) states subtract has been subtracted, their right-hand side is that of the first stage, and those that are
+/// [implied] are not found.
+pub const STEADY: u8 = 1;
+/// Without states that [follow](follows).
+pub const LED: u8 = 2;
+
 system!(
-    /// `I + L`; or where what [steady](crate::model::Steady) states subtract from the equations below them has been subtracted.
-    Down<const STEADY>, false: |sweep, pivot, others| if !(STEADY && pivot.steady) {
-        sweep.down::<A, STEADY>(pivot, others);
+    /// `I + L`
+    Down<const PIVOTS>, false: |sweep, pivot, others| if !is_left_out::<M>(PIVOTS, pivot) {
+        sweep.down::<A, PIVOTS>(pivot, others);
     }
 );
 system!(
-    /// `P + U`; or where the first stage has the right-hand side that [steady](crate::model::Steady) states have at all of them, without
-    /// those that are [implied](crate::model::Steady::implied).
-    Up<const STEADY>, false: |sweep, pivot, _others| if !(STEADY && pivot.steady && implied::<M, E, S>(pivot.slot as usize).is_some()) {
-        sweep.up::<A, STEADY>(pivot);
+    /// `P + U`
+    Up<const PIVOTS>, false: |sweep, pivot, _others| if !(is_left_out::<M>(PIVOTS, pivot)
+        && (PIVOTS == LED || implied::<M, E, S>(pivot.slot as usize).is_some()))
+    {
+        sweep.up::<A, PIVOTS>(pivot);
     }
 );
 system!(
@@ -233,10 +262,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
     Sweep<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
-    fn down<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
+    fn down<A: Arithmetic, const PIVOTS: u8>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
         // What is added to a row is added in registers where one column fills them.
         if const { align_of::<E>() > 8 && goes_by_rows::<M>(size_of::<Block<E, S>>()) } {
-            self.down_by_rows::<A, STEADY>(pivot);
+            self.down_by_rows::<A, PIVOTS>(pivot);
             if !is_scaled::<S>(pivot) {
                 return;
             }
@@ -339,7 +368,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
 
     /// What pivots before this one that are not scaled subtract from its row.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn down_by_rows<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot) {
+    fn down_by_rows<A: Arithmetic, const PIVOTS: u8>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
         if slot >= rows.len() {
@@ -348,8 +377,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
         if !pivot.left(S).is_empty() {
             let mut packet = load(rows, slot, *column);
             for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
-                // What steady states subtract is subtracted.
-                if STEADY && is_steady::<M>(left.slot as usize) {
+                if PIVOTS == STEADY && is_steady::<M>(left.slot as usize)
+                    || PIVOTS == LED && follows::<M>(left.slot as usize).is_some()
+                {
                     continue;
                 }
                 let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
@@ -361,13 +391,13 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn up<A: Arithmetic, const STEADY: bool>(&mut self, pivot: &'static Pivot) {
+    fn up<A: Arithmetic, const PIVOTS: u8>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, viewer } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        if STEADY && pivot.steady {
+        if PIVOTS == STEADY && pivot.steady {
             packet = [packet[0]; S];
         }
         for (block, other) in beside(*factors, pivot.upper()) {
@@ -393,6 +423,23 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
         store(rows, pivot.slot as usize, *column, &packet);
         viewer.see::<A>(pivot.slot as usize, &packet);
     }
+}
+
+/// Whether a pivot is left out on the way down.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn is_left_out<M: Dae>(pivots: u8, pivot: &Pivot) -> bool {
+    match pivots {
+        STEADY => pivot.steady,
+        LED => pivot.steady && follows::<M>(pivot.slot as usize).is_some(),
+        _ => false,
+    }
+}
+
+/// What is known of the steady state of a slot, if it follows another in every iteration of Newton's method, as it is
+/// [implied](Steady::implied).
+#[inline(always)]
+pub fn follows<M: Dae>(slot: usize) -> Option<&'static Steady> {
+    M::STRUCTURE.elimination.steady.get(slot).filter(|steady| steady.implied)
 }
 
 /// Whether a slot is a [steady](Steady) state.

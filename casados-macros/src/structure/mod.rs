@@ -192,7 +192,8 @@ fn elimination(
                 && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
-    let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &scaled);
+    let homogeneous = steady::homogeneous(model, trivial);
+    let steady = steady::find(x.len() as u32, (jacobian, blocks), &homogeneous, &plan, &scaled);
     Elimination { plan, positions, identity, scaled, steady }
 }
 

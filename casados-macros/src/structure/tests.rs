@@ -210,9 +210,9 @@ fn squares_of_what_is_a_multiple_of_others() {
 /// `q̇ = v` and an equation that feels `q`, or `q̇` too, or `v` by way of a control.
 #[test]
 fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
-    let steady = |own: fn(&[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
+    let steady = |own: fn(&mut Graph, &[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
         accepted(model([4, 0, 1, 0], move |g, v| {
-            let first = own(v);
+            let first = own(g, v);
             let mut f = vec![sub(g, v[0], first)];
             for derivative in &v[1..4] {
                 let (force, product) = (other(g, v), mul(g, v[5], v[6]));
@@ -226,18 +226,29 @@ fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
     };
     let sine = |g: &mut Graph, v: &[Node]| g.unary(Unary::Sin, v[4]);
     // Behind four entries of f_ẋ (0, 5); q is first by columns, felt by three.
-    assert_eq!(steady(|v| v[5], sine), [Some([4, 0, 3]), None, None, None]);
+    assert_eq!(steady(|_, v| v[5], sine), [Some([4, 0, 3]), None, None, None]);
     // The control, behind the entries of f_x.
-    assert_eq!(steady(|v| v[8], sine), [Some([16, 0, 3]), None, None, None]);
+    assert_eq!(steady(|_, v| v[8], sine), [Some([16, 0, 3]), None, None, None]);
     // The equation of q varies.
-    assert_eq!(steady(|v| v[4], sine), [None; 4]);
+    assert_eq!(steady(|_, v| v[4], sine), [None; 4]);
+    // It has a constant, or a function of time.
+    let shifted = |g: &mut Graph, v: &[Node]| {
+        let constant = g.constant(-0.5);
+        sub(g, v[5], constant)
+    };
+    assert_eq!(steady(shifted, sine), [None; 4]);
+    let timed = |g: &mut Graph, v: &[Node]| {
+        let time = g.unary(Unary::Sin, v[9]);
+        sub(g, v[5], time)
+    };
+    assert_eq!(steady(timed, sine), [None; 4]);
     let with_derivative = |g: &mut Graph, v: &[Node]| {
         let sine = g.unary(Unary::Sin, v[4]);
         sub(g, sine, v[0])
     };
-    assert_eq!(steady(|v| v[5], with_derivative), [None; 4]);
+    assert_eq!(steady(|_, v| v[5], with_derivative), [None; 4]);
     // Nobody feels q.
-    assert_eq!(steady(|v| v[5], |_, v| v[8]), [None; 4]);
+    assert_eq!(steady(|_, v| v[5], |_, v| v[8]), [None; 4]);
 }
 
 #[test]
