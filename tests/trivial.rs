@@ -1,11 +1,11 @@
 //! What is left out where equations are trivial, `q̇ = c v`: below their pivots in forward sensitivities, and rows of `D` in second
 //! derivatives. Held against differences of what they are derivatives of, with the plan of elimination and without.
 
-use casados::Method;
 use casados::irk::Integrator;
 use casados::model::Steady;
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
+use casados::Method;
 use lost::Lost;
 use nalgebra::{SMatrix, SVector, vector};
 
@@ -145,6 +145,70 @@ fn derivatives_are_those_of_the_solution() -> Test {
 fn without_the_plan() -> Test {
     check(steps::<Lost<Points<0>>, Gauss<2>, 2>()?, true)?;
     check(steps::<Lost<Points<1>>, Gauss<2>, 2>()?, true)
+}
+
+/// States that follow another one, a control and a parameter in every iteration, each felt by three more: `a`, `b`, `c`.
+#[dae(CURVED = [0, 1])]
+fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2]) -> [f64; 6] {
+    let [a, b, c, v, w, y] = x;
+    let [q, r] = if CURVED == 1 { [(a - b).sin() * c, v * w] } else { [0.0, 0.0] };
+    [
+        xdot[0] - 2.0 * y,
+        xdot[1] - u[0],
+        xdot[2] + 3.0 * p[1],
+        xdot[3] + a + b - 0.5 * c + 0.2 * w - 0.6 * y - q,
+        xdot[4] - 0.7 * a + 0.3 * b + c + 0.1 * v - p[0] - q,
+        xdot[5] + 0.4 * a - b + c + 0.3 * y - 0.2 * v + w - u[1] - r,
+    ]
+}
+
+/// Where states follow others no iteration finds them: the solution is that of the whole matrix, whose iterations find them all.
+fn same_as_whole<B: Method<S>, const S: usize, const CURVED: usize>(options: Options) -> Test
+where
+    Led<CURVED>: Dae<Shape = <Led<0> as Dae>::Shape>,
+{
+    let steady = &<Led<CURVED> as Dae>::STRUCTURE.elimination.steady;
+    assert_eq!(
+        steady.iter().map(|of| of.implied).collect::<Vec<_>>(),
+        [true, true, true, false, false, false]
+    );
+    let (at, whole) = (W::from(BEGIN), Options { newton: Newton::default(), ..options });
+    let (x, u, p) = split(&at);
+    let mut led = Integrator::<Led<CURVED>, B, S, f64, Heap>::new(options)?;
+    let mut lost = Integrator::<Lost<Led<CURVED>>, B, S, f64, Heap>::new(whole)?;
+    led.set_parameters(&p)?;
+    lost.set_parameters(&p)?;
+    let expected = lost.solve(&x, &u, LENGTH)?.x;
+    let found = led.solve(&x, &u, LENGTH)?.x;
+    assert_eq!(led.statistics().dense, 0);
+    let error = (found - expected).amax();
+    assert!(error <= ROUNDING * expected.amax(), "{error:e}");
+    Ok(())
+}
+
+#[test]
+fn states_follow_in_every_iteration() -> Test {
+    let ordinary = Options { steps: 3, ..Default::default() };
+    let fixed = |count| Newton { fixed_iterations: Some(count), ..Default::default() };
+    let by = |jacobian| Options { newton: Newton { jacobian, ..Default::default() }, ..ordinary };
+    for options in
+        [ordinary, Options { compensated: true, ..ordinary }, by(Jacobian::Full), by(Jacobian::Frozen)]
+    {
+        same_as_whole::<Gauss<1>, 1, 1>(options)?;
+        same_as_whole::<Gauss<2>, 2, 1>(options)?;
+        same_as_whole::<RadauIIA<3>, 3, 1>(options)?;
+        same_as_whole::<Gauss<4>, 4, 1>(options)?;
+        same_as_whole::<RadauIIA<3>, 3, 0>(options)?;
+    }
+    same_as_whole::<Gauss<2>, 2, 1>(Options { newton: fixed(12), ..ordinary })?;
+    // Linear equations take one iteration, from wherever it starts.
+    for newton in [fixed(1), Newton::default()] {
+        let options = Options { newton, ..ordinary };
+        same_as_whole::<Gauss<1>, 1, 0>(options)?;
+        same_as_whole::<Gauss<2>, 2, 0>(options)?;
+        same_as_whole::<Gauss<4>, 4, 0>(options)?;
+    }
+    Ok(())
 }
 
 /// An angle that three equations feel.
