@@ -1,11 +1,11 @@
 //! What is left out where equations are trivial, `q̇ = c v`: below their pivots in forward sensitivities, and rows of `D` in second
 //! derivatives. Held against differences of what they are derivatives of, with the plan of elimination and without.
 
+use casados::Method;
 use casados::irk::Integrator;
 use casados::model::Steady;
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
-use casados::Method;
 use lost::Lost;
 use nalgebra::{SMatrix, SVector, vector};
 

@@ -78,6 +78,19 @@ pub(super) const fn has_followers<M: Dae>() -> bool {
     false
 }
 
+/// The unknowns but for followers before the first that is none, and behind the last: `(first, end)`.
+pub(super) const fn led<M: Dae>() -> (usize, usize) {
+    let steady = M::STRUCTURE.elimination.steady;
+    let (mut first, mut end) = (0, M::Shape::NK);
+    while first < end && first < steady.len() && steady[first].implied {
+        first += 1;
+    }
+    while end > first && end <= steady.len() && steady[end - 1].implied {
+        end -= 1;
+    }
+    (first, end)
+}
+
 /// `k_i` of a state, if it follows something that lies at these points.
 #[inline(always)]
 pub(super) fn follower<M: Dae, E: Lanes, const S: usize>(

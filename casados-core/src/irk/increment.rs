@@ -1,11 +1,12 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
+use super::follow::led;
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, follows, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Plain, Shape};
 
-/// The residual in the slots of the equations, zeros in those of states that follow others.
+/// The residual in the slots of the equations, but for those of states that [follow](super::follow) others.
 pub(super) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
     pub f: &'a ArrayK<M, [E; S]>,
     pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
@@ -26,9 +27,11 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
         let slot = slot::<M>(equation);
+        if follows::<M>(slot).is_some() {
+            return;
+        }
         if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
-            let zero = [E::from_f64(0.0); S];
-            to.as_flattened_mut().copy_from_slice(if follows::<M>(slot).is_some() { &zero } else { f });
+            to.as_flattened_mut().copy_from_slice(f);
         }
     }
 }
@@ -100,7 +103,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     fn run<A: Arithmetic>(self) -> (E, E) {
         let Self { x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } = self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
-        for (y, increment) in y.as_mut().iter_mut().zip(increment.as_mut()) {
+        let (own_y, own) = (part_mut::<M, _>(y.as_mut()), part_mut::<M, _>(increment.as_mut()));
+        for (y, increment) in own_y.iter_mut().zip(own) {
             // In registers: the optimiser cannot know that they do not overlap.
             let (mut new, mut deltas) = (*y, *increment);
             for (y, [delta]) in new.iter_mut().zip(&mut deltas) {
@@ -111,17 +115,18 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
         }
         if measure {
             let largest = Measure::<M, E, S> { x, y, increment, weights, h, floor }.run::<A>();
-            let weights = weights.as_ref();
-            for ((size, increment), &weight) in sizes.as_mut().iter_mut().zip(increment.as_ref()).zip(weights)
+            let (sizes, weights) = (part_mut::<M, _>(sizes.as_mut()), part::<M, _>(weights.as_ref()));
+            for ((size, increment), &weight) in
+                sizes.iter_mut().zip(part::<M, _>(increment.as_ref())).zip(weights)
             {
                 *size = largest_of(increment) * weight;
             }
             return (largest, infinite);
         }
         // Four unknowns side by side, and the rest one by one.
-        let (increments, last) = increment.as_ref().as_chunks::<4>();
-        let (weights, last_weights) = weights.as_ref().as_chunks::<4>();
-        let (sizes, last_sizes) = sizes.as_mut().as_chunks_mut::<4>();
+        let (increments, last) = part::<M, _>(increment.as_ref()).as_chunks::<4>();
+        let (weights, last_weights) = part::<M, _>(weights.as_ref()).as_chunks::<4>();
+        let (sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
         let mut some = Increments::none(tolerance, full);
         for ((increments, weights), sizes) in increments.iter().zip(weights).zip(sizes) {
             some.take(increments, weights, sizes);
@@ -136,6 +141,17 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
         let number = E::le(sum.abs(), E::from_f64(f64::MAX));
         (E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite))
     }
+}
+
+/// What belongs to unknowns that iterations find, as far as that is a part of it: those that [follow](super::follow) others have no increments.
+#[inline(always)]
+fn part<M: Dae, T>(of: &[T]) -> &[T] {
+    of.get(const { led::<M>().0 }..const { led::<M>().1 }).unwrap_or_default()
+}
+
+#[inline(always)]
+fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
+    of.get_mut(const { led::<M>().0 }..const { led::<M>().1 }).unwrap_or_default()
 }
 
 /// What is known of the increments of some unknowns, in `N` strands.
@@ -237,9 +253,12 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
         let (mut largest, mut sum) = ([zero; S], [zero; S]);
-        let unknowns = y.as_ref().iter().zip(increment.as_ref()).zip(weights.as_mut());
+        let first = const { led::<M>().0 };
+        let y = part::<M, _>(y.as_ref()).iter();
+        let unknowns = y.zip(part::<M, _>(increment.as_ref())).zip(part_mut::<M, _>(weights.as_mut()));
         for (unknown, ((y, increment), weight)) in unknowns.enumerate() {
-            let mut size = (x.as_ref().get(unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
+            let mut size =
+                (x.as_ref().get(first + unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
             for (y, [delta]) in y.iter().zip(increment) {
                 size = y.abs().max(delta.abs().max(size));
             }

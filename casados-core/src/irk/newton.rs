@@ -146,6 +146,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let ask = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
         let mut first = E::from_f64(0.0);
         let mut iteration = 0;
+        // Nothing will be written where states follow others.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         let mut expect = self.expects_followers(renew);
         loop {
@@ -280,6 +281,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let valid = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
+        // Nothing will be written where states follow others.
+        self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         for iteration in 0..count {
             let expect = self.expects_followers(!valid);
             if expect {
