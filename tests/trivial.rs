@@ -3,7 +3,7 @@
 
 use casados::Method;
 use casados::irk::Integrator;
-use casados::model::Steady;
+use casados::model::{Follower, Steady};
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
 use lost::Lost;
@@ -157,7 +157,7 @@ fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2
         xdot[1] - u[0],
         xdot[2] + 3.0 * p[1],
         xdot[3] + a + b - 0.5 * c + 0.2 * w - 0.6 * y - q,
-        xdot[4] - 0.7 * a + 0.3 * b + c + 0.1 * v - p[0] - q,
+        xdot[4] - 0.7 * a + 0.3 * b + c + 0.1 * v - p[0] - q + 0.3 * xdot[0] - 0.2 * xdot[1],
         xdot[5] + 0.4 * a - b + c + 0.3 * y - 0.2 * v + w - u[1] - r,
     ]
 }
@@ -167,11 +167,9 @@ fn same_as_whole<B: Method<S>, const S: usize, const CURVED: usize>(options: Opt
 where
     Led<CURVED>: Dae<Shape = <Led<0> as Dae>::Shape>,
 {
-    let steady = &<Led<CURVED> as Dae>::STRUCTURE.elimination.steady;
-    assert_eq!(
-        steady.iter().map(|of| of.implied).collect::<Vec<_>>(),
-        [true, true, true, false, false, false]
-    );
+    let followers = <Led<CURVED> as Dae>::STRUCTURE.elimination.followers;
+    let follows: Vec<bool> = followers.iter().map(|of| of.entry != Follower::NONE).collect();
+    assert_eq!(follows, [true, true, true, false, false, false]);
     let (at, whole) = (W::from(BEGIN), Options { newton: Newton::default(), ..options });
     let (x, u, p) = split(&at);
     let mut led = Integrator::<Led<CURVED>, B, S, f64, Heap>::new(options)?;

@@ -231,7 +231,7 @@ impl<M: Dae, E: Lanes, const S: usize, const LED: bool> Kernel for Place<'_, M, 
             }
         }
         if LED {
-            for (state, &x) in x.iter().enumerate().take(M::STRUCTURE.elimination.steady.len()) {
+            for (state, &x) in x.iter().enumerate().take(M::STRUCTURE.elimination.followers.len()) {
                 let Some(k) = follower::<M, E, S>(state, jacobian, points) else { continue };
                 points[state] = k;
                 points[nx + state] = stages::<A, E, S>(x, &minus_ha, &k);

@@ -1,19 +1,10 @@
-//! States that follow another in every iteration of Newton's method.
-//!
-//! The derivative of a state that is [implied](crate::model::Steady::implied), `ẋ = c v`, is no unknown: with a state `v`
-//!
-//! ```text
-//! k_i = c (x_v + h Σ_j a_ij k_vj)
-//! ```
-//!
-//! holds before the first iteration and after each of them, so that its equations have no residual, nothing is subtracted below its pivot, and
-//! nobody solves for it. With a control or a parameter `k_i = c v`.
+//! States that [follow](crate::model::Follower) another in every iteration of Newton's method: their derivatives are no unknowns.
 
 use super::evaluate::{entry, stages};
 use super::record::{Coefficients, Work};
-use crate::linalg::{Arithmetic, Kernel, coupling, dispatch, follows, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, follows};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Follower};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
@@ -67,10 +58,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 
 /// Whether any state follows.
 pub(super) const fn has_followers<M: Dae>() -> bool {
-    let steady = M::STRUCTURE.elimination.steady;
+    let followers = M::STRUCTURE.elimination.followers;
     let mut index = 0;
-    while index < steady.len() {
-        if steady[index].implied {
+    while index < followers.len() {
+        if is_follower(&followers[index]) {
             return true;
         }
         index += 1;
@@ -80,12 +71,12 @@ pub(super) const fn has_followers<M: Dae>() -> bool {
 
 /// The unknowns but for followers before the first that is none, and behind the last: `(first, end)`.
 pub(super) const fn led<M: Dae>() -> (usize, usize) {
-    let steady = M::STRUCTURE.elimination.steady;
+    let followers = M::STRUCTURE.elimination.followers;
     let (mut first, mut end) = (0, M::Shape::NK);
-    while first < end && first < steady.len() && steady[first].implied {
+    while first < end && first < followers.len() && is_follower(&followers[first]) {
         first += 1;
     }
-    while end > first && end <= steady.len() && steady[end - 1].implied {
+    while end > first && end <= followers.len() && is_follower(&followers[end - 1]) {
         end -= 1;
     }
     (first, end)
@@ -104,6 +95,10 @@ pub(super) fn follower<M: Dae, E: Lanes, const S: usize>(
         *k = -(minus_c * *k);
     }
     Some(k)
+}
+
+const fn is_follower(of: &Follower) -> bool {
+    of.entry != Follower::NONE
 }
 
 struct Follow<'a, M: Dae, E: Plain, const S: usize> {
@@ -125,8 +120,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Follow<'_, M, E, S> {
         let Self { jacobian, points, x, rest, y, a, h } = self;
         let (points, y) = (points.as_mut(), y.as_mut());
         let minus_ha = coupling(a, h);
-        for state in 0..M::STRUCTURE.elimination.steady.len() {
-            let entry = follows::<M>(state).and_then(|steady| entry::<M, _>(jacobian, steady.entry as usize));
+        for state in 0..M::STRUCTURE.elimination.followers.len() {
+            let entry = follows::<M>(state).and_then(|of| entry::<M, _>(jacobian, of.entry as usize));
             let Some((_, leader, _)) = entry else { continue };
             let leader = leader.wrapping_sub(M::Shape::NX);
             let (x, rest) = (x.as_ref().get(leader), rest.as_ref().get(leader));
@@ -156,7 +151,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Expect<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+    fn run<A: Arithmetic>(mut self) {
+        each_row::<A, _>(&mut self);
         let Self { jacobian, f, a, h } = self;
         // `h c_i`
         let mut nodes = [E::from_f64(0.0); S];
@@ -165,24 +161,38 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Expect<'_, M, E, S> {
                 *node = *node + h * a;
             }
         }
-        for state in 0..M::STRUCTURE.elimination.steady.len() {
+        for state in 0..M::STRUCTURE.elimination.followers.len() {
             let Some(follower) = follows::<M>(state) else { continue };
             let Some((own, ..)) = entry::<M, _>(jacobian, follower.entry as usize) else { continue };
-            // What is missing in `k`.
             let Some(f_own) = f.as_mut().get_mut(own) else { continue };
-            let residual = f_own[0];
+            let missing = f_own[0];
             *f_own = [E::from_f64(0.0); S];
             for index in follower.first..follower.end {
                 let Some(&index) = M::STRUCTURE.by_column.get(index as usize) else { continue };
                 let Some((row, _, felt)) = entry::<M, _>(jacobian, index as usize) else { continue };
-                if slot::<M>(row) == state {
-                    continue;
-                }
                 let Some(f) = f.as_mut().get_mut(row) else { continue };
-                let share = felt[0] * residual;
+                let share = felt[0] * missing;
                 for (f, &node) in f.iter_mut().zip(&nodes) {
                     *f = A::subtract(*f, share, node);
                 }
+            }
+        }
+    }
+}
+
+/// What other equations have of the derivatives of followers: the residual of its own equation is what is missing in each.
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Expect<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.blocks[1];
+    const INSTRUCTIONS: usize = 2;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, index: usize) {
+        let Some((row, state, felt)) = entry::<M, _>(self.jacobian, index) else { return };
+        let own = follows::<M>(state).and_then(|of| entry::<M, _>(self.jacobian, of.entry as usize));
+        let Some((own, ..)) = own.filter(|own| own.0 != row) else { return };
+        let missing = self.f.as_ref().get(own).map(|f| f[0]);
+        if let (Some(missing), Some(f)) = (missing, self.f.as_mut().get_mut(row)) {
+            for f in f {
+                *f = A::subtract(*f, felt[0], missing);
             }
         }
     }

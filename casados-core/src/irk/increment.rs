@@ -6,7 +6,7 @@ use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Plain, Shape};
 
-/// The residual in the slots of the equations, but for those of states that [follow](super::follow) others.
+/// The residual in the slots of the equations; states that [follow](super::follow) others have none.
 pub(super) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
     pub f: &'a ArrayK<M, [E; S]>,
     pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
@@ -27,11 +27,13 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
         let slot = slot::<M>(equation);
-        if follows::<M>(slot).is_some() {
+        let follower = follows::<M>(slot);
+        if follower.is_some_and(|follower| !follower.asked) {
             return;
         }
         if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
-            to.as_flattened_mut().copy_from_slice(f);
+            let zero = [E::from_f64(0.0); S];
+            to.as_flattened_mut().copy_from_slice(if follower.is_some() { &zero } else { f });
         }
     }
 }

@@ -173,12 +173,13 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Split<'_, M, E, S> {
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
         let slot = slot::<M>(equation);
-        if follows::<M>(slot).is_some() {
+        let follower = follows::<M>(slot);
+        if follower.is_some_and(|follower| !follower.asked) {
             return;
         }
         let (f, row) = (self.f.as_ref().get(equation), self.rows.as_mut().get_mut(slot));
         if let (Some(f), Some([[row]])) = (f, row) {
-            *row = coarse(self.basis.split::<A>(f));
+            *row = if follower.is_some() { Complex::zero() } else { coarse(self.basis.split::<A>(f)) };
         }
     }
 }

@@ -9,7 +9,7 @@ use super::packets::{is_zero, load, store, subtract_of};
 use super::prefetch::Ahead;
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
-use crate::model::{Dae, Pivot, Steady, Update};
+use crate::model::{Dae, Follower, Pivot, Steady, Update};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
@@ -51,7 +51,7 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     dispatch(Solve { factors, rows });
 }
 
-/// Solves `M X = R` in place, without states that [follow](follows).
+/// Solves `M X = R` in place, where states that [follow](follows) have no right-hand side: they are found only if they are asked for.
 pub fn solve_led<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -232,7 +232,7 @@ pub const ALL: u8 = 0;
 /// What [steady](Steady) states subtract has been subtracted, their right-hand side is that of the first stage, and those that are
 /// [implied] are not found.
 pub const STEADY: u8 = 1;
-/// Without states that [follow](follows).
+/// States that [follow](follows) have no right-hand side, and are found only where they are asked for.
 pub const LED: u8 = 2;
 
 system!(
@@ -244,7 +244,7 @@ system!(
 system!(
     /// `P + U`
     Up<const PIVOTS>, false: |sweep, pivot, _others| if !(is_left_out::<M>(PIVOTS, pivot)
-        && (PIVOTS == LED || implied::<M, E, S>(pivot.slot as usize).is_some()))
+        && is_not_found::<M, E, S>(PIVOTS, pivot.slot as usize))
     {
         sweep.up::<A, PIVOTS>(pivot);
     }
@@ -430,16 +430,24 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
 fn is_left_out<M: Dae>(pivots: u8, pivot: &Pivot) -> bool {
     match pivots {
         STEADY => pivot.steady,
-        LED => pivot.steady && follows::<M>(pivot.slot as usize).is_some(),
+        LED => pivot.identity && follows::<M>(pivot.slot as usize).is_some(),
         _ => false,
     }
 }
 
-/// What is known of the steady state of a slot, if it follows another in every iteration of Newton's method, as it is
-/// [implied](Steady::implied).
+/// Whether a pivot that is left out on the way down is left out on the way up.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn is_not_found<M: Dae, E, const S: usize>(pivots: u8, slot: usize) -> bool {
+    match pivots {
+        LED => follows::<M>(slot).is_some_and(|follower| !follower.asked),
+        _ => implied::<M, E, S>(slot).is_some(),
+    }
+}
+
+/// What is known of the state of a slot, if it [follows](Follower) another in every iteration of Newton's method.
 #[inline(always)]
-pub fn follows<M: Dae>(slot: usize) -> Option<&'static Steady> {
-    M::STRUCTURE.elimination.steady.get(slot).filter(|steady| steady.implied)
+pub fn follows<M: Dae>(slot: usize) -> Option<&'static Follower> {
+    M::STRUCTURE.elimination.followers.get(slot).filter(|follower| follower.entry != Follower::NONE)
 }
 
 /// Whether a slot is a [steady](Steady) state.

@@ -20,6 +20,8 @@ pub struct Elimination {
     pub slot_of_equation: &'static [u32],
     /// For each slot whether it is a state whose pivot has the same right-hand sides at all stages; empty if none is.
     pub steady: &'static [Steady],
+    /// For each state whether it follows another in every iteration of Newton's method; empty if none does.
+    pub followers: &'static [Follower],
 }
 
 impl Elimination {
@@ -32,6 +34,7 @@ impl Elimination {
         assembly: &[],
         slot_of_equation: &[],
         steady: &[],
+        followers: &[],
     };
 
     /// How many blocks are fill.
@@ -114,6 +117,32 @@ pub struct Steady {
 
 impl Steady {
     /// No entry: the slot is no such state.
+    pub const NONE: u32 = u32::MAX;
+}
+
+/// A state `x_j` with a pivot `ẋ_j − c v = 0` and nothing else, where `v` is a state that does not follow itself, a control or a parameter. Its
+/// derivatives at the stages are those of
+///
+/// ```text
+/// k_ij = c (x_v + h Σ_l a_il k_lv)        or        k_ij = c v
+/// ```
+///
+/// before the first iteration of Newton's method and after each of them, so that its equation has no residual and nothing is subtracted below its
+/// pivot; and that nobody finds its increment but where others [ask](Follower::asked) for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Follower {
+    /// The entry of the Jacobian that is `−c`, or [`Follower::NONE`].
+    pub entry: u32,
+    /// Where in the [entries by column](super::Structure::by_column) those of `x_j` begin
+    pub first: u32,
+    /// and end.
+    pub end: u32,
+    /// Whether another pivot has a block of `U` in its column.
+    pub asked: bool,
+}
+
+impl Follower {
+    /// No entry: the state follows nobody.
     pub const NONE: u32 = u32::MAX;
 }
 

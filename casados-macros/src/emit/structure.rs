@@ -2,6 +2,7 @@
 
 use crate::graph::Node;
 use crate::language::Variables;
+use crate::structure::followers::Follower;
 use crate::structure::{Analysis, Derivatives, Elimination, Facts, FunctionAnalysis, Operations};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -124,7 +125,7 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
 /// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that is its pivot.
 fn elimination(analysis: &Analysis) -> TokenStream {
     let krate = &analysis.model.krate;
-    let Elimination { plan, positions, identity, scaled, steady } = &analysis.elimination;
+    let Elimination { plan, positions, identity, scaled, steady, followers } = &analysis.elimination;
     let mut slot_of_equation = vec![0; plan.pivots.len()];
     for &(row, column) in &plan.pivots {
         slot_of_equation[row as usize] = column;
@@ -208,6 +209,10 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         quote!(steady(#entry, #first, #end, #turn, #implied))
     });
     let steady: Vec<_> = steady.collect();
+    let followers: Vec<_> = match followers.iter().any(Option::is_some) {
+        true => followers.iter().map(follower).collect(),
+        false => Vec::new(),
+    };
     let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32)
         .filter(|&block| !positions.contains_key(&plan.blocks[block as usize]))
         .collect();
@@ -222,7 +227,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         .collect();
     let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Left, Pivot, Steady, Update};
+        use #krate::model::{Assembly, Follower, Left, Pivot, Steady, Update};
         const fn pivot(
             slot: u32,
             [block, upper, end]: [u32; 3],
@@ -234,6 +239,9 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         }
         const fn steady(entry: u32, first: u32, end: u32, turn: u32, implied: bool) -> Steady {
             Steady { entry, first, end, turn, implied }
+        }
+        const fn follower(entry: u32, first: u32, end: u32, asked: bool) -> Follower {
+            Follower { entry, first, end, asked }
         }
         const fn update(block: u32, first: bool) -> Update {
             Update { block, first }
@@ -252,8 +260,19 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             assembly: &const { [#(#assembly),*] },
             slot_of_equation: &[#(#slot_of_equation),*],
             steady: &const { [#(#steady),*] },
+            followers: &const { [#(#followers),*] },
         }
     }}
+}
+
+/// A row of the table of states that follow others.
+fn follower(of: &Option<Follower>) -> TokenStream {
+    let (numbers, asked) = match of {
+        Some(Follower { entry, first, end, asked }) => ([*entry, *first, *end], *asked),
+        None => ([u32::MAX, 0, 0], false),
+    };
+    let numbers = numbers.map(Literal::u32_unsuffixed);
+    quote!(follower(#(#numbers),*, #asked))
 }
 
 /// How many scaled pivots from each on have the same rows below them; zero for all but the first of them. Their own rows must be

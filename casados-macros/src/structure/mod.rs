@@ -3,6 +3,7 @@
 
 mod elimination;
 mod facts;
+pub mod followers;
 mod index;
 mod samples;
 mod steady;
@@ -71,6 +72,8 @@ pub struct Elimination {
     /// For each state, if right-hand sides of its pivot are the same at all stages: the entry of the Jacobian they are made of, and
     /// where in the entries by column those of its `f_x` begin and end.
     pub steady: Vec<Option<[u32; 3]>>,
+    /// For each state, if it follows another one in every iteration of Newton's method.
+    pub followers: Vec<Option<followers::Follower>>,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -192,9 +195,9 @@ fn elimination(
                 && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
         })
         .collect();
-    let homogeneous = steady::homogeneous(model, trivial);
-    let steady = steady::find(x.len() as u32, (jacobian, blocks), &homogeneous, &plan, &scaled);
-    Elimination { plan, positions, identity, scaled, steady }
+    let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &scaled);
+    let followers = followers::find(model, (jacobian, blocks), trivial, &plan, &identity);
+    Elimination { plan, positions, identity, scaled, steady, followers }
 }
 
 /// As many equations as unknowns.

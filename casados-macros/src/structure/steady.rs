@@ -1,29 +1,14 @@
 //! States such as `q` in `q̇ = v`, whose right-hand sides in forward sensitivities are the same at all stages: `casados_core::model::Steady`.
 
-use super::Model;
 use super::elimination::Plan;
-use crate::graph::{Degree, Entry, Point};
-
-/// Of trivial rows those that are `c ẋ + c′ v`, without a function of time or a constant.
-pub fn homogeneous(model: &Model, trivial: &[u32]) -> Vec<u32> {
-    let Model { graph, residual, variables, opaque, .. } = model;
-    let [x, z, u, p] = [&variables.x, &variables.z, &variables.u, &variables.p].map(|names| names.len());
-    let time = 2 * x + z + u + p;
-    // Constants that are not known here are anything.
-    let (point, opaque) = (vec![0.0; time + 1], vec![0.75; opaque.len()]);
-    let values = graph.evaluate(residual, Point { variables: &point, opaque: &opaque, seeds: &[] });
-    let degrees = graph.degrees(residual, |variable| variable as usize == time);
-    let is_homogeneous =
-        |&row: &u32| values[row as usize] == 0.0 && degrees[row as usize] == Degree::Constant;
-    trivial.iter().copied().filter(is_homogeneous).collect()
-}
+use crate::graph::Entry;
 
 /// For each of `nx` states, if it is such: the entry of the Jacobian that its right-hand sides are made of, and where in the entries by
 /// column those of its `f_x` begin and end. Pivots are `scaled`: with fewer equations below them there is nothing to be gained.
 pub fn find(
     nx: u32,
     (jacobian, blocks): (&[Entry], [usize; 6]),
-    homogeneous: &[u32],
+    trivial: &[u32],
     plan: &Plan,
     scaled: &[bool],
 ) -> Vec<Option<[u32; 3]>> {
@@ -37,7 +22,7 @@ pub fn find(
     let mut steady = vec![None; nx as usize];
     for (k, (&(row, column), &[block, upper, _])) in plan.pivots.iter().zip(&plan.ranges).enumerate() {
         let Some(to) = steady.get_mut(column as usize) else { continue };
-        if !(scaled[k] && homogeneous.contains(&row) && is_free(row)) {
+        if !(scaled[k] && trivial.contains(&row) && is_free(row)) {
             continue;
         }
         // What its equation consists of beside the derivative: a state, a control or a parameter.

@@ -210,9 +210,9 @@ fn squares_of_what_is_a_multiple_of_others() {
 /// `q̇ = v` and an equation that feels `q`, or `q̇` too, or `v` by way of a control.
 #[test]
 fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
-    let steady = |own: fn(&mut Graph, &[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
+    let steady = |own: fn(&[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
         accepted(model([4, 0, 1, 0], move |g, v| {
-            let first = own(g, v);
+            let first = own(v);
             let mut f = vec![sub(g, v[0], first)];
             for derivative in &v[1..4] {
                 let (force, product) = (other(g, v), mul(g, v[5], v[6]));
@@ -226,29 +226,71 @@ fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
     };
     let sine = |g: &mut Graph, v: &[Node]| g.unary(Unary::Sin, v[4]);
     // Behind four entries of f_ẋ (0, 5); q is first by columns, felt by three.
-    assert_eq!(steady(|_, v| v[5], sine), [Some([4, 0, 3]), None, None, None]);
+    assert_eq!(steady(|v| v[5], sine), [Some([4, 0, 3]), None, None, None]);
     // The control, behind the entries of f_x.
-    assert_eq!(steady(|_, v| v[8], sine), [Some([16, 0, 3]), None, None, None]);
+    assert_eq!(steady(|v| v[8], sine), [Some([16, 0, 3]), None, None, None]);
     // The equation of q varies.
-    assert_eq!(steady(|_, v| v[4], sine), [None; 4]);
-    // It has a constant, or a function of time.
-    let shifted = |g: &mut Graph, v: &[Node]| {
-        let constant = g.constant(-0.5);
-        sub(g, v[5], constant)
-    };
-    assert_eq!(steady(shifted, sine), [None; 4]);
-    let timed = |g: &mut Graph, v: &[Node]| {
-        let time = g.unary(Unary::Sin, v[9]);
-        sub(g, v[5], time)
-    };
-    assert_eq!(steady(timed, sine), [None; 4]);
+    assert_eq!(steady(|v| v[4], sine), [None; 4]);
     let with_derivative = |g: &mut Graph, v: &[Node]| {
         let sine = g.unary(Unary::Sin, v[4]);
         sub(g, sine, v[0])
     };
-    assert_eq!(steady(|_, v| v[5], with_derivative), [None; 4]);
+    assert_eq!(steady(|v| v[5], with_derivative), [None; 4]);
     // Nobody feels q.
-    assert_eq!(steady(|_, v| v[5], |_, v| v[8]), [None; 4]);
+    assert_eq!(steady(|v| v[5], |_, v| v[8]), [None; 4]);
+}
+
+/// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial as well.
+#[test]
+fn states_that_follow_others() {
+    type Row = fn(&mut Graph, &[Node]) -> Node;
+    let followers = |own: Row, second: Option<Row>, other: Row| {
+        let found = accepted(model([4, 0, 1, 0], move |g, v| {
+            let first = own(g, v);
+            let mut f = vec![sub(g, v[0], first)];
+            for derivative in &v[1..4] {
+                let (force, product) = (other(g, v), mul(g, v[5], v[6]));
+                let (rest, product) = (sub(g, *derivative, force), mul(g, product, v[7]));
+                f.push(sub(g, rest, product));
+            }
+            if let Some(second) = second {
+                let second = second(g, v);
+                f[1] = sub(g, v[1], second);
+            }
+            f
+        }))
+        .elimination
+        .followers;
+        found.iter().map(|of| of.map(|of| [of.entry, of.first, of.end])).collect::<Vec<_>>()
+    };
+    let sine: Row = |g, v| g.unary(Unary::Sin, v[4]);
+    // Behind four entries of f_ẋ (0, 5); q is first by columns, felt by three.
+    assert_eq!(followers(|_, v| v[5], None, sine), [Some([4, 0, 3]), None, None, None]);
+    // The control, behind the entries of f_x.
+    assert_eq!(followers(|_, v| v[8], None, sine), [Some([16, 0, 3]), None, None, None]);
+    // The equation varies; it has a constant; a function of time.
+    assert_eq!(followers(|_, v| v[4], None, sine), [None; 4]);
+    let shifted: Row = |g, v| {
+        let constant = g.constant(-0.5);
+        sub(g, v[5], constant)
+    };
+    assert_eq!(followers(shifted, None, sine), [None; 4]);
+    let timed: Row = |g, v| {
+        let time = g.unary(Unary::Sin, v[9]);
+        sub(g, v[5], time)
+    };
+    assert_eq!(followers(timed, None, sine), [None; 4]);
+    // The others feel its derivative: behind seven entries of f_ẋ.
+    let with_derivative: Row = |g, v| {
+        let sine = g.unary(Unary::Sin, v[4]);
+        sub(g, sine, v[0])
+    };
+    assert_eq!(followers(|_, v| v[5], None, with_derivative), [Some([7, 0, 3]), None, None, None]);
+    // One of two that follow each other, or of a row of them.
+    for second in [(|_, v| v[4]) as Row, |_, v| v[6], |_, v| v[8]] {
+        let found = followers(|_, v| v[5], Some(second), sine);
+        assert_eq!(found.iter().flatten().count(), 1, "{found:?}");
+    }
 }
 
 #[test]
