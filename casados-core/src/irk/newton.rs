@@ -188,11 +188,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                     }
                 }
             }
-            if core::mem::take(&mut expect) {
-                self.expect_followers(coefficients);
-            }
             if ask && iteration == 0 {
                 first = dispatch(Largest { residual: self.f.as_ref().as_flattened() });
+            }
+            if core::mem::take(&mut expect) {
+                self.expect_followers(coefficients);
             }
             if compensate {
                 self.correct_residual();
