@@ -4,7 +4,7 @@ use super::evaluate::{entry, stages};
 use super::record::{Coefficients, Work};
 use crate::linalg::{Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, follows};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Follower};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Elimination, Follower};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
@@ -95,6 +95,23 @@ pub(super) fn follower<M: Dae, E: Lanes, const S: usize>(
         *k = -(minus_c * *k);
     }
     Some(k)
+}
+
+/// How many blocks of the factors an iteration needs.
+pub(super) const fn blocks_of_iteration<M: Dae>() -> usize {
+    let Elimination { pivots, followers, .. } = M::STRUCTURE.elimination;
+    let (mut count, mut index) = (0, 0);
+    while index < pivots.len() {
+        let (pivot, slot) = (&pivots[index], pivots[index].slot as usize);
+        let (lower, upper) = (pivot.upper - pivot.block - 1, pivot.end - pivot.upper);
+        if slot >= followers.len() || !is_follower(&followers[slot]) {
+            count += 1 + lower + upper;
+        } else if followers[slot].asked {
+            count += 1 + upper;
+        }
+        index += 1;
+    }
+    count as usize
 }
 
 const fn is_follower(of: &Follower) -> bool {
