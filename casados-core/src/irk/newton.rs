@@ -14,6 +14,9 @@
 //! terms: more cannot be known. (Where a model rests, unknowns are differences of large terms that cancel: they have no digits
 //! by which an increment could be small.)
 //!
+//! States that [follow](crate::model::Follower) another one, as `q` in `q̇ = v`, are no unknowns here: their `k` is that of whom they follow before
+//! each iteration and after the last, whatever start values are given for it.
+//!
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
 //! values is kept as long as the iterations that are still expected with it cost less than a new one. How many that are is known from
 //! two increments; of the first one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new one, with

@@ -3,6 +3,7 @@
 use super::block::{Block, coupling};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
+use super::left_out::follows;
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
 use super::substitution;
@@ -66,7 +67,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
             Some(dense) => {
                 dense.solve(b);
                 for (slot, row) in b.as_mut().iter_mut().enumerate() {
-                    if substitution::follows::<M>(slot).is_some() {
+                    if follows::<M>(slot).is_some() {
                         *row = Zeroable::zeroed();
                     }
                 }

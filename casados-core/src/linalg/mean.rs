@@ -5,9 +5,10 @@ use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
+use super::left_out::follows;
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
-use super::substitution::{self, follows};
+use super::substitution;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Aligned, Shape};
@@ -169,7 +170,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Split<'_, M, E, S> {
 
 impl<M: Dae, E: Lanes, const S: usize> AtRow for Split<'_, M, E, S> {
     const ROWS: usize = M::Shape::NK;
-    const INSTRUCTIONS: usize = PARTS_OF_ROW * S;
+    const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
         let slot = slot::<M>(equation);
@@ -183,9 +184,6 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Split<'_, M, E, S> {
         }
     }
 }
-
-/// Instructions for each stage of a row.
-const PARTS_OF_ROW: usize = 3;
 
 /// Slots, back from the eigenbasis.
 struct Join<'a, M: Dae, E: Lanes, const S: usize> {

@@ -21,6 +21,7 @@ mod eigen_factors;
 mod factors;
 mod fused;
 mod kernels;
+mod left_out;
 mod mean;
 mod packets;
 mod prefetch;
@@ -39,11 +40,10 @@ pub(crate) use eigen_factors::{EigenFactors, PARTS, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::{are_finite, axpy};
+pub(crate) use left_out::{STEADY, follows, implied, is_implied};
 pub(crate) use mean::MeanFactors;
 pub(crate) use prefetch::Ahead;
 pub(crate) use sparse::Planned;
 pub(crate) use straight::{AtRow, each_row, is_long, is_short};
-pub(crate) use substitution::{
-    Down, STEADY, TransposedDown, TransposedUp, Up, Viewer, follows, implied, is_implied, sweeps,
-};
+pub(crate) use substitution::{Down, TransposedDown, TransposedUp, Up, Viewer, sweeps};
 pub(crate) use twice::{dot_compensated, moved, two_product};

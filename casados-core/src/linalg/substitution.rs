@@ -5,11 +5,12 @@
 
 use super::block::{Block, Packet, negate, subtract, subtract_scaled};
 use super::fused::{Arithmetic, Kernel, dispatch};
+use super::left_out::{ALL, LED, STEADY, follows, is_left_out, is_not_found, is_steady};
 use super::packets::{is_zero, load, store, subtract_of};
 use super::prefetch::Ahead;
 use super::sparse::{Planned, beside, has_all, is_scaled};
 use super::straight::{AtPivot, from_first, from_last, is_long};
-use crate::model::{Dae, Follower, Pivot, Steady, Update};
+use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
@@ -227,14 +228,6 @@ macro_rules! system {
     };
 }
 
-/// Every pivot.
-pub const ALL: u8 = 0;
-/// What [steady](Steady) states subtract has been subtracted, their right-hand side is that of the first stage, and those that are
-/// [implied] are not found.
-pub const STEADY: u8 = 1;
-/// States that [follow](follows) have no right-hand side, and are found only where they are asked for.
-pub const LED: u8 = 2;
-
 system!(
     /// `I + L`
     Down<const PIVOTS>, false: |sweep, pivot, others| if !is_left_out::<M>(PIVOTS, pivot) {
@@ -425,37 +418,6 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
     }
 }
 
-/// Whether a pivot is left out on the way down.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn is_left_out<M: Dae>(pivots: u8, pivot: &Pivot) -> bool {
-    match pivots {
-        STEADY => pivot.steady,
-        LED => pivot.identity && follows::<M>(pivot.slot as usize).is_some(),
-        _ => false,
-    }
-}
-
-/// Whether a pivot that is left out on the way down is left out on the way up.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn is_not_found<M: Dae, E, const S: usize>(pivots: u8, slot: usize) -> bool {
-    match pivots {
-        LED => follows::<M>(slot).is_some_and(|follower| !follower.asked),
-        _ => implied::<M, E, S>(slot).is_some(),
-    }
-}
-
-/// What is known of the state of a slot, if it [follows](Follower) another in every iteration of Newton's method.
-#[inline(always)]
-pub fn follows<M: Dae>(slot: usize) -> Option<&'static Follower> {
-    M::STRUCTURE.elimination.followers.get(slot).filter(|follower| follower.entry != Follower::NONE)
-}
-
-/// Whether a slot is a [steady](Steady) state.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn is_steady<M: Dae>(slot: usize) -> bool {
-    matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.entry != Steady::NONE)
-}
-
 /// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in another column. Of large blocks that
 /// the second cache holds the processor fetches some columns ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
 /// aircraft, with up to nineteen blocks in a row, 6 % more.
@@ -468,19 +430,6 @@ const fn goes_by_rows<M: Dae>(block: usize) -> bool {
         index += 1;
     }
     block <= 256 || longest <= 8
-}
-
-/// Whether nobody solves for a steady state, as it is [implied](Steady::implied). Of plain numbers, of which a register holds a row, what is
-/// made of it would be as much work as it is.
-#[inline(always)]
-pub const fn is_implied<E, const S: usize>(steady: &Steady) -> bool {
-    size_of::<E>() > 8 && S > 2 && steady.implied
-}
-
-/// What is known of the steady state of a slot, if it is such.
-#[inline(always)]
-pub fn implied<M: Dae, E, const S: usize>(slot: usize) -> Option<&'static Steady> {
-    M::STRUCTURE.elimination.steady.get(slot).filter(|steady| is_implied::<E, S>(steady))
 }
 
 /// The blocks below pivots: so many below each, but the optimiser does not know.
