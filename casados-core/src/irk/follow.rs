@@ -46,13 +46,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !has_followers::<M>() } {
             return;
         }
-        let Self { f, linear, inputs, .. } = self;
-        dispatch(Expect::<M, E, S> {
-            jacobian: &linear.jacobian,
-            f,
-            a: &coefficients.a,
-            h: inputs.time.step,
-        });
+        let Self { f, points, linear, inputs, .. } = self;
+        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
+        dispatch(Expect::<M, E, S> { jacobian, points, f, a, h });
     }
 }
 
@@ -80,6 +76,17 @@ pub(super) const fn led<M: Dae>() -> (usize, usize) {
         end -= 1;
     }
     (first, end)
+}
+
+/// Whom a state follows, if that is a state, and `−c`.
+#[inline(always)]
+pub(super) fn leader<M: Dae, E: Lanes, const S: usize>(
+    state: usize,
+    jacobian: &M::Jacobian<[E; S]>,
+) -> Option<(usize, E)> {
+    let (_, variable, minus_c) = entry::<M, _>(jacobian, follows::<M>(state)?.entry as usize)?;
+    let leader = variable.checked_sub(M::Shape::NX)?;
+    if leader < M::Shape::NX { Some((leader, *minus_c.first()?)) } else { None }
 }
 
 /// `k_i` of a state, if it follows something that lies at these points.
@@ -159,6 +166,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Follow<'_, M, E, S> {
 
 struct Expect<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
+    /// Where their `k` will be.
+    points: &'a mut ArrayV<M, [E; S]>,
     f: &'a mut ArrayK<M, [E; S]>,
     a: &'a [[E; S]; S],
     h: E,
@@ -170,7 +179,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Expect<'_, M, E, S> {
     #[inline(always)]
     fn run<A: Arithmetic>(mut self) {
         each_row::<A, _>(&mut self);
-        let Self { jacobian, f, a, h } = self;
+        let Self { jacobian, points, f, a, h } = self;
         // `h c_i`
         let mut nodes = [E::from_f64(0.0); S];
         for (node, a) in nodes.iter_mut().zip(a) {
@@ -184,6 +193,9 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Expect<'_, M, E, S> {
             let Some(f_own) = f.as_mut().get_mut(own) else { continue };
             let missing = f_own[0];
             *f_own = [E::from_f64(0.0); S];
+            for k in points.as_mut().get_mut(state).into_iter().flatten() {
+                *k = *k - missing;
+            }
             for index in follower.first..follower.end {
                 let Some(&index) = M::STRUCTURE.by_column.get(index as usize) else { continue };
                 let Some((row, _, felt)) = entry::<M, _>(jacobian, index as usize) else { continue };

@@ -1,8 +1,8 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use super::follow::led;
+use super::follow::{has_followers, leader, led};
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, follows, slot};
-use crate::model::{ArrayK, ArrayX, Dae};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Plain, Shape};
 
@@ -84,6 +84,7 @@ impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
 
 /// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
 pub(super) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
+    pub followed: &'a Followed<'a, M, E, S>,
     pub x: &'a ArrayX<M, E>,
     pub y: &'a mut ArrayK<M, [E; S]>,
     pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
@@ -103,7 +104,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Output = (E, E);
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> (E, E) {
-        let Self { x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } = self;
+        let Self { followed, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
+            self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
         let (own_y, own) = (part_mut::<M, _>(y.as_mut()), part_mut::<M, _>(increment.as_mut()));
         for (y, increment) in own_y.iter_mut().zip(own) {
@@ -116,7 +118,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             (*y, *increment) = (new, deltas);
         }
         if measure {
-            let largest = Measure::<M, E, S> { x, y, increment, weights, h, floor }.run::<A>();
+            let largest = Measure::<M, E, S> { followed, x, y, increment, weights, h, floor }.run::<A>();
             let (sizes, weights) = (part_mut::<M, _>(sizes.as_mut()), part::<M, _>(weights.as_ref()));
             for ((size, increment), &weight) in
                 sizes.iter_mut().zip(part::<M, _>(increment.as_ref())).zip(weights)
@@ -237,6 +239,7 @@ fn largest_of<E: Lanes, const S: usize>(increment: &[[E; 1]; S]) -> E {
 
 /// The size of an increment relative to the unknowns as they are now.
 pub(super) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
+    pub followed: &'a Followed<'a, M, E, S>,
     pub x: &'a ArrayX<M, E>,
     pub y: &'a ArrayK<M, [E; S]>,
     pub increment: &'a ArrayK<M, [[E; 1]; S]>,
@@ -250,7 +253,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { x, y, increment, weights, h, floor } = self;
+        let Self { followed, x, y, increment, weights, h, floor } = self;
         let (zero, one, smallest) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(E::SMALLEST));
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
@@ -271,8 +274,37 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
                 *sum = *sum + size;
             }
         }
-        size_of(largest, sum)
+        if const { !has_followers::<M>() } {
+            return size_of(largest, sum);
+        }
+        // `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`.
+        let &Followed { jacobian, points, norm } = followed;
+        let (mut most, norm) = (size_of(largest, sum), norm * h.abs());
+        for state in 0..M::STRUCTURE.elimination.followers.len() {
+            let Some((leader, minus_c)) = leader::<M, E, S>(state, jacobian) else { continue };
+            let (Some(weight), Some(increment)) =
+                (weights.as_mut().get_mut(leader), increment.as_ref().get(leader))
+            else {
+                continue;
+            };
+            let mut size = (x.as_ref().get(state).map_or(zero, |x| *x).abs() * per_step).max(smallest);
+            for k in points.as_ref().get(state).into_iter().flatten() {
+                size = k.abs().max(size);
+            }
+            *weight = (norm * minus_c.abs() / size).max(*weight);
+            most = (largest_of(increment) * *weight).max(most);
+        }
+        most
     }
+}
+
+/// Who [follows](super::follow) unknowns, whose increments count for them too.
+pub(super) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
+    pub jacobian: &'a M::Jacobian<[E; S]>,
+    /// Where their `k` are.
+    pub points: &'a ArrayV<M, [E; S]>,
+    /// `‖A‖`
+    pub norm: E,
 }
 
 /// The largest of all stages, or what is not a number.

@@ -29,7 +29,7 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::follow::blocks_of_iteration;
-use super::increment::{Largest, Measure, PlaceResidual, Subtract, Update};
+use super::increment::{Followed, Largest, Measure, PlaceResidual, Subtract, Update};
 use super::progress::{Look, Progress, Verdict, remaining};
 use super::record::{Coefficients, Linearization, Work};
 use crate::linalg::dispatch;
@@ -234,7 +234,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 }
             }
             let floor = E::from_f64(rounding / tolerance);
+            let followed = &Followed::<M, E, S> {
+                jacobian: &self.linear.jacobian,
+                points: &self.points,
+                norm: coefficients.norm,
+            };
             let (size, next) = dispatch(Update::<M, E, S> {
+                followed,
                 x,
                 y,
                 increment: &mut self.increment,
@@ -251,7 +257,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             verdict = progress.judge(look, size, next);
             if verdict.changed && !exact && iteration > 1 {
                 let (increment, weights) = (&self.increment, &mut self.weights);
-                let again = dispatch(Measure::<M, E, S> { x, y, increment, weights, h, floor });
+                let again = dispatch(Measure::<M, E, S> { followed, x, y, increment, weights, h, floor });
                 verdict = progress.judge(Look::Again, again, again);
             }
             if !verdict.active {
