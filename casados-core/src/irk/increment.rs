@@ -277,26 +277,31 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
         if const { !has_followers::<M>() } {
             return size_of(largest, sum);
         }
-        // `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`.
+        // `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where what `q` follows is much smaller than its change within the step.
         let &Followed { jacobian, points, norm } = followed;
-        let (mut most, norm) = (size_of(largest, sum), norm * h.abs());
+        let (mut most, norm) = (size_of(largest, sum), E::from_f64(TYPICAL) * norm * h.abs());
         for state in 0..M::STRUCTURE.elimination.followers.len() {
             let Some((leader, minus_c)) = leader::<M, E, S>(state, jacobian) else { continue };
-            let (Some(weight), Some(increment)) =
-                (weights.as_mut().get_mut(leader), increment.as_ref().get(leader))
-            else {
-                continue;
-            };
+            let Some(weight) = weights.as_mut().get_mut(leader) else { continue };
             let mut size = (x.as_ref().get(state).map_or(zero, |x| *x).abs() * per_step).max(smallest);
             for k in points.as_ref().get(state).into_iter().flatten() {
                 size = k.abs().max(size);
             }
-            *weight = (norm * minus_c.abs() / size).max(*weight);
-            most = (largest_of(increment) * *weight).max(most);
+            let bound = norm * minus_c.abs();
+            if E::any(E::lt(*weight * size, bound))
+                && let Some(increment) = increment.as_ref().get(leader)
+            {
+                *weight = (bound / size).max(*weight);
+                most = (largest_of(increment) * *weight).max(most);
+            }
         }
         most
     }
 }
+
+/// So much of their bound increments of followers typically are: `Σ_j a_ij Δ_j` sums up to half of the largest `Σ_j |a_ij| |Δ_j|` if they have one
+/// sign at all stages, and less if not. (With the bound itself 5 masses take an iteration more in each step than their own increments ask for.)
+const TYPICAL: f64 = 0.25;
 
 /// Who [follows](super::follow) unknowns, whose increments count for them too.
 pub(super) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
