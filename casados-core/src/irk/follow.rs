@@ -52,6 +52,19 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 }
 
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Takes from the residual of the others what is missing in `k` beyond its digits, of what follows: `f ← f − f_x hA r`, with the residual `r` of
+    /// its own equation.
+    pub(super) fn correct_followers(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { !has_followers::<M>() } {
+            return;
+        }
+        let Self { f, linear, inputs, .. } = self;
+        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
+        dispatch(Correct::<M, E, S> { jacobian, f, a, h });
+    }
+}
+
 /// Whether any state follows.
 pub(super) const fn has_followers<M: Dae>() -> bool {
     let followers = M::STRUCTURE.elimination.followers;
@@ -222,6 +235,35 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Expect<'_, M, E, S> {
         if let (Some(missing), Some(f)) = (missing, self.f.as_mut().get_mut(row)) {
             for f in f {
                 *f = A::subtract(*f, felt[0], missing);
+            }
+        }
+    }
+}
+
+struct Correct<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    f: &'a mut ArrayK<M, [E; S]>,
+    a: &'a [[E; S]; S],
+    h: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Correct<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, f, a, h } = self;
+        let minus_ha = coupling(a, h);
+        for state in 0..M::STRUCTURE.elimination.followers.len() {
+            let Some(follower) = follows::<M>(state) else { continue };
+            let Some((own, ..)) = entry::<M, _>(jacobian, follower.entry as usize) else { continue };
+            let Some(&residual) = f.as_ref().get(own) else { continue };
+            let shift = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
+            for index in follower.first..follower.end {
+                let Some(&index) = M::STRUCTURE.by_column.get(index as usize) else { continue };
+                let Some((row, _, felt)) = entry::<M, _>(jacobian, index as usize) else { continue };
+                let Some(f) = f.as_mut().get_mut(row) else { continue };
+                A::subtract_products(f, felt, &shift);
             }
         }
     }

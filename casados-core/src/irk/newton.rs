@@ -209,6 +209,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             if compensate {
                 self.correct_residual();
+                self.correct_followers(coefficients);
             }
             if exact && iteration > 0 {
                 self.validity.factors = true;
