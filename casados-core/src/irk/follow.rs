@@ -53,6 +53,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Writes what follows sums that have been [compensated](super::compensated), to its last digit.
+    pub(super) fn follow_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
+        if const { !has_followers::<M>() } {
+            return;
+        }
+        dispatch(Round::<M, E, S> { jacobian: &self.linear.jacobian, points: &mut self.points, y });
+    }
+
     /// Takes from the residual of the others what is missing in `k` beyond its digits, of what follows: `f ← f − f_x hA r`, with the residual `r` of
     /// its own equation.
     pub(super) fn correct_followers(&mut self, coefficients: &Coefficients<E, S>) {
@@ -235,6 +243,29 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Expect<'_, M, E, S> {
         if let (Some(missing), Some(f)) = (missing, self.f.as_mut().get_mut(row)) {
             for f in f {
                 *f = A::subtract(*f, felt[0], missing);
+            }
+        }
+    }
+}
+
+struct Round<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    points: &'a mut ArrayV<M, [E; S]>,
+    y: &'a mut ArrayK<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Round<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, points, y } = self;
+        for state in 0..M::STRUCTURE.elimination.followers.len() {
+            let k = follower::<M, E, S>(state, jacobian, points.as_ref());
+            if let (Some(k), Some(point), Some(y)) =
+                (k, points.as_mut().get_mut(state), y.as_mut().get_mut(state))
+            {
+                (*point, *y) = (k, k);
             }
         }
     }

@@ -115,6 +115,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             None => self.converge(coefficients, kept, options, step, x, y, statistics),
         };
         self.follow(coefficients, x, y);
+        if options.compensated {
+            self.place_compensated(coefficients, x, y);
+            self.follow_compensated(y);
+        }
         solved
     }
 
@@ -172,6 +176,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let compensate = *compensated && (iteration > 0 || exact);
             if compensate {
                 self.follow(coefficients, x, y);
+                self.place_compensated(coefficients, x, y);
+                self.follow_compensated(y);
                 self.place_compensated(coefficients, x, y);
             }
             let asked = ask && iteration == 1;
