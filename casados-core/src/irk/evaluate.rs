@@ -3,10 +3,10 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
 //! has registers of that many numbers, one call of the model computes them all.
 
-use super::follow::{follower, has_followers};
+use super::follow::follower;
 use super::record::{Coefficients, Times, Work};
 use super::stages::Stages;
-use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch, follows};
+use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch, follows, has_followers};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};

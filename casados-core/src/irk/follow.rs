@@ -2,9 +2,11 @@
 
 use super::evaluate::{entry, stages};
 use super::record::{Coefficients, Work};
-use crate::linalg::{Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, follows};
+use crate::linalg::{
+    Arithmetic, AtRow, Kernel, coupling, dispatch, each_row, follows, has_followers, is_follower,
+};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Elimination, Follower};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Elimination};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
@@ -50,9 +52,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
         dispatch(Expect::<M, E, S> { jacobian, points, f, a, h });
     }
-}
 
-impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Writes what follows sums that have been [compensated](super::compensated), to its last digit.
     pub(super) fn follow_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
         if const { !has_followers::<M>() } {
@@ -71,19 +71,6 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
         dispatch(Correct::<M, E, S> { jacobian, f, a, h });
     }
-}
-
-/// Whether any state follows.
-pub(super) const fn has_followers<M: Dae>() -> bool {
-    let followers = M::STRUCTURE.elimination.followers;
-    let mut index = 0;
-    while index < followers.len() {
-        if is_follower(&followers[index]) {
-            return true;
-        }
-        index += 1;
-    }
-    false
 }
 
 /// The unknowns but for followers before the first that is none, and behind the last: `(first, end)`.
@@ -140,10 +127,6 @@ pub(super) const fn blocks_of_iteration<M: Dae>() -> usize {
         index += 1;
     }
     count as usize
-}
-
-const fn is_follower(of: &Follower) -> bool {
-    of.entry != Follower::NONE
 }
 
 struct Follow<'a, M: Dae, E: Plain, const S: usize> {

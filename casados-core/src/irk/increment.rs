@@ -1,7 +1,7 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use super::follow::{has_followers, leader, led};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, follows, slot};
+use super::follow::{leader, led};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, follows, has_followers, slot};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::{Plain, Shape};

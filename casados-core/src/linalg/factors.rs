@@ -3,7 +3,7 @@
 use super::block::{Block, coupling};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::follows;
+use super::left_out::{follows, has_followers};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
 use super::substitution;
@@ -63,6 +63,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 
     /// Solves `J X = B` in place but for states that [follow](super::follows), where there is nothing.
     pub fn solve_led<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        if const { !has_followers::<M>() } {
+            return self.solve(b);
+        }
         match self.dense() {
             Some(dense) => {
                 dense.solve(b);
