@@ -278,8 +278,16 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             return size_of(largest, sum);
         }
         // `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where what `q` follows is much smaller than its change within the step.
-        let &Followed { jacobian, points, norm } = followed;
-        let (mut most, norm) = (size_of(largest, sum), E::from_f64(TYPICAL) * norm * h.abs());
+        let &Followed { jacobian, points, a } = followed;
+        let (mut most, mut norm) = (size_of(largest, sum), zero);
+        for a in a {
+            let mut sum = zero;
+            for a in a {
+                sum = sum + a.abs();
+            }
+            norm = sum.max(norm);
+        }
+        norm = E::from_f64(TYPICAL) * norm * h.abs();
         for state in 0..M::STRUCTURE.elimination.followers.len() {
             let Some((leader, minus_c)) = leader::<M, E, S>(state, jacobian) else { continue };
             let Some(weight) = weights.as_mut().get_mut(leader) else { continue };
@@ -308,8 +316,7 @@ pub(super) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// Where their `k` are.
     pub points: &'a ArrayV<M, [E; S]>,
-    /// `‖A‖`
-    pub norm: E,
+    pub a: &'a [[E; S]; S],
 }
 
 /// The largest of all stages, or what is not a number.

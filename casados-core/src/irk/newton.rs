@@ -244,7 +244,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let followed = &Followed::<M, E, S> {
                 jacobian: &self.linear.jacobian,
                 points: &self.points,
-                norm: coefficients.norm,
+                a: &coefficients.a,
             };
             let (size, next) = dispatch(Update::<M, E, S> {
                 followed,

@@ -28,8 +28,6 @@ pub(crate) struct Coefficients<E, const S: usize> {
     pub a: [[E; S]; S],
     pub b: [E; S],
     pub c: [E; S],
-    /// `‖A‖`, of the largest sums of rows.
-    pub norm: E,
     /// Lagrange polynomials at the start of the step.
     pub start: [E; S],
     /// Lagrange polynomials at its end.
@@ -55,9 +53,6 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
             a: tableau.a().map(|row| row.map(E::from_f64)),
             b: tableau.b().map(E::from_f64),
             c: tableau.c().map(E::from_f64),
-            norm: E::from_f64(
-                tableau.a().iter().fold(0.0, |most, row| row.iter().map(|a| a.abs()).sum::<f64>().max(most)),
-            ),
             start: tableau.lagrange(0.0).map(E::from_f64),
             end: end.map(E::from_f64),
             // Polynomials of higher degree are not worth much outside of their interval.
