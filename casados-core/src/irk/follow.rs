@@ -129,6 +129,7 @@ pub(super) const fn blocks_of_iteration<M: Dae>() -> usize {
     count as usize
 }
 
+/// See [`Work::follow`].
 struct Follow<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     points: &'a mut ArrayV<M, [E; S]>,
@@ -168,6 +169,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Follow<'_, M, E, S> {
     }
 }
 
+/// See [`Work::expect_followers`].
 struct Expect<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// Where their `k` will be.
@@ -231,6 +233,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Expect<'_, M, E, S> {
     }
 }
 
+/// See [`Work::follow_compensated`].
 struct Round<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     points: &'a mut ArrayV<M, [E; S]>,
@@ -254,6 +257,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Round<'_, M, E, S> {
     }
 }
 
+/// See [`Work::correct_followers`].
 struct Correct<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     f: &'a mut ArrayK<M, [E; S]>,
