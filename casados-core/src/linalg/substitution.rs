@@ -49,7 +49,7 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(Solve { factors, rows });
+    dispatch(Solve::<M, E, R, S, ALL> { factors, rows });
 }
 
 /// Solves `M X = R` in place, where states that [follow](follows) have no right-hand side: they are found only if they are asked for.
@@ -57,33 +57,23 @@ pub fn solve_led<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(SolveLed(Solve { factors, rows }));
+    dispatch(Solve::<M, E, R, S, LED> { factors, rows });
 }
 
-struct SolveLed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
-
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveLed<'_, M, E, R, S> {
-    type Number = E;
-    type Output = ();
-    const WIDE: bool = is_long::<M, S>();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        packets!(Down<LED>, Up<LED>: self.0);
-    }
-}
-
-struct Solve<'a, M, E, R, const S: usize> {
+struct Solve<'a, M, E, R, const S: usize, const PIVOTS: u8> {
     factors: Planned<'a, M, E, S>,
     rows: &'a mut [[R; S]],
 }
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const PIVOTS: u8> Kernel
+    for Solve<'_, M, E, R, S, PIVOTS>
+{
     type Number = E;
     type Output = ();
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        packets!(Down<ALL>, Up<ALL>: self);
+        packets!(Down<PIVOTS>, Up<PIVOTS>: self);
     }
 }
 
@@ -95,7 +85,7 @@ pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     dispatch(SolveTransposed(Solve { factors, rows }));
 }
 
-struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
+struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S, ALL>);
 
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
     type Number = E;
