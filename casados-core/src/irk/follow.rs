@@ -33,12 +33,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 
     /// Whether stages are all alike as long as nothing follows, so that the model, with its Jacobian, is evaluated there once: what follows is
-    /// [expected](Self::expect_followers) then.
+    /// [expected](Self::expect_followers) then. Where stages are evaluated side by side that spares nothing, and of two stages little: what
+    /// follows is then where it will be from the first evaluation on, whose Jacobians are better for it. (Simulations of 5 and 7 masses with two
+    /// stages take 10 and 20 % less, with four 5 %; a batch of the aircraft with four stages would take a fifth more.)
     pub(super) fn expects_followers(&mut self, jacobian: bool) -> bool {
         if const { !has_followers::<M>() } {
             return false;
         }
-        self.alike &= jacobian;
+        self.alike &= jacobian && E::LANES > 1 && S > 2;
         self.alike
     }
 
