@@ -203,7 +203,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                     }
                     _ => {
                         kept = None;
-                        self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+                        self.factor(coefficients);
                     }
                 }
             }
@@ -323,9 +323,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
                 self.evaluate_jacobian();
-                let h = self.inputs.time.step;
                 kept = None;
-                self.linear.factors.factor_by_plan(&self.linear.jacobian, &coefficients.a, h);
+                self.factor(coefficients);
             }
             if expect {
                 self.expect_followers(coefficients);
@@ -337,6 +336,16 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let zero = E::from_f64(0.0);
         Solved { converged: E::le(zero, zero), exact: false }
+    }
+
+    /// Factors by blocks; of all unknowns where derivatives will take them, too.
+    fn factor(&mut self, coefficients: &Coefficients<E, S>) {
+        let (Linearization { jacobian, factors }, h) = (&mut self.linear, self.inputs.time.step);
+        if const { M::STRUCTURE.linear_in_state || M::STRUCTURE.constant_matrix } {
+            factors.factor_by_plan(jacobian, &coefficients.a, h);
+        } else {
+            factors.factor_led_by_plan(jacobian, &coefficients.a, h);
+        }
     }
 
     /// Whether the residual that an increment leaves, of the `first` one, lets so many iterations be expected that new factors cost less.

@@ -6,6 +6,7 @@ use super::complex::Complex;
 use super::dense::Dense;
 use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
+use super::left_out::ALL;
 use super::sparse::{self, Planned};
 use super::substitution;
 use crate::model::{ArrayK, Dae};
@@ -143,7 +144,8 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
             }
             *to = element;
         }
-        sparse::Factor::<M, _, 1> { coupling: &[[Complex::zero()]], blocks, model: PhantomData }.run::<A>();
+        sparse::Factor::<M, _, 1, ALL> { coupling: &[[Complex::zero()]], blocks, model: PhantomData }
+            .run::<A>();
         // A pivot that vanishes leaves infinite elements or NaN.
         let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
         pivots.fold(true, |finite, [[element]]| finite & element.is_finite())

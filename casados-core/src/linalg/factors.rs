@@ -1,9 +1,9 @@
 //! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
 
-use super::block::{Block, coupling};
+use super::block::{self, Block};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{follows, has_followers};
+use super::left_out::{fill, follows, has_followers, is_fill, is_led, row_of, rows};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
 use super::substitution;
@@ -49,8 +49,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let Self { coupling, blocks, .. } = self;
-        dispatch(Assemble::<M, E, S> { jacobian, a, h, coupling, blocks });
+        *coupling = block::coupling(a, h);
+        dispatch(Assemble::<M, E, S, false> { jacobian, coupling, blocks });
         sparse::factor::<M, E, S>(coupling, blocks.as_mut());
+    }
+
+    /// The same for [`solve_led`](Self::solve_led) alone: states that have gone into [those that they follow](crate::model::Led) are left out.
+    pub fn factor_led_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
+        if const { !is_led::<M>() } {
+            return self.factor_by_plan(jacobian, a, h);
+        }
+        self.is_dense = false;
+        let Self { coupling, blocks, .. } = self;
+        *coupling = block::coupling(a, h);
+        dispatch(Assemble::<M, E, S, true> { jacobian, coupling, blocks });
+        sparse::factor_led::<M, E, S>(coupling, blocks.as_mut());
     }
 
     /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots.
@@ -115,47 +128,58 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     }
 }
 
-/// All blocks of the Newton matrix, each written once.
-struct Assemble<'a, M: Dae, E: Plain, const S: usize> {
+/// All blocks of the Newton matrix, each written once; or of that without states that have gone into those that they follow.
+struct Assemble<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
-    a: &'a [[E; S]; S],
-    h: E,
-    /// Becomes `−hA`.
-    coupling: &'a mut Block<E, S>,
+    /// `−hA`
+    coupling: &'a Block<E, S>,
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> {
+impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> Kernel for Assemble<'_, M, E, S, LED> {
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
-        *self.coupling = coupling(self.a, self.h);
-        each_row::<A, _>(&mut self);
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, coupling, blocks } = self;
+        // `−(hA)²`
+        let mut square = [[E::from_f64(0.0); S]; S];
+        if LED {
+            A::subtract_blocks(&mut square, coupling, coupling);
+        }
+        each_row::<A, _>(&mut Rows::<M, E, S, LED> { jacobian, coupling: *coupling, square, blocks });
     }
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
-    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
-    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
+/// See [`Assemble`].
+struct Rows<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    coupling: Block<E, S>,
+    square: Block<E, S>,
+    blocks: &'a mut M::Factors<Block<E, S>>,
+}
+
+impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> AtRow for Rows<'_, M, E, S, LED> {
+    const ROWS: usize = rows::<M>(LED);
+    const SIMPLE: usize = fill::<M>(LED);
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<M, E>() } && entry.is_fill() {
+        let Some((own, led)) = row_of::<M>(LED, row) else { return };
+        if const { sparse::begins_with_update::<M, E>() } && is_fill(own, led) {
             return;
         }
-        let Some(to) = blocks.get_mut(entry.block as usize) else { return };
+        let Some(to) = blocks.get_mut(own.block as usize) else { return };
         // An index that marks what is not there lies outside of the Jacobian.
-        let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
+        let (state, direct) = (jacobian.get(own.state as usize), jacobian.get(own.direct as usize));
         let mut block = [[E::from_f64(0.0); S]; S];
         if let Some(state) = state {
-            if (const { S > 1 }) && entry.scaled {
+            if (const { S > 1 }) && own.scaled {
                 to[0] = *state;
                 return;
             }
-            for (column, ha) in block.iter_mut().zip(&*self.coupling) {
+            for (column, ha) in block.iter_mut().zip(&self.coupling) {
                 A::subtract_products(column, state, ha);
             }
         }
@@ -164,16 +188,31 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Assemble<'_, M, E, S> {
                 column[stage] = column[stage] + direct;
             }
         }
+        if LED
+            && let Some(led) = led
+            && let Some(minus_c) = jacobian.get(led.by as usize)
+        {
+            let ways = [(led.direct, &self.coupling), (led.state, &self.square)];
+            for (entry, columns) in ways {
+                let Some(&(mut felt)) = jacobian.get(entry as usize) else { continue };
+                for (felt, &minus_c) in felt.iter_mut().zip(minus_c) {
+                    *felt = -(*felt * minus_c);
+                }
+                for (column, ha) in block.iter_mut().zip(columns) {
+                    A::subtract_products(column, &felt, ha);
+                }
+            }
+        }
         *to = block;
     }
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        let Some((own, _)) = row_of::<M>(LED, row) else { return };
         if const { sparse::begins_with_update::<M, E>() } {
             return;
         }
-        if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
+        if let Some(block) = self.blocks.as_mut().get_mut(own.block as usize) {
             *block = [[E::from_f64(0.0); S]; S];
         }
     }

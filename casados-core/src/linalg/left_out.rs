@@ -1,6 +1,6 @@
 //! Which pivots of a plan a solve leaves out: of states whose right-hand side or solution is known without it.
 
-use crate::model::{Dae, Follower, Pivot, Steady};
+use crate::model::{Assembly, Dae, Follower, Led, Pivot, Steady};
 
 /// Every pivot.
 pub const ALL: u8 = 0;
@@ -44,6 +44,17 @@ pub fn follows<M: Dae>(slot: usize) -> Option<&'static Follower> {
     M::STRUCTURE.elimination.followers.get(slot).filter(|follower| is_follower(follower))
 }
 
+/// Whether iterations leave states out of the elimination.
+pub const fn is_led<M: Dae>() -> bool {
+    WANTED && !M::STRUCTURE.elimination.led.is_empty()
+}
+
+/// Whether the elimination leaves a pivot out: its state has gone into whom it follows.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub fn is_absorbed<M: Dae>(pivots: u8, pivot: &Pivot) -> bool {
+    pivots == LED && pivot.identity && follows::<M>(pivot.slot as usize).is_some_and(|of| of.absorbed)
+}
+
 /// Whether any state follows.
 pub const fn has_followers<M: Dae>() -> bool {
     let followers = M::STRUCTURE.elimination.followers;
@@ -74,4 +85,33 @@ pub const fn is_implied<E, const S: usize>(steady: &Steady) -> bool {
 #[inline(always)]
 pub fn implied<M: Dae, E, const S: usize>(slot: usize) -> Option<&'static Steady> {
     M::STRUCTURE.elimination.steady.get(slot).filter(|steady| is_implied::<E, S>(steady))
+}
+
+/// How many blocks there are, of all or where states that are absorbed are left out.
+pub const fn rows<M: Dae>(led: bool) -> usize {
+    let plan = &M::STRUCTURE.elimination;
+    if led { plan.led.len() } else { plan.assembly.len() }
+}
+
+/// How many of them are fill, which are the first.
+pub const fn fill<M: Dae>(led: bool) -> usize {
+    let plan = &M::STRUCTURE.elimination;
+    if led { plan.fill_led() } else { plan.fill() }
+}
+
+/// What one of them is made of: its own entries, and those of a state that is absorbed.
+#[inline(always)]
+pub fn row_of<M: Dae>(led: bool, row: usize) -> Option<(&'static Assembly, Option<&'static Led>)> {
+    let plan = &M::STRUCTURE.elimination;
+    if led {
+        plan.led.get(row).map(|led| (&led.own, Some(led)))
+    } else {
+        plan.assembly.get(row).map(|own| (own, None))
+    }
+}
+
+/// Whether only elimination puts something there.
+#[inline(always)]
+pub fn is_fill(own: &Assembly, led: Option<&Led>) -> bool {
+    led.map_or(own.is_fill(), Led::is_fill)
 }

@@ -5,7 +5,7 @@ use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::follows;
+use super::left_out::{fill, follows, is_fill, is_led, row_of, rows};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
 use super::substitution;
@@ -46,13 +46,15 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     ) {
         let blocks = &mut self.blocks;
         if const { E::LANES > 1 } && first_only {
-            let scale = coarse(basis.values.scaled(h));
-            dispatch(AssembleMean::<M, E, S, true> { jacobian, scale, blocks });
+            let scale = basis.values.scaled(h);
+            let scales = [scale, scale * scale].map(coarse);
+            dispatch(AssembleMean::<M, E, S, true> { jacobian, scales, blocks });
         } else {
-            let scale = coarse(basis.values.scaled(h * E::from_f64(const { 1.0 / S as f64 })));
-            dispatch(AssembleMean::<M, E, S, false> { jacobian, scale, blocks });
+            let (scale, share) = (basis.values.scaled(h), E::from_f64(const { 1.0 / S as f64 }));
+            let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(coarse);
+            dispatch(AssembleMean::<M, E, S, false> { jacobian, scales, blocks });
         }
-        sparse::factor::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
+        sparse::factor_led::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
 
     /// Solves the Newton system of the stages, but for states that [follow](super::follows): what is in the rows of the solution that belong to
@@ -74,11 +76,11 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     }
 }
 
-/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, each block written once.
+/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, and what of it has gone into the columns of others, each block written once.
 struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
-    /// `hμ` of what is added up
-    scale: Number<E, S>,
+    /// `hμ` and `(hμ)²` of what is added up
+    scales: [Number<E, S>; 2],
     blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
 }
 
@@ -96,36 +98,45 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
 impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
     for AssembleMean<'_, M, E, S, FIRST_ONLY>
 {
-    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
-    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
+    const ROWS: usize = rows::<M>(is_led::<M>());
+    const SIMPLE: usize = fill::<M>(is_led::<M>());
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
-        if const { sparse::begins_with_update::<M, Number<E, S>>() } && entry.is_fill() {
+        let Some((own, led)) = row_of::<M>(is_led::<M>(), row) else { return };
+        if const { sparse::begins_with_update::<M, Number<E, S>>() } && is_fill(own, led) {
             return;
         }
-        let Some([[to]]) = blocks.get_mut(entry.block as usize) else { return };
-        let (state, direct) = (jacobian.get(entry.state as usize), jacobian.get(entry.direct as usize));
-        let mut element = match state {
-            Some(state) => self.scale.scaled(Self::total(state).coarse()),
+        let Some([[to]]) = blocks.get_mut(own.block as usize) else { return };
+        let [scale, square] = self.scales;
+        let mut element = match jacobian.get(own.state as usize) {
+            Some(state) => scale.scaled(Self::total(state).coarse()),
             None => Complex::zero(),
         };
-        if let Some(direct) = direct {
+        if let Some(direct) = jacobian.get(own.direct as usize) {
             let share = E::from_f64(const { if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 } });
             element = element.plus((share * Self::total(direct)).coarse());
+        }
+        if let Some(led) = led
+            && let Some([minus_c, ..]) = jacobian.get(led.by as usize).map(<[E; S]>::as_slice)
+        {
+            for (entry, scale) in [(led.direct, scale), (led.state, square)] {
+                if let Some(felt) = jacobian.get(entry as usize) {
+                    element = element - scale.scaled((*minus_c * Self::total(felt)).coarse());
+                }
+            }
         }
         *to = element;
     }
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some(entry) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        let Some((own, _)) = row_of::<M>(is_led::<M>(), row) else { return };
         if const { sparse::begins_with_update::<M, Number<E, S>>() } {
             return;
         }
-        if let Some(block) = self.blocks.as_mut().get_mut(entry.block as usize) {
+        if let Some(block) = self.blocks.as_mut().get_mut(own.block as usize) {
             *block = [[Complex::zero()]];
         }
     }

@@ -17,6 +17,7 @@
 
 use super::block::{Block, inverse, product};
 use super::fused::{Arithmetic, Kernel, dispatch};
+use super::left_out::{ALL, LED, is_absorbed};
 use super::straight::{AtPivot, from_first, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
@@ -41,17 +42,22 @@ impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot block
 /// that is singular leaves elements that are not finite.
 pub fn factor<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
-    dispatch(Factor::<M, E, S> { coupling, blocks, model: PhantomData });
+    dispatch(Factor::<M, E, S, ALL> { coupling, blocks, model: PhantomData });
+}
+
+/// The same without states that have gone into [those that they follow](crate::model::Led).
+pub fn factor_led<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
+    dispatch(Factor::<M, E, S, LED> { coupling, blocks, model: PhantomData });
 }
 
 /// See [`factor`].
-pub(super) struct Factor<'a, M, E, const S: usize> {
+pub(super) struct Factor<'a, M, E, const S: usize, const PIVOTS: u8> {
     pub coupling: &'a Block<E, S>,
     pub blocks: &'a mut [Block<E, S>],
     pub model: PhantomData<M>,
 }
 
-impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
+impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> Kernel for Factor<'_, M, E, S, PIVOTS> {
     type Number = E;
     type Output = ();
     const WIDE: bool = is_long::<M, S>();
@@ -63,12 +69,15 @@ impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     }
 }
 
-impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
+impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> AtPivot for Factor<'_, M, E, S, PIVOTS> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [Update]) {
         let Self { coupling, blocks, .. } = self;
+        if is_absorbed::<M>(PIVOTS, pivot) {
+            return;
+        }
         if is_scaled::<S>(pivot) {
             let width = pivot.upper().len();
             for (index, upper) in pivot.upper().enumerate() {
@@ -81,7 +90,7 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
                         continue;
                     };
                     let Some(block) = blocks.get_mut(target.block as usize) else { continue };
-                    if is_first::<M, E>(target) {
+                    if is_first::<M, E, PIVOTS>(target) {
                         let mut sum = [[E::from_f64(0.0); S]; S];
                         for (column, product) in sum.iter_mut().zip(&product) {
                             A::subtract_products(column, &scale, product);
@@ -112,7 +121,7 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
                 for (upper, target) in pivot.upper().zip(&mut updates) {
                     let Some(&upper) = blocks.get(upper) else { continue };
                     if let Some(block) = blocks.get_mut(target.block as usize) {
-                        update::<A, M, E, S>(block, target, &lower, &upper);
+                        update::<A, M, E, S, PIVOTS>(block, target, &lower, &upper);
                     }
                 }
             }
@@ -125,7 +134,7 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
                 if let (Some(upper), Some(block)) = (upper, block) {
-                    update::<A, M, E, S>(block, target, &lower, upper);
+                    update::<A, M, E, S, PIVOTS>(block, target, &lower, upper);
                 }
             }
         }
@@ -134,13 +143,13 @@ impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
 
 /// `block − lower · upper`
 #[inline(always)]
-fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
+fn update<A: Arithmetic, M: Dae, E: Field, const S: usize, const PIVOTS: u8>(
     block: &mut Block<E, S>,
     target: &Update,
     lower: &Block<E, S>,
     upper: &Block<E, S>,
 ) {
-    if is_first::<M, E>(target) {
+    if is_first::<M, E, PIVOTS>(target) {
         let mut sum = [[E::from_f64(0.0); S]; S];
         A::subtract_blocks(&mut sum, lower, upper);
         *block = sum;
@@ -157,8 +166,8 @@ pub const fn begins_with_update<M: Dae, E>() -> bool {
 
 /// Whether nothing is there before an update.
 #[inline(always)]
-const fn is_first<M: Dae, E>(update: &Update) -> bool {
-    (const { begins_with_update::<M, E>() }) && update.first
+const fn is_first<M: Dae, E, const PIVOTS: u8>(update: &Update) -> bool {
+    (const { begins_with_update::<M, E>() }) && if PIVOTS == LED { update.first_led } else { update.first }
 }
 
 /// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.

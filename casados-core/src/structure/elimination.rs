@@ -22,6 +22,9 @@ pub struct Elimination {
     pub steady: &'static [Steady],
     /// For each state whether it follows another in every iteration of Newton's method; empty if none does.
     pub followers: &'static [Follower],
+    /// What the blocks are made of where states that are [absorbed](Follower::absorbed) are left out of the elimination, as
+    /// [`assembly`](Self::assembly); empty if none is.
+    pub led: &'static [Led],
 }
 
 impl Elimination {
@@ -35,6 +38,7 @@ impl Elimination {
         slot_of_equation: &[],
         steady: &[],
         followers: &[],
+        led: &[],
     };
 
     /// How many blocks are fill.
@@ -42,6 +46,16 @@ impl Elimination {
     pub const fn fill(&self) -> usize {
         let mut count = 0;
         while count < self.assembly.len() && self.assembly[count].is_fill() {
+            count += 1;
+        }
+        count
+    }
+
+    /// How many blocks are fill where states that are [absorbed](Follower::absorbed) are left out.
+    #[must_use]
+    pub const fn fill_led(&self) -> usize {
+        let mut count = 0;
+        while count < self.led.len() && self.led[count].is_fill() {
             count += 1;
         }
         count
@@ -139,6 +153,9 @@ pub struct Follower {
     pub end: u32,
     /// Whether another pivot has a block of `U` in its column.
     pub asked: bool,
+    /// Whether nobody asks for it, and it is the first that follows whom it follows: iterations leave it out of the elimination. Of
+    /// `Δk_j = c hA Δk_v` the column of `x_j` is then a part of that of `v` ([`Led`]).
+    pub absorbed: bool,
 }
 
 impl Follower {
@@ -184,6 +201,8 @@ pub struct Update {
     pub block: u32,
     /// Nothing is there before: the block is fill, and this is its first update.
     pub first: bool,
+    /// The same where states that are [absorbed](Follower::absorbed) are left out.
+    pub first_led: bool,
 }
 
 /// A block of the Newton matrix before elimination: `diag(direct) + h diag(state) A`; zero where there is only fill.
@@ -207,5 +226,27 @@ impl Assembly {
     #[must_use]
     pub const fn is_fill(&self) -> bool {
         self.direct == Self::NONE && self.state == Self::NONE
+    }
+}
+
+/// A block of the matrix without states that are [absorbed](Follower::absorbed): its own entries, and
+/// `c (diag(direct) + h diag(state) A) hA` from one of them, which follows the unknown of the column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Led {
+    /// Its own entries.
+    pub own: Assembly,
+    /// The entry of the Jacobian that is `−c`, or [`Assembly::NONE`].
+    pub by: u32,
+    /// The entry of `f_ẋ` of the state that is absorbed, or [`Assembly::NONE`].
+    pub direct: u32,
+    /// Its entry of `f_x`, or [`Assembly::NONE`].
+    pub state: u32,
+}
+
+impl Led {
+    /// Whether elimination alone puts anything there.
+    #[must_use]
+    pub const fn is_fill(&self) -> bool {
+        self.own.is_fill() && self.by == Assembly::NONE
     }
 }

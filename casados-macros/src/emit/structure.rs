@@ -2,7 +2,7 @@
 
 use crate::graph::Node;
 use crate::language::Variables;
-use crate::structure::followers::Follower;
+use crate::structure::followers::{Follower, Led};
 use crate::structure::{Analysis, Derivatives, Elimination, Facts, FunctionAnalysis, Operations};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -125,7 +125,7 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
 /// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that is its pivot.
 fn elimination(analysis: &Analysis) -> TokenStream {
     let krate = &analysis.model.krate;
-    let Elimination { plan, positions, identity, scaled, steady, followers } = &analysis.elimination;
+    let Elimination { plan, positions, identity, scaled, steady, followers, led } = &analysis.elimination;
     let mut slot_of_equation = vec![0; plan.pivots.len()];
     for &(row, column) in &plan.pivots {
         slot_of_equation[row as usize] = column;
@@ -190,11 +190,28 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     // Those of a kind one after the other: what is done to them then has no branches that nobody can foresee.
     assembly
         .sort_by_key(|(scaled, direct, state, block)| (*scaled, direct.is_some(), state.is_some(), *block));
+    let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
     let assembly = assembly.into_iter().map(|(scaled, direct, state, block)| {
-        let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
         let (direct, state, block) = (entry(direct), entry(state), Literal::u32_unsuffixed(block));
         quote!(assembly(#block, #direct, #state, #scaled))
     });
+    let mut led: Vec<&Led> = led.iter().collect();
+    led.sort_by_key(|Led { block, own: [direct, state], through }| {
+        let through = through.map(|through| through.of.map(|entry| entry.is_some()));
+        (through, scaled.contains(block), direct.is_some(), state.is_some(), *block)
+    });
+    let made_without: HashSet<u32> =
+        led.iter().filter(|led| led.own != [None; 2] || led.through.is_some()).map(|led| led.block).collect();
+    let led: Vec<_> = led
+        .into_iter()
+        .map(|Led { block, own, through }| {
+            let scaled = scaled.contains(block);
+            let (block, own) = (Literal::u32_unsuffixed(*block), own.map(entry));
+            let of = through.map_or([None; 2], |through| through.of).map(entry);
+            let by = entry(through.map(|through| through.by));
+            quote!(led([#block, #(#own),*], #scaled, [#by, #(#of),*]))
+        })
+        .collect();
     // Nothing where no state is.
     let some = steady.iter().any(Option::is_some);
     let count = if some { plan.pivots.len() as u32 } else { 0 };
@@ -209,6 +226,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         quote!(steady(#entry, #first, #end, #turn, #implied))
     });
     let steady: Vec<_> = steady.collect();
+    let absorbed = followers;
     let followers: Vec<_> = match followers.iter().any(Option::is_some) {
         true => followers.iter().map(follower).collect(),
         false => Vec::new(),
@@ -216,18 +234,30 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32)
         .filter(|&block| !positions.contains_key(&plan.blocks[block as usize]))
         .collect();
+    // The same without the pivots of states that are absorbed.
+    let mut empty_without: HashSet<u32> = match led.is_empty() {
+        true => HashSet::new(),
+        false => (0..plan.blocks.len() as u32).filter(|block| !made_without.contains(block)).collect(),
+    };
+    let is_absorbed =
+        |slot: u32| matches!(absorbed.get(slot as usize), Some(Some(follower)) if follower.absorbed);
+    let by_absorbed = plan.pivots.iter().zip(&plan.ranges).flat_map(|(&(_, slot), &[block, upper, end])| {
+        let count = (upper - block - 1) * (end - upper);
+        std::iter::repeat_n(is_absorbed(slot), count as usize)
+    });
     let updates: Vec<_> = plan
         .updates
         .iter()
-        .map(|&block| {
-            let first = empty.remove(&block);
+        .zip(by_absorbed)
+        .map(|(&block, absorbed)| {
+            let first = [empty.remove(&block), !absorbed && empty_without.remove(&block)];
             let block = Literal::u32_unsuffixed(block);
-            quote!(update(#block, #first))
+            quote!(update(#block, [#(#first),*]))
         })
         .collect();
     let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Follower, Left, Pivot, Steady, Update};
+        use #krate::model::{Assembly, Follower, Led, Left, Pivot, Steady, Update};
         const fn pivot(
             slot: u32,
             [block, upper, end]: [u32; 3],
@@ -240,17 +270,20 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         const fn steady(entry: u32, first: u32, end: u32, turn: u32, implied: bool) -> Steady {
             Steady { entry, first, end, turn, implied }
         }
-        const fn follower(entry: u32, first: u32, end: u32, asked: bool) -> Follower {
-            Follower { entry, first, end, asked }
+        const fn follower(entry: u32, first: u32, end: u32, [asked, absorbed]: [bool; 2]) -> Follower {
+            Follower { entry, first, end, asked, absorbed }
         }
-        const fn update(block: u32, first: bool) -> Update {
-            Update { block, first }
+        const fn update(block: u32, [first, first_led]: [bool; 2]) -> Update {
+            Update { block, first, first_led }
         }
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }
         }
         const fn assembly(block: u32, direct: u32, state: u32, scaled: bool) -> Assembly {
             Assembly { block, direct, state, scaled }
+        }
+        const fn led([block, direct, state]: [u32; 3], scaled: bool, [by, of_direct, of_state]: [u32; 3]) -> Led {
+            Led { own: assembly(block, direct, state, scaled), by, direct: of_direct, state: of_state }
         }
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },
@@ -261,18 +294,21 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             slot_of_equation: &[#(#slot_of_equation),*],
             steady: &const { [#(#steady),*] },
             followers: &const { [#(#followers),*] },
+            led: &const { [#(#led),*] },
         }
     }}
 }
 
 /// A row of the table of states that follow others.
 fn follower(of: &Option<Follower>) -> TokenStream {
-    let (numbers, asked) = match of {
-        Some(Follower { entry, first, end, asked }) => ([*entry, *first, *end], *asked),
-        None => ([u32::MAX, 0, 0], false),
+    let (numbers, kinds) = match of {
+        Some(Follower { entry, first, end, asked, absorbed }) => {
+            ([*entry, *first, *end], [*asked, *absorbed])
+        }
+        None => ([u32::MAX, 0, 0], [false; 2]),
     };
     let numbers = numbers.map(Literal::u32_unsuffixed);
-    quote!(follower(#(#numbers),*, #asked))
+    quote!(follower(#(#numbers),*, [#(#kinds),*]))
 }
 
 /// How many scaled pivots from each on have the same rows below them; zero for all but the first of them. Their own rows must be

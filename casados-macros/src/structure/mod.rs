@@ -74,6 +74,8 @@ pub struct Elimination {
     pub steady: Vec<Option<[u32; 3]>>,
     /// For each state, if it follows another one in every iteration of Newton's method.
     pub followers: Vec<Option<followers::Follower>>,
+    /// What is left of the matrix where those that are absorbed are not in it; nothing if none is.
+    pub led: Vec<followers::Led>,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -197,7 +199,11 @@ fn elimination(
         .collect();
     let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &scaled);
     let followers = followers::find(model, (jacobian, blocks), trivial, &plan, &identity);
-    Elimination { plan, positions, identity, scaled, steady, followers }
+    let led = match followers.iter().flatten().any(|follower| follower.absorbed) {
+        true => followers::led(x.len() as u32, jacobian, &plan, &positions, &followers),
+        false => Vec::new(),
+    };
+    Elimination { plan, positions, identity, scaled, steady, followers, led }
 }
 
 /// As many equations as unknowns.
