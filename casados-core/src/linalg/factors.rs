@@ -1,6 +1,6 @@
 //! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
 
-use super::block::{self, Block};
+use super::block::{Block, coupling};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
 use super::left_out::{fill, follows, has_followers, is_fill, is_led, row_of, rows};
@@ -49,8 +49,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let Self { coupling, blocks, .. } = self;
-        *coupling = block::coupling(a, h);
-        dispatch(Assemble::<M, E, S, false> { jacobian, coupling, blocks });
+        dispatch(Assemble::<M, E, S, false> { jacobian, a, h, coupling, blocks });
         sparse::factor::<M, E, S>(coupling, blocks.as_mut());
     }
 
@@ -61,8 +60,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         }
         self.is_dense = false;
         let Self { coupling, blocks, .. } = self;
-        *coupling = block::coupling(a, h);
-        dispatch(Assemble::<M, E, S, true> { jacobian, coupling, blocks });
+        dispatch(Assemble::<M, E, S, true> { jacobian, a, h, coupling, blocks });
         sparse::factor_led::<M, E, S>(coupling, blocks.as_mut());
     }
 
@@ -131,8 +129,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 /// All blocks of the Newton matrix, each written once; or of that without states that have gone into those that they follow.
 struct Assemble<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
-    /// `−hA`
-    coupling: &'a Block<E, S>,
+    a: &'a [[E; S]; S],
+    h: E,
+    /// Becomes `−hA`.
+    coupling: &'a mut Block<E, S>,
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
@@ -141,20 +141,23 @@ impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> Kernel for Assem
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { jacobian, coupling, blocks } = self;
-        // `−(hA)²`
+        let Self { jacobian, a, h, coupling: to, blocks } = self;
+        let coupling = coupling(a, h);
+        *to = coupling;
         let mut square = [[E::from_f64(0.0); S]; S];
         if LED {
-            A::subtract_blocks(&mut square, coupling, coupling);
+            A::subtract_blocks(&mut square, &coupling, &coupling);
         }
-        each_row::<A, _>(&mut Rows::<M, E, S, LED> { jacobian, coupling: *coupling, square, blocks });
+        each_row::<A, _>(&mut Rows::<M, E, S, LED> { jacobian, coupling, square, blocks });
     }
 }
 
 /// See [`Assemble`].
 struct Rows<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
+    /// `−hA`
     coupling: Block<E, S>,
+    /// `−(hA)²`
     square: Block<E, S>,
     blocks: &'a mut M::Factors<Block<E, S>>,
 }

@@ -45,14 +45,11 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         h: E,
     ) {
         let blocks = &mut self.blocks;
+        let values = &basis.values;
         if const { E::LANES > 1 } && first_only {
-            let scale = basis.values.scaled(h);
-            let scales = [scale, scale * scale].map(coarse);
-            dispatch(AssembleMean::<M, E, S, true> { jacobian, scales, blocks });
+            dispatch(AssembleMean::<M, E, S, true> { jacobian, values, h, blocks });
         } else {
-            let (scale, share) = (basis.values.scaled(h), E::from_f64(const { 1.0 / S as f64 }));
-            let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(coarse);
-            dispatch(AssembleMean::<M, E, S, false> { jacobian, scales, blocks });
+            dispatch(AssembleMean::<M, E, S, false> { jacobian, values, h, blocks });
         }
         sparse::factor_led::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
@@ -79,8 +76,9 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
 /// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, and what of it has gone into the columns of others, each block written once.
 struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
-    /// `hμ` and `(hμ)²` of what is added up
-    scales: [Number<E, S>; 2],
+    /// The eigenvalues `μ`.
+    values: &'a Complex<E, S>,
+    h: E,
     blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
 }
 
@@ -90,14 +88,23 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
     type Number = E;
     type Output = ();
     #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
-        each_row::<A, _>(&mut self);
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, values, h, blocks } = self;
+        let (scale, share) = (values.scaled(h), E::from_f64(Rows::<M, E, S, FIRST_ONLY>::SHARE));
+        let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(coarse);
+        each_row::<A, _>(&mut Rows::<M, E, S, FIRST_ONLY> { jacobian, scales, blocks });
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
-    for AssembleMean<'_, M, E, S, FIRST_ONLY>
-{
+/// See [`AssembleMean`].
+struct Rows<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// `hμ` and `(hμ)²` of what is added up.
+    scales: [Number<E, S>; 2],
+    blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_, M, E, S, FIRST_ONLY> {
     const ROWS: usize = rows::<M>(is_led::<M>());
     const SIMPLE: usize = fill::<M>(is_led::<M>());
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
@@ -115,8 +122,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
             None => Complex::zero(),
         };
         if let Some(direct) = jacobian.get(own.direct as usize) {
-            let share = E::from_f64(const { if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 } });
-            element = element.plus((share * Self::total(direct)).coarse());
+            element = element.plus((E::from_f64(Self::SHARE) * Self::total(direct)).coarse());
         }
         if let Some(led) = led
             && let Some([minus_c, ..]) = jacobian.get(led.by as usize).map(<[E; S]>::as_slice)
@@ -142,7 +148,10 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow
     }
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AssembleMean<'_, M, E, S, FIRST_ONLY> {
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S, FIRST_ONLY> {
+    /// The mean is so much of what is added up.
+    const SHARE: f64 = if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 };
+
     /// The sum over the stages.
     #[inline(always)]
     fn total(stages: &[E; S]) -> E {
