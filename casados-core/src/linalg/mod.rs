@@ -40,7 +40,7 @@ pub(crate) use eigen_factors::{EigenFactors, PARTS, Rows};
 pub use factors::{Factors, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::{are_finite, axpy};
-pub(crate) use left_out::{STEADY, follows, has_followers, implied, is_follower, is_implied, is_led};
+pub(crate) use left_out::{STEADY, follows, has_followers, implied, is_follower, is_implied};
 pub(crate) use mean::MeanFactors;
 pub(crate) use prefetch::Ahead;
 pub(crate) use sparse::Planned;

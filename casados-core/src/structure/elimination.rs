@@ -61,19 +61,14 @@ impl Elimination {
         count
     }
 
-    /// How many products of `s×s` blocks the updates and pivots of a factorisation cost, with states that are [absorbed](Follower::absorbed) or
-    /// without; a block with scaled rows is a fraction of one, an inverse is four.
-    pub(crate) const fn products(&self, s: f64, led: bool) -> f64 {
+    /// How many products of `s×s` blocks the updates of a factorisation cost; a block with scaled rows is a fraction of one.
+    pub(crate) const fn products(&self, s: f64) -> f64 {
         let (mut products, mut index) = (0.0, 0);
         while index < self.pivots.len() {
             let pivot = &self.pivots[index];
-            let slot = pivot.slot as usize;
-            if !(led && slot < self.followers.len() && self.followers[slot].absorbed) {
-                let lower = (pivot.upper - pivot.block - 1) as f64;
-                let upper = (pivot.end - pivot.upper) as f64;
-                let scaled = pivot.scaled && s > 1.0;
-                products += 4.0 + if scaled { upper + lower * upper / s } else { lower * upper };
-            }
+            let lower = (pivot.upper - pivot.block - 1) as f64;
+            let upper = (pivot.end - pivot.upper) as f64;
+            products += if pivot.scaled && s > 1.0 { upper + lower * upper / s } else { lower * upper };
             index += 1;
         }
         products
