@@ -1,11 +1,11 @@
 //! What is left out where equations are trivial, `q̇ = c v`: below their pivots in forward sensitivities, and rows of `D` in second
 //! derivatives. Held against differences of what they are derivatives of, with the plan of elimination and without.
 
-use casados::Method;
 use casados::irk::Integrator;
 use casados::model::{Follower, Steady};
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
+use casados::{Method, Statistics};
 use lost::Lost;
 use nalgebra::{SMatrix, SVector, vector};
 
@@ -207,6 +207,68 @@ fn states_follow_in_every_iteration() -> Test {
         same_as_whole::<Gauss<4>, 4, 0>(options)?;
     }
     Ok(())
+}
+
+/// Positions that follow one velocity, another one, and a control, each felt by several more, as are derivatives of two of them. Where `p = 0`
+/// the equations are linear, which nobody knows before they run.
+#[dae]
+fn gone(xdot: [f64; 7], x: [f64; 7], u: [f64; 1], p: [f64; 1]) -> [f64; 7] {
+    let [a, b, c, d, v, w, y] = x;
+    [
+        xdot[0] - 2.0 * v,
+        xdot[1] + v,
+        xdot[2] - w,
+        xdot[3] - u[0],
+        xdot[4] + 0.2 * a + 0.9 * b - 0.1 * c + 0.3 * v + 0.1 * w + 0.3 * xdot[1] + p[0] * v * v * v,
+        xdot[5] - 0.2 * a + 0.5 * c + 0.1 * d + 0.2 * v - 0.1 * xdot[2] + p[0] * w * w * w,
+        xdot[6] - v + 0.4 * w + 0.5 * y + p[0] * y * v,
+    ]
+}
+
+/// Newton's method finds the solution of linear equations in one iteration if states that are left out have gone into the right columns.
+fn one_iteration<B: Method<S>, const S: usize>() -> Test {
+    let (x, u, p) = (vector![0.4, -0.3, 0.8, 0.5, -0.6, 0.1, 0.7], vector![0.3], vector![0.0]);
+    let options = Options { steps: 3, ..Default::default() };
+    let fixed = Newton { fixed_iterations: Some(1), ..Default::default() };
+    let mut whole = Integrator::<Lost<Gone>, B, S, f64, Heap>::new(options)?;
+    whole.set_parameters(&p)?;
+    let expected = whole.solve(&x, &u, LENGTH)?.x;
+    for newton in [Newton::default(), fixed] {
+        let mut led = Integrator::<Gone, B, S, f64, Heap>::new(Options { newton, ..options })?;
+        led.set_parameters(&p)?;
+        let error = (led.solve(&x, &u, LENGTH)?.x - expected).amax();
+        assert!(error <= ROUNDING, "{error:e}");
+        let Statistics { steps, iterations, dense, .. } = *led.statistics();
+        // Without their share, increments would shrink by `(hA)²`, a five-hundredth: to rounding in six iterations. The second one is none.
+        assert!(iterations <= 2 * steps && dense == 0, "{iterations} iterations, {dense} pivoted");
+    }
+    // Registers, whose factors may have half of the digits.
+    let mut batch = casados::batch::Integrator::<Gone, B, S, f64>::new(options)?;
+    let mut found = vec![Default::default(); 8];
+    let (x0, h) = (vec![x; 8], [LENGTH]);
+    batch.solve(&Intervals { x0: &x0, u: &[u; 8], p: &[p; 8], h: &h, ..Default::default() }, &mut found)?;
+    for found in &found {
+        assert!((found.x - expected).amax() <= ROUNDING);
+    }
+    let Statistics { steps, iterations, .. } = batch.statistics().work;
+    assert!(
+        iterations <= 3 * steps && batch.statistics().redone == 0,
+        "{iterations} iterations of {steps} steps"
+    );
+    Ok(())
+}
+
+#[test]
+fn states_that_are_left_out_go_into_whom_they_follow() -> Test {
+    let plan = &<Gone as Dae>::STRUCTURE.elimination;
+    let absorbed: Vec<bool> = plan.followers.iter().map(|of| of.absorbed).collect();
+    // Of two that follow one the first goes.
+    assert_eq!(absorbed, [false, true, true, true, false, false, false]);
+    assert!(plan.followers[0].entry != Follower::NONE && plan.led.len() < plan.assembly.len());
+    one_iteration::<Gauss<1>, 1>()?;
+    one_iteration::<Gauss<2>, 2>()?;
+    one_iteration::<RadauIIA<3>, 3>()?;
+    one_iteration::<Gauss<4>, 4>()
 }
 
 /// An angle that three equations feel.
