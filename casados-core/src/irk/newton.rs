@@ -19,7 +19,7 @@
 //!
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
 //! values is kept as long as the iterations that are still expected with it cost less than a new one. How many that are is known from
-//! two increments; of the first one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new one, with
+//! two increments by the same; of the first one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new one, with
 //! three stages or more, is the mean of those of the stages, or that in their middle where they are not evaluated side by side. Its system is
 //! solved in the eigenbasis of the tableau, in numbers that may be [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for
 //! each stage.
@@ -285,7 +285,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
             // New factors take two more iterations themselves.
             let expensive = 2.0 + Self::RENEWAL[usize::from(cheap)];
-            let slow = verdict.remaining > expensive && (!early || verdict.grows);
+            // The first increment of new factors against the last of old ones does not tell how good the new ones are.
+            let fresh = early || renew && iteration > 1;
+            let slow = verdict.remaining > expensive && (!fresh || verdict.grows);
             renew = !exact && (full || adaptive && !near && slow);
         }
     }
