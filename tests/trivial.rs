@@ -6,9 +6,13 @@ use casados::model::{Follower, Steady};
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
 use casados::{Method, Statistics};
+use chain::{Chain, stretched};
 use lost::Lost;
 use nalgebra::{SMatrix, SVector, vector};
 
+#[allow(dead_code)]
+#[path = "../examples/models/chain.rs"]
+mod chain;
 #[allow(dead_code)]
 #[path = "../examples/firmware/src/lost.rs"]
 mod lost;
@@ -269,6 +273,21 @@ fn states_that_are_left_out_go_into_whom_they_follow() -> Test {
     one_iteration::<Gauss<2>, 2>()?;
     one_iteration::<RadauIIA<3>, 3>()?;
     one_iteration::<Gauss<4>, 4>()
+}
+
+/// From zero, positions are where they follow to in the first evaluation, so that its Jacobian is one within the step; and the Jacobian after it is not
+/// taken anew because of an increment of the first. (With positions at the start of the step 7 masses had three factorisations.)
+#[test]
+fn jacobians_from_zero_do_for_several_iterations() -> Test {
+    let newton = Newton { tolerance: 1e-8, ..Default::default() };
+    let mut irk = Irk::<Chain<33>, Gauss<2>>::new(Options { newton, ..Default::default() })?;
+    irk.solve(&stretched(), &vector![-1.0, 1.0, 1.0], 0.2)?;
+    let Statistics { iterations, factorizations, .. } = *irk.statistics();
+    assert!(
+        iterations <= 5 && factorizations <= 2,
+        "{iterations} iterations, {factorizations} factorisations"
+    );
+    Ok(())
 }
 
 /// An angle that three equations feel.
