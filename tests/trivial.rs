@@ -181,6 +181,7 @@ where
     led.set_parameters(&p)?;
     lost.set_parameters(&p)?;
     let expected = lost.solve(&x, &u, LENGTH)?.x;
+    assert_ne!(lost.statistics().dense, 0);
     let found = led.solve(&x, &u, LENGTH)?.x;
     assert_eq!(led.statistics().dense, 0);
     let error = (found - expected).amax();
@@ -237,6 +238,7 @@ fn one_iteration<B: Method<S>, const S: usize>() -> Test {
     let mut whole = Integrator::<Lost<Gone>, B, S, f64, Heap>::new(options)?;
     whole.set_parameters(&p)?;
     let expected = whole.solve(&x, &u, LENGTH)?.x;
+    assert_ne!(whole.statistics().dense, 0);
     for newton in [Newton::default(), fixed] {
         let mut led = Integrator::<Gone, B, S, f64, Heap>::new(Options { newton, ..options })?;
         led.set_parameters(&p)?;
