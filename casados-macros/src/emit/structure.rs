@@ -4,6 +4,7 @@ use crate::graph::Node;
 use crate::language::Variables;
 use crate::structure::followers::{Follower, Led};
 use crate::structure::{Analysis, Derivatives, Elimination, Facts, FunctionAnalysis, Operations};
+use crate::structure::{Plan, Position};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -190,28 +191,12 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     // Those of a kind one after the other: what is done to them then has no branches that nobody can foresee.
     assembly
         .sort_by_key(|(scaled, direct, state, block)| (*scaled, direct.is_some(), state.is_some(), *block));
-    let entry = |entry: Option<u32>| Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX));
     let assembly = assembly.into_iter().map(|(scaled, direct, state, block)| {
         let (direct, state, block) = (entry(direct), entry(state), Literal::u32_unsuffixed(block));
         quote!(assembly(#block, #direct, #state, #scaled))
     });
-    let mut led: Vec<&Led> = led.iter().collect();
-    led.sort_by_key(|Led { block, own: [direct, state], through }| {
-        let through = through.map(|through| through.of.map(|entry| entry.is_some()));
-        (through, scaled.contains(block), direct.is_some(), state.is_some(), *block)
-    });
-    let made_without: HashSet<u32> =
-        led.iter().filter(|led| led.own != [None; 2] || led.through.is_some()).map(|led| led.block).collect();
-    let led: Vec<_> = led
-        .into_iter()
-        .map(|Led { block, own, through }| {
-            let scaled = scaled.contains(block);
-            let (block, own) = (Literal::u32_unsuffixed(*block), own.map(entry));
-            let of = through.map_or([None; 2], |through| through.of).map(entry);
-            let by = entry(through.map(|through| through.by));
-            quote!(led([#block, #(#own),*], #scaled, [#by, #(#of),*]))
-        })
-        .collect();
+    let updates = updates(plan, &positions, followers, led);
+    let led = rows_without(led, &scaled);
     // Nothing where no state is.
     let some = steady.iter().any(Option::is_some);
     let count = if some { plan.pivots.len() as u32 } else { 0 };
@@ -226,35 +211,10 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         quote!(steady(#entry, #first, #end, #turn, #implied))
     });
     let steady: Vec<_> = steady.collect();
-    let absorbed = followers;
     let followers: Vec<_> = match followers.iter().any(Option::is_some) {
         true => followers.iter().map(follower).collect(),
         false => Vec::new(),
     };
-    let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32)
-        .filter(|&block| !positions.contains_key(&plan.blocks[block as usize]))
-        .collect();
-    // The same without the pivots of states that are absorbed.
-    let mut empty_without: HashSet<u32> = match led.is_empty() {
-        true => HashSet::new(),
-        false => (0..plan.blocks.len() as u32).filter(|block| !made_without.contains(block)).collect(),
-    };
-    let is_absorbed =
-        |slot: u32| matches!(absorbed.get(slot as usize), Some(Some(follower)) if follower.absorbed);
-    let by_absorbed = plan.pivots.iter().zip(&plan.ranges).flat_map(|(&(_, slot), &[block, upper, end])| {
-        let count = (upper - block - 1) * (end - upper);
-        std::iter::repeat_n(is_absorbed(slot), count as usize)
-    });
-    let updates: Vec<_> = plan
-        .updates
-        .iter()
-        .zip(by_absorbed)
-        .map(|(&block, absorbed)| {
-            let first = [empty.remove(&block), !absorbed && empty_without.remove(&block)];
-            let block = Literal::u32_unsuffixed(block);
-            quote!(update(#block, [#(#first),*]))
-        })
-        .collect();
     let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
         use #krate::model::{Assembly, Follower, Led, Left, Pivot, Steady, Update};
@@ -297,6 +257,55 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             led: &const { [#(#led),*] },
         }
     }}
+}
+
+/// An entry of the Jacobian, if it is there.
+fn entry(entry: Option<u32>) -> Literal {
+    Literal::u32_unsuffixed(entry.unwrap_or(u32::MAX))
+}
+
+/// What blocks are made of where states that are absorbed are left out, those of a kind one after the other, fill first.
+fn rows_without(led: &[Led], scaled: &HashSet<u32>) -> Vec<TokenStream> {
+    let mut led: Vec<&Led> = led.iter().collect();
+    led.sort_by_key(|Led { block, own: [direct, state], through }| {
+        let through = through.map(|through| through.of.map(|entry| entry.is_some()));
+        (through, scaled.contains(block), direct.is_some(), state.is_some(), *block)
+    });
+    led.into_iter()
+        .map(|Led { block, own, through }| {
+            let scaled = scaled.contains(block);
+            let (block, own) = (Literal::u32_unsuffixed(*block), own.map(entry));
+            let of = through.map_or([None; 2], |through| through.of).map(entry);
+            let by = entry(through.map(|through| through.by));
+            quote!(led([#block, #(#own),*], #scaled, [#by, #(#of),*]))
+        })
+        .collect()
+}
+
+/// For each update its block, and whether nothing is there before: with all pivots, and without those of states that are absorbed.
+fn updates(
+    plan: &Plan,
+    positions: &HashMap<(u32, u32), &Position>,
+    followers: &[Option<Follower>],
+    led: &[Led],
+) -> Vec<TokenStream> {
+    let mut empty: HashSet<u32> = (0..plan.blocks.len() as u32)
+        .filter(|&block| !positions.contains_key(&plan.blocks[block as usize]))
+        .collect();
+    let mut empty_without: HashSet<u32> =
+        led.iter().filter(|led| led.own == [None; 2] && led.through.is_none()).map(|led| led.block).collect();
+    let is_absorbed =
+        |slot: u32| matches!(followers.get(slot as usize), Some(Some(follower)) if follower.absorbed);
+    let by_absorbed = plan.pivots.iter().zip(&plan.ranges).flat_map(|(&(_, slot), &[block, upper, end])| {
+        let count = (upper - block - 1) * (end - upper);
+        std::iter::repeat_n(is_absorbed(slot), count as usize)
+    });
+    let updates = plan.updates.iter().zip(by_absorbed).map(|(&block, absorbed)| {
+        let first = [empty.remove(&block), !absorbed && empty_without.remove(&block)];
+        let block = Literal::u32_unsuffixed(block);
+        quote!(update(#block, [#(#first),*]))
+    });
+    updates.collect()
 }
 
 /// A row of the table of states that follow others.
