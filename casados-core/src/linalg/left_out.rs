@@ -1,4 +1,5 @@
-//! Which pivots of a plan a solve leaves out: of states whose right-hand side or solution is known without it.
+//! Which pivots of a plan a solve leaves out: of states whose right-hand side or solution is known without it; and which of these the elimination
+//! leaves out, with what blocks are made of then.
 
 use crate::model::{Assembly, Dae, Follower, Led, Pivot, Steady};
 

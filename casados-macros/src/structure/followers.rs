@@ -1,8 +1,7 @@
 //! States such as `q` in `q̇ = v`, which follow another one in every iteration of Newton's method: `casados_core::model::Follower`.
 
-use super::Model;
-use super::Position;
 use super::elimination::Plan;
+use super::{Model, Position};
 use crate::graph::{Degree, Entry, Point};
 use std::collections::HashMap;
 
