@@ -9,7 +9,7 @@ use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
     Assembly, Cost, Elimination, Fold, Follower, Led, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
-    Steady, Structure, Term, Update, all, by_column, columns, symmetric,
+    Steady, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 

@@ -3,10 +3,12 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
 //! has registers of that many numbers, one call of the model computes them all.
 
-use super::follow::follower;
+use super::follow::{are_together, follower, led};
 use super::record::{Coefficients, Times, Work};
 use super::stages::Stages;
-use crate::linalg::{Arithmetic, Kernel, are_finite, coupling, dispatch, follows, has_followers};
+use crate::linalg::{
+    Arithmetic, AtRow, Block, Kernel, are_finite, coupling, dispatch, each_row, follows, has_followers,
+};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};
@@ -220,22 +222,46 @@ impl<M: Dae, E: Lanes, const S: usize, const LED: bool> Kernel for Place<'_, M, 
         if y.len() < nx || points.len() < nx + y.len() {
             return;
         }
-        let ((k, z), (xdot, own)) = (y.split_at(nx), points.split_at_mut(nx));
-        xdot.copy_from_slice(k);
-        let (xi, own) = own.split_at_mut(nx);
-        own[..z.len()].copy_from_slice(z);
         let minus_ha = coupling(a, h);
-        for (state, ((xi, &x), k)) in xi.iter_mut().zip(x).zip(k).enumerate() {
-            if !(LED && follows::<M>(state).is_some()) {
-                *xi = stages::<A, E, S>(x, &minus_ha, k);
+        // Of those that follow, which are most often the first or the last, there is nothing to copy.
+        let (first, end) = if LED { const { led::<M>() } } else { (0, y.len()) };
+        let k = first..nx.min(end).max(first);
+        let (xdot, rest) = points.split_at_mut(nx);
+        let (xi, rest) = rest.split_at_mut(nx);
+        rest[..y.len() - nx].copy_from_slice(&y[nx..]);
+        let own_x = x.get(k.clone()).unwrap_or_default().iter();
+        let (own_xdot, own_xi) = (xdot.get_mut(k.clone()), xi.get_mut(k.clone()));
+        let places = own_xdot.unwrap_or_default().iter_mut().zip(own_xi.unwrap_or_default());
+        let own_y = y.get(k.clone()).unwrap_or_default();
+        for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(k).zip(own_y) {
+            if !(LED && (const { !are_together::<M>() }) && follows::<M>(state).is_some()) {
+                (*xdot, *xi) = (*k, stages::<A, E, S>(x, &minus_ha, k));
             }
         }
         if LED {
-            for (state, &x) in x.iter().enumerate().take(M::STRUCTURE.elimination.followers.len()) {
-                let Some(k) = follower::<M, E, S>(state, jacobian, points) else { continue };
-                points[state] = k;
-                points[nx + state] = stages::<A, E, S>(x, &minus_ha, &k);
-            }
+            each_row::<A, _>(&mut Followers::<M, E, S> { points, jacobian, x, minus_ha });
+        }
+    }
+}
+
+/// Those of states that follow, and their states, once that of whom they follow is there.
+struct Followers<'a, M: Dae, E: Plain, const S: usize> {
+    points: &'a mut [[E; S]],
+    jacobian: &'a M::Jacobian<[E; S]>,
+    x: &'a [E],
+    minus_ha: Block<E, S>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Followers<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.elimination.followers.len();
+    const INSTRUCTIONS: usize = 3 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Some(k) = follower::<M, E, S>(state, self.jacobian, self.points) else { return };
+        let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
+        *xdot = k;
+        if let Some(xi) = self.points.get_mut(M::Shape::NX + state) {
+            *xi = stages::<A, E, S>(x, &self.minus_ha, &k);
         }
     }
 }

@@ -88,6 +88,19 @@ pub(super) const fn led<M: Dae>() -> (usize, usize) {
     (first, end)
 }
 
+/// Whether [all that are left](led) are none that follow.
+pub(super) const fn are_together<M: Dae>() -> bool {
+    let (followers, (first, end)) = (M::STRUCTURE.elimination.followers, led::<M>());
+    let mut index = first;
+    while index < end && index < followers.len() {
+        if is_follower(&followers[index]) {
+            return false;
+        }
+        index += 1;
+    }
+    true
+}
+
 /// Whom a state follows, if that is a state, and `−c`.
 #[inline(always)]
 pub(super) fn leader<M: Dae, E: Lanes, const S: usize>(

@@ -107,43 +107,56 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
         let Self { followed, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
             self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
-        let (own_y, own) = (part_mut::<M, _>(y.as_mut()), part_mut::<M, _>(increment.as_mut()));
-        for (y, increment) in own_y.iter_mut().zip(own) {
-            // In registers: the optimiser cannot know that they do not overlap.
-            let (mut new, mut deltas) = (*y, *increment);
-            for (y, [delta]) in new.iter_mut().zip(&mut deltas) {
-                *delta = E::select(active, *delta, zero);
-                *y = *y - *delta;
-            }
-            (*y, *increment) = (new, deltas);
-        }
         if measure {
-            let largest = Measure::<M, E, S> { followed, x, y, increment, weights, h, floor }.run::<A>();
-            let (sizes, weights) = (part_mut::<M, _>(sizes.as_mut()), part::<M, _>(weights.as_ref()));
-            for ((size, increment), &weight) in
-                sizes.iter_mut().zip(part::<M, _>(increment.as_ref())).zip(weights)
-            {
-                *size = largest_of(increment) * weight;
+            let (own_y, own) = (part_mut::<M, _>(y.as_mut()), part_mut::<M, _>(increment.as_mut()));
+            for (y, increment) in own_y.iter_mut().zip(own) {
+                subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
             }
-            return (largest, infinite);
+            let measure = Measure::<M, E, S> { followed, x, y, increment, weights, sizes, h, floor };
+            return (measure.run::<A>(), infinite);
         }
         // Four unknowns side by side, and the rest one by one.
-        let (increments, last) = part::<M, _>(increment.as_ref()).as_chunks::<4>();
+        let (y, last_y) = part_mut::<M, _>(y.as_mut()).as_chunks_mut::<4>();
+        let (increments, last) = part_mut::<M, _>(increment.as_mut()).as_chunks_mut::<4>();
         let (weights, last_weights) = part::<M, _>(weights.as_ref()).as_chunks::<4>();
         let (sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
         let mut some = Increments::none(tolerance, full);
-        for ((increments, weights), sizes) in increments.iter().zip(weights).zip(sizes) {
+        for (((y, increments), weights), sizes) in y.iter_mut().zip(increments).zip(weights).zip(sizes) {
+            subtract(y, increments, active);
             some.take(increments, weights, sizes);
         }
         let mut others = Increments::none(tolerance, full);
-        for ((increment, weight), size) in last.iter().zip(last_weights).zip(last_sizes) {
-            let (increment, weight) = (core::array::from_ref(increment), core::array::from_ref(weight));
-            others.take(increment, weight, core::array::from_mut(size));
+        for (((y, increment), weight), size) in last_y.iter_mut().zip(last).zip(last_weights).zip(last_sizes)
+        {
+            let increment = core::array::from_mut(increment);
+            subtract(core::array::from_mut(y), increment, active);
+            others.take(increment, core::array::from_ref(weight), core::array::from_mut(size));
         }
         let ([largest, excess, sum], others) = (some.total(), others.total());
         let (largest, excess, sum) = (largest.max(others[0]), excess.max(others[1]), sum + others[2]);
         let number = E::le(sum.abs(), E::from_f64(f64::MAX));
         (E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite))
+    }
+}
+
+/// `y ← y − Δ` of some unknowns, in lanes that are `active`; in the others there is no increment. A single lane is, or it would not be here.
+#[inline(always)]
+fn subtract<E: Lanes, const S: usize, const N: usize>(
+    y: &mut [[E; S]; N],
+    increments: &mut [[[E; 1]; S]; N],
+    active: E::Mask,
+) {
+    // In registers: the optimiser cannot know that they do not overlap.
+    let (mut new, mut deltas) = (*y, *increments);
+    for (y, [delta]) in new.as_flattened_mut().iter_mut().zip(deltas.as_flattened_mut()) {
+        if const { E::LANES > 1 } {
+            *delta = E::select(active, *delta, E::from_f64(0.0));
+        }
+        *y = *y - *delta;
+    }
+    *y = new;
+    if const { E::LANES > 1 } {
+        *increments = deltas;
     }
 }
 
@@ -208,7 +221,8 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
             // Where increments hardly shrink, nothing is expected but that the next one is as large.
             let expected = excess[n].max(new[n] + new[n] - old[n]);
             let own = new[n] - self.tolerance;
-            self.excess[n] = E::select(E::lt(own, expected), own, expected).max(self.excess[n]);
+            // The smaller one.
+            self.excess[n] = (-(-own).max(-expected)).max(self.excess[n]);
             self.largest[n] = new[n].max(self.largest[n]);
         }
         *sizes = new;
@@ -227,16 +241,6 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
     }
 }
 
-/// The largest of all stages.
-#[inline(always)]
-fn largest_of<E: Lanes, const S: usize>(increment: &[[E; 1]; S]) -> E {
-    let mut largest = E::from_f64(0.0);
-    for [delta] in increment {
-        largest = delta.abs().max(largest);
-    }
-    largest
-}
-
 /// The size of an increment relative to the unknowns as they are now.
 pub(super) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
     pub followed: &'a Followed<'a, M, E, S>,
@@ -244,6 +248,7 @@ pub(super) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
     pub y: &'a ArrayK<M, [E; S]>,
     pub increment: &'a ArrayK<M, [[E; 1]; S]>,
     pub weights: &'a mut ArrayK<M, E>,
+    pub sizes: &'a mut ArrayK<M, E>,
     pub h: E,
     pub floor: E,
 }
@@ -253,57 +258,150 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { followed, x, y, increment, weights, h, floor } = self;
-        let (zero, one, smallest) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(E::SMALLEST));
+        let Self { followed, x, y, increment, weights, sizes, h, floor } = self;
+        let zero = E::from_f64(0.0);
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
-        let (mut largest, mut sum) = ([zero; S], [zero; S]);
-        let first = const { led::<M>().0 };
-        let y = part::<M, _>(y.as_ref()).iter();
-        let unknowns = y.zip(part::<M, _>(increment.as_ref())).zip(part_mut::<M, _>(weights.as_mut()));
-        for (unknown, ((y, increment), weight)) in unknowns.enumerate() {
-            let mut size =
-                (x.as_ref().get(first + unknown).map_or(zero, |x| *x).abs() * per_step).max(smallest);
-            for (y, [delta]) in y.iter().zip(increment) {
-                size = y.abs().max(delta.abs().max(size));
-            }
-            *weight = one / size;
-            for ((largest, sum), [delta]) in largest.iter_mut().zip(&mut sum).zip(increment) {
-                let size = delta.abs() * *weight;
-                *largest = size.max(*largest);
-                *sum = *sum + size;
-            }
+        // Four unknowns side by side, and the rest one by one.
+        let (ys, last_ys) = part::<M, _>(y.as_ref()).as_chunks::<4>();
+        let (increments, last) = part::<M, _>(increment.as_ref()).as_chunks::<4>();
+        let (own_weights, last_weights) = part_mut::<M, _>(weights.as_mut()).as_chunks_mut::<4>();
+        let (own_sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
+        let mut states = x.as_ref().get(const { led::<M>().0 }..).unwrap_or_default();
+        let mut some = Relative { largest: [zero; 4], sum: [zero; 4], per_step };
+        for (((y, increments), weights), sizes) in ys.iter().zip(increments).zip(own_weights).zip(own_sizes) {
+            some.take(&mut states, y, increments, weights, sizes);
         }
+        let mut others = Relative { largest: [zero], sum: [zero], per_step };
+        for (((y, increment), weight), size) in last_ys.iter().zip(last).zip(last_weights).zip(last_sizes) {
+            let (y, increment) = (core::array::from_ref(y), core::array::from_ref(increment));
+            let (weight, size) = (core::array::from_mut(weight), core::array::from_mut(size));
+            others.take(&mut states, y, increment, weight, size);
+        }
+        let most = size_of([some.total(), others.total()]);
         if const { !has_followers::<M>() } {
-            return size_of(largest, sum);
+            return most;
         }
-        // `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where what `q` follows is much smaller than its change within the step.
-        let &Followed { jacobian, points, a } = followed;
-        let (mut most, mut norm) = (size_of(largest, sum), zero);
-        for a in a {
+        let mut norm = zero;
+        for a in followed.a {
             let mut sum = zero;
             for a in a {
                 sum = sum + a.abs();
             }
             norm = sum.max(norm);
         }
-        norm = E::from_f64(TYPICAL) * norm * h.abs();
-        for state in 0..M::STRUCTURE.elimination.followers.len() {
-            let Some((leader, minus_c)) = leader::<M, E, S>(state, jacobian) else { continue };
-            let Some(weight) = weights.as_mut().get_mut(leader) else { continue };
-            let mut size = (x.as_ref().get(state).map_or(zero, |x| *x).abs() * per_step).max(smallest);
-            for k in points.as_ref().get(state).into_iter().flatten() {
-                size = k.abs().max(size);
-            }
-            let bound = norm * minus_c.abs();
-            if E::any(E::lt(*weight * size, bound))
-                && let Some(increment) = increment.as_ref().get(leader)
-            {
-                *weight = (bound / size).max(*weight);
-                most = (largest_of(increment) * *weight).max(most);
+        let norm = E::from_f64(TYPICAL) * norm * h.abs();
+        let mut led = Leaders::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
+        each_row::<A, _>(&mut led);
+        led.most
+    }
+}
+
+/// What is known of the relative size of the increments of some unknowns, in `N` strands.
+struct Relative<E, const N: usize> {
+    largest: [E; N],
+    /// What is not a number is not lost in a sum.
+    sum: [E; N],
+    per_step: E,
+}
+
+impl<E: Lanes, const N: usize> Relative<E, N> {
+    /// Takes `N` unknowns into account, of which those that are derivatives have these states.
+    #[inline(always)]
+    fn take<const S: usize>(
+        &mut self,
+        states: &mut &[E],
+        y: &[[E; S]; N],
+        increments: &[[[E; 1]; S]; N],
+        weights: &mut [E; N],
+        sizes: &mut [E; N],
+    ) {
+        let (zero, one, smallest) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(E::SMALLEST));
+        let (mut scale, mut size, mut sum) = ([zero; N], [zero; N], [zero; N]);
+        if let Some((own, rest)) = states.split_first_chunk() {
+            (scale, *states) = (*own, rest);
+        } else {
+            for (scale, x) in scale.iter_mut().zip(core::mem::take(states)) {
+                *scale = *x;
             }
         }
-        most
+        for scale in &mut scale {
+            *scale = (scale.abs() * self.per_step).max(smallest);
+        }
+        // Stage by stage, so that what is done to unknowns is done to vectors.
+        #[allow(clippy::needless_range_loop)]
+        for i in 0..S {
+            for n in 0..N {
+                let [delta] = increments[n][i];
+                size[n] = delta.abs().max(size[n]);
+                scale[n] = y[n][i].abs().max(scale[n]);
+                sum[n] = sum[n] + delta;
+            }
+        }
+        for n in 0..N {
+            weights[n] = one / size[n].max(scale[n]);
+            sizes[n] = size[n] * weights[n];
+            self.sum[n] = self.sum[n] + sum[n] * weights[n];
+            self.largest[n] = sizes[n].max(self.largest[n]);
+        }
+    }
+
+    /// The largest, and the sum.
+    #[inline(always)]
+    fn total(&self) -> [E; 2] {
+        let (mut largest, mut sum) = (E::from_f64(0.0), E::from_f64(0.0));
+        for n in 0..N {
+            (largest, sum) = (self.largest[n].max(largest), sum + self.sum[n]);
+        }
+        [largest, sum]
+    }
+}
+
+/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where what `q` follows is much smaller than its change within the step.
+struct Leaders<'a, M: Dae, E: Plain, const S: usize> {
+    followed: &'a Followed<'a, M, E, S>,
+    x: &'a ArrayX<M, E>,
+    increment: &'a ArrayK<M, [[E; 1]; S]>,
+    weights: &'a mut ArrayK<M, E>,
+    sizes: &'a mut ArrayK<M, E>,
+    per_step: E,
+    /// `h ‖A‖`
+    norm: E,
+    /// The largest increment.
+    most: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Leaders<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.elimination.followers.len();
+    const INSTRUCTIONS: usize = 8;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Followed { jacobian, points, .. } = self.followed;
+        let Some((leader, minus_c)) = leader::<M, E, S>(state, jacobian) else { return };
+        let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
+        let (Some(weight), Some(k)) = (weights.get_mut(leader), points.as_ref().get(state)) else { return };
+        let bound = self.norm * minus_c.abs();
+        // At one stage it is large enough nearly always.
+        if !E::any(E::lt(*weight * k[0].abs(), bound)) {
+            return;
+        }
+        let smallest = E::from_f64(E::SMALLEST);
+        let mut size = match self.x.as_ref().get(state) {
+            Some(x) => (x.abs() * self.per_step).max(smallest),
+            None => smallest,
+        };
+        for k in k {
+            size = k.abs().max(size);
+        }
+        if let (Some(to), Some(increment)) = (sizes.get_mut(leader), self.increment.as_ref().get(leader)) {
+            *weight = (bound / size).max(*weight);
+            let mut largest = E::from_f64(0.0);
+            for [delta] in increment {
+                largest = delta.abs().max(largest);
+            }
+            *to = largest * *weight;
+            self.most = to.max(self.most);
+        }
     }
 }
 
@@ -319,13 +417,9 @@ pub(super) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
     pub a: &'a [[E; S]; S],
 }
 
-/// The largest of all stages, or what is not a number.
+/// The largest of two strands, or what is not a number.
 #[inline(always)]
-fn size_of<E: Lanes, const S: usize>(largest: [E; S], sum: [E; S]) -> E {
-    let zero = E::from_f64(0.0);
-    let (mut total, mut most) = (zero, zero);
-    for (&largest, &sum) in largest.iter().zip(&sum) {
-        (total, most) = (total + sum, largest.max(most));
-    }
-    E::select(E::le(total, E::from_f64(f64::MAX)), most, total)
+fn size_of<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
+    let total = sum + other;
+    E::select(E::le(total.abs(), E::from_f64(f64::MAX)), a.max(b), total)
 }

@@ -51,6 +51,14 @@ const FAR: usize = 1;
 /// So often the mean Jacobian is renewed in a step before the stages' own are taken.
 const MEANS: usize = 3;
 
+/// So many iterations new factors still take themselves: by blocks, and of the mean Jacobian, with which increments never shrink quadratically. (With two, 17 masses
+/// had a factorisation more and 65 had two more, in one iteration less: 12 and 20 % more time.)
+const STILL: [f64; 2] = [2.0, 3.0];
+
+/// Unknowns that were larger than their first increment, and have moved by no more than so much of their size since then, still are of that size, and
+/// what follows them too, whose increments count for so much of their bound ([`TYPICAL`](super::increment)).
+const LITTLE_MOVED: f64 = 1.0 / 8.0;
+
 /// Linear equations are refined so often if one iteration was not enough.
 const REFINEMENTS: usize = 4;
 
@@ -163,7 +171,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         };
         // Whether the residual that the first increment leaves is asked how good its Jacobian is.
         let ask = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
-        let mut first = E::from_f64(0.0);
+        let [zero, one, little, infinite] = [0.0, 1.0, LITTLE_MOVED, f64::INFINITY].map(E::from_f64);
+        // How far unknowns have moved since they were measured.
+        let mut moved = zero;
+        let mut first = zero;
         let mut iteration = 0;
         // Nothing will be written where states follow others.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
@@ -262,11 +273,13 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 full,
                 measure: iteration == 1,
             });
+            moved = if iteration == 1 { E::select(E::lt(size, one), zero, infinite) } else { moved + size };
             let look = if iteration == 1 { Look::First { new: renew } } else { Look::Later };
             verdict = progress.judge(look, size, next);
-            if verdict.changed && !exact && iteration > 1 {
-                let (increment, weights) = (&self.increment, &mut self.weights);
-                let again = dispatch(Measure::<M, E, S> { followed, x, y, increment, weights, h, floor });
+            if verdict.changed && !exact && iteration > 1 && !E::all(E::le(moved, little)) {
+                let Self { increment, weights, sizes, .. } = self;
+                let measure = Measure::<M, E, S> { followed, x, y, increment, weights, sizes, h, floor };
+                let again = dispatch(measure);
                 verdict = progress.judge(Look::Again, again, again);
             }
             if !verdict.active {
@@ -283,8 +296,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             // Those of a solution nearby do for all iterations, unless increments hardly shrink.
             near &= !verdict.stuck;
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
-            // New factors take two more iterations themselves.
-            let expensive = 2.0 + Self::RENEWAL[usize::from(cheap)];
+            let expensive = STILL[usize::from(cheap)] + Self::RENEWAL[usize::from(cheap)];
             // The first increment of new factors against the last of old ones does not tell how good the new ones are.
             let fresh = early || renew && iteration > 1;
             let slow = verdict.remaining > expensive && (!fresh || verdict.grows);
@@ -356,7 +368,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well.
     fn leaves_much(&self, first: E, tolerance: f64, cheap: bool) -> bool {
         let left = dispatch(Largest { residual: self.f.as_ref().as_flattened() }) / first;
-        let expensive = 2.0 + Self::RESIDUAL + Self::RENEWAL[usize::from(cheap)];
+        let expensive = STILL[usize::from(cheap)] + Self::RESIDUAL + Self::RENEWAL[usize::from(cheap)];
         let mut cell: E::Cell = Zeroable::zeroed();
         left.store(&mut cell);
         let slowest = (0..E::LANES)

@@ -3,17 +3,15 @@
 
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
-use super::factors::slot;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{fill, follows, is_fill, is_led, row_of, rows};
-use super::sparse::{self, Planned};
+use super::left_out::{fill, is_fill, is_led, row_of, rows};
+use super::mean_solve::Solve;
+use super::sparse;
 use super::straight::{AtRow, each_row};
-use super::substitution;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Lanes;
-use crate::shape::{Aligned, Shape};
+use crate::shape::Aligned;
 use bytemuck::Zeroable;
-use core::marker::PhantomData;
 
 /// Factors of the mean Jacobian of the stages for all eigenvalues, by the plan: what an iteration takes that need
 /// not be exact.
@@ -25,7 +23,7 @@ pub struct MeanFactors<M: Dae, E: Lanes, const S: usize> {
 }
 
 /// What systems in the eigenbasis are solved with.
-type Number<E, const S: usize> = Complex<<E as Lanes>::Coarse, S>;
+pub(super) type Number<E, const S: usize> = Complex<<E as Lanes>::Coarse, S>;
 
 impl<M: Dae, E: Lanes, const S: usize> Clone for MeanFactors<M, E, S> {
     fn clone(&self) -> Self {
@@ -62,14 +60,10 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         f: &ArrayK<M, [E; S]>,
         solution: &mut ArrayK<M, [[E; 1]; S]>,
     ) {
-        dispatch(Split::<M, E, S> { basis, f, rows: &mut self.rows });
-        let factors = Planned::<M, _, 1> {
-            model: PhantomData,
-            blocks: self.blocks.as_ref(),
-            coupling: &[[Complex::zero()]],
-        };
-        substitution::solve_led(factors, self.rows.as_mut());
-        dispatch(Join::<M, E, S> { basis, solution, rows: &self.rows });
+        let Self { blocks, rows } = self;
+        let (blocks, rows) =
+            (blocks.as_ref().as_flattened().as_flattened(), rows.as_mut().as_flattened_mut());
+        dispatch(Solve::<M, E, S> { basis, f, blocks, rows: rows.as_flattened_mut(), solution });
     }
 }
 
@@ -168,60 +162,6 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S,
 
 /// With half of the digits.
 #[inline(always)]
-fn coarse<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
+pub(super) fn coarse<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
     Complex { parts: number.parts.map(T::coarse) }
-}
-
-/// Equations in their slots, in the eigenbasis.
-struct Split<'a, M: Dae, E: Lanes, const S: usize> {
-    basis: &'a Eigenbasis<E, S, S>,
-    f: &'a ArrayK<M, [E; S]>,
-    rows: &'a mut ArrayK<M, [[Number<E, S>; 1]; 1]>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Split<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
-        each_row::<A, _>(&mut self);
-    }
-}
-
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Split<'_, M, E, S> {
-    const ROWS: usize = M::Shape::NK;
-    const INSTRUCTIONS: usize = 3 * S;
-    #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, equation: usize) {
-        let slot = slot::<M>(equation);
-        let follower = follows::<M>(slot);
-        if follower.is_some_and(|follower| !follower.asked) {
-            return;
-        }
-        let (f, row) = (self.f.as_ref().get(equation), self.rows.as_mut().get_mut(slot));
-        if let (Some(f), Some([[row]])) = (f, row) {
-            *row = if follower.is_some() { Complex::zero() } else { coarse(self.basis.split::<A>(f)) };
-        }
-    }
-}
-
-/// Slots, back from the eigenbasis.
-struct Join<'a, M: Dae, E: Lanes, const S: usize> {
-    basis: &'a Eigenbasis<E, S, S>,
-    solution: &'a mut ArrayK<M, [[E; 1]; S]>,
-    rows: &'a ArrayK<M, [[Number<E, S>; 1]; 1]>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Join<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for (slot, ([[row]], solution)) in self.rows.as_ref().iter().zip(self.solution.as_mut()).enumerate() {
-            if follows::<M>(slot).is_none() {
-                let row = Complex { parts: row.parts.map(E::fine) };
-                solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&row));
-            }
-        }
-    }
 }

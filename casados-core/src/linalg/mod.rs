@@ -23,6 +23,7 @@ mod fused;
 mod kernels;
 mod left_out;
 mod mean;
+mod mean_solve;
 mod packets;
 mod prefetch;
 mod sparse;

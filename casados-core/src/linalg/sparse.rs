@@ -161,7 +161,7 @@ fn update<A: Arithmetic, M: Dae, E: Field, const S: usize, const PIVOTS: u8>(
 /// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less work than to ask; and where it is little.
 pub const fn begins_with_update<M: Dae, E>() -> bool {
     let plan = &M::STRUCTURE.elimination;
-    size_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
+    align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
 }
 
 /// Whether nothing is there before an update.

@@ -5,7 +5,7 @@
 //! two stages takes a fifth of the instructions.
 
 use super::fused::Arithmetic;
-use crate::model::{Dae, Pivot, Update};
+use crate::model::{Dae, Pivot, Supernode, Update};
 
 // Where nothing is optimised straight lines would only be long, and in firmware memory is dearer than time.
 #[cfg(any(test, all(feature = "std", not(debug_assertions))))]
@@ -119,6 +119,68 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         if let Some((pivot, others)) = all.get(index..).and_then(|pivots| pivots.split_first()) {
             visit.at::<A>(pivot, others, &[]);
         }
+    }
+}
+
+/// Whether pivots of a [supernode](Supernode) are taken together. In firmware, where nobody follows, each is one of its own.
+pub const GROUPED: bool = cfg!(feature = "std");
+
+/// What is done at each supernode of a plan.
+pub trait AtSupernode {
+    /// About how many instructions that takes for each block of the factors.
+    const INSTRUCTIONS: usize;
+    /// With all of its pivots. To be `#[inline(always)]`.
+    fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]);
+}
+
+/// At the turn of its first pivot.
+struct AtFirst<'a, V>(&'a mut V);
+
+impl<V: AtSupernode> AtPivot for AtFirst<'_, V> {
+    const INSTRUCTIONS: usize = V::INSTRUCTIONS;
+    const OTHERS: bool = true;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [Update]) {
+        if const { !GROUPED } {
+            return self.0.at::<A, 1>([pivot]);
+        }
+        match (pivot.supernode, others) {
+            (4, [second, third, fourth, ..]) => self.0.at::<A, 4>([pivot, second, third, fourth]),
+            (3, [second, third, ..]) => self.0.at::<A, 3>([pivot, second, third]),
+            (2, [second, ..]) => self.0.at::<A, 2>([pivot, second]),
+            (1, _) => self.0.at::<A, 1>([pivot]),
+            _ => {}
+        }
+    }
+}
+
+/// From the first supernode to the last.
+#[inline(always)]
+pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+    if const { !GROUPED || is_short_plan::<A, M, AtFirst<'_, V>>() } {
+        return from_first::<A, M, _>(&mut AtFirst(visit));
+    }
+    for supernode in M::STRUCTURE.elimination.supernodes {
+        at_supernode::<A, M, V>(visit, supernode);
+    }
+}
+
+/// From the last supernode to the first.
+#[inline(always)]
+pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+    if const { !GROUPED || is_short_plan::<A, M, AtFirst<'_, V>>() } {
+        return from_last::<A, M, _>(&mut AtFirst(visit));
+    }
+    for supernode in M::STRUCTURE.elimination.supernodes.iter().rev() {
+        at_supernode::<A, M, V>(visit, supernode);
+    }
+}
+
+#[inline(always)]
+fn at_supernode<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V, supernode: &'static Supernode) {
+    let pivots = M::STRUCTURE.elimination.pivots.get(supernode.first as usize..);
+    if let Some((pivot, others)) = pivots.and_then(|pivots| pivots.split_first()) {
+        AtFirst(visit).at::<A>(pivot, others, &[]);
     }
 }
 

@@ -10,7 +10,8 @@ pub struct Elimination {
     pub pivots: &'static [Pivot],
     /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its unknown.
     pub slots: &'static [u32],
-    /// For each pivot the blocks of `L` in its row: of pivots that are not scaled, then of those that are.
+    /// For each pivot the blocks of `L` in its row: of pivots that are not scaled, of which those of states that follow others come first, then of those
+    /// that are, of which they come last.
     pub left: &'static [Left],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
     pub updates: &'static [Update],
@@ -20,6 +21,8 @@ pub struct Elimination {
     pub slot_of_equation: &'static [u32],
     /// For each slot whether it is a state whose pivot has the same right-hand sides at all stages; empty if none is.
     pub steady: &'static [Steady],
+    /// The pivots that iterations of Newton's method do not leave out, supernode by supernode.
+    pub supernodes: &'static [Supernode],
     /// For each state whether it follows another in every iteration of Newton's method; empty if none does.
     pub followers: &'static [Follower],
     /// What the blocks are made of where states that are [absorbed](Follower::absorbed) are left out of the elimination, as
@@ -37,6 +40,7 @@ impl Elimination {
         assembly: &[],
         slot_of_equation: &[],
         steady: &[],
+        supernodes: &[],
         followers: &[],
         led: &[],
     };
@@ -80,14 +84,17 @@ impl Elimination {
 pub struct Pivot {
     /// The unknown that it determines.
     pub slot: u32,
+    /// The equation that determines it.
+    pub equation: u32,
     /// Its own block.
     pub block: u32,
     /// Where the blocks of its row begin.
     pub upper: u32,
     /// Where the blocks of its row end.
     pub end: u32,
-    /// Where in [`Elimination::left`] the blocks of `L` in its row begin, where those of scaled pivots begin, and where all end.
-    pub left: [u32; 3],
+    /// Where in [`Elimination::left`] the blocks of `L` in its row begin, where those begin whose pivots are no states that
+    /// [follow](Follower) others, where those of scaled pivots begin, where those of scaled pivots that follow begin, and where all end.
+    pub left: [u32; 5],
     /// The pivot is the identity, whatever the step size and the point.
     pub identity: bool,
     /// The pivot is the identity, and nothing has been added to the blocks of its column, three or more, which are
@@ -98,6 +105,8 @@ pub struct Pivot {
     /// How many pivots from this one on are scaled and have the same rows below them, as those of the coordinates of a point: at most
     /// three, which go through these rows together; zero if one before this one has counted it.
     pub beside: u32,
+    /// How many pivots from this one on are a [`Supernode`]; zero if one before this one has counted it.
+    pub supernode: u32,
 }
 
 /// A state `x_j` with a pivot `ẋ_j − c v = 0` that is the first thing done to it, where `v` is a state, a control or a parameter: right-hand
@@ -175,7 +184,13 @@ impl Pivot {
     #[must_use]
     #[inline(always)]
     pub const fn left(&self, stages: usize) -> core::ops::Range<usize> {
-        self.left[0] as usize..self.left[if stages > 1 { 1 } else { 2 }] as usize
+        self.left[0] as usize..self.left[if stages > 1 { 2 } else { 4 }] as usize
+    }
+    /// All blocks of `L` in its row, in [`Elimination::left`], but for those of states that follow others.
+    #[must_use]
+    #[inline(always)]
+    pub const fn left_led(&self) -> core::ops::Range<usize> {
+        self.left[1] as usize..self.left[3] as usize
     }
     /// The blocks of its row, to the right of it.
     #[must_use]
@@ -183,6 +198,16 @@ impl Pivot {
     pub const fn upper(&self) -> core::ops::Range<usize> {
         self.upper as usize..self.end as usize
     }
+}
+
+/// Pivots one after the other, four at most, that have the same rows below them and the same columns beside them but for themselves, and whose rows
+/// have the same blocks of `L` of pivots that are no states that [follow](Follower) others. If one of them is such a state, or [`scaled`](Pivot::scaled), it is alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Supernode {
+    /// The first of them.
+    pub first: u32,
+    /// How many they are.
+    pub count: u32,
 }
 
 /// A block of `L`, as it is met in its row.

@@ -7,7 +7,7 @@ mod elimination;
 
 pub use cost::Cost;
 pub use curvature::{Fold, Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
-pub use elimination::{Assembly, Elimination, Follower, Led, Left, Pivot, Steady, Update};
+pub use elimination::{Assembly, Elimination, Follower, Led, Left, Pivot, Steady, Supernode, Update};
 
 /// What is known about a model before it runs.
 #[derive(Clone, Copy, Debug)]

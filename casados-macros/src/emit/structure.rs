@@ -3,6 +3,7 @@
 use crate::graph::Node;
 use crate::language::Variables;
 use crate::structure::followers::{Follower, Led};
+use crate::structure::supernodes;
 use crate::structure::{Analysis, Derivatives, Elimination, Facts, FunctionAnalysis, Operations};
 use crate::structure::{Plan, Position};
 use proc_macro2::{Literal, TokenStream};
@@ -140,22 +141,32 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             if lower { slot_of_equation[row as usize] } else { column }
         })
         .collect();
-    // Blocks of `L` row by row: those of scaled pivots behind the others.
-    let mut rows = vec![[Vec::new(), Vec::new()]; plan.pivots.len()];
+    // Blocks of `L` row by row: those of scaled pivots behind the others, those of states that follow at both ends.
+    let mut rows = vec![[const { Vec::new() }; 4]; plan.pivots.len()];
     for ((&(_, slot), &[block, upper, _]), &scaled) in plan.pivots.iter().zip(&plan.ranges).zip(scaled) {
+        let follows = matches!(followers.get(slot as usize), Some(Some(_)));
+        let kind = match (scaled, follows) {
+            (false, true) => 0,
+            (false, false) => 1,
+            (true, false) => 2,
+            (true, true) => 3,
+        };
         for block in block + 1..upper {
-            rows[slots[block as usize] as usize][usize::from(scaled)].push([block, slot]);
+            rows[slots[block as usize] as usize][kind].push([block, slot]);
         }
     }
     let (mut left, mut pivots) = (Vec::new(), Vec::new());
-    let is_free: Vec<bool> = plan.pivots.iter().map(|&(_, slot)| rows[slot as usize][0].is_empty()).collect();
+    let is_free: Vec<bool> =
+        plan.pivots.iter().map(|&(_, slot)| rows[slot as usize][..2].iter().all(Vec::is_empty)).collect();
     let is_steady: Vec<bool> =
         plan.pivots.iter().map(|&(_, slot)| matches!(steady.get(slot as usize), Some(Some(_)))).collect();
     let beside = beside(&plan.ranges, &slots, scaled, &is_free, &is_steady);
-    for (((((&(_, slot), range), identity), scaled), beside), steady) in
-        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled).zip(beside).zip(&is_steady)
+    let supernodes = supernodes::find(plan, scaled, followers);
+    let groups = beside.into_iter().zip(&supernodes);
+    for (((((&(row, slot), range), identity), scaled), (beside, supernode)), steady) in
+        plan.pivots.iter().zip(&plan.ranges).zip(identity).zip(scaled).zip(groups).zip(&is_steady)
     {
-        let mut ends = [left.len(); 3];
+        let mut ends = [left.len(); 5];
         for (kind, end) in rows[slot as usize].iter().zip(&mut ends[1..]) {
             left.extend(kind.iter().map(|pair| {
                 let [block, slot] = pair.map(Literal::u32_unsuffixed);
@@ -164,10 +175,13 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             *end = left.len();
         }
         let ends = ends.map(Literal::usize_unsuffixed);
-        let [slot, block, upper, end] = [slot, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
-        let beside = Literal::u32_unsuffixed(beside);
+        let [slot, row, block, upper, end] =
+            [slot, row, range[0], range[1], range[2]].map(Literal::u32_unsuffixed);
+        let groups = [beside, *supernode].map(Literal::u32_unsuffixed);
         let kinds = [identity, scaled, steady];
-        pivots.push(quote!(pivot(#slot, [#block, #upper, #end], [#(#ends),*], [#(#kinds),*], #beside)));
+        pivots.push(quote! {
+            pivot([#slot, #row], [#block, #upper, #end], [#(#ends),*], [#(#kinds),*], [#(#groups),*])
+        });
     }
     let scaled: HashSet<u32> = plan
         .ranges
@@ -211,24 +225,36 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         quote!(steady(#entry, #first, #end, #turn, #implied))
     });
     let steady: Vec<_> = steady.collect();
+    let is_left_out = |pivot: usize| {
+        let follower = followers.get(plan.pivots[pivot].1 as usize);
+        matches!(follower, Some(Some(follower)) if !follower.asked)
+    };
+    let own = supernodes.iter().enumerate().filter(|&(first, &count)| count > 0 && !is_left_out(first));
+    let supernodes = own.map(|(first, &count)| {
+        let [first, count] = [first as u32, count].map(Literal::u32_unsuffixed);
+        quote!(supernode(#first, #count))
+    });
     let followers: Vec<_> = match followers.iter().any(Option::is_some) {
         true => followers.iter().map(follower).collect(),
         false => Vec::new(),
     };
     let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Follower, Led, Left, Pivot, Steady, Update};
+        use #krate::model::{Assembly, Follower, Led, Left, Pivot, Steady, Supernode, Update};
         const fn pivot(
-            slot: u32,
+            [slot, equation]: [u32; 2],
             [block, upper, end]: [u32; 3],
-            left: [u32; 3],
+            left: [u32; 5],
             [identity, scaled, steady]: [bool; 3],
-            beside: u32,
+            [beside, supernode]: [u32; 2],
         ) -> Pivot {
-            Pivot { slot, block, upper, end, left, identity, scaled, steady, beside }
+            Pivot { slot, equation, block, upper, end, left, identity, scaled, steady, beside, supernode }
         }
         const fn steady(entry: u32, first: u32, end: u32, turn: u32, implied: bool) -> Steady {
             Steady { entry, first, end, turn, implied }
+        }
+        const fn supernode(first: u32, count: u32) -> Supernode {
+            Supernode { first, count }
         }
         const fn follower(entry: u32, first: u32, end: u32, [asked, absorbed]: [bool; 2]) -> Follower {
             Follower { entry, first, end, asked, absorbed }
@@ -253,6 +279,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             assembly: &const { [#(#assembly),*] },
             slot_of_equation: &[#(#slot_of_equation),*],
             steady: &const { [#(#steady),*] },
+            supernodes: &const { [#(#supernodes),*] },
             followers: &const { [#(#followers),*] },
             led: &const { [#(#led),*] },
         }

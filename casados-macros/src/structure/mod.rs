@@ -7,6 +7,7 @@ pub mod followers;
 mod index;
 mod samples;
 mod steady;
+pub mod supernodes;
 #[cfg(test)]
 mod tests;
 

@@ -424,11 +424,10 @@ macro_rules! complex {
                     return;
                 };
                 let numbers = Self::load(b);
-                let imaginary = $ops::xor(Self::twice(a, $ops::WIDTH / 2).0, $ops::signs_below());
+                // `i b`: what several products have in common is made once.
+                let turned = Self($ops::xor($ops::swap_halves(numbers.0), $ops::signs_below()));
                 let difference = Self::load(target).subtract_product(Self::twice(a, 0), numbers);
-                difference
-                    .subtract_product(Self(imaginary), Self($ops::swap_halves(numbers.0)))
-                    .store(target);
+                difference.subtract_product(Self::twice(a, $ops::WIDTH / 2), turned).store(target);
             }
             /// `target − a b`, element by element, as far as all go.
             #[inline(always)]
