@@ -5,10 +5,10 @@ use casados::irk::Integrator;
 use casados::model::{Follower, Steady};
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
-use casados::{Method, Statistics};
+use casados::{Method, Shape, Statistics};
 use chain::{Chain, stretched};
 use lost::Lost;
-use nalgebra::{SMatrix, SVector, vector};
+use nalgebra::{SMatrix, SVector, Vector1, vector};
 
 #[allow(dead_code)]
 #[path = "../examples/models/chain.rs"]
@@ -230,17 +230,41 @@ fn gone(xdot: [f64; 7], x: [f64; 7], u: [f64; 1], p: [f64; 1]) -> [f64; 7] {
     ]
 }
 
-/// Newton's method finds the solution of linear equations in one iteration if states that are left out have gone into the right columns.
-fn one_iteration<B: Method<S>, const S: usize>() -> Test {
-    let (x, u, p) = (vector![0.4, -0.3, 0.8, 0.5, -0.6, 0.1, 0.7], vector![0.3], vector![0.0]);
+/// Points of four, three, two and one coordinates in a row, one of which follows another. Where `p = 0` the equations are linear.
+#[dae(NX = [11, 61])]
+fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1]) -> [f64; NX] {
+    let point = |i: usize| 4 * (i / 10) + [0, 0, 0, 0, 1, 1, 1, 2, 2, 3][i % 10];
+    let mut f = xdot;
+    for i in 0..NX - 1 {
+        f[i] += p[0] * x[i] * x[i] - 0.1 * u[0] * (i % 3) as f64;
+        for j in 0..NX - 1 {
+            if point(i) <= point(j) + 1 && point(j) <= point(i) + 1 {
+                f[i] += ((3 * i + 5 * j) % 7) as f64 * 0.1 * x[j] - 0.3 * x[j];
+            }
+        }
+    }
+    f[2] += 0.4 * x[NX - 1];
+    f[NX - 1] -= 2.0 * x[1];
+    f
+}
+
+/// Newton's method finds the solution of linear equations in one iteration if states that are left out have gone into the right columns, and its systems
+/// are solved.
+fn one_iteration<M, B: Method<S>, const S: usize, const NX: usize>(x: SVector<f64, NX>) -> Test
+where
+    M: Dae<
+        Shape: Shape<VectorX<f64> = SVector<f64, NX>, VectorU<f64> = Vector1<f64>, VectorP<f64> = Vector1<f64>>,
+    >,
+{
+    let (u, p) = (vector![0.3], vector![0.0]);
     let options = Options { steps: 3, ..Default::default() };
     let fixed = Newton { fixed_iterations: Some(1), ..Default::default() };
-    let mut whole = Integrator::<Lost<Gone>, B, S, f64, Heap>::new(options)?;
+    let mut whole = Integrator::<Lost<M>, B, S, f64, Heap>::new(options)?;
     whole.set_parameters(&p)?;
     let expected = whole.solve(&x, &u, LENGTH)?.x;
     assert_ne!(whole.statistics().dense, 0);
     for newton in [Newton::default(), fixed] {
-        let mut led = Integrator::<Gone, B, S, f64, Heap>::new(Options { newton, ..options })?;
+        let mut led = Integrator::<M, B, S, f64, Heap>::new(Options { newton, ..options })?;
         led.set_parameters(&p)?;
         let error = (led.solve(&x, &u, LENGTH)?.x - expected).amax();
         assert!(error <= ROUNDING, "{error:e}");
@@ -249,7 +273,7 @@ fn one_iteration<B: Method<S>, const S: usize>() -> Test {
         assert!(iterations <= 2 * steps && dense == 0, "{iterations} iterations, {dense} pivoted");
     }
     // Registers, whose factors may have half of the digits.
-    let mut batch = casados::batch::Integrator::<Gone, B, S, f64>::new(options)?;
+    let mut batch = casados::batch::Integrator::<M, B, S, f64>::new(options)?;
     let mut found = vec![Default::default(); 8];
     let (x0, h) = (vec![x; 8], [LENGTH]);
     batch.solve(&Intervals { x0: &x0, u: &[u; 8], p: &[p; 8], h: &h, ..Default::default() }, &mut found)?;
@@ -271,10 +295,29 @@ fn states_that_are_left_out_go_into_whom_they_follow() -> Test {
     // Of two that follow one the first goes.
     assert_eq!(absorbed, [false, true, true, true, false, false, false]);
     assert!(plan.followers[0].entry != Follower::NONE && plan.led.len() < plan.assembly.len());
-    one_iteration::<Gauss<1>, 1>()?;
-    one_iteration::<Gauss<2>, 2>()?;
-    one_iteration::<RadauIIA<3>, 3>()?;
-    one_iteration::<Gauss<4>, 4>()
+    let x = vector![0.4, -0.3, 0.8, 0.5, -0.6, 0.1, 0.7];
+    one_iteration::<Gone, Gauss<1>, 1, 7>(x)?;
+    one_iteration::<Gone, Gauss<2>, 2, 7>(x)?;
+    one_iteration::<Gone, RadauIIA<3>, 3, 7>(x)?;
+    one_iteration::<Gone, Gauss<4>, 4, 7>(x)
+}
+
+/// Points are supernodes, in straight lines and in loops.
+#[test]
+fn supernodes_are_solved_together() -> Test {
+    let plan = &<Knots<61> as Dae>::STRUCTURE.elimination;
+    for count in 1..=4 {
+        assert!(plan.supernodes.iter().any(|of| of.count == count), "{count} in {:?}", plan.supernodes);
+    }
+    let total: u32 = plan.supernodes.iter().map(|of| of.count).sum();
+    assert_eq!(total as usize, plan.pivots.len() - 1);
+    let (few, many) = (SVector::from_fn(|i, _| (i as f64).sin()), SVector::from_fn(|i, _| (i as f64).sin()));
+    one_iteration::<Knots<11>, RadauIIA<3>, 3, 11>(few)?;
+    one_iteration::<Knots<11>, Gauss<4>, 4, 11>(few)?;
+    one_iteration::<Knots<61>, Gauss<2>, 2, 61>(many)?;
+    one_iteration::<Knots<61>, RadauIIA<3>, 3, 61>(many)?;
+    one_iteration::<Knots<61>, Gauss<4>, 4, 61>(many)?;
+    one_iteration::<Knots<61>, Gauss<5>, 5, 61>(many)
 }
 
 /// From zero, positions are where they follow to in the first evaluation, so that its Jacobian is one within the step; and the Jacobian after it is not
