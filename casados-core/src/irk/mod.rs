@@ -35,6 +35,7 @@ mod hessian;
 mod implied;
 mod increment;
 mod integrator;
+mod measure;
 mod multiply;
 mod newton;
 mod pivoted;

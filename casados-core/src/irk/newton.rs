@@ -29,7 +29,8 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::follow::blocks_of_iteration;
-use super::increment::{Followed, Largest, Measure, PlaceResidual, Subtract, Update};
+use super::increment::{Largest, PlaceResidual, Subtract, Update};
+use super::measure::{Followed, Measure};
 use super::progress::{Look, Progress, Verdict, remaining};
 use super::record::{Coefficients, Linearization, Work};
 use crate::linalg::dispatch;
@@ -56,7 +57,7 @@ const MEANS: usize = 3;
 const STILL: [f64; 2] = [2.0, 3.0];
 
 /// Unknowns that were larger than their first increment, and have moved by no more than so much of their size since then, still are of that size, and
-/// what follows them too, whose increments count for so much of their bound ([`TYPICAL`](super::increment)).
+/// what follows them too, whose increments count for so much of their bound ([`TYPICAL`](super::measure)).
 const LITTLE_MOVED: f64 = 1.0 / 8.0;
 
 /// Linear equations are refined so often if one iteration was not enough.
