@@ -56,10 +56,6 @@ const MEANS: usize = 3;
 /// had a factorisation more and 65 had two more, in one iteration less: 12 and 20 % more time.)
 const STILL: [f64; 2] = [2.0, 3.0];
 
-/// Unknowns that were larger than their first increment, and have moved by no more than so much of their size since then, still are of that size, and
-/// what follows them too, whose increments count for so much of their bound ([`TYPICAL`](super::measure)).
-const LITTLE_MOVED: f64 = 1.0 / 8.0;
-
 /// Linear equations are refined so often if one iteration was not enough.
 const REFINEMENTS: usize = 4;
 
@@ -172,10 +168,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         };
         // Whether the residual that the first increment leaves is asked how good its Jacobian is.
         let ask = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
-        let [zero, one, little, infinite] = [0.0, 1.0, LITTLE_MOVED, f64::INFINITY].map(E::from_f64);
-        // How far unknowns have moved since they were measured.
-        let mut moved = zero;
-        let mut first = zero;
+        let mut first = E::from_f64(0.0);
         let mut iteration = 0;
         // Nothing will be written where states follow others.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
@@ -274,10 +267,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 full,
                 measure: iteration == 1,
             });
-            moved = if iteration == 1 { E::select(E::lt(size, one), zero, infinite) } else { moved + size };
             let look = if iteration == 1 { Look::First { new: renew } } else { Look::Later };
             verdict = progress.judge(look, size, next);
-            if verdict.changed && !exact && iteration > 1 && !E::all(E::le(moved, little)) {
+            if verdict.changed && verdict.moved && !exact && iteration > 1 {
                 let Self { increment, weights, sizes, .. } = self;
                 let measure = Measure::<M, E, S> { followed, x, y, increment, weights, sizes, h, floor };
                 let again = dispatch(measure);

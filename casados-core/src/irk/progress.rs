@@ -4,6 +4,10 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::scalar::Lanes;
 use bytemuck::Zeroable;
 
+/// Unknowns that were larger than their first increment, and have moved by no more than so much of their size since then, still are of that size, and
+/// what follows them too, whose increments count for so much of their bound ([`TYPICAL`](super::measure)).
+const LITTLE_MOVED: f64 = 1.0 / 8.0;
+
 /// What is known of every lane. One that is neither active nor has converged has failed.
 #[derive(Clone, Copy)]
 pub(super) struct Progress<E: Lanes> {
@@ -15,6 +19,8 @@ pub(super) struct Progress<E: Lanes> {
     last: E,
     /// How fast increments shrink; zero if that is not known.
     rate: E,
+    /// How far unknowns have moved since they were measured, in parts of their sizes; infinite if increments were as large.
+    moved: E,
     /// What the next increment has to be below.
     tolerance: E,
     /// Of linear equations the residual tells, not the increment.
@@ -43,6 +49,8 @@ pub(super) struct Verdict {
     pub grows: bool,
     /// Those of some active lane hardly shrink.
     pub stuck: bool,
+    /// In some lane unknowns may no longer be of the size that was measured.
+    pub moved: bool,
     /// How many more increments are expected until the tolerance, in the slowest lane.
     pub remaining: f64,
 }
@@ -53,7 +61,7 @@ impl<E: Lanes> Progress<E> {
         let zero = E::from_f64(0.0);
         let (all, none) = (E::le(zero, zero), E::lt(zero, zero));
         let [rate, tolerance] = [rate, tolerance].map(E::from_f64);
-        Self { active: all, converged: none, last: zero, rate, tolerance, exact }
+        Self { active: all, converged: none, last: zero, rate, moved: zero, tolerance, exact }
     }
 
     /// After an increment of this `size`, and what is expected of the `next` one.
@@ -105,7 +113,8 @@ impl<E: Lanes> Judge<'_, E> {
     #[inline(always)]
     fn verdict(self) -> Verdict {
         let Self { progress, look, size, next } = self;
-        let Progress { mut active, mut converged, mut last, mut rate, tolerance, exact } = *progress;
+        let Progress { mut active, mut converged, mut last, mut rate, mut moved, tolerance, exact } =
+            *progress;
         let (zero, one, half) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(0.5));
         let before = active;
         match look {
@@ -120,7 +129,9 @@ impl<E: Lanes> Judge<'_, E> {
                 if let Look::First { new } = look {
                     // What the last step found out holds for its factors only; and too roughly to stop by it.
                     rate = if new { zero } else { rate };
+                    moved = E::select(E::lt(size, one), zero, E::from_f64(f64::INFINITY));
                 } else {
+                    moved = moved + size;
                     rate = E::select(active, size / last, rate);
                     let rounding = E::and(E::le(size, E::from_f64(E::STAGNATION)), E::le(last, size + size));
                     expected = E::select(rounding, zero, next);
@@ -135,12 +146,13 @@ impl<E: Lanes> Judge<'_, E> {
                 }
             }
         }
-        *progress = Progress { active, converged, last, rate, tolerance, exact };
+        *progress = Progress { active, converged, last, rate, moved, tolerance, exact };
         Verdict {
             active: E::any(active),
             changed: E::any(E::and(before, E::not(active))),
             grows: E::any(E::and(active, E::lt(one, rate))),
             stuck: E::any(E::and(active, E::le(half, rate))),
+            moved: !E::all(E::le(moved, E::from_f64(LITTLE_MOVED))),
             remaining: remaining(active, last, rate, tolerance),
         }
     }
