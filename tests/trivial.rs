@@ -237,9 +237,9 @@ fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1
     let mut f = xdot;
     for i in 0..NX - 1 {
         f[i] += p[0] * x[i] * x[i] - 0.1 * u[0] * (i % 3) as f64;
-        for j in 0..NX - 1 {
+        for (j, other) in x.iter().enumerate().take(NX - 1) {
             if point(i) <= point(j) + 1 && point(j) <= point(i) + 1 {
-                f[i] += ((3 * i + 5 * j) % 7) as f64 * 0.1 * x[j] - 0.3 * x[j];
+                f[i] += ((3 * i + 5 * j) % 7) as f64 * 0.1 * other - 0.3 * other;
             }
         }
     }
