@@ -55,8 +55,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         if const { is_led::<M>() } {
             self.factor::<LED>(jacobian, a, h);
         } else {
-            // Not once more beside it: firmware has no room for two.
-            self.factor_by_plan(jacobian, a, h);
+            self.factor::<ALL>(jacobian, a, h);
         }
     }
 
