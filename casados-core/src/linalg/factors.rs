@@ -3,7 +3,7 @@
 use super::block::{Block, coupling};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{ALL, LED, fill, follows, has_followers, is_fill, is_led, row_of, rows};
+use super::left_out::{fill, follows, has_followers, is_fill, is_led, row_of, rows};
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
 use super::substitution;
@@ -47,24 +47,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all stages. A pivot
     /// that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
-        self.factor::<ALL>(jacobian, a, h);
+        self.is_dense = false;
+        let Self { coupling, blocks, .. } = self;
+        dispatch(Assemble::<M, E, S, false> { jacobian, a, h, coupling, blocks });
+        sparse::factor::<M, E, S>(coupling, blocks.as_mut());
     }
 
     /// The same for [`solve_led`](Self::solve_led) alone: states that have gone into [those that they follow](crate::model::Led) are left out.
     pub fn factor_led_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
-        if const { is_led::<M>() } {
-            self.factor::<LED>(jacobian, a, h);
-        } else {
-            self.factor::<ALL>(jacobian, a, h);
+        if const { !is_led::<M>() } {
+            return self.factor_by_plan(jacobian, a, h);
         }
-    }
-
-    #[inline(always)]
-    fn factor<const PIVOTS: u8>(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let Self { coupling, blocks, .. } = self;
-        dispatch(Assemble::<M, E, S, PIVOTS> { jacobian, a, h, coupling, blocks });
-        sparse::factor::<M, E, S, PIVOTS>(coupling, blocks.as_mut());
+        dispatch(Assemble::<M, E, S, true> { jacobian, a, h, coupling, blocks });
+        sparse::factor_led::<M, E, S>(coupling, blocks.as_mut());
     }
 
     /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots.
@@ -130,7 +127,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 }
 
 /// All blocks of the Newton matrix, each written once; or of that without states that have gone into those that they follow.
-struct Assemble<'a, M: Dae, E: Plain, const S: usize, const PIVOTS: u8> {
+struct Assemble<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
     h: E,
@@ -139,7 +136,7 @@ struct Assemble<'a, M: Dae, E: Plain, const S: usize, const PIVOTS: u8> {
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize, const PIVOTS: u8> Kernel for Assemble<'_, M, E, S, PIVOTS> {
+impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> Kernel for Assemble<'_, M, E, S, LED> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -148,15 +145,15 @@ impl<M: Dae, E: Field + Plain, const S: usize, const PIVOTS: u8> Kernel for Asse
         let coupling = coupling(a, h);
         *to = coupling;
         let mut square = [[E::from_f64(0.0); S]; S];
-        if PIVOTS == LED {
+        if LED {
             A::subtract_blocks(&mut square, &coupling, &coupling);
         }
-        each_row::<A, _>(&mut Rows::<M, E, S, PIVOTS> { jacobian, coupling, square, blocks });
+        each_row::<A, _>(&mut Rows::<M, E, S, LED> { jacobian, coupling, square, blocks });
     }
 }
 
 /// See [`Assemble`].
-struct Rows<'a, M: Dae, E: Plain, const S: usize, const PIVOTS: u8> {
+struct Rows<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `−hA`
     coupling: Block<E, S>,
@@ -165,14 +162,14 @@ struct Rows<'a, M: Dae, E: Plain, const S: usize, const PIVOTS: u8> {
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize, const PIVOTS: u8> AtRow for Rows<'_, M, E, S, PIVOTS> {
-    const ROWS: usize = rows::<M>(PIVOTS == LED);
-    const SIMPLE: usize = fill::<M>(PIVOTS == LED);
+impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> AtRow for Rows<'_, M, E, S, LED> {
+    const ROWS: usize = rows::<M>(LED);
+    const SIMPLE: usize = fill::<M>(LED);
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some((own, led)) = row_of::<M>(PIVOTS == LED, row) else { return };
+        let Some((own, led)) = row_of::<M>(LED, row) else { return };
         if const { sparse::begins_with_update::<M, E>() } && is_fill(own, led) {
             return;
         }
@@ -194,7 +191,7 @@ impl<M: Dae, E: Field + Plain, const S: usize, const PIVOTS: u8> AtRow for Rows<
                 column[stage] = column[stage] + direct;
             }
         }
-        if PIVOTS == LED
+        if LED
             && let Some(led) = led
             && let Some(minus_c) = jacobian.get(led.by as usize)
         {
@@ -214,7 +211,7 @@ impl<M: Dae, E: Field + Plain, const S: usize, const PIVOTS: u8> AtRow for Rows<
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some((own, _)) = row_of::<M>(PIVOTS == LED, row) else { return };
+        let Some((own, _)) = row_of::<M>(LED, row) else { return };
         if const { sparse::begins_with_update::<M, E>() } {
             return;
         }

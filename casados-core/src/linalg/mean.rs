@@ -4,7 +4,7 @@
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{LED, fill, is_fill, is_led, row_of, rows};
+use super::left_out::{fill, is_fill, is_led, row_of, rows};
 use super::mean_solve::Solve;
 use super::sparse;
 use super::straight::{AtRow, each_row};
@@ -49,7 +49,7 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         } else {
             dispatch(AssembleMean::<M, E, S, false> { jacobian, values, h, blocks });
         }
-        sparse::factor::<M, _, 1, LED>(&[[Complex::zero()]], self.blocks.as_mut());
+        sparse::factor_led::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
     }
 
     /// Solves the Newton system of the stages, but for states that [follow](super::follows): what is in the rows of the solution that belong to

@@ -17,7 +17,7 @@
 
 use super::block::{Block, inverse, product};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{LED, is_absorbed};
+use super::left_out::{ALL, LED, is_absorbed};
 use super::straight::{AtPivot, from_first, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
@@ -40,12 +40,14 @@ impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
 impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
 
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot block
-/// that is singular leaves elements that are not finite. Of all pivots, or without states that have gone into [those that they follow](crate::model::Led).
-pub fn factor<M: Dae, E: Field, const S: usize, const PIVOTS: u8>(
-    coupling: &Block<E, S>,
-    blocks: &mut [Block<E, S>],
-) {
-    dispatch(Factor::<M, E, S, PIVOTS> { coupling, blocks, model: PhantomData });
+/// that is singular leaves elements that are not finite.
+pub fn factor<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
+    dispatch(Factor::<M, E, S, ALL> { coupling, blocks, model: PhantomData });
+}
+
+/// The same without states that have gone into [those that they follow](crate::model::Led).
+pub fn factor_led<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
+    dispatch(Factor::<M, E, S, LED> { coupling, blocks, model: PhantomData });
 }
 
 /// See [`factor`].
