@@ -253,7 +253,11 @@ fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1
 fn one_iteration<M, B: Method<S>, const S: usize, const NX: usize>(x: SVector<f64, NX>) -> Test
 where
     M: Dae<
-        Shape: Shape<VectorX<f64> = SVector<f64, NX>, VectorU<f64> = Vector1<f64>, VectorP<f64> = Vector1<f64>>,
+        Shape: Shape<
+            VectorX<f64> = SVector<f64, NX>,
+            VectorU<f64> = Vector1<f64>,
+            VectorP<f64> = Vector1<f64>,
+        >,
     >,
 {
     let (u, p) = (vector![0.3], vector![0.0]);
