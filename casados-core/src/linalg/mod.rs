@@ -7,7 +7,7 @@
 //! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
 //! by the plan of the model (`sparse`, `substitution`, `transposed`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
 //! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
-//! iterations that need not be exact, `EigenFactors` for steps of variable size.
+//! iterations that need not be exact (`mean`, solved supernode by supernode in `mean_solve`), `EigenFactors` for steps of variable size.
 //!
 //! What a kernel consists of is inlined, so that it is compiled for the machine's instructions. Without optimisation helpers that know
 //! nothing of a model are functions like others: inlined they would be no faster, and compiled once more for each kernel of each model.
