@@ -146,25 +146,6 @@ pub fn sweeps<
     );
     from_first::<A, M, _>(&mut first);
     let rows = first.0.rows;
-    second_sweep::<A, M, E, R, S, W, Second>(factors, rows, column, viewer);
-}
-
-/// Solves the second of two triangular systems: the first has been.
-#[inline(always)]
-pub fn second_sweep<
-    A: Arithmetic,
-    M: Dae,
-    E: Field + Plain,
-    R: Array<E>,
-    const S: usize,
-    const W: usize,
-    Second: System,
->(
-    factors: Planned<'_, M, E, S>,
-    rows: &mut [[R; S]],
-    column: usize,
-    viewer: &mut impl Viewer<E, S, W>,
-) {
     let mut second =
         Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, viewer }, PhantomData);
     from_last::<A, M, _>(&mut second);
