@@ -47,6 +47,7 @@ mod dynamics;
 mod error;
 mod horizon;
 mod instance;
+mod ipm;
 mod kkt;
 mod least_squares;
 mod linearise;
@@ -71,6 +72,9 @@ pub use horizon::Horizon;
 #[cfg(feature = "alloc")]
 pub use instance::HeapOcp;
 pub use instance::Ocp;
+#[cfg(feature = "alloc")]
+pub use ipm::HeapIpm;
+pub use ipm::{Ipm, IpmOptions};
 pub use least_squares::LeastSquaresCost;
 pub use linearise::{Curvature, Exact, GaussNewton};
 pub use map::Map;

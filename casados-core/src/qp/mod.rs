@@ -53,7 +53,7 @@ mod clarabel;
 #[cfg(feature = "alloc")]
 mod condense;
 mod error;
-mod interior;
+pub(crate) mod interior;
 mod layout;
 #[cfg(feature = "alloc")]
 mod memory;
@@ -89,5 +89,5 @@ pub(crate) use check::bounds as bound_residuals;
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
-pub(crate) use layout::{assign, pad, part, part_mut};
+pub(crate) use layout::{Places, assign, end, pad, part, part_mut, take_mut};
 pub(crate) use problem::Arrays;

@@ -29,7 +29,7 @@ pub type HeapQp<T = f64> = Qp<T, Vec<StageDims>, Vec<T>>;
 /// The data of a QP, for solvers.
 #[derive(Clone, Copy, Debug)]
 pub struct QpView<'a, T> {
-    pub(super) dims: &'a [StageDims],
+    pub(crate) dims: &'a [StageDims],
     pub(super) data: &'a [T],
 }
 

@@ -28,15 +28,15 @@ pub type HeapSolution<T = f64> = Solution<T, Vec<StageDims>, Vec<T>>;
 /// A solution, for solvers.
 #[derive(Debug)]
 pub struct SolutionView<'a, T> {
-    pub(super) dims: &'a [StageDims],
+    pub(crate) dims: &'a [StageDims],
     /// All `v = (x, u)`.
-    pub(super) v: &'a mut [T],
+    pub(crate) v: &'a mut [T],
     /// All `π`.
-    pub(super) dynamics: &'a mut [T],
+    pub(crate) dynamics: &'a mut [T],
     /// Multipliers of lower bounds.
-    pub(super) lower: &'a mut [T],
+    pub(crate) lower: &'a mut [T],
     /// Multipliers of upper bounds.
-    pub(super) upper: &'a mut [T],
+    pub(crate) upper: &'a mut [T],
 }
 
 /// What a solution has of one stage.

@@ -40,6 +40,10 @@ pub struct Iteration {
     pub elastic: bool,
     /// Whether the step has a second-order correction.
     pub corrected: bool,
+    /// The barrier parameter `μ`; zero in sequential quadratic programming.
+    pub barrier: f64,
+    /// What was added to the diagonal of the Hessian, `δ_w`.
+    pub regularisation: f64,
     /// How long it took.
     pub times: Times,
 }
@@ -50,6 +54,8 @@ pub struct Iteration {
 pub enum Status {
     /// The conditions of optimality hold.
     Converged,
+    /// The conditions of optimality hold to the acceptable tolerance, and no better point was found.
+    Acceptable,
     /// The iterations were used up.
     MaxIterations,
     /// The observer stopped it.
@@ -104,6 +110,7 @@ impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Converged => f.write_str("converged"),
+            Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
             Self::MaxIterations => f.write_str("not converged: the iterations were used up"),
             Self::Stopped => f.write_str("stopped by the observer"),
             Self::Infeasible { constraint, violation } => {
@@ -166,7 +173,7 @@ impl fmt::Display for Log<'_> {
 }
 
 /// Time since it was last asked.
-pub(super) struct Watch {
+pub(in crate::ocp) struct Watch {
     #[cfg(feature = "std")]
     last: std::time::Instant,
 }

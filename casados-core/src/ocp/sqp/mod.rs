@@ -4,13 +4,15 @@
 //! linearise at (x̄, ū)  →  QP with the Hessian of Gauss and Newton, or the exact one made convex  →  step
 //! ```
 
-mod elastic;
+pub(super) mod elastic;
 mod log;
 mod options;
 mod run;
 mod search;
 
 pub use log::{Iteration, Log, Outcome, Status, Times};
+pub(super) use log::Watch;
+pub(super) use run::{failed, infeasible};
 pub use options::{Globalisation, SqpOptions};
 
 use super::error::{OcpError, Part};

@@ -345,7 +345,7 @@ fn between<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     target.combine(a, b, |a, b| if length == T::ONE { b } else { a + length * (b - a) });
 }
 
-fn infeasible<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn infeasible<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
     worst: &Worst,
 ) -> Status {
@@ -353,7 +353,7 @@ fn infeasible<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> +
     Status::Infeasible { constraint: ocp.name(field, stage, index, side), violation }
 }
 
-fn failed<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn failed<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
     error: QpError,
 ) -> Status {

@@ -18,6 +18,9 @@ pub(crate) use kernels::{
 pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub use store::Store;
+pub(crate) use newton::{Iterate, Largest};
+pub(crate) use riccati::First;
+pub(crate) use sides::{Counts, Penalties, Sides, count, is_first_fixed, set};
 pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
@@ -31,10 +34,7 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 use core::marker::PhantomData;
-use newton::Iterate;
-use riccati::First;
 use run::{Limits, Run};
-use sides::{Counts, Penalties, Sides, count, is_first_fixed};
 
 /// An interior point that exploits the structure of optimal control.
 ///

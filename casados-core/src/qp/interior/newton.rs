@@ -43,6 +43,8 @@ pub struct Iterate<'a, T> {
     pub mu: T,
     /// The largest terms of the residuals when they were computed last.
     pub terms: Terms<T>,
+    /// What is added to the diagonal of the Hessian.
+    pub proximal: T,
 }
 
 /// What residuals are sums of.
@@ -61,6 +63,16 @@ pub struct Largest<T> {
     pub dynamics: T,
     pub inequalities: T,
     pub complementarity: T,
+}
+
+impl<T: Real> Largest<T> {
+    /// No residuals.
+    pub const ZERO: Self = Self {
+        stationarity: T::ZERO,
+        dynamics: T::ZERO,
+        inequalities: T::ZERO,
+        complementarity: T::ZERO,
+    };
 }
 
 impl<T: Real> From<Largest<T>> for Residuals {
@@ -127,6 +139,7 @@ impl<'a, T: Real> Iterate<'a, T> {
             initial: take_mut(numbers, if first == First::Fixed { initial } else { 0 }),
             mu: T::ZERO,
             terms: Terms { forces: T::ZERO, values: T::ZERO },
+            proximal: T::ZERO,
         }
     }
 
@@ -311,6 +324,11 @@ impl<'a, T: Real> Iterate<'a, T> {
         });
         if factor {
             self.weights.fill(T::ZERO);
+            if self.proximal > T::ZERO {
+                for place in Places::<T>::new(self.qp.dims) {
+                    part_mut(self.weights, place.row, place.n).fill(self.proximal);
+                }
+            }
             scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
             scatter(self.weights, sides.equations, sides.free, |sum, _| sum + weight);
         }
@@ -324,6 +342,32 @@ impl<'a, T: Real> Iterate<'a, T> {
         self.riccati.solve::<E>(equations, factor, self.step)?;
         self.sides.gather(self.step, |value, _| value, |value, _| -value);
         Ok(())
+    }
+
+    /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals stay as
+    /// they were.
+    pub fn go(&mut self, primal: T, dual: T) {
+        let weight = Self::equation_weight();
+        add_scaled(self.v, primal, self.step);
+        let sides = &mut self.sides;
+        add_scaled(sides.slack, primal, sides.slack_step);
+        add_scaled(sides.multiplier, dual, sides.multiplier_step);
+        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&*sides.equation_residual);
+        for ((&row, free), &residual) in equations {
+            *free = *free - primal * weight * (at(self.step, row) + residual);
+        }
+    }
+
+    /// The point and the multipliers after the full step; slacks stay as they are.
+    pub fn go_to_multipliers(&mut self) {
+        let weight = Self::equation_weight();
+        add_scaled(self.v, T::ONE, self.step);
+        let sides = &mut self.sides;
+        add_scaled(sides.multiplier, T::ONE, sides.multiplier_step);
+        let equations = sides.equations.iter().zip(&mut *sides.free).zip(&*sides.equation_residual);
+        for ((&row, free), &residual) in equations {
+            *free = *free - weight * (at(self.step, row) + residual);
+        }
     }
 
     /// Goes a part of the step.

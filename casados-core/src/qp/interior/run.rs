@@ -201,7 +201,7 @@ impl<T: Real> Iterate<'_, T> {
     }
 
     /// The point and its multipliers.
-    fn store(&mut self, solution: &mut SolutionView<'_, T>) {
+    pub fn store(&mut self, solution: &mut SolutionView<'_, T>) {
         for place in Places::<T>::new(self.qp.dims) {
             assign(part_mut(solution.v, place.v, place.n), part(self.v, place.row, place.n));
         }

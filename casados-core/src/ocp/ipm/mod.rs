@@ -1,0 +1,88 @@
+//! A nonlinear interior point on the structure of optimal control.
+//!
+//! ```text
+//! min  f(v) − μ Σ log s        c(v) = 0,  σ (g(v) − bound) = s        μ → 0
+//! ```
+//!
+//! | | |
+//! | --- | --- |
+//! | `run` | the iterations |
+//! | `start` | the first point |
+//! | `newton`, `direction` | Newton's equations by the Riccati recursion, and what makes them convex |
+//! | `measure`, `filter`, `line_search` | how far a step goes |
+//! | `barrier` | how `μ` shrinks |
+//! | `elastic` | penalties where no step makes progress |
+//!
+//! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the Riccati
+//! recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has a factor of
+//! Cholesky.
+
+mod barrier;
+mod direction;
+mod filter;
+mod line_search;
+mod measure;
+mod newton;
+mod options;
+mod run;
+mod start;
+
+pub use options::IpmOptions;
+
+use super::error::OcpError;
+use super::problem::Formulation;
+use super::sqp::Iteration;
+#[cfg(feature = "alloc")]
+use super::sqp::Log;
+use crate::qp::{Solution, StageDims, Store};
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// A nonlinear interior point for an [`Ocp`](super::Ocp), with exact Hessians.
+#[derive(Clone, Debug)]
+pub struct Ipm<T, D, M, I> {
+    /// Options, which may be changed between calls.
+    pub options: IpmOptions,
+    /// A point that is tried.
+    trial: Solution<T, D, M>,
+    /// The best iterate.
+    best: Solution<T, D, M>,
+    /// Of Newton's equations.
+    numbers: M,
+    indices: I,
+    /// See [`Work`](run::Work).
+    work: M,
+    #[cfg(feature = "alloc")]
+    log: Vec<Iteration>,
+}
+
+/// A nonlinear interior point with its memory on the heap.
+#[cfg(feature = "alloc")]
+pub type HeapIpm<T = f64> = Ipm<T, Vec<StageDims>, Vec<T>, Vec<u32>>;
+
+#[cfg(feature = "alloc")]
+impl<T: Real> HeapIpm<T> {
+    /// For a problem.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(ocp: &super::HeapOcp<P, T>) -> Result<Self, OcpError> {
+        let dims = ocp.qp().dims();
+        Ok(Self {
+            options: IpmOptions::new::<T>(),
+            trial: Solution::new(dims)?,
+            best: Solution::new(dims)?,
+            numbers: Vec::new(),
+            indices: Vec::new(),
+            work: Vec::new(),
+            log: Vec::new(),
+        })
+    }
+
+    /// The iterations of the last run, to be printed.
+    #[must_use]
+    pub fn log(&self) -> Log<'_> {
+        Log(&self.log)
+    }
+}

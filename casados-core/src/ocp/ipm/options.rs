@@ -1,0 +1,74 @@
+//! What can be chosen.
+
+use crate::ocp::error::OcpError;
+use crate::scalar::Real;
+
+/// Options of [`Ipm`](super::Ipm). Letters are those of Wächter and Biegler, "On the implementation
+/// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
+/// Program. 106 (2006).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IpmOptions {
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below. Default 1e-8; of
+    /// single precision 1e-3.
+    pub tolerance: f64,
+    /// A point whose residuals stay below this for `acceptable_iterations` is accepted where the
+    /// tolerance is not reached. Default 1e-6; of single precision 1e-2.
+    pub acceptable_tolerance: f64,
+    /// Default 15.
+    pub acceptable_iterations: usize,
+    /// Default 200.
+    pub max_iterations: usize,
+    /// The first barrier parameter `μ`. Default 0.1.
+    pub start_mu: f64,
+    /// Bounds are left by this at the start, relative to their size and to the room between them.
+    /// Default 1e-2.
+    pub bound_push: f64,
+    /// Whether slacks and multipliers begin at those of the iterate. Default false.
+    pub warm_start: bool,
+    /// The same distance where the start is warm. Default 1e-6.
+    pub warm_push: f64,
+    /// Whether bounds of states and constraints get penalties where no step makes progress. Default
+    /// true.
+    pub elastic: bool,
+    /// The first of these penalties, linear; they grow by factors of ten up to ten thousand times
+    /// that. Default 1e3.
+    pub elastic_penalty: f64,
+}
+
+impl IpmOptions {
+    /// For numbers of some precision.
+    #[must_use]
+    pub fn new<T: Real>() -> Self {
+        let (tolerance, acceptable_tolerance) = if T::EPSILON < 1e-10 { (1e-8, 1e-6) } else { (1e-3, 1e-2) };
+        Self {
+            tolerance,
+            acceptable_tolerance,
+            acceptable_iterations: 15,
+            max_iterations: 200,
+            start_mu: 0.1,
+            bound_push: 1e-2,
+            warm_start: false,
+            warm_push: 1e-6,
+            elastic: true,
+            elastic_penalty: 1e3,
+        }
+    }
+
+    /// Finds values that no run can have.
+    pub(super) fn check(&self) -> Result<(), OcpError> {
+        let positive = [
+            ("tolerance", self.tolerance),
+            ("acceptable_tolerance", self.acceptable_tolerance),
+            ("start_mu", self.start_mu),
+            ("bound_push", self.bound_push),
+            ("warm_push", self.warm_push),
+            ("elastic_penalty", self.elastic_penalty),
+        ];
+        for (option, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(OcpError::InvalidValue { part: crate::ocp::error::Part::Penalty, stage: 0, index: 0, value });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,118 @@
+//! The first point: inside of all bounds, with slacks and multipliers away from zero.
+
+use super::IpmOptions;
+use crate::qp::interior::{Iterate, set};
+use crate::qp::{Bounds, Places, QpView, SolutionView, StageDims, part_mut};
+use crate::scalar::Real;
+
+/// Moves states and controls that have hard bounds away from these by `κ max(1, |bound|)`, and by no
+/// more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
+pub(super) fn push_inside<T: Real>(qp: QpView<'_, T>, fixed: bool, push: f64, solution: &mut SolutionView<'_, T>) {
+    let push = T::from_f64(push);
+    for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
+        let v = part_mut(solution.v, place.v, place.n);
+        let (x, u) = v.split_at_mut_checked(place.nx).unwrap_or_default();
+        if !(fixed && place.stage == 0) {
+            push_part(&stage.x_bounds(), push, x);
+        }
+        push_part(&stage.u_bounds(), push, u);
+    }
+}
+
+fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
+    let penalties = bounds.lower_linear.iter().zip(bounds.upper_linear);
+    for (((v, &lower), &upper), (soft_below, soft_above)) in
+        v.iter_mut().zip(bounds.lower).zip(bounds.upper).zip(penalties)
+    {
+        let below = lower.is_finite() && !soft_below.is_finite();
+        let above = upper.is_finite() && !soft_above.is_finite();
+        if below && above && !(lower < upper) {
+            *v = lower;
+            continue;
+        }
+        let room = if below && above { push * (upper - lower) } else { T::from_f64(f64::INFINITY) };
+        let distance = |bound: T| (push * bound.abs().max(T::ONE)).min_of(room);
+        if below {
+            *v = (*v).max(lower + distance(lower));
+        }
+        if above {
+            *v = (*v).min_of(upper - distance(upper));
+        }
+    }
+}
+
+/// The smaller one of two numbers.
+trait MinOf {
+    fn min_of(self, other: Self) -> Self;
+}
+
+impl<T: Real> MinOf for T {
+    fn min_of(self, other: T) -> T {
+        if other < self { other } else { self }
+    }
+}
+
+/// Slacks at the distances from the bounds, and no less than `push`; multipliers of a warm start, or
+/// one. `values` are evaluated already, so that distances are in `scratch`.
+pub(super) fn begin_sides<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    options: &IpmOptions,
+    warm: bool,
+    mu: T,
+    solution: &SolutionView<'_, T>,
+) {
+    let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
+    let sides = &mut iterate.sides;
+    let count = sides.counts.sides();
+    // Variables are inside of their hard bounds; their slacks are exact and stay so. Others are pushed.
+    let mut places = Places::<T>::new(iterate.qp.dims).peekable();
+    let mut last = 0;
+    for (((slack, &distance), &bound), &row) in
+        sides.slack.iter_mut().zip(&*sides.scratch).zip(&*sides.bound).zip(&*sides.rows)
+    {
+        let row = row as usize;
+        if row < last {
+            // Upper sides follow behind lower ones.
+            places = Places::<T>::new(iterate.qp.dims).peekable();
+        }
+        last = row;
+        while places.next_if(|place| row >= place.row + place.rows).is_some() {}
+        let is_variable = places.peek().is_some_and(|place| row < place.row + place.n);
+        let exact = is_variable && distance > T::ZERO;
+        *slack = if exact { distance } else { distance.max(push * bound.abs().max(T::ONE)) };
+    }
+    sides.multiplier.fill(T::ONE);
+    if warm {
+        sides.take_multipliers(solution);
+        for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
+            *multiplier = (*multiplier).max(mu / slack);
+        }
+    }
+    for j in 0..sides.soft.len() {
+        let side = sides.soft.get(j).map_or(0, |&side| side as usize);
+        let (linear, quadratic) = (at(sides.linear, j), at(sides.quadratic, j));
+        // `λ + ν = linear + quadratic e`, from the start on.
+        let violation = (at(sides.slack, side) - at(sides.scratch, side)).max(push);
+        let force = linear + quadratic * violation;
+        let half = T::from_f64(0.5) * force;
+        let multiplier = at(sides.multiplier, side).min_of(half);
+        set(sides.multiplier, side, multiplier);
+        set(sides.slack, count + j, violation);
+        set(sides.multiplier, count + j, force - multiplier);
+    }
+}
+
+fn at<T: Real>(values: &[T], index: usize) -> T {
+    values.get(index).copied().unwrap_or(T::ZERO)
+}
+
+/// How many numbers the largest stage takes.
+pub(super) const fn scratch<T>(dims: &[StageDims]) -> usize {
+    let (mut largest, mut rest) = (0, dims);
+    while let Some((first, others)) = rest.split_first() {
+        let ld = crate::qp::pad::<T>(first.nx + first.nu);
+        largest = if ld > largest { ld } else { largest };
+        rest = others;
+    }
+    largest
+}
