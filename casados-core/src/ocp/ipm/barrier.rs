@@ -1,6 +1,6 @@
 //! How the barrier parameter shrinks.
 
-use crate::qp::interior::Largest;
+use crate::qp::Residuals;
 use crate::scalar::{Real, Scalar};
 
 /// `κ_ε`: a barrier problem is solved well enough where its error is below this times `μ`.
@@ -11,9 +11,9 @@ const LINEAR: f64 = 0.2;
 const SUPERLINEAR: f64 = 1.5;
 
 /// `E_μ`: the largest residual of the conditions of the barrier problem.
-pub(super) fn error<T: Real>(residuals: &Largest<T>, farthest: f64) -> f64 {
-    let Largest { stationarity, dynamics, inequalities, .. } = *residuals;
-    [stationarity, dynamics, inequalities].into_iter().fold(farthest, |m, r| larger(m, r.to_f64()))
+pub(super) fn error(residuals: &Residuals, farthest: f64) -> f64 {
+    let Residuals { stationarity, dynamics, inequalities, .. } = *residuals;
+    [stationarity, dynamics, inequalities].into_iter().fold(farthest, larger)
 }
 
 /// The largest `|s λ − μ|`.

@@ -114,8 +114,10 @@ where
     ) -> Result<Option<Accepted>, OcpError> {
         let mut alpha = longest;
         let shortest = expected.shortest();
+        if std::env::var("IPM").is_ok() { std::println!("here {:?} slope {:e} longest {longest:e} shortest {shortest:e}", expected.here, expected.slope); }
         while alpha >= shortest {
             let there = self.pair(ocp, expected.mu, alpha);
+            if std::env::var("IPM").is_ok() { std::println!("   {alpha:e} {there:?}"); }
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
                 return Ok(Some(Accepted { alpha, corrected: false }));
             }

@@ -3,9 +3,9 @@
 //! With the QP written at the iterate, one step of the interior point of QPs from there is a step of
 //! that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
 
-use crate::qp::interior::{Counts, First, Iterate, Largest, Penalties, Sides, count, is_first_fixed};
+use crate::qp::interior::{Counts, First, Iterate, Penalties, Sides, count, is_first_fixed};
 use super::run::Work;
-use crate::qp::{Field, QpError, QpView, SolutionView, Store, assign};
+use crate::qp::{Field, Places, QpError, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers};
 
 /// What is known about the sides of a problem before any memory is touched.
@@ -44,27 +44,23 @@ pub(super) fn attach<'a, T: Real>(
     Ok(Iterate::new(qp, first, sides, &mut numbers))
 }
 
-/// Evaluates all residuals at the iterate; multipliers `π` of the dynamics are those that make the
-/// gradient of the Lagrangian in the states zero.
-pub(super) fn evaluate<T: Real>(iterate: &mut Iterate<'_, T>, solution: &mut SolutionView<'_, T>) -> Largest<T> {
-    let mut result = None;
-    iterate.take_point(solution);
+/// Evaluates all residuals at a point. `π` becomes what makes the gradient of the Lagrangian in the
+/// states zero: Newton's step is the same for every `π`.
+pub(super) fn evaluate<T: Real>(iterate: &mut Iterate<'_, T>, at: &SolutionView<'_, T>, pi: &mut [T]) {
+    iterate.take_point(at);
     iterate.give_initial_state();
-    T::registers(Evaluate { iterate, pi: solution.dynamics, result: &mut result });
-    result.unwrap_or(Largest::ZERO)
+    T::registers(Evaluate { iterate, pi });
 }
 
 struct Evaluate<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
-    result: &'r mut Option<Largest<T>>,
 }
 
 impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let _ = self.iterate.evaluate::<E>(self.pi);
-        *self.result = Some(self.iterate.residuals::<E>());
     }
 }
 
@@ -116,6 +112,7 @@ pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut W
     assign(work.rows, iterate.v);
     assign(work.slacks, iterate.sides.multiplier);
     assign(work.ends, iterate.sides.free);
+    iterate.proximal = T::from_f64(work.delta);
     T::registers(After { iterate, pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
@@ -141,4 +138,89 @@ impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
 /// Those of [`step`].
 pub(super) fn resolve<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: f64) -> Result<(), QpError> {
     step(iterate, mu, T::from_f64(delta))
+}
+
+/// The weight of the identity in place of the Hessian in [`least_squares`].
+const IDENTITY: f64 = 1e8;
+
+/// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
+/// constraints, into `work.pi` and `work.curving`; those of bounds of variables are given. These are
+/// Newton's equations with a large multiple of the identity for a Hessian, and no residuals of the
+/// constraints (Wächter and Biegler, section 3.6).
+///
+/// # Errors
+/// Those of the recursion.
+pub(super) fn least_squares<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Work<'_, T>) -> Result<(), QpError> {
+    let identity = T::from_f64(IDENTITY);
+    assign(work.slacks, iterate.sides.multiplier);
+    general_multipliers(iterate, |_| T::ZERO);
+    let mut result = Ok(());
+    T::registers(LeastSquares { iterate, pi: work.pi, result: &mut result });
+    result?;
+    let sides = &mut iterate.sides;
+    assign(work.curving, sides.multiplier_step);
+    sides.multiplier_step.fill(T::ZERO);
+    general_multipliers(iterate, |i| work.curving.get(i).copied().unwrap_or(T::ZERO));
+    assign(work.rows, iterate.v);
+    iterate.proximal = identity;
+    T::registers(After { iterate, pi: work.pi });
+    assign(iterate.v, work.rows);
+    assign(iterate.sides.multiplier, work.slacks);
+    Ok(())
+}
+
+/// Sets multipliers of sides of general constraints.
+fn general_multipliers<T: Real>(iterate: &mut Iterate<'_, T>, value: impl Fn(usize) -> T) {
+    let sides = &mut iterate.sides;
+    let count = sides.counts.sides();
+    let general = is_general::<T>(iterate.qp, sides.rows);
+    for (i, (multiplier, general)) in sides.multiplier.iter_mut().zip(general).enumerate().take(count) {
+        if general {
+            *multiplier = value(i);
+        }
+    }
+}
+
+/// Whether rows, first those of lower and then those of upper sides, belong to general constraints.
+pub(super) fn is_general<'a, T: Real>(qp: QpView<'a, T>, rows: &'a [u32]) -> impl Iterator<Item = bool> + 'a {
+    let mut places = Places::<T>::new(qp.dims).peekable();
+    let mut last = 0;
+    rows.iter().map(move |&row| {
+        let row = row as usize;
+        if row < last {
+            places = Places::<T>::new(qp.dims).peekable();
+        }
+        last = row;
+        while places.next_if(|place| row >= place.row + place.rows).is_some() {}
+        places.peek().is_some_and(|place| row >= place.row + place.ld)
+    })
+}
+
+struct LeastSquares<'r, 'a, 's, T> {
+    iterate: &'r mut Iterate<'a, T>,
+    pi: &'s mut [T],
+    result: &'r mut Result<(), QpError>,
+}
+
+impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(self) {
+        let Self { iterate, pi, result } = self;
+        let _ = iterate.evaluate::<E>(pi);
+        let identity = T::from_f64(IDENTITY);
+        iterate.dynamics.fill(T::ZERO);
+        iterate.proximal = identity;
+        let sides = &mut iterate.sides;
+        sides.residual.fill(T::ZERO);
+        sides.equation_residual.fill(T::ZERO);
+        sides.target.fill(T::ZERO);
+        sides.inverse.fill(T::ZERO);
+        let general = is_general::<T>(iterate.qp, sides.rows);
+        for ((inverse, multiplier), general) in sides.inverse.iter_mut().zip(&mut *sides.multiplier).zip(general) {
+            if general {
+                (*inverse, *multiplier) = (T::ONE, identity);
+            }
+        }
+        *result = iterate.newton::<E>(true);
+    }
 }

@@ -5,7 +5,7 @@ use super::direction::Regularisation;
 use super::filter::Filter;
 use super::line_search::{Accepted, Expected, Room, longest};
 use super::measure;
-use super::newton::{Lengths, attach, dynamics_after, evaluate, evaluate_values};
+use super::newton::{Lengths, attach, dynamics_after, evaluate, evaluate_values, least_squares};
 use super::start::{begin_sides, push_inside, scratch};
 use super::Ipm;
 use crate::ocp::convexify::Convexification;
@@ -15,8 +15,8 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Exact;
 use crate::ocp::problem::Formulation;
 use crate::ocp::sqp::{Iteration, Outcome, Status, Times, Watch, elastic, failed, infeasible};
-use crate::qp::interior::Penalties;
-use crate::qp::{StageDims, Store, end, take_mut};
+use crate::qp::interior::{Penalties, Sides};
+use crate::qp::{StageDims, Store, assign, end, take_mut};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
@@ -43,6 +43,9 @@ pub(super) struct Work<'a, T> {
     pub multiplier_step: &'a mut [T],
     /// Multipliers `π` after the full step.
     pub pi: &'a mut [T],
+    /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those of
+    /// the barrier go as far as they stay positive.
+    pub curving: &'a mut [T],
     /// Over the variables of a stage.
     pub scratch: &'a mut [T],
     /// Linear penalties as they were given.
@@ -54,7 +57,7 @@ pub(super) struct Work<'a, T> {
 impl<'a, T: Real> Work<'a, T> {
     fn length(dims: &[StageDims], ends: usize, pairs: usize) -> usize {
         let end = end::<T>(dims);
-        ends + 2 * end.row + 3 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
+        ends + 2 * end.row + 4 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
     }
 
     fn new(dims: &[StageDims], ends: usize, pairs: usize, mut memory: &'a mut [T]) -> Self {
@@ -68,6 +71,7 @@ impl<'a, T: Real> Work<'a, T> {
             slack_step: take_mut(rest, pairs),
             multiplier_step: take_mut(rest, pairs),
             pi: take_mut(rest, end.dynamics),
+            curving: take_mut(rest, pairs),
             scratch: take_mut(rest, scratch::<T>(dims)),
             penalties: take_mut(rest, elastic::memory(dims)),
             delta: 0.0,
@@ -124,7 +128,8 @@ where
         P::Dynamics: SecondOrder<T>,
     {
         self.options.check()?;
-        ocp.check()?;
+        // Bounds of constraints are in the QP once it is written.
+        ocp.linearise(Exact { convexification: Convexification::None })?;
         let all = Lengths::of(ocp.qp(), Penalties::Elastic(T::ONE));
         let lengths = Lengths::of(ocp.qp(), Penalties::Given);
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), all.counts.pairs());
@@ -136,7 +141,7 @@ where
             let (qp, iterate) = ocp.qp_and_iterate();
             push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
         }
-        ocp.remember_penalties(Self::work(&mut self.work, ocp, &all).penalties);
+        ocp.remember_penalties(Self::work(&mut self.work, ocp.qp().dims, ocp.ends(), &all).penalties);
         let mut state = State {
             lengths,
             mu: self.options.start_mu,
@@ -182,7 +187,7 @@ where
             }
             outcome.iterations += 1;
         };
-        ocp.set_penalties(Self::work(&mut self.work, ocp, &all).penalties, None);
+        ocp.set_penalties(Self::work(&mut self.work, ocp.qp().dims, ocp.ends(), &all).penalties, None);
         if outcome.status != Status::Converged && state.best.is_finite() {
             ocp.iterate.copy_from(&self.best);
         }
@@ -191,8 +196,8 @@ where
         result.map(|()| outcome)
     }
 
-    fn work<'w, P: Formulation<T>>(memory: &'w mut M, ocp: &Ocp<P, T, D, M>, all: &Lengths) -> Work<'w, T> {
-        Work::new(ocp.qp().dims, ocp.ends(), all.counts.pairs(), memory.as_mut())
+    fn work<'w>(memory: &'w mut M, dims: &[StageDims], ends: usize, all: &Lengths) -> Work<'w, T> {
+        Work::new(dims, ends, all.counts.pairs(), memory.as_mut())
     }
 
     /// One iteration; a status if it is the last one.
@@ -208,28 +213,38 @@ where
     {
         let mut watch = Watch::start();
         let exact = Exact { convexification: Convexification::None };
+        if state.begun {
+            self.curve(ocp, all, state)?;
+        }
         ocp.linearise(exact)?;
         if !state.begun {
-            self.begin(ocp, state, exact)?;
+            self.begin(ocp, all, state)?;
+            self.curve(ocp, all, state)?;
+            // The Hessian has multipliers in it.
+            ocp.linearise(exact)?;
         }
         let Self { options, trial, best, numbers, indices, work, .. } = self;
-        let mut work = Self::work(work, ocp, all);
+        let mut work = Self::work(work, ocp.qp().dims, ocp.ends(), all);
+        {
+            let (qp, solution) = ocp.qp_and_iterate();
+            let mut iterate = attach(qp, &state.lengths, numbers, indices)?;
+            iterate.store(&mut solution.view_mut());
+        }
+        let (residuals, objective) = ocp.residuals();
         let here = {
             let objective = ocp.objective.to_f64();
             let (qp, solution) = ocp.qp_and_iterate();
-            let mut view = solution.view_mut();
             let mut iterate = attach(qp, &state.lengths, numbers, indices)?;
-            let largest = evaluate(&mut iterate, &mut view);
-            iterate.store(&mut view);
-            let farthest = |mu| barrier::farthest(iterate.sides.slack, iterate.sides.multiplier, mu);
+            evaluate(&mut iterate, &solution.view_mut(), work.pi);
+            let Sides { slack, multiplier, .. } = &iterate.sides;
+            let error = |mu| barrier::error(&residuals, barrier::farthest(slack, multiplier, mu));
             let before = state.mu;
-            state.mu = barrier::shrink(state.mu, |mu| barrier::error(&largest, farthest(mu)), options.tolerance);
+            state.mu = barrier::shrink(state.mu, error, options.tolerance);
             if state.mu != before {
                 state.filter.clear();
             }
             measure::here(&iterate, objective, state.mu)
         };
-        let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.times.linearise) = (state.elastic.is_some(), watch.lap());
         if row.iteration == 0 {
@@ -320,6 +335,10 @@ where
             for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
                 *pi = *pi + part * (after - *pi);
             }
+            let full = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+            for (curving, (&multiplier, &step)) in work.curving.iter_mut().zip(full) {
+                *curving = *curving + part * (multiplier + step - *curving);
+            }
             iterate.go(part, T::from_f64(dual));
             let sides = &mut iterate.sides;
             for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(sides.counts.sides()) {
@@ -341,35 +360,52 @@ where
     fn begin<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
         state: &mut State,
-        exact: Exact,
-    ) -> Result<(), OcpError>
-    where
-        P::Dynamics: SecondOrder<T>,
-    {
+    ) -> Result<(), OcpError> {
         let warm = self.options.warm_start || state.elastic.is_some();
-        let discarded = {
-            let (qp, solution) = ocp.qp_and_iterate();
-            let mut view = solution.view_mut();
-            let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-            iterate.take_point(&view);
-            iterate.give_initial_state();
-            evaluate_values(&mut iterate);
-            begin_sides(&mut iterate, &self.options, warm, T::from_f64(state.mu), &view);
-            let _ = evaluate(&mut iterate, &mut view);
-            iterate.store(&mut view);
-            let largest = view.dynamics.iter().fold(0.0f64, |m, pi| f64::max(m, pi.abs().to_f64()));
-            let is_small = largest <= LARGEST_MULTIPLIER;
-            if !is_small {
+        let ends = ocp.ends();
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut view = solution.view_mut();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut work = Self::work(&mut self.work, qp.dims, ends, all);
+        iterate.take_point(&view);
+        iterate.give_initial_state();
+        evaluate_values(&mut iterate);
+        begin_sides(&mut iterate, &self.options, warm, T::from_f64(state.mu), &view);
+        iterate.store(&mut view);
+        if warm {
+            assign(work.curving, iterate.sides.multiplier);
+        } else if least_squares(&mut iterate, &mut work).is_ok() {
+            let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST_MULTIPLIER);
+            if work.pi.iter().chain(&*work.curving).all(is_small) {
+                assign(view.dynamics, work.pi);
+            } else {
                 view.dynamics.fill(T::ZERO);
+                work.curving.fill(T::ZERO);
             }
-            !is_small
-        };
-        state.begun = true;
-        if !discarded {
-            // The Hessian has multipliers in it.
-            ocp.linearise(exact)?;
         }
+        state.begun = true;
+        Ok(())
+    }
+
+    /// Writes the multipliers that the Hessian has.
+    fn curve<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &State,
+    ) -> Result<(), OcpError> {
+        let ends = ocp.ends();
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut view = solution.view_mut();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let work = Self::work(&mut self.work, qp.dims, ends, all);
+        assign(work.slacks, iterate.sides.multiplier);
+        assign(iterate.sides.multiplier, work.curving);
+        iterate.take_point(&view);
+        iterate.store(&mut view);
+        assign(iterate.sides.multiplier, work.slacks);
         Ok(())
     }
 }

@@ -65,21 +65,14 @@ pub(super) fn begin_sides<T: Real>(
     let sides = &mut iterate.sides;
     let count = sides.counts.sides();
     // Variables are inside of their hard bounds; their slacks are exact and stay so. Others are pushed.
-    let mut places = Places::<T>::new(iterate.qp.dims).peekable();
-    let mut last = 0;
-    for (((slack, &distance), &bound), &row) in
-        sides.slack.iter_mut().zip(&*sides.scratch).zip(&*sides.bound).zip(&*sides.rows)
+    let general = super::newton::is_general::<T>(iterate.qp, sides.rows);
+    for (((slack, &distance), &bound), general) in
+        sides.slack.iter_mut().zip(&*sides.scratch).zip(&*sides.bound).zip(general)
     {
-        let row = row as usize;
-        if row < last {
-            // Upper sides follow behind lower ones.
-            places = Places::<T>::new(iterate.qp.dims).peekable();
-        }
-        last = row;
-        while places.next_if(|place| row >= place.row + place.rows).is_some() {}
-        let is_variable = places.peek().is_some_and(|place| row < place.row + place.n);
-        let exact = is_variable && distance > T::ZERO;
-        *slack = if exact { distance } else { distance.max(push * bound.abs().max(T::ONE)) };
+        let exact = !general && distance > T::ZERO;
+        // Bounds of general constraints are those of the QP, whose size says nothing.
+        let size = if general { T::ONE } else { bound.abs().max(T::ONE) };
+        *slack = if exact { distance } else { distance.max(push * size) };
     }
     sides.multiplier.fill(T::ONE);
     if warm {

@@ -184,6 +184,14 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
+        if self.proximal > T::ZERO {
+            for place in Places::<T>::new(self.qp.dims) {
+                let step = part(self.step, place.row, place.n);
+                for (force, &step) in part_mut(forces, place.row, place.n).iter_mut().zip(step) {
+                    *force = *force + self.proximal * step;
+                }
+            }
+        }
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
         largest = larger::<T, E>(largest, forces);
