@@ -105,7 +105,7 @@ pub(super) fn range(
 }
 
 /// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
-fn means(name: &str, variable: &str) -> bool {
+pub(super) fn means(name: &str, variable: &str) -> bool {
     variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
 }
 

@@ -28,6 +28,10 @@ pub(super) struct Data<'a, T> {
     pub extended: &'a mut [T],
     /// Room for two matrices and a vector over `(x, u)`.
     pub scratch: &'a mut [T],
+    /// One for every state with `x₀ = x_N`, and zero.
+    pub tied: &'a mut [T],
+    /// The multipliers of these conditions.
+    pub theta: &'a mut [T],
 }
 
 /// `NX + NU`
@@ -40,7 +44,7 @@ pub(super) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 9] {
+const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 11] {
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
     let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
     let n = inputs::<P::Shape>();
@@ -55,25 +59,32 @@ const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 9] {
         if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
         extended::<P::Shape>(constraints),
         (2 * n + 1) * pad::<T>(n),
+        P::Shape::NX,
+        P::Shape::NX,
     ]
 }
 
 /// How many numbers it takes.
 pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
-    let [a, b, c, d, e, f, g, h, i] = lengths::<P, T>(intervals);
-    a + b + c + d + e + f + g + h + i
+    let mut rest: &[usize] = &lengths::<P, T>(intervals);
+    let mut sum = 0;
+    while let Some((&first, others)) = rest.split_first() {
+        sum += first;
+        rest = others;
+    }
+    sum
 }
 
 /// The parts.
 pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
     let mut rest = memory;
-    let [times, p, references, lower, upper, algebraic, weights, extended, scratch] =
+    let [times, p, references, lower, upper, algebraic, weights, extended, scratch, tied, theta] =
         lengths::<P, T>(intervals).map(|length| {
             let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
             rest = behind;
             part
         });
-    Data { times, p, references, lower, upper, algebraic, weights, extended, scratch }
+    Data { times, p, references, lower, upper, algebraic, weights, extended, scratch, tied, theta }
 }
 
 /// What is given at a node.

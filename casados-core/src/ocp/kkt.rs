@@ -93,7 +93,7 @@ fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 
 /// The larger size; NaN stays.
 #[inline(always)]
-fn grow<T: Real>(largest: &mut f64, value: T) {
+pub(super) fn grow<T: Real>(largest: &mut f64, value: T) {
     let size = value.abs().to_f64();
     if size.is_nan() || size > *largest {
         *largest = size;

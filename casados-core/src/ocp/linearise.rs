@@ -214,6 +214,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         self.objective = objective;
+        self.couple();
         Ok(())
     }
 
@@ -222,7 +223,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
-        let (residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
+        let (mut residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
+        for gap in super::coupling::gaps(data.tied, &self.iterate) {
+            super::kkt::grow(&mut residuals.dynamics, gap);
+        }
         (residuals, self.objective.to_f64() + penalties)
     }
 

@@ -41,6 +41,7 @@ mod algebraic;
 mod bounds;
 mod constraint;
 mod convexify;
+mod coupling;
 mod cost;
 mod data;
 mod dynamics;

@@ -114,10 +114,8 @@ where
     ) -> Result<Option<Accepted>, OcpError> {
         let mut alpha = longest;
         let shortest = expected.shortest();
-        if std::env::var("IPM").is_ok() { std::println!("here {:?} slope {:e} longest {longest:e} shortest {shortest:e}", expected.here, expected.slope); }
         while alpha >= shortest {
             let there = self.pair(ocp, expected.mu, alpha);
-            if std::env::var("IPM").is_ok() { std::println!("   {alpha:e} {there:?}"); }
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
                 return Ok(Some(Accepted { alpha, corrected: false }));
             }
@@ -155,7 +153,11 @@ where
         let gaps = ocp.gaps(self.trial, self.work.ends);
         let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
-        let theta = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);
+        let mut theta = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);
+        if let Some(coupling) = &mut self.work.coupling {
+            coupling.evaluate(iterate.qp, self.work.rows);
+            theta += coupling.violation();
+        }
         let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
         Some(Pair { theta, phi: objective + penalties + mu * barrier })
     }
@@ -185,7 +187,12 @@ where
                 let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
-                let solved = super::newton::resolve(&mut iterate, T::from_f64(expected.mu), self.work.delta);
+                let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(self.work.delta));
+                if let Some(coupling) = &mut self.work.coupling {
+                    // The conditions are linear: no correction of theirs.
+                    coupling.evaluate(iterate.qp, iterate.v);
+                }
+                let solved = super::newton::step(&mut iterate, self.work.coupling.as_mut(), mu, delta);
                 alpha = longest(iterate.sides.slack, iterate.sides.slack_step, tau).min(1.0);
                 solved
             };

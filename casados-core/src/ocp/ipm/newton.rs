@@ -3,7 +3,7 @@
 //! With the QP written at the iterate, one step of the interior point of QPs from there is a step of
 //! that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
 
-use crate::qp::interior::{Counts, First, Iterate, Penalties, Sides, count, is_first_fixed};
+use crate::qp::interior::{Counts, Coupling, First, Iterate, Penalties, Sides, count, is_first_fixed};
 use super::run::Work;
 use crate::qp::{Field, Places, QpError, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers};
@@ -85,24 +85,33 @@ impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
 /// # Errors
 /// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
 /// definite.
-pub(super) fn step<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: T) -> Result<(), QpError> {
+pub(super) fn step<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    coupling: Option<&mut Coupling<'_, T>>,
+    mu: T,
+    delta: T,
+) -> Result<(), QpError> {
     let mut result = Ok(());
     iterate.proximal = delta;
-    T::registers(Step { iterate, mu, result: &mut result });
+    T::registers(Step { iterate, coupling, mu, result: &mut result });
     result
 }
 
-struct Step<'r, 'a, T> {
+struct Step<'r, 'a, 'c, T> {
     iterate: &'r mut Iterate<'a, T>,
+    coupling: Option<&'r mut Coupling<'c, T>>,
     mu: T,
     result: &'r mut Result<(), QpError>,
 }
 
-impl<T: Real> Registers<T> for Step<'_, '_, T> {
+impl<T: Real> Registers<T> for Step<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         self.iterate.sides.aim(self.mu);
-        *self.result = self.iterate.newton::<E>(true);
+        *self.result = match self.coupling {
+            None => self.iterate.newton::<E>(true),
+            Some(coupling) => self.iterate.newton_coupled::<E>(coupling),
+        };
     }
 }
 
@@ -132,14 +141,6 @@ impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
     }
 }
 
-/// Newton's step at the same point after the constants of linear conditions have changed.
-///
-/// # Errors
-/// Those of [`step`].
-pub(super) fn resolve<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: f64) -> Result<(), QpError> {
-    step(iterate, mu, T::from_f64(delta))
-}
-
 /// The weight of the identity in place of the Hessian in [`least_squares`].
 const IDENTITY: f64 = 1e8;
 
@@ -155,7 +156,8 @@ pub(super) fn least_squares<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Wo
     assign(work.slacks, iterate.sides.multiplier);
     general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
-    T::registers(LeastSquares { iterate, pi: work.pi, result: &mut result });
+    let coupling = work.coupling.as_mut();
+    T::registers(LeastSquares { iterate, coupling, pi: work.pi, result: &mut result });
     result?;
     let sides = &mut iterate.sides;
     assign(work.curving, sides.multiplier_step);
@@ -196,16 +198,17 @@ pub(super) fn is_general<'a, T: Real>(qp: QpView<'a, T>, rows: &'a [u32]) -> imp
     })
 }
 
-struct LeastSquares<'r, 'a, 's, T> {
+struct LeastSquares<'r, 'a, 's, 'c, T> {
     iterate: &'r mut Iterate<'a, T>,
+    coupling: Option<&'r mut Coupling<'c, T>>,
     pi: &'s mut [T],
     result: &'r mut Result<(), QpError>,
 }
 
-impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
+impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, pi, result } = self;
+        let Self { iterate, coupling, pi, result } = self;
         let _ = iterate.evaluate::<E>(pi);
         let identity = T::from_f64(IDENTITY);
         iterate.dynamics.fill(T::ZERO);
@@ -221,6 +224,12 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
                 (*inverse, *multiplier) = (T::ONE, identity);
             }
         }
-        *result = iterate.newton::<E>(true);
+        *result = match coupling {
+            None => iterate.newton::<E>(true),
+            Some(coupling) => {
+                coupling.residual.fill(T::ZERO);
+                iterate.newton_coupled::<E>(coupling)
+            }
+        };
     }
 }

@@ -15,7 +15,8 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Exact;
 use crate::ocp::problem::Formulation;
 use crate::ocp::sqp::{Iteration, Outcome, Status, Times, Watch, elastic, failed, infeasible};
-use crate::qp::interior::{Penalties, Sides};
+use crate::ocp::data::split;
+use crate::qp::interior::{Coupling, Penalties, Sides};
 use crate::qp::{StageDims, Store, assign, end, take_mut};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
@@ -50,12 +51,20 @@ pub(super) struct Work<'a, T> {
     pub scratch: &'a mut [T],
     /// Linear penalties as they were given.
     pub penalties: &'a mut [T],
+    /// Conditions between the first and the last state.
+    pub coupling: Option<Coupling<'a, T>>,
     /// `δ_w` of the step.
     pub delta: f64,
 }
 
 impl<'a, T: Real> Work<'a, T> {
     fn length(dims: &[StageDims], ends: usize, pairs: usize) -> usize {
+        Self::before_coupling(dims, ends, pairs)
+            + first_nx(dims)
+            + Coupling::<T>::memory(dims, first_nx(dims))
+    }
+
+    fn before_coupling(dims: &[StageDims], ends: usize, pairs: usize) -> usize {
         let end = end::<T>(dims);
         ends + 2 * end.row + 4 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
     }
@@ -74,9 +83,18 @@ impl<'a, T: Real> Work<'a, T> {
             curving: take_mut(rest, pairs),
             scratch: take_mut(rest, scratch::<T>(dims)),
             penalties: take_mut(rest, elastic::memory(dims)),
+            coupling: {
+                let tied = &*take_mut(rest, first_nx(dims));
+                let coupled = tied.iter().any(|&tied| tied != T::ZERO);
+                coupled.then(|| Coupling::new(dims, tied, rest))
+            },
             delta: 0.0,
         }
     }
+}
+
+fn first_nx(dims: &[StageDims]) -> usize {
+    dims.first().map_or(0, |dims| dims.nx)
 }
 
 /// What a run remembers from one iteration to the next.
@@ -140,6 +158,14 @@ where
         {
             let (qp, iterate) = ocp.qp_and_iterate();
             push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
+        }
+        {
+            // Which states are tied lies behind the penalties.
+            let (dims, ends) = (ocp.qp().dims, ocp.ends());
+            let begin = Work::<T>::before_coupling(dims, ends, all.counts.pairs());
+            let memory = self.work.as_mut().get_mut(begin..).unwrap_or_default();
+            let (tied, _) = ocp.coupling();
+            assign(memory, tied);
         }
         ocp.remember_penalties(Self::work(&mut self.work, ocp.qp().dims, ocp.ends(), &all).penalties);
         let mut state = State {
@@ -243,7 +269,12 @@ where
             if state.mu != before {
                 state.filter.clear();
             }
-            measure::here(&iterate, objective, state.mu)
+            let mut here = measure::here(&iterate, objective, state.mu);
+            if let Some(coupling) = &mut work.coupling {
+                coupling.evaluate(iterate.qp, iterate.v);
+                here.theta += coupling.violation();
+            }
+            here
         };
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.times.linearise) = (state.elastic.is_some(), watch.lap());
@@ -282,12 +313,18 @@ where
         // The search direction.
         let tau = barrier::fraction_to_boundary(state.mu);
         let (expected, alpha_primal, alpha_dual, tiny) = {
+            let intervals = ocp.intervals();
+            let theta = &*split::<P, T>(ocp.data.as_mut(), intervals).theta;
             let mut iterate = attach(ocp.qp.view(), &state.lengths, numbers, indices)?;
-            match state.regularisation.direction(&mut iterate, T::from_f64(state.mu)) {
+            match state.regularisation.direction(&mut iterate, &mut work.coupling, T::from_f64(state.mu)) {
                 Ok(delta) => (work.delta, row.regularisation) = (delta, delta),
                 Err(error) => return Ok(Some(failed(ocp, error))),
             }
-            let slope = measure::slope(&iterate, state.mu, work.scratch);
+            let mut slope = measure::slope(&iterate, state.mu, work.scratch);
+            if let Some(coupling) = &work.coupling {
+                // The gradients of the QP have these terms of the Lagrangian.
+                slope -= coupling.slope(iterate.qp, theta, iterate.step).to_f64();
+            }
             let expected = Expected { here, slope, theta_min: state.theta_min, mu: state.mu };
             let sides = &iterate.sides;
             let primal = longest(sides.slack, sides.slack_step, tau);
@@ -319,8 +356,10 @@ where
         };
         (row.step, row.corrected) = (alpha, corrected);
         let mu = state.mu;
-        let alpha_dual = {
-            let (qp, solution) = ocp.qp_and_iterate();
+        {
+            let intervals = ocp.intervals();
+            let theta = split::<P, T>(ocp.data.as_mut(), intervals).theta;
+            let (qp, solution) = (ocp.qp.view(), &mut ocp.iterate);
             let mut view = solution.view_mut();
             let mut iterate = attach(qp, &state.lengths, numbers, indices)?;
             let tied = iterate.sides.quadratic.iter().any(|&q| q > T::ZERO);
@@ -332,6 +371,11 @@ where
             let dual = if tied { dual.min(alpha) } else { dual };
             dynamics_after(&mut iterate, &mut work);
             let part = T::from_f64(alpha);
+            if let Some(coupling) = &work.coupling {
+                for (theta, &step) in theta.iter_mut().zip(&*coupling.step) {
+                    *theta = *theta + part * step;
+                }
+            }
             for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
                 *pi = *pi + part * (after - *pi);
             }
@@ -347,9 +391,7 @@ where
                 *multiplier = T::from_f64(clamped);
             }
             iterate.store(&mut view);
-            dual
-        };
-        let _ = alpha_dual;
+        }
         if tiny && state.mu <= tolerance {
             return Ok(Some(Status::NoProgress));
         }
@@ -365,7 +407,9 @@ where
     ) -> Result<(), OcpError> {
         let warm = self.options.warm_start || state.elastic.is_some();
         let ends = ocp.ends();
-        let (qp, solution) = ocp.qp_and_iterate();
+        let intervals = ocp.intervals();
+        let theta = split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let (qp, solution) = (ocp.qp.view(), &mut ocp.iterate);
         let mut view = solution.view_mut();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mut work = Self::work(&mut self.work, qp.dims, ends, all);
@@ -380,6 +424,11 @@ where
             let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST_MULTIPLIER);
             if work.pi.iter().chain(&*work.curving).all(is_small) {
                 assign(view.dynamics, work.pi);
+                if let Some(coupling) = &work.coupling {
+                    for (theta, &step) in theta.iter_mut().zip(&*coupling.step) {
+                        *theta = *theta + step;
+                    }
+                }
             } else {
                 view.dynamics.fill(T::ZERO);
                 work.curving.fill(T::ZERO);

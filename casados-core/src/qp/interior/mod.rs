@@ -2,6 +2,7 @@
 //! are solved by a Riccati recursion.
 
 mod active;
+mod coupling;
 mod kernels;
 mod newton;
 mod options;
@@ -18,6 +19,7 @@ pub(crate) use kernels::{
 pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub use store::Store;
+pub(crate) use coupling::{Coupling, last_state};
 pub(crate) use newton::{Iterate, Largest};
 pub(crate) use riccati::First;
 pub(crate) use sides::{Counts, Penalties, Sides, count, is_first_fixed, set};

@@ -32,9 +32,9 @@ pub struct Iterate<'a, T> {
     /// Gradient of the Lagrangian.
     pub stationarity: &'a mut [T],
     /// Right-hand side of Newton's equations.
-    gradient: &'a mut [T],
+    pub gradient: &'a mut [T],
     /// Weights of rows.
-    weights: &'a mut [T],
+    pub weights: &'a mut [T],
     /// `A x + B u + b − x₊`
     pub dynamics: &'a mut [T],
     /// The multiplier of a given state at the start.
@@ -352,6 +352,12 @@ impl<'a, T: Real> Iterate<'a, T> {
         Ok(())
     }
 
+    /// The changes of the distances of sides, from a step that somebody else made.
+    #[inline(always)]
+    pub fn gather_step(&mut self) {
+        self.sides.gather(self.step, |value, _| value, |value, _| -value);
+    }
+
     /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals stay as
     /// they were.
     pub fn go(&mut self, primal: T, dual: T) {
@@ -522,7 +528,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// What the sides add to the gradient of Newton's equations, into `scratch`, and their weights.
     #[inline(always)]
-    fn push(&mut self, weights: bool) {
+    pub fn push(&mut self, weights: bool) {
         if weights {
             for ((weight, &multiplier), &inverse) in
                 self.weight.iter_mut().zip(&*self.multiplier).zip(&*self.inverse)
@@ -546,7 +552,7 @@ impl<T: Real> Sides<'_, T> {
 
     /// Changes of slacks from the changes of rows in `scratch`, and of multipliers.
     #[inline(always)]
-    fn steps(&mut self) {
+    pub fn steps(&mut self) {
         let sides = self.counts.sides();
         for ((step, &change), &residual) in
             self.slack_step.iter_mut().zip(&*self.scratch).zip(&*self.residual).take(sides)
