@@ -67,6 +67,12 @@ impl Record {
         }
     }
 
+    /// A list of lists of numbers of any length.
+    pub fn vectors(&self, key: &str) -> Result<Vec<Vec<f64>>, String> {
+        let list = self.0[key].as_array().ok_or_else(|| format!("`{key}` is not a list"))?;
+        list.iter().map(|row| Self(serde_json::json!({ "row": row })).list("row")).collect()
+    }
+
     /// A list of rows.
     pub fn matrix<const R: usize, const C: usize>(&self, key: &str) -> Result<SMatrix<f64, R, C>, String> {
         Ok(SMatrix::from_row_slice(&self.numbers(key, R * C)?))

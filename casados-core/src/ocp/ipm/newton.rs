@@ -44,12 +44,11 @@ pub(super) fn attach<'a, T: Real>(
     Ok(Iterate::new(qp, first, sides, &mut numbers))
 }
 
-/// Evaluates all residuals at a point. `π` becomes what makes the gradient of the Lagrangian in the
-/// states zero: Newton's step is the same for every `π`.
-pub(super) fn evaluate<T: Real>(iterate: &mut Iterate<'_, T>, at: &SolutionView<'_, T>, pi: &mut [T]) {
+/// Evaluates all residuals at a point with its multipliers `π`.
+pub(super) fn evaluate<T: Real>(iterate: &mut Iterate<'_, T>, at: &mut SolutionView<'_, T>) {
     iterate.take_point(at);
     iterate.give_initial_state();
-    T::registers(Evaluate { iterate, pi });
+    T::registers(Evaluate { iterate, pi: at.dynamics });
 }
 
 struct Evaluate<'r, 'a, 's, T> {
@@ -60,7 +59,7 @@ struct Evaluate<'r, 'a, 's, T> {
 impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let _ = self.iterate.evaluate::<E>(self.pi);
+        self.iterate.evaluate_at::<E>(self.pi);
     }
 }
 
@@ -122,22 +121,23 @@ pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut W
     assign(work.slacks, iterate.sides.multiplier);
     assign(work.ends, iterate.sides.free);
     iterate.proximal = T::from_f64(work.delta);
-    T::registers(After { iterate, pi: work.pi });
+    T::registers(After { iterate, coupling: work.coupling.as_ref(), pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
     assign(iterate.sides.free, work.ends);
 }
 
-struct After<'r, 'a, 's, T> {
+struct After<'r, 'a, 's, 'c, T> {
     iterate: &'r mut Iterate<'a, T>,
+    coupling: Option<&'r Coupling<'c, T>>,
     pi: &'s mut [T],
 }
 
-impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
+impl<T: Real> Registers<T> for After<'_, '_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         self.iterate.go_to_multipliers();
-        self.iterate.evaluate_gradient::<E>(self.pi);
+        self.iterate.controlled_costates::<E>(self.pi, self.coupling);
     }
 }
 
@@ -165,7 +165,7 @@ pub(super) fn least_squares<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Wo
     general_multipliers(iterate, |i| work.curving.get(i).copied().unwrap_or(T::ZERO));
     assign(work.rows, iterate.v);
     iterate.proximal = identity;
-    T::registers(After { iterate, pi: work.pi });
+    T::registers(After { iterate, coupling: work.coupling.as_ref(), pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
     Ok(())
@@ -209,7 +209,8 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         let Self { iterate, coupling, pi, result } = self;
-        let _ = iterate.evaluate::<E>(pi);
+        pi.fill(T::ZERO);
+        iterate.evaluate_at::<E>(pi);
         let identity = T::from_f64(IDENTITY);
         iterate.dynamics.fill(T::ZERO);
         iterate.proximal = identity;

@@ -261,7 +261,7 @@ where
             let objective = ocp.objective.to_f64();
             let (qp, solution) = ocp.qp_and_iterate();
             let mut iterate = attach(qp, &state.lengths, numbers, indices)?;
-            evaluate(&mut iterate, &solution.view_mut(), work.pi);
+            evaluate(&mut iterate, &mut solution.view_mut());
             let Sides { slack, multiplier, .. } = &iterate.sides;
             let error = |mu| barrier::error(&residuals, barrier::farthest(slack, multiplier, mu));
             let before = state.mu;

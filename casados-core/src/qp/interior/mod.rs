@@ -10,6 +10,7 @@ mod riccati;
 mod run;
 mod sides;
 mod store;
+mod symmetric;
 mod vector;
 
 pub(crate) use kernels::{

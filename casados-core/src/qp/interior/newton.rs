@@ -1,7 +1,8 @@
 //! One iterate of the interior point, its residuals, and the step from it.
 
+use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
-use super::riccati::{Equations, First, Riccati};
+use super::riccati::{Equations, First, Riccati, eliminate};
 use super::sides::{Counts, Sides, set};
 use super::vector::{
     add_scaled, dot, larger, largest_negative_product, largest_negative_ratio, largest_product, largest_size,
@@ -47,6 +48,7 @@ pub struct Iterate<'a, T> {
     pub proximal: T,
 }
 
+
 /// What residuals are sums of.
 #[derive(Clone, Copy)]
 pub struct Terms<T> {
@@ -87,11 +89,25 @@ impl<T: Real> From<Largest<T>> for Residuals {
     }
 }
 
+/// Where the multipliers `π` of the dynamics come from when a gradient is computed.
+#[derive(Clone, Copy)]
+pub enum Costates<'c, 'm, T> {
+    /// The adjoint recursion: the gradient in the states vanishes.
+    Adjoint,
+    /// The adjoint recursion of the controlled system, with the last factors: where the gradient in the
+    /// controls vanishes both are the same, and errors decay where the adjoint recursion lets them grow.
+    /// With the changes of the multipliers of a coupling.
+    Controlled(Option<&'c Coupling<'m, T>>),
+    /// They are given.
+    Given,
+}
+
 /// The residuals as a function of its own; the gradient only where there is room for multipliers and the objective.
 struct Evaluate<'s, 'a, T, E> {
     iterate: &'s mut Iterate<'a, T>,
     values: bool,
     multipliers: Option<(&'s mut [T], &'s mut T)>,
+    costates: Costates<'s, 's, T>,
     register: PhantomData<E>,
 }
 
@@ -102,7 +118,7 @@ impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
             self.iterate.values::<E>();
         }
         if let Some((multipliers, objective)) = self.multipliers {
-            *objective = self.iterate.gradient::<E>(multipliers);
+            *objective = self.iterate.gradient::<E>(multipliers, self.costates);
         }
     }
 }
@@ -151,30 +167,49 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
     /// Lagrangian in `x` zero, and the gradient in `u`. Returns the objective.
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
-        self.evaluate_parts::<E>(true, Some(multipliers))
+        self.evaluate_parts::<E>(true, Some(multipliers), Costates::Adjoint)
+    }
+
+    /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is what they leave.
+    pub fn evaluate_at<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_parts::<E>(true, Some(multipliers), Costates::Given);
+    }
+
+    /// The multipliers `π` at the point, by the recursion of the controlled system.
+    pub fn controlled_costates<E: Packed<T>>(
+        &mut self,
+        multipliers: &mut [T],
+        coupling: Option<&Coupling<'_, T>>,
+    ) {
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled(coupling));
     }
 
     /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are in `scratch` afterwards.
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
-        let _ = self.evaluate_parts::<E>(true, None);
+        let _ = self.evaluate_parts::<E>(true, None, Costates::Adjoint);
     }
 
     /// What is left of [`evaluate`](Self::evaluate) after [`evaluate_values`](Self::evaluate_values).
     pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers));
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Adjoint);
     }
 
     #[inline(always)]
-    fn evaluate_parts<E: Packed<T>>(&mut self, values: bool, multipliers: Option<&mut [T]>) -> T {
+    fn evaluate_parts<E: Packed<T>>(
+        &mut self,
+        values: bool,
+        multipliers: Option<&mut [T]>,
+        costates: Costates<'_, '_, T>,
+    ) -> T {
         let (mut objective, register) = (T::ZERO, PhantomData);
         let multipliers = multipliers.map(|multipliers| (multipliers, &mut objective));
-        E::vectorize(Evaluate::<T, E> { iterate: self, values, multipliers, register });
+        E::vectorize(Evaluate::<T, E> { iterate: self, values, multipliers, costates, register });
         objective
     }
 
     /// The multipliers `π`, the gradient in `u`, and the objective.
     #[inline(always)]
-    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
+    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates<'_, '_, T>) -> T {
         let sides = &mut self.sides;
         // Forces of the constraints, by rows.
         let forces = &mut *self.gradient;
@@ -191,6 +226,9 @@ impl<'a, T: Real> Iterate<'a, T> {
                     *force = *force + self.proximal * step;
                 }
             }
+        }
+        if let Costates::Controlled(Some(coupling)) = costates {
+            coupling.push(self.qp, forces);
         }
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
@@ -223,7 +261,20 @@ impl<'a, T: Real> Iterate<'a, T> {
                 *minus = -force;
             }
             subtract::<T, E>(g, matrix, minus, n, next + ng);
-            if place.stage > 0 {
+            if matches!(costates, Costates::Controlled(_)) {
+                let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
+                let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
+                let y = part_mut(self.riccati.y, place.v + nx, place.nu);
+                eliminate::<T, E>(g, panel, ld, inverse, y, nx);
+            }
+            if place.stage > 0 && matches!(costates, Costates::Given) {
+                let before = place.dynamics.saturating_sub(pad::<T>(nx));
+                let pi = part(multipliers, before, nx);
+                for (g, &pi) in g.iter_mut().zip(pi) {
+                    *g = *g - pi;
+                }
+                largest = larger::<T, E>(largest, pi);
+            } else if place.stage > 0 {
                 // π is what makes this part zero.
                 let before = place.dynamics.saturating_sub(pad::<T>(nx));
                 let pi = part_mut(multipliers, before, nx);
@@ -320,6 +371,22 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// their distances are afterwards.
     #[inline(always)]
     pub fn solve<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
+        self.assemble(factor);
+        let equations = Equations {
+            qp: self.qp,
+            first: self.first,
+            weights: self.weights,
+            gradient: self.gradient,
+            dynamics: self.dynamics,
+        };
+        self.riccati.solve::<E>(equations, factor, self.step)?;
+        self.gather_step();
+        Ok(())
+    }
+
+    /// Gradient and weights of Newton's equations.
+    #[inline(always)]
+    pub fn assemble(&mut self, factor: bool) {
         let weight = Self::equation_weight();
         let sides = &mut self.sides;
         assign(self.gradient, self.stationarity);
@@ -340,16 +407,6 @@ impl<'a, T: Real> Iterate<'a, T> {
             scatter(self.weights, sides.rows, sides.weight, |sum, &weight| sum + weight);
             scatter(self.weights, sides.equations, sides.free, |sum, _| sum + weight);
         }
-        let equations = Equations {
-            qp: self.qp,
-            first: self.first,
-            weights: self.weights,
-            gradient: self.gradient,
-            dynamics: self.dynamics,
-        };
-        self.riccati.solve::<E>(equations, factor, self.step)?;
-        self.sides.gather(self.step, |value, _| value, |value, _| -value);
-        Ok(())
     }
 
     /// The changes of the distances of sides, from a step that somebody else made.

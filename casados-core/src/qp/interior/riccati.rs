@@ -25,6 +25,9 @@ pub enum First {
     Fixed,
     /// It is eliminated like controls.
     Free,
+    /// It is tied to the state at the end, and is found with the multipliers of that. Controls may then
+    /// have pivots of either sign: what counts is the inertia of the whole.
+    Tied,
 }
 
 /// Memory of the recursion.
@@ -34,23 +37,25 @@ pub struct Riccati<'a, T> {
     /// `−[A B]ᵀ P₊` and `−[C D]ᵀ diag(w)`
     w: &'a mut [T],
     /// `P`
-    p: &'a mut [T],
+    pub p: &'a mut [T],
     /// `(K; L)` of all stages, then the factor of `P` at the start.
-    panels: &'a mut [T],
+    pub panels: &'a mut [T],
     /// Reciprocals of pivots.
-    inverse: &'a mut [T],
+    pub inverse: &'a mut [T],
     /// What was added to pivots.
     pub added: &'a mut [T],
     /// `L⁻¹ g_u`
-    y: &'a mut [T],
+    pub y: &'a mut [T],
     /// `−P₊ r`
     offset: &'a mut [T],
     /// The gradient of the stage at work.
-    g: &'a mut [T],
+    pub g: &'a mut [T],
     /// `−(p₊ + P₊ r)`, and the negative gradient of general constraints.
     pub minus: &'a mut [T],
     /// Pivots that were made larger.
     pub regularised: usize,
+    /// Negative pivots, where these are allowed.
+    pub negative: usize,
     /// The largest element of the diagonals so far: what elimination has subtracted was as large as that.
     largest: T,
     /// Behind the last stage.
@@ -111,6 +116,7 @@ impl<'a, T: Real> Riccati<'a, T> {
             g: take_mut(memory, ld),
             minus: take_mut(memory, pad::<T>(next_and_ng)),
             regularised: 0,
+            negative: 0,
             largest: T::ZERO,
             end,
         }
@@ -175,10 +181,11 @@ impl<T: Real> Riccati<'_, T> {
     }
 
     #[inline(always)]
-    fn backward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, factor: bool) -> Result<(), QpError> {
+    pub fn backward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, factor: bool) -> Result<(), QpError> {
         let Equations { qp, first, weights, gradient, dynamics } = *equations;
         if factor {
             self.regularised = 0;
+            self.negative = 0;
             self.largest = T::ZERO;
         }
         for place in Places::<T>::ending(qp.dims, self.end).rev() {
@@ -246,7 +253,7 @@ impl<T: Real> Riccati<'_, T> {
         let w = Columns { data: &*self.w, ld };
         // Columns are computed four at a time. The first with a control among them are needed whole.
         let whole = nx / 4 * 4;
-        if stage > 0 || first == First::Free {
+        if stage > 0 || first != First::Fixed {
             product::<T, E>(self.m, ld, hessian, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
         }
         product::<T, E>(self.m, ld, hessian, matrix, w, (n, whole..n, next + ng), Part::Full);
@@ -269,7 +276,9 @@ impl<T: Real> Riccati<'_, T> {
         let added = part_mut(self.added, place.v, ld);
         let (before, panel) = self.m.split_at_mut_checked(nx * ld).unwrap_or_default();
         let panel = part_mut(panel, 0, nu * ld);
-        let pivots = Pivots { inverse: part_mut(inverse, nx, nu), added: part_mut(added, nx, nu), largest };
+        let indefinite = first == First::Tied;
+        let (of_controls, added_u) = (part_mut(inverse, nx, nu), part_mut(added, nx, nu));
+        let pivots = Pivots { inverse: of_controls, added: added_u, largest, indefinite };
         let not_convex = |index: usize, pivot: T| QpError::NotConvex { stage, index, pivot: pivot.to_f64() };
         self.regularised += cholesky::<T, E>(panel, ld, nx, n, pivots).map_err(|(i, p)| not_convex(i, p))?;
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
@@ -281,7 +290,20 @@ impl<T: Real> Riccati<'_, T> {
         let ld_x = pad::<T>(nx);
         let source = Source::Matrix(Columns { data: before, ld });
         product::<T, E>(self.p, ld_x, source, panel, panel, (nx, 0..nx, nu), Part::Lower);
-        if stage > 0 {
+        if indefinite {
+            // What has a negative pivot was subtracted, and is to be added.
+            let columns = panel.data.chunks_exact(ld.max(1)).zip(part(inverse, nx, nu));
+            for (column, _) in columns.filter(|(_, inverse)| **inverse < T::ZERO) {
+                self.negative += 1;
+                for (p, &factor) in self.p.chunks_exact_mut(ld_x.max(1)).zip(column).take(nx) {
+                    let twice = -(factor + factor);
+                    for (p, &c) in p.iter_mut().zip(column).take(nx) {
+                        *p = *p - twice * c;
+                    }
+                }
+            }
+        }
+        if stage > 0 || indefinite {
             mirror(self.p, ld_x, nx);
             return Ok(());
         }
@@ -291,14 +313,15 @@ impl<T: Real> Riccati<'_, T> {
                 *start = p;
             }
         }
-        let pivots = Pivots { inverse: part_mut(inverse, 0, nx), added: part_mut(added, 0, nx), largest };
+        let (inverse, added) = (part_mut(inverse, 0, nx), part_mut(added, 0, nx));
+        let pivots = Pivots { inverse, added, largest, indefinite: false };
         self.regularised +=
             cholesky::<T, E>(start, ld, 0, nx, pivots).map_err(|(i, p)| not_convex(nu + i, p))?;
         Ok(())
     }
 
     #[inline(always)]
-    fn forward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, step: &mut [T]) {
+    pub fn forward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, step: &mut [T]) {
         let Equations { qp, first, dynamics, .. } = *equations;
         let mut rest = step;
         for place in Places::<T>::new(qp.dims) {
@@ -311,8 +334,10 @@ impl<T: Real> Riccati<'_, T> {
             let (v, general) = here.split_at_mut_checked(ld).unwrap_or_default();
             if place.stage == 0 {
                 v.fill(T::ZERO);
-                if first == First::Free {
+                if first != First::Fixed {
                     assign(part_mut(v, 0, nx), part(y, 0, nx));
+                }
+                if first == First::Free {
                     let panel = panel.get(nu * ld..).unwrap_or_default();
                     substitute(part_mut(v, 0, nx), panel, ld, 0, part(inverse, 0, nx));
                 }
@@ -333,9 +358,10 @@ impl<T: Real> Riccati<'_, T> {
     }
 }
 
-/// `y = L⁻¹ g_u`, and `g − (K; L) y` for what is left.
+/// `y = L⁻¹ g_u`, and `g − (K; L) S y` for what is left; `S` are the signs of pivots, which their
+/// reciprocals have.
 #[inline(always)]
-fn eliminate<T: Real, E: Packed<T>>(
+pub fn eliminate<T: Real, E: Packed<T>>(
     g: &mut [T],
     panel: &[T],
     ld: usize,
@@ -344,8 +370,9 @@ fn eliminate<T: Real, E: Packed<T>>(
     row: usize,
 ) {
     for (i, ((column, &inverse), y)) in panel.chunks_exact(ld.max(1)).zip(inverse).zip(y).enumerate() {
-        *y = g.get(row + i).map_or(T::ZERO, |&g| g * inverse);
-        subtract_column::<T, E>(g, *y, column);
+        let signed = g.get(row + i).map_or(T::ZERO, |&g| g * inverse);
+        *y = if inverse < T::ZERO { -signed } else { signed };
+        subtract_column::<T, E>(g, signed, column);
     }
 }
 
@@ -368,6 +395,8 @@ struct Pivots<'a, T> {
     added: &'a mut [T],
     /// The largest element of the diagonal.
     largest: T,
+    /// Whether negative pivots are pivots like others.
+    indefinite: bool,
 }
 
 /// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the other rows of the panel are
@@ -384,7 +413,8 @@ fn cholesky<T: Real, E: Packed<T>>(
     rows: usize,
     pivots: Pivots<'_, T>,
 ) -> Result<usize, (usize, T)> {
-    let Pivots { inverse, added, largest } = pivots;
+    let Pivots { inverse, added, largest, indefinite } = pivots;
+    let mut negative = false;
     let mut regularised = 0;
     let epsilon = T::from_f64(T::EPSILON);
     let noise = T::from_f64(T::EPSILON * 4.0) * T::from_whole(rows);
@@ -399,7 +429,15 @@ fn cholesky<T: Real, E: Packed<T>>(
         // Rows of a product begin at a multiple of its width.
         let width = (count - begin).min(4 - (row + begin) % 4);
         let (done, group) = panel.split_at_mut_checked(begin * ld).unwrap_or_default();
-        if begin > 0 {
+        if negative {
+            for (done, &inverse) in done.chunks_exact(ld.max(1)).zip(&*inverse) {
+                for (i, column) in group.chunks_exact_mut(ld.max(1)).enumerate().take(width) {
+                    let factor = done.get(row + begin + i).copied().unwrap_or(T::ZERO);
+                    let factor = if inverse < T::ZERO { -factor } else { factor };
+                    subtract_column::<T, E>(column, factor, done);
+                }
+            }
+        } else if begin > 0 {
             let done = Columns { data: &*done, ld };
             let y = done.below(row + begin);
             product::<T, E>(group, ld, Source::Target, done, y, (rows, 0..width, begin), Part::Full);
@@ -417,7 +455,12 @@ fn cholesky<T: Real, E: Packed<T>>(
             *added = T::ZERO;
             // `inverse` is still what the diagonal was before elimination.
             let is_positive = pivot > noise * *inverse;
-            if !is_positive {
+            if indefinite && pivot < -epsilon.sqrt() * inverse.abs() {
+                negative = true;
+                *inverse = -T::ONE / (-pivot).sqrt();
+            } else if indefinite && pivot <= epsilon.sqrt() * inverse.abs() {
+                return Err((index, pivot));
+            } else if !is_positive {
                 let is_noise = pivot >= -epsilon.sqrt() * largest;
                 if !is_noise {
                     return Err((index, pivot));
@@ -425,12 +468,15 @@ fn cholesky<T: Real, E: Packed<T>>(
                 pivot = if largest > T::ZERO { largest } else { T::ONE };
                 *added = pivot - found;
                 regularised += 1;
+                *inverse = T::ONE / pivot.sqrt();
+            } else {
+                *inverse = T::ONE / pivot.sqrt();
             }
-            *inverse = T::ONE / pivot.sqrt();
-            scale::<T, E>(column, *inverse);
+            let (size, sign) = (inverse.abs(), *inverse < T::ZERO);
+            scale::<T, E>(column, size);
             for (j, other) in rest.chunks_exact_mut(ld.max(1)).take(width - 1 - i).enumerate() {
                 let factor = column.get(row + index + 1 + j).copied().unwrap_or(T::ZERO);
-                subtract_column::<T, E>(other, factor, column);
+                subtract_column::<T, E>(other, if sign { -factor } else { factor }, column);
             }
         }
         begin += width;
