@@ -48,55 +48,55 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
             const STRUCTURE: #krate::model::Structure = #structure;
 
             #[inline]
-            fn residual<S: #krate::Lanes>(v: &[S::Cell; #lv], f: &mut [S::Cell; #lk]) {
-                code::residual::<S>(#c v, f);
+            fn residual<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_f: &mut [S::Cell; #lk]) {
+                code::residual::<S>(#c casados_v, casados_f);
             }
 
             #[inline]
-            fn jacobian_constants<S: #krate::Lanes>(jacobian: &mut [S::Cell; #lj]) {
-                code::jacobian_constants::<S>(#c jacobian);
+            fn jacobian_constants<S: #krate::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
+                code::jacobian_constants::<S>(#c casados_jacobian);
             }
 
             #[inline]
             fn residual_jacobian<S: #krate::Lanes>(
-                v: &[S::Cell; #lv],
-                f: &mut [S::Cell; #lk],
-                jacobian: &mut [S::Cell; #lj],
+                casados_v: &[S::Cell; #lv],
+                casados_f: &mut [S::Cell; #lk],
+                casados_jacobian: &mut [S::Cell; #lj],
             ) {
-                code::residual_jacobian::<S>(#c v, f, jacobian);
+                code::residual_jacobian::<S>(#c casados_v, casados_f, casados_jacobian);
             }
 
             #[inline]
-            fn tangent<S: #krate::Lanes>(v: &[#krate::scalar::Tangent<S>; #lv], f: &mut [#krate::scalar::Tangent<S>; #lk]) {
-                code::residual::<#krate::scalar::Tangent<S>>(#c v, f);
+            fn tangent<S: #krate::Lanes>(casados_v: &[#krate::scalar::Tangent<S>; #lv], casados_f: &mut [#krate::scalar::Tangent<S>; #lk]) {
+                code::residual::<#krate::scalar::Tangent<S>>(#c casados_v, casados_f);
             }
 
             #[inline]
-            fn adjoint<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], gradient: &mut [S::Cell; #lv]) {
-                code::adjoint::<S>(#c v, mu, gradient);
-                S::from_f64(0.0).store(&mut gradient[#time]);
+            fn adjoint<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_gradient: &mut [S::Cell; #lv]) {
+                code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
+                S::from_f64(0.0).store(&mut casados_gradient[#time]);
             }
 
             #[inline]
-            fn hessian<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], hessian: &mut [S::Cell; #lh]) {
-                code::hessian::<S>(#c v, mu, hessian);
+            fn hessian<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_hessian: &mut [S::Cell; #lh]) {
+                code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
 
         #[automatically_derived]
         impl #krate::GraphDae for #ty {
-            fn residual_of<S: #krate::Scalar<Cell = S>>(v: &[S], f: &mut [S]) {
-                if let (Some(v), Some(f)) = (v.first_chunk(), f.first_chunk_mut()) {
-                    code::residual::<S>(#c v, f);
+            fn residual_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_f: &mut [S]) {
+                if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_f)) = (casados_v.first_chunk(), casados_f.first_chunk_mut()) {
+                    code::residual::<S>(#c casados_v, casados_f);
                 }
             }
 
-            fn adjoint_of<S: #krate::Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]) {
-                if let (Some(v), Some(mu), Some(gradient)) =
-                    (v.first_chunk(), mu.first_chunk(), gradient.first_chunk_mut())
+            fn adjoint_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
+                if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_mu), ::core::option::Option::Some(casados_gradient)) =
+                    (casados_v.first_chunk(), casados_mu.first_chunk(), casados_gradient.first_chunk_mut())
                 {
-                    code::adjoint::<S>(#c v, mu, gradient);
-                    S::from_f64(0.0).store(&mut gradient[#time]);
+                    code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
+                    S::from_f64(0.0).store(&mut casados_gradient[#time]);
                 }
             }
         }

@@ -57,11 +57,11 @@ pub struct Argument {
 
 /// Reads an item if it is a dual model.
 pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Option<Source>> {
-    let (item, place, function, items, name, visibility, attributes) = match syn::parse2(item)? {
+    let (item, place, function, items, name, visibility, attributes) = match syn::parse2(item.clone())? {
         Item::Fn(function) => {
             let (name, visibility) = (function.sig.ident.clone(), function.vis.clone());
             let attributes = function.attrs.clone();
-            (function.to_token_stream(), Place::Beside, function, Vec::new(), name, visibility, attributes)
+            (item, Place::Beside, function, Vec::new(), name, visibility, attributes)
         }
         Item::Mod(mut module) => {
             let Ok(index) = module::model_function(form, &mut module) else { return Ok(None) };
@@ -69,7 +69,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
             let Some(Item::Fn(function)) = items.get(index).cloned() else { return Ok(None) };
             let (name, visibility) = (module.ident.clone(), module.vis.clone());
             let attributes = module.attrs.clone();
-            (module.to_token_stream(), Place::Inside, function, items, name, visibility, attributes)
+            (super::tokens::without_marks(item), Place::Inside, function, items, name, visibility, attributes)
         }
         _ => return Ok(None),
     };
