@@ -19,6 +19,10 @@ use proc_macro::TokenStream;
 const STACK: usize = 1 << 29;
 
 /// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
+///
+/// What a model may contain is in `docs/language.md`. In `f64` the residual has the bits of the function,
+/// but structural zeros are zeros: `0.0 * y` is dropped, whatever `y` is when it runs. Conditions of the
+/// compiler (`#[cfg]`) are refused inside of a model.
 #[proc_macro_attribute]
 pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Dae, attribute.into(), item.into()).into()

@@ -22,7 +22,6 @@ mod methods;
 pub mod mistakes;
 mod model;
 mod module;
-pub mod tokens;
 mod operator;
 mod path;
 mod pattern;
@@ -33,6 +32,7 @@ pub mod signature;
 mod statement;
 #[cfg(test)]
 mod tests;
+pub mod tokens;
 mod types;
 mod user;
 mod value;

@@ -94,7 +94,10 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
 /// One argument, after those before it.
 fn argument(form: Form, input: &FnArg, before: &[Argument]) -> Result<Argument> {
     let FnArg::Typed(input) = input else {
-        return Err(Error::new_spanned(input, "a model is a function without `self`: write it outside of the `impl`"));
+        return Err(Error::new_spanned(
+            input,
+            "a model is a function without `self`: write it outside of the `impl`",
+        ));
     };
     let role = role(form, &input.pat)?;
     if before.iter().any(|argument| argument.role == role) {

@@ -116,9 +116,10 @@ fn module_end(tokens: &[TokenTree]) -> Option<usize> {
                 }
             }
             TokenTree::Ident(ident) if ident == "mod" => {
-                let end = tokens.iter().skip(index).position(|token| {
-                    matches!(token, TokenTree::Group(_)) || is_punct(Some(token), ';')
-                })?;
+                let end = tokens
+                    .iter()
+                    .skip(index)
+                    .position(|token| matches!(token, TokenTree::Group(_)) || is_punct(Some(token), ';'))?;
                 return Some(index + end + 1);
             }
             _ => return None,
@@ -292,7 +293,7 @@ mod tests {
         let (first, last) = ("use a;".parse().unwrap(), "struct B;".parse().unwrap());
         assert_eq!(
             with(without_marks(item), &first, &last).to_string(),
-            "mod m { # ! [allow (dead_code)] use a ; fn m () { } struct B ; }"
+            "mod m { #! [allow (dead_code)] use a ; fn m () { } struct B ; }"
         );
     }
 }

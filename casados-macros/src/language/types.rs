@@ -193,7 +193,10 @@ impl Evaluator {
             }
             _ => {
                 if name == "u128" {
-                    return Err(error(last, "a model has no `u128`, whose values exceed `i128`: write `f64` or `i128`"));
+                    return Err(error(
+                        last,
+                        "a model has no `u128`, whose values exceed `i128`: write `f64` or `i128`",
+                    ));
                 } else if let Some(ty) = IntegerType::named(&name) {
                     Type::Integer(ty)
                 } else if let Some((rows, columns)) = matrix_alias(&name) {
