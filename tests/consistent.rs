@@ -1,5 +1,8 @@
 //! The start of an adaptive integration: consistent `ẋ` and `z`, or an error that names what is not.
 
+#[path = "consistent/roots.rs"]
+mod roots;
+
 use casados::prelude::*;
 use nalgebra::{Vector1, vector};
 

@@ -62,6 +62,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
         base.atol.as_mut().fill(T::from_f64(options.atol));
+        for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
+            *given = T::from_f64(*start);
+        }
         Ok(Self {
             options,
             base,
@@ -101,8 +104,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// Start values `ẋ` and `z` from which consistent ones are found; zero if never set. Where there are several
-    /// solutions they decide for one.
+    /// Start values `ẋ` and `z` from which consistent ones are found; if never set, the nominal values of the model,
+    /// [`Dae::START`]. Where there are several solutions they decide for one.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
