@@ -201,6 +201,8 @@ pub enum Refusal {
     Singular,
     /// The model returned an infinite value or NaN, or the numbers overflowed.
     NotFinite,
+    /// The interval is shorter than the distance of the time from the next number.
+    Resolution,
 }
 
 /// An algebraic state, and where Newton's method started for it.
@@ -395,6 +397,7 @@ impl fmt::Display for Error {
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
                     Refusal::NotFinite => "the model is not finite",
+                    Refusal::Resolution => "the time does not resolve it",
                 };
                 write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
             }
