@@ -2,10 +2,15 @@
 
 use crate::error::Error;
 
+/// Solutions without a digit that is right are none.
+const COARSEST: f64 = 0.1;
+/// Newton's method is there after a few dozens, or never.
+const MOST_ITERATIONS: usize = 10_000;
+
 /// What can be chosen about an integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Steps of equal size in one interval.
+    /// Steps of equal size in one interval, at least one.
     pub steps: usize,
     /// How the stages of an implicit method are solved; explicit methods do not read it.
     pub newton: Newton,
@@ -29,13 +34,13 @@ impl Default for Options {
 pub struct Newton {
     /// The iteration ends when its error is expected below this, relative to the size of each unknown
     /// (of a derivative `ẋ` also below `|x/h|`, the change that rounds to none in `x`).
-    /// Zero, the default, means rounding: a few units in the last place of the number type.
+    /// Between zero and 0.1; zero, the default, means rounding: a few units in the last place of the number type.
     pub tolerance: f64,
-    /// With a tolerance: more iterations than these are the error `NotConverged`.
+    /// With a tolerance: more iterations than these are the error `NotConverged`. Between 1 and 10000; 50 by default.
     pub max_iterations: usize,
     /// Which Jacobian the iteration takes. Sensitivities always take the one of the solution.
     pub jacobian: Jacobian,
-    /// Exactly these iterations, and no test for convergence: the same run time in every call.
+    /// Exactly these iterations, between 1 and 10000, and no test for convergence: the same run time in every call.
     pub fixed_iterations: Option<usize>,
 }
 
@@ -120,14 +125,17 @@ impl Options {
             return invalid("steps", 0.0, "an interval has at least one step");
         }
         let newton = &self.newton;
-        if !(newton.tolerance >= 0.0 && newton.tolerance.is_finite()) {
-            return invalid("newton.tolerance", newton.tolerance, "a tolerance is a number not below zero");
+        if !(0.0..=COARSEST).contains(&newton.tolerance) {
+            return invalid("newton.tolerance", newton.tolerance, "a tolerance is between 0 and 0.1");
         }
-        if newton.max_iterations == 0 {
-            return invalid("newton.max_iterations", 0.0, "Newton's method takes at least one iteration");
-        }
-        if newton.fixed_iterations == Some(0) {
-            return invalid("newton.fixed_iterations", 0.0, "Newton's method takes at least one iteration");
+        let limits = [
+            ("newton.max_iterations", Some(newton.max_iterations)),
+            ("newton.fixed_iterations", newton.fixed_iterations),
+        ];
+        for (option, iterations) in limits {
+            if let Some(count) = iterations.filter(|count| !(1..=MOST_ITERATIONS).contains(count)) {
+                return invalid(option, count as f64, "Newton's method takes between 1 and 10000 iterations");
+            }
         }
         Ok(())
     }

@@ -211,3 +211,72 @@ fn parts_that_vanish_come_back() {
         assert!((x - (6.0 - u)).abs() <= 1e-14, "{u}: {x}");
     }
 }
+
+/// Each option outside of its range is refused before anything runs, with its name, its value, and the range.
+#[test]
+fn options_outside_of_their_ranges_are_refused() {
+    use casados::options::Newton;
+    let newton = Newton::default();
+    let refused = |error: Option<Error>, name: &str, range: &str| {
+        let Some(Error::InvalidOption { option, value, .. }) = error else { panic!("{name}: {error:?}") };
+        let text = error.map(|error| error.to_string()).unwrap_or_default();
+        assert_eq!(option, name);
+        assert!(text.contains(name) && text.contains(&value.to_string()) && text.contains(range), "{text}");
+    };
+    let tolerance = |tolerance: f64| Options { newton: Newton { tolerance, ..newton }, ..Default::default() };
+    let iterations = |max_iterations: usize, fixed_iterations: Option<usize>| Options {
+        newton: Newton { max_iterations, fixed_iterations, ..newton },
+        ..Default::default()
+    };
+    let of_newton = "between 1 and 10000 iterations";
+    for (options, name, range) in [
+        (Options { steps: 0, ..Default::default() }, "steps", "at least one"),
+        (tolerance(10.0), "newton.tolerance", "between 0 and 0.1"),
+        (tolerance(0.11), "newton.tolerance", "between 0 and 0.1"),
+        (tolerance(-1e-300), "newton.tolerance", "between 0 and 0.1"),
+        (tolerance(f64::NAN), "newton.tolerance", "between 0 and 0.1"),
+        (tolerance(f64::INFINITY), "newton.tolerance", "between 0 and 0.1"),
+        (iterations(0, None), "newton.max_iterations", of_newton),
+        (iterations(usize::MAX, None), "newton.max_iterations", of_newton),
+        (iterations(50, Some(0)), "newton.fixed_iterations", of_newton),
+        (iterations(50, Some(usize::MAX)), "newton.fixed_iterations", of_newton),
+    ] {
+        refused(options.check().err(), name, range);
+        refused(Irk::<Falling, Gauss<2>>::new(options).err(), name, range);
+        refused(Erk::<Falling, Rk4>::new(options).err(), name, range);
+        refused(Batch::<Falling, Gauss<2>>::new(options).err(), name, range);
+    }
+    assert!(tolerance(0.1).check().and(iterations(10_000, Some(10_000)).check()).is_ok());
+
+    let valid = AdaptiveOptions::default();
+    for (options, name, range) in [
+        (AdaptiveOptions { rtol: f64::NAN, ..valid }, "rtol", "between 10 ε of the number type and 1"),
+        (AdaptiveOptions { rtol: 1e-16, ..valid }, "rtol", "between 10 ε of the number type and 1"),
+        (AdaptiveOptions { rtol: 10.0, ..valid }, "rtol", "between 10 ε of the number type and 1"),
+        (AdaptiveOptions { atol: 0.0, ..valid }, "atol", "finite and above 0"),
+        (AdaptiveOptions { atol: f64::NAN, ..valid }, "atol", "finite and above 0"),
+        (AdaptiveOptions { atol: f64::INFINITY, ..valid }, "atol", "finite and above 0"),
+        (AdaptiveOptions { initial_step: Some(-0.1), ..valid }, "initial_step", "finite length above 0"),
+        (
+            AdaptiveOptions { initial_step: Some(f64::INFINITY), ..valid },
+            "initial_step",
+            "finite length above 0",
+        ),
+        (AdaptiveOptions { max_step: 0.0, ..valid }, "max_step", "above 0"),
+        (AdaptiveOptions { max_step: f64::NAN, ..valid }, "max_step", "above 0"),
+        (AdaptiveOptions { min_step: -1.0, ..valid }, "min_step", "between 0 and `max_step`"),
+        (AdaptiveOptions { min_step: 2.0, max_step: 1.0, ..valid }, "min_step", "between 0 and `max_step`"),
+        (AdaptiveOptions { max_steps: 0, ..valid }, "max_steps", "at least one"),
+    ] {
+        refused(Adaptive::<Falling, Radau>::new(options).err(), name, range);
+    }
+    let mut adaptive = Adaptive::<Falling, Radau>::new(valid).unwrap();
+    let (one, none) = (vector![1.0], vector![]);
+    refused(adaptive.set_relative_tolerances(&vector![-1.0], &none).err(), "rtol", "and 1");
+    refused(adaptive.set_absolute_tolerances(&vector![0.0], &none).err(), "atol", "above 0");
+    refused(
+        adaptive.set_sensitivity_scales(&vector![f64::NAN], &one, &vector![]).err(),
+        "sensitivity_scales",
+        "not below 0",
+    );
+}

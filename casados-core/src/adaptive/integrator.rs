@@ -178,7 +178,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let scales = || x0.as_slice().iter().chain(u.as_slice()).chain(p.as_slice());
         if let Some(scale) = scales().find(|scale| !(scale.is_finite() && **scale >= T::ZERO)) {
             let (option, value) = ("sensitivity_scales", scale.to_f64());
-            return Err(Error::InvalidOption { option, value, reason: "a magnitude is not negative" });
+            return Err(Error::InvalidOption {
+                option,
+                value,
+                reason: "a magnitude is finite and not below 0",
+            });
         }
         for (to, from) in self.base.magnitudes.as_mut().iter_mut().zip(scales()) {
             *to = *from;
