@@ -280,3 +280,37 @@ fn options_outside_of_their_ranges_are_refused() {
         "not below 0",
     );
 }
+
+/// One Newton matrix for all steps of an interval.
+#[dae]
+fn linear(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64) -> [f64; 3] {
+    [xdot[0] - 1.7 * x[1], xdot[1] + 2.1 * x[0] + 0.3 * x[1] - z, z - 0.7 * u + 0.1 * x[0]]
+}
+
+/// No value where the first state is negative.
+#[function]
+fn logarithm(x: [f64; 2], z: f64, u: f64) -> f64 {
+    x[0].ln() + 0.0 * (z + u)
+}
+
+/// Derivatives of dense output are those of the last good call to the last bit, whatever a call that failed has left.
+#[test]
+fn dense_derivatives_are_those_of_the_last_good_call() {
+    let (x0, u, negative) = (vector![0.3, -0.7], vector![0.9], vector![-50.0, -0.2]);
+    macro_rules! check {
+        ($($method:ty),*) => {$(
+            let options = Options { steps: 3, ..Default::default() };
+            let mut irk = Irk::<Linear, $method>::new(options).unwrap();
+            let mut calm = Irk::<Linear, $method>::new(options).unwrap();
+            irk.forward(&x0, &u, 0.3).unwrap();
+            calm.forward(&x0, &u, 0.3).unwrap();
+            for h in [0.9, 0.01, 0.5] {
+                irk.with(&mut Quadrature::<Logarithm>::new()).forward(&negative, &u, h).unwrap_err();
+                for t in [0.05, 0.12, 0.2, 0.3] {
+                    assert_eq!(irk.dense_forward(t).unwrap(), calm.dense_forward(t).unwrap(), "{h} {t}");
+                }
+            }
+        )*};
+    }
+    check!(Gauss<2>, Gauss<4>, RadauIIA<3>);
+}

@@ -130,7 +130,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.set_parameters(p)
     }
 
-    /// The time at the start of the interval of all following calls; zero if never set.
+    /// The time at the start of the interval of all following calls; zero if never set. It does not move on by itself.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last time stays.
@@ -231,7 +231,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.reserve()
     }
 
-    /// `x₊`, and `z` at both ends.
+    /// `x₊` at the end of an interval of length `h`, and `z` at both ends.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -257,7 +257,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&self.run.keep()?.result)
     }
 
-    /// The solution at a time inside the interval of the last successful call.
+    /// The solution at the time `t`, as the model sees it, inside the interval of the last successful call.
     ///
     /// # Errors
     /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`];
