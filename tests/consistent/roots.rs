@@ -240,3 +240,33 @@ fn errors_say_where_algebraic_states_started() {
     let error = irk.solve(&Vector1::new(-1.0), &none, 0.1).unwrap_err();
     assert!(matches!(error, Error::NonFiniteModel { equation: 1, .. }), "{error}");
 }
+
+/// The larger root of [`larger`] with a range that neither is in.
+#[dae(range(z = 1.6..=2.0, x = -10.0..=10.0))]
+fn elsewhere(xdot: f64, x: f64, z: f64) -> [f64; 2] {
+    [xdot + 0.3 * z, z * z - 3.0 * z + x]
+}
+
+#[test]
+fn reports_warn_of_solutions_outside_of_their_ranges() {
+    use casados::testing::{Exact, Points, check_derivatives, check_exact, check_sensitivities};
+    let (x0, none) = (vector![X0], SVector::<f64, 0>::zeros());
+    let mut irk = Irk::<Larger, RadauIIA<2>>::new(Options::default()).unwrap();
+    let report = check_sensitivities(&mut irk, &x0, &none, &none, 0.1).unwrap();
+    assert!(report.passed() && report.warnings.is_empty(), "{report}");
+    let mut irk = Irk::<LargerInRange, RadauIIA<2>>::new(Options::default()).unwrap();
+    let report = check_sensitivities(&mut irk, &x0, &none, &none, 0.1).unwrap();
+    assert!(report.passed() && report.warnings.is_empty(), "{report}");
+    // The same numbers, and a range that they are not in: at both ends.
+    let mut irk = Irk::<Elsewhere, RadauIIA<2>>::new(Options::default()).unwrap();
+    let report = check_sensitivities(&mut irk, &x0, &none, &none, 0.1).unwrap();
+    assert!(report.passed() && report.warnings.len() == 2, "{report}");
+    let text = report.to_string();
+    assert!(text.contains("warning: ") && text.contains("outside of its range 1.6e0..=2e0"), "{text}");
+    assert!(text.contains("nominal(z = ..)"), "{text}");
+    let mut fine = Irk::<Elsewhere, RadauIIA<2>>::new(Options { steps: 2, ..Default::default() }).unwrap();
+    let report = check_exact(&mut irk, &mut fine, &x0, &none, &none, 0.1, &Exact::default()).unwrap();
+    assert_eq!(report.warnings.len(), 2, "{report}");
+    // Random points are where the model lives.
+    check_derivatives::<LargerInRange>(&Points::random(3)).assert();
+}
