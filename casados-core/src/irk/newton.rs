@@ -358,17 +358,17 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 
     /// Whether the residual that an increment leaves, of the `first` one, lets so many iterations be expected that new factors cost less.
-    /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well.
+    /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well. Where it leaves more than there
+    /// was, another increment by the same factors would be longer than the first, and may lead to another root than Newton's
+    /// method does.
     fn leaves_much(&self, first: E, tolerance: f64, cheap: bool) -> bool {
         let left = dispatch(Largest { residual: self.f.as_ref().as_flattened() }) / first;
         let expensive = STILL[usize::from(cheap)] + Self::RESIDUAL + Self::RENEWAL[usize::from(cheap)];
         let mut cell: E::Cell = Zeroable::zeroed();
         left.store(&mut cell);
-        let slowest = (0..E::LANES)
-            .map(|lane| E::lane(&cell, lane))
-            .filter(|&left| left < 1.0 / 16.0)
-            .fold(0.0, f64::max);
-        remaining(true, 1.0, slowest, tolerance) > expensive
+        let lanes = || (0..E::LANES).map(|lane| E::lane(&cell, lane));
+        let slowest = lanes().filter(|&left| left < 1.0 / 16.0).fold(0.0, f64::max);
+        remaining(true, 1.0, slowest, tolerance) > expensive || lanes().any(|left| left >= 1.0)
     }
 
     /// The residual in the slots of the equations.

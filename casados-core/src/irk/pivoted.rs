@@ -75,6 +75,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                         unknown: unknown_name::<M>(last.unknown),
                         increment: last.size.to_f64(),
                         at: Place { step, stage, iteration },
+                        started: None,
                     });
                 }
             }

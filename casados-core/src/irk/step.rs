@@ -14,6 +14,8 @@ use crate::statistics::Statistics;
 
 /// Where the unknowns of the stages start.
 pub(crate) enum From<'a, M: Dae, E: Lanes, const S: usize> {
+    /// At the start values of the model.
+    Nominal,
     Zero,
     Given,
     Record(&'a [Step<M, E, S>]),
@@ -30,7 +32,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.rest.as_mut().fill(E::from_f64(0.0));
     }
 
-    /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued.
+    /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued, or if that is not worth
+    /// much its algebraic states.
     pub(crate) fn start(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -49,15 +52,24 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             (_, Some(before), Some(next)) => {
                 dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
             }
-            (From::Zero, ..) => {
+            (From::Nominal | From::Zero, ..) => {
                 y.as_mut().fill([E::from_f64(0.0); S]);
                 self.alike = M::STRUCTURE.autonomous;
+                if matches!(from, From::Nominal) {
+                    for (y, start) in y.as_mut().iter_mut().zip(M::START) {
+                        *y = [E::from_f64(*start); S];
+                    }
+                    self.alike &= const { starts_at_rest::<M>() };
+                }
             }
             (From::Given, ..) => {
                 for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
                     *y = [*given; S];
                 }
             }
+        }
+        if coefficients.next.is_none() && !matches!(from, From::Record(_) | From::Solved(_)) {
+            stay(before, y);
         }
     }
 
@@ -148,12 +160,18 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 return Ok(solved.exact);
             }
             self.start(coefficients, from, n, None, y);
+            if !matches!(from, From::Record(_)) {
+                stay(before, y);
+            }
         }
         if !F::KEPT {
             return Err(Error::NotPivoted { step: n });
         }
-        self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics)?;
-        Ok(false)
+        match self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics) {
+            Ok(()) => Ok(false),
+            Err(error) if n == 0 => Err(self.explain_start(error, from)),
+            Err(error) => Err(error),
+        }
     }
 
     /// The linearisation at the solution of a step, `exact` if the factors that are there are its own.
@@ -207,6 +225,31 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             self.validity = Validity { factors: true, mean: false, rate: 0.0 };
         }
     }
+}
+
+/// Algebraic states as at the last stage of the step before: on its branch.
+pub(crate) fn stay<M: Dae, E: Lanes, const S: usize>(
+    before: Option<&Step<M, E, S>>,
+    y: &mut ArrayK<M, [E; S]>,
+) {
+    let Some(before) = before else { return };
+    for (y, before) in y.as_mut().iter_mut().zip(before.y.as_ref()).skip(M::Shape::NX) {
+        if let Some(&last) = before.last() {
+            *y = [last; S];
+        }
+    }
+}
+
+/// Whether every `ẋ` starts at zero: then states are the same at all stages.
+const fn starts_at_rest<M: Dae>() -> bool {
+    let mut unknown = 0;
+    while unknown < M::Shape::NX && unknown < M::START.len() {
+        if M::START[unknown] != 0.0 {
+            return false;
+        }
+        unknown += 1;
+    }
+    true
 }
 
 /// Algebraic states at a point of the polynomial through the stages.

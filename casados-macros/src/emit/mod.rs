@@ -4,6 +4,7 @@ mod chunk;
 mod code;
 mod divisor;
 mod documentation;
+mod domain;
 mod dual;
 mod function;
 mod model;

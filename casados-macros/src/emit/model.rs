@@ -1,7 +1,7 @@
 //! The implementations of `Dae`, `GraphDae` and `Ode` for one model.
 
 use super::code::{self, MODEL, dimensions, ty};
-use super::structure;
+use super::{domain, structure};
 use crate::language::{Model, Variables};
 use crate::structure::{Analysis, Derivatives};
 use proc_macro2::{Literal, TokenStream};
@@ -20,6 +20,17 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
     let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let structure = structure::write(analysis);
+    // Nonlinear in the unknowns, whatever the states are.
+    let unknown = |variable: u32| match variable as usize {
+        derivative if derivative < nx => Some(derivative),
+        algebraic => (algebraic >= 2 * nx && algebraic < 2 * nx + nz).then(|| algebraic - nx),
+    };
+    let domain = domain::write(krate, variables, &model.samplings, |of| {
+        hessian.iter().any(|&(row, column, _)| {
+            let (row, column) = (unknown(row), unknown(column));
+            row.is_some() && column.is_some() && (row == Some(of) || column == Some(of))
+        })
+    });
     // Constants from outside are an argument: the module of the code sees no name of the user's.
     let c = (!opaque.is_empty()).then(|| quote!(&C,));
 
@@ -46,6 +57,7 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
             type Hessian<T: #krate::shape::Plain> = [T; #lh];
             type Factors<B: #krate::shape::Plain> = [B; #lb];
             const STRUCTURE: #krate::model::Structure = #structure;
+            #domain
 
             #[inline]
             fn residual<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_f: &mut [S::Cell; #lk]) {
