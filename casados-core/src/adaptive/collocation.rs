@@ -30,6 +30,9 @@ use core::marker::PhantomData;
 /// follows from large ones by an equation, they may be above the tolerance of the iteration.
 const NOISE: f64 = 0.01;
 
+/// An estimate that is smaller lets the next step grow, whatever it is of.
+const UNDOUBTED: f64 = 0.25;
+
 /// Memory of a step.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
@@ -94,7 +97,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
             right: from_fn(|part| groups(S, |i| right[part][i])),
             lagrange: tableau.lagrange(0.0).map(T::from_f64),
             factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
-            transport: Transport::new::<T, S>(basis.values(), tableau.is_stiffly_accurate()),
+            transport: Transport::new::<T, S>(basis.values()),
             basis,
             tableau,
             memory,
@@ -194,24 +197,43 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
         let errors = self.memory.error.as_ref().get(..counted).unwrap_or_default();
         let first = norm(errors, start.scale.as_ref());
+        let larger = self.second(first, start);
+        if at_end || !start.known || larger <= first.max(UNDOUBTED) {
+            return Ok(larger);
+        }
+        // Newton's method leaves a residual of algebraic equations at the start, which does not shrink with the step: not
+        // of this step, and without it only the second estimate is below its tolerance.
+        let mut defect = self.memory.f_point;
+        self.memory.point = *start.point;
+        self.evaluate_point(residuals)?;
+        for (defect, left) in defect.as_mut().iter_mut().zip(self.memory.f_point.as_ref()) {
+            *defect = *defect - *left;
+        }
+        self.filter(start.h, &mut defect);
+        Ok(self.second(first, start))
+    }
+
+    /// The larger one of an estimate and the second one, of the defect that was filtered last.
+    fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
         let [error, bent] = self.transported(start.h);
         let asked =
             start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
         let relative = error.as_ref().iter().zip(bent.as_ref()).zip(asked);
-        Ok(self
-            .transport
-            .larger(first, relative.map(|((error, bent), asked)| (*error * asked, *bent * asked))))
+        self.transport.larger(first, relative.map(|((error, bent), asked)| (*error * asked, *bent * asked)))
+    }
+
+    /// The residual at the point that is there.
+    fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
+        let Memory { point, f_point, .. } = &mut *self.memory;
+        *residuals += 1;
+        M::residual::<T>(point, f_point);
+        if not_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
     }
 
     /// The estimated error of `(x, z)` from the defect at the point that is there.
     fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
-        let Memory { point, f_point, .. } = &mut *self.memory;
-        *residuals += 1;
-        M::residual::<T>(point, f_point);
-        if not_finite(f_point.as_ref()).is_some() {
-            return Err(Failure::NotFinite);
-        }
-        let mut error = *f_point;
+        self.evaluate_point(residuals)?;
+        let mut error = self.memory.f_point;
         self.filter(h, &mut error);
         self.memory.error = error;
         Ok(())
@@ -411,6 +433,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         if at_end || !(again && error >= 1.0) {
             return Ok(error);
         }
+        self.memory.point = point;
         let states = &mut self.memory.point.as_mut()[M::Shape::NX..];
         for (state, error) in states.iter_mut().zip(self.memory.error.as_ref()) {
             *state = *state + *error;

@@ -181,8 +181,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 None => stages.begin(&self.base.point),
             }
             if need == Need::Jacobian {
-                let start =
-                    Start { point: &self.base.point, scale: &self.base.scale, asked: &self.base.asked, h };
+                let start = Start {
+                    point: &self.base.point,
+                    scale: &self.base.scale,
+                    asked: &self.base.asked,
+                    known: accepted_h.is_some(),
+                    h,
+                };
                 // In the middle of the step, as far as that is foreseen: nearer to all stages than the start is. Where the
                 // step fails, at the start.
                 current = accepted_h.is_none() || rejected;
@@ -233,8 +238,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             self.check_step(t, h, refusal)?;
             tried += 1;
-            let start =
-                Start { point: &self.base.point, scale: &self.base.scale, asked: &self.base.asked, h };
+            let start = Start {
+                point: &self.base.point,
+                scale: &self.base.scale,
+                asked: &self.base.asked,
+                known: accepted_h.is_some(),
+                h,
+            };
             let residuals = &mut self.statistics.residuals;
             let outcome = stages.solve(&start, self.base.newton_tolerance, &mut convergence, residuals);
             self.statistics.iterations += convergence.iterations;

@@ -29,9 +29,6 @@ use crate::scalar::{Real, Scalar};
 const DAMPED: f64 = 0.1;
 /// The errors of oscillations add up, and more of them the more accurate and therefore the more steps there are.
 const KEPT: f64 = 4.0;
-/// Where nothing is a stage at the end, `r` is larger than `φ` at small `z`.
-const KEPT_AT_END: f64 = 1.0;
-
 /// A complex number.
 type Number = Complex<f64, 2>;
 
@@ -40,15 +37,13 @@ type Number = Complex<f64, 2>;
 pub struct Transport {
     /// `c`, as factors of the parts of a solution; and those of `r(z)/z²`.
     weights: [[f64; PARTS]; 2],
-    /// How much errors count that are kept.
-    kept: f64,
     /// The estimate of lower order behaves like this power of what is estimated here.
     exponent: f64,
 }
 
 impl Transport {
     /// From the eigenvalues of a method with `S` stages; of complex conjugate ones there is one, and a real one is the first.
-    pub fn new<T: Real, const S: usize>(values: &Complex<T, PARTS>, on_stage: bool) -> Self {
+    pub fn new<T: Real, const S: usize>(values: &Complex<T, PARTS>) -> Self {
         let value = |l: usize| {
             let (re, im) = values.get(l);
             Number { parts: [re.to_f64(), im.to_f64()] }
@@ -81,8 +76,7 @@ impl Transport {
             }
         }
         let s = S as f64;
-        let kept = if on_stage { KEPT } else { KEPT_AT_END };
-        Self { weights, kept, exponent: (s + 1.0) / (2.0 * s) }
+        Self { weights, exponent: (s + 1.0) / (2.0 * s) }
     }
 
     /// Factors of the parts of a solution.
@@ -101,13 +95,9 @@ impl Transport {
             bent_square += bent * bent;
             count += 1;
         }
-        // From full at an angle of two thirds of π to none at a right one.
-        let against = if product < 0.0 {
-            (-2.0 * product / (Scalar::sqrt(square) * Scalar::sqrt(bent_square))).min(1.0)
-        } else {
-            0.0
-        };
-        let share = DAMPED + (self.kept - DAMPED) * against;
+        // The square of the cosine between them, where they point against each other.
+        let against = if product < 0.0 { product / square * (product / bent_square) } else { 0.0 };
+        let share = DAMPED + (KEPT - DAMPED) * against;
         let second = share * Scalar::sqrt(square / count.max(1) as f64);
         // Written so that NaN stays.
         if first.is_nan() || second <= first && second <= 1.0 {
