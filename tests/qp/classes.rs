@@ -91,7 +91,8 @@ fn wrong(known: &Known, found: &HeapSolution<f64>, tolerance: f64) -> Option<Str
 /// Solves problems of a kind; `start` may write something senseless into the solution first.
 fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Counts, QpError> {
     let mut counts = Counts::default();
-    for seed in 0..cases(few) {
+    let only: Option<u64> = std::env::var("ONLY").ok().and_then(|s| s.parse().ok());
+    for seed in only.map_or(0..cases(few), |s| s..s + 1) {
         let mut random = Numbers::new(seed.wrapping_mul(2).wrapping_add(1));
         let known = problem(&mut random, kind)?;
         let (own, _) = residuals(known.qp.view(), &known.solution);

@@ -51,6 +51,7 @@ impl<T: Real> Iterate<'_, T> {
         self.sides.take_multipliers(solution);
         self.sides.guess();
         self.evaluate_gradient::<E>(solution.dynamics);
+        self.set_compliance();
         let (mut factor, mut changes) = (true, usize::MAX);
         loop {
             if factor {
@@ -98,7 +99,7 @@ impl<T: Real> Iterate<'_, T> {
     /// Newton's step, with the sides as they are; whether there is one.
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
-        let weight = Self::equation_weight();
+        let weight = T::ONE / self.sides.compliance;
         self.sides.force(weight);
         if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;

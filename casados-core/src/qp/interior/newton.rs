@@ -4,7 +4,7 @@ use super::kernels::{Columns, add_transposed, subtract, symmetric};
 use super::riccati::{Equations, First, Riccati};
 use super::sides::{Counts, Sides, set};
 use super::vector::{
-    add_scaled, dot, larger, largest_negative_product, largest_negative_ratio, largest_product, largest_size,
+    add_scaled, dot, larger, largest_negative_ratio, largest_product, largest_size,
     shrink,
 };
 use crate::qp::error::QpError;
@@ -12,7 +12,7 @@ use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_m
 use crate::qp::problem::QpView;
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
-use crate::qp::statistics::Residuals;
+use crate::qp::statistics::{Residuals, larger as larger_or_nan, positive};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
@@ -130,9 +130,11 @@ impl<'a, T: Real> Iterate<'a, T> {
         }
     }
 
-    /// `1 / ε` of equations: they are satisfied up to `ε Δy`, and the next step takes what is left.
-    pub fn equation_weight() -> T {
-        T::ONE / T::from_f64(T::EPSILON).sqrt()
+    /// What sides and equations give way to forces, in the units of the problem.
+    pub fn set_compliance(&mut self) {
+        let Terms { forces, values } = self.terms;
+        let stiffness = T::from_f64(0.01) * forces / values.max(T::ONE);
+        self.sides.compliance = T::from_f64(T::EPSILON).sqrt() / stiffness.max(T::ONE);
     }
 
     /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
@@ -299,7 +301,7 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// their distances are afterwards.
     #[inline(always)]
     pub fn solve<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
-        let weight = Self::equation_weight();
+        let weight = T::ONE / self.sides.compliance;
         let sides = &mut self.sides;
         assign(self.gradient, self.stationarity);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
@@ -329,13 +331,15 @@ impl<'a, T: Real> Iterate<'a, T> {
     /// Goes a part of the step.
     #[inline(always)]
     pub fn advance<E: Packed<T>>(&mut self, alpha: T) {
-        let weight = Self::equation_weight();
+        let weight = T::ONE / self.sides.compliance;
         let left = T::ONE - alpha;
         add_scaled(self.v, alpha, self.step);
         shrink(self.stationarity, left);
         shrink(self.dynamics, left);
         let sides = &mut self.sides;
         shrink(sides.residual, left);
+        let count = sides.counts.sides();
+        add_scaled(part_mut(sides.residual, 0, count), -alpha * sides.compliance, sides.multiplier_step);
         add_scaled(sides.slack, alpha, sides.slack_step);
         add_scaled(sides.multiplier, alpha, sides.multiplier_step);
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
@@ -450,11 +454,15 @@ impl<T: Real> Sides<'_, T> {
     /// `s Δλ + λ Δs = μ − s λ`
     #[inline(always)]
     pub fn aim(&mut self, mu: T) {
-        for ((inverse, &slack), (target, &multiplier)) in
-            self.inverse.iter_mut().zip(&*self.slack).zip(self.target.iter_mut().zip(&*self.multiplier))
+        let (sides, soft) = (self.counts.sides(), T::ZERO);
+        let own = self.compliance;
+        let pairs = self.slack.iter().zip(&*self.multiplier);
+        for (i, ((inverse, target), (&slack, &multiplier))) in
+            self.inverse.iter_mut().zip(&mut *self.target).zip(pairs).enumerate()
         {
-            *inverse = T::ONE / slack;
-            *target = mu * *inverse - multiplier;
+            let compliance = if i < sides { own } else { soft };
+            *inverse = T::ONE / (slack + compliance * multiplier);
+            *target = (mu - slack * multiplier) * *inverse;
         }
     }
 
@@ -462,9 +470,11 @@ impl<T: Real> Sides<'_, T> {
     #[inline(always)]
     pub fn correct(&mut self, sigma_mu: T) {
         let steps = self.slack_step.iter().zip(&*self.multiplier_step);
-        let pairs = self.multiplier.iter().zip(&*self.inverse);
-        for ((target, (&ds, &dl)), (&multiplier, &inverse)) in self.target.iter_mut().zip(steps).zip(pairs) {
-            *target = (sigma_mu - ds * dl) * inverse - multiplier;
+        let pairs = self.multiplier.iter().zip(&*self.slack).zip(&*self.inverse);
+        for ((target, (&ds, &dl)), ((&multiplier, &slack), &inverse)) in
+            self.target.iter_mut().zip(steps).zip(pairs)
+        {
+            *target = (sigma_mu - ds * dl - slack * multiplier) * inverse;
         }
     }
 
@@ -495,24 +505,29 @@ impl<T: Real> Sides<'_, T> {
     /// Changes of slacks from the changes of rows in `scratch`, and of multipliers.
     #[inline(always)]
     fn steps(&mut self) {
-        let sides = self.counts.sides();
-        for ((step, &change), &residual) in
-            self.slack_step.iter_mut().zip(&*self.scratch).zip(&*self.residual).take(sides)
+        let (sides, compliance) = (self.counts.sides(), self.compliance);
+        let pairs = self.slack.iter().zip(&*self.multiplier).zip(&*self.inverse).zip(&*self.target);
+        let steps = self.slack_step.iter_mut().zip(&mut *self.multiplier_step);
+        let changes = self.scratch.iter().zip(&*self.residual).take(sides);
+        for (((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)), (&change, &residual)) in
+            steps.zip(pairs).zip(changes)
         {
-            *step = change + residual;
+            let change = change + residual;
+            *slack_step = change * (slack * inverse) + compliance * target;
+            *multiplier_step = target - multiplier * inverse * change;
         }
         for (j, &side) in self.soft.iter().enumerate() {
             let Some(soft) = self.soft_side(j, side as usize) else { break };
-            let Some(step) = self.slack_step.get_mut(side as usize) else { break };
-            let violation = (soft.sum - soft.stiffness * *step) * soft.inverse;
-            // Their sum, written such that it keeps its digits where the slack is small and its weight large.
-            *step = (soft.sum + soft.compliance * *step) * soft.inverse;
+            let change = at(self.scratch, side) + at(self.residual, side);
+            // The change of `s − e`, and their sum written such that it keeps its digits where the slack is small and its
+            // weight large.
+            let change = change * soft.share + compliance * soft.target;
+            let violation = (soft.sum - soft.stiffness * change) * soft.inverse;
+            let step = (soft.sum + soft.compliance * change) * soft.inverse;
+            set(self.slack_step, side as usize, step);
+            set(self.multiplier_step, side as usize, soft.own - soft.stiffness * step);
             set(self.slack_step, sides + j, violation);
-        }
-        let pairs = self.multiplier.iter().zip(&*self.inverse);
-        let steps = self.multiplier_step.iter_mut().zip(&*self.slack_step).zip(&*self.target);
-        for (((step, &slack), &target), (&multiplier, &inverse)) in steps.zip(pairs) {
-            *step = target - multiplier * inverse * slack;
+            set(self.multiplier_step, sides + j, soft.others - soft.other * violation);
         }
     }
 
@@ -520,27 +535,58 @@ impl<T: Real> Sides<'_, T> {
     #[inline(always)]
     fn soft_side(&self, j: usize, side: usize) -> Option<Soft<T>> {
         let violation = self.counts.sides() + j;
-        let stiffness = *self.multiplier.get(side)? * *self.inverse.get(side)?;
+        let (slack, multiplier) = (*self.slack.get(side)?, *self.multiplier.get(side)?);
+        let stiffness = multiplier / slack;
         let other = *self.multiplier.get(violation)? * *self.inverse.get(violation)?;
         let quadratic = *self.quadratic.get(j)?;
-        let target = *self.target.get(side)?;
+        let own = *self.target.get(side)? * (T::ONE + self.compliance * stiffness);
+        let others = *self.target.get(violation)?;
         let inverse = T::ONE / (quadratic + stiffness + other);
-        let sum = target + *self.target.get(violation)?;
+        let sum = own + others;
+        let weight = stiffness * (quadratic + other) * inverse;
+        let share = T::ONE / (T::ONE + self.compliance * weight);
         Some(Soft {
-            weight: stiffness * (quadratic + other) * inverse,
+            weight: weight * share,
+            target: (own - stiffness * sum * inverse) * share,
             compliance: quadratic + other,
-            target: target - stiffness * sum * inverse,
+            share,
+            own,
+            others,
+            other,
             sum,
             stiffness,
             inverse,
         })
     }
 
-    /// How far the step can go before a slack or a multiplier vanishes, at most 1.
+    /// How far the step can go, at most 1, such that slacks and multipliers keep some part of what they have.
     #[inline(always)]
-    pub fn longest<E: Packed<T>>(&self) -> T {
-        let ratio = largest_negative_product::<T, E>(T::ONE, self.slack_step, self.inverse);
-        T::ONE / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
+    pub fn longest<E: Packed<T>>(&self, keep: T) -> T {
+        let most = T::ONE - keep;
+        let ratio = largest_negative_ratio::<T, E>(most, self.slack_step, self.slack);
+        most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
+    }
+
+    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, of distances from them in `scratch`, whatever
+    /// slacks and violations are.
+    pub fn judge(&mut self) -> (T, T) {
+        let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
+        for (j, &side) in self.soft.iter().enumerate() {
+            let (violation, multiplier) = (positive(-at(self.scratch, side)), at(self.multiplier, side));
+            let lacks = at(self.linear, j as u32) + at(self.quadratic, j as u32) * violation - multiplier;
+            inequalities = larger_or_nan(inequalities, -lacks);
+            products = larger_or_nan(products, violation * positive(lacks));
+            let distance = at(self.scratch, side);
+            set(self.scratch, side as usize, positive(distance));
+        }
+        for (&distance, &multiplier) in self.scratch.iter().zip(&*self.multiplier).take(self.counts.sides()) {
+            inequalities = larger_or_nan(inequalities, -distance);
+            products = larger_or_nan(products, positive(distance) * multiplier);
+        }
+        for &residual in &*self.equation_residual {
+            inequalities = larger_or_nan(inequalities, residual.abs());
+        }
+        (inequalities, products)
     }
 }
 
@@ -548,6 +594,10 @@ impl<T: Real> Sides<'_, T> {
 struct Soft<T> {
     weight: T,
     target: T,
+    share: T,
+    own: T,
+    others: T,
+    other: T,
     sum: T,
     stiffness: T,
     compliance: T,

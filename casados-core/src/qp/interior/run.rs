@@ -122,6 +122,7 @@ impl<T: Real> Iterate<'_, T> {
         self.sides.begin(start, distance, solution);
         // Only now are slacks what they are.
         let _ = self.evaluate::<E>(solution.dynamics);
+        self.set_compliance();
     }
 
     #[inline(always)]
@@ -143,6 +144,7 @@ impl<T: Real> Iterate<'_, T> {
                 // What is known of the residuals is what steps should have left of them: now they are computed.
                 let objective = self.evaluate::<E>(solution.dynamics);
                 (residuals, known) = (self.residuals::<E>(), self.mu);
+                (residuals.inequalities, residuals.complementarity) = self.sides.judge();
                 if limits.hold(residuals, self.terms) {
                     (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                     return Ok(statistics);
@@ -165,26 +167,29 @@ impl<T: Real> Iterate<'_, T> {
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
-            let mut alpha = self.sides.longest::<E>();
+            let (least, most) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
+            let distance = self.mu.max(least);
+            let keep = if distance < most { distance } else { most };
+            let mut alpha = self.sides.longest::<E>(keep);
             if !refine && self.mu > T::ZERO {
                 let after = self.sides.mu_after::<E>(alpha, self.mu);
                 let ratio = after / self.mu;
                 self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
                 self.newton::<E>(false)?;
-                alpha = self.sides.longest::<E>();
+                alpha = self.sides.longest::<E>(keep);
                 if alpha < T::from_f64(SHORT) {
                     // Products are too different for the corrector to be right: first they are made equal.
                     self.sides.aim(self.mu * T::from_f64(SHORT));
                     self.newton::<E>(false)?;
-                    alpha = self.sides.longest::<E>();
+                    alpha = self.sides.longest::<E>(keep);
                 }
             }
-            if alpha < T::ONE {
-                let (least, most) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
-                let distance = self.mu.max(least);
-                alpha = alpha * (T::ONE - if distance < most { distance } else { most });
-            }
             statistics.iterations += 1;
+            #[cfg(feature = "std")]
+            if std::env::var("DBG").is_ok() {
+                let r: crate::qp::Residuals = residuals.into();
+                std::eprintln!("{} mu {:e} alpha {:e} reg {} {r} step {:e}", statistics.iterations, self.mu.to_f64(), alpha.to_f64(), self.riccati.regularised, largest_size::<T, E>(self.step).to_f64());
+            }
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) {
                 break QpError::Stalled { iterations, residuals: residuals.into() };
             }

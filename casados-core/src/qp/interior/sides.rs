@@ -147,6 +147,8 @@ pub fn count<T: Real>(qp: QpView<'_, T>, fixed: bool, penalties: Penalties<T>) -
 /// All sides, and what an interior point keeps of each.
 pub struct Sides<'a, T> {
     pub counts: Counts,
+    /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the regularisation of the dual.
+    pub compliance: T,
     /// Rows of sides.
     pub rows: &'a mut [u32],
     /// Rows of equations.
@@ -200,6 +202,7 @@ impl<'a, T: Real> Sides<'a, T> {
         let (pairs, sides) = (counts.pairs(), counts.sides());
         let list = Self {
             counts,
+            compliance: T::ZERO,
             rows: take_mut(indices, sides),
             equations: take_mut(indices, counts.equations),
             soft: take_mut(indices, counts.soft),
