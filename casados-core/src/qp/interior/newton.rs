@@ -427,8 +427,12 @@ impl<T: Real> Sides<'_, T> {
             // The gradient with respect to the violation vanishes from the start: λ + ν = linear + quadratic e.
             let violation = (slack - value).max(distance);
             let force = linear + quadratic * violation;
+            // Both products are as large as those of the others, or as equal as the force allows.
             let least = T::from_f64(0.01) * force;
-            let multiplier = if multiplier < force - least { multiplier.max(least) } else { force - least };
+            let share = distance * distance / slack;
+            let least = if share < least { share } else { least };
+            let most = force - least;
+            let multiplier = if multiplier < most { multiplier.max(least) } else { most };
             set(self.multiplier, side, multiplier);
             set(self.slack, sides + j, violation);
             set(self.multiplier, sides + j, force - multiplier);

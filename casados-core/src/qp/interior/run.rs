@@ -133,7 +133,7 @@ impl<T: Real> Iterate<'_, T> {
         limits: &Limits<T>,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
-        let (mut short, mut refine) = (0, false);
+        let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
         let mut known = self.mu;
         let failure = loop {
             let mut residuals = self.residuals::<E>();
@@ -149,16 +149,22 @@ impl<T: Real> Iterate<'_, T> {
                     (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                     return Ok(statistics);
                 }
-                if small && statistics.refinements > 3 {
+                let Terms { forces, values } = limits.of(self.terms);
+                let apart = residuals.inequalities > values || residuals.complementarity > forces;
+                if small && apart {
+                    // Between two pieces of a penalty multipliers are off by the root of their products.
+                    share = share * T::from_f64(0.01);
+                } else if small && statistics.refinements > 3 {
                     let iterations = statistics.iterations;
                     break QpError::Stalled { iterations, residuals: residuals.into() };
+                } else {
+                    // Multipliers and slacks are good: the next step is to correct the others only.
+                    refine = small;
+                    statistics.refinements += usize::from(small);
                 }
-                // Multipliers and slacks are good: the next step is to correct the others only.
-                refine = small;
-                statistics.refinements += usize::from(small);
             }
             // Products far below the tolerance gain nothing, and make weights that swallow the digits of everything else.
-            let floor = T::from_f64(0.01) * limits.of(self.terms).forces;
+            let floor = share * limits.of(self.terms).forces;
             let iterations = statistics.iterations;
             if iterations >= options.max_iterations {
                 break QpError::MaxIterations { iterations, residuals: residuals.into() };
