@@ -139,14 +139,14 @@ impl<T: Real> Iterate<'_, T> {
         self.give_initial_state();
         self.evaluate_values::<E>();
         let cold = T::from_f64(options.start_mu).sqrt();
+        let gap = largest_size::<T, E>(self.dynamics).max(self.sides.violation());
+        let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
             // The farther it is from being feasible, the less its slacks and multipliers mean.
-            Start::Warm => {
-                let gap = largest_size::<T, E>(self.dynamics).max(self.sides.violation());
-                let distance = T::from_f64(options.warm_distance).max(gap);
-                if distance < cold { distance } else { cold }
-            }
-            Start::Cold => cold,
+            Start::Warm if warm < cold => warm,
+            // Slacks that are small beside violations make steps short.
+            Start::Cold if attempt.proximal => gap.max(cold),
+            _ => cold,
         };
         self.sides.begin(start, distance, solution);
         // Only now are slacks what they are.
