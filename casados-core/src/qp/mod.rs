@@ -91,3 +91,4 @@ pub(crate) use interior::{
 };
 pub(crate) use layout::{assign, pad, part, part_mut};
 pub(crate) use problem::Arrays;
+pub(crate) use statistics::larger;

@@ -10,8 +10,9 @@
 //! this classical form needs less than the one with the square root of `P`.
 
 use super::kernels::{
-    Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column,
+    Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column, symmetric,
 };
+use super::vector::larger;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
@@ -122,6 +123,8 @@ impl<'a, T: Real> Riccati<'a, T> {
 pub struct Equations<'a, T> {
     pub qp: QpView<'a, T>,
     pub first: First,
+    /// Whether the Hessian counts.
+    pub objective: bool,
     /// Weights of bounds and general constraints.
     pub weights: &'a [T],
     /// Gradient, over variables and general constraints.
@@ -144,7 +147,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
         let Self { riccati, equations, factor, step, result, .. } = self;
-        *result = riccati.backward::<E>(&equations, factor);
+        *result = riccati.backward::<E>(&equations, factor, step);
         if result.is_ok() {
             riccati.forward::<E>(&equations, step);
         }
@@ -175,8 +178,13 @@ impl<T: Real> Riccati<'_, T> {
     }
 
     #[inline(always)]
-    fn backward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, factor: bool) -> Result<(), QpError> {
-        let Equations { qp, first, weights, gradient, dynamics } = *equations;
+    fn backward<E: Packed<T>>(
+        &mut self,
+        equations: &Equations<'_, T>,
+        factor: bool,
+        scratch: &mut [T],
+    ) -> Result<(), QpError> {
+        let Equations { qp, first, gradient, dynamics, .. } = *equations;
         if factor {
             self.regularised = 0;
             self.largest = T::ZERO;
@@ -200,7 +208,7 @@ impl<T: Real> Riccati<'_, T> {
                 *minus = -general;
             }
             if factor {
-                self.factor_stage::<E>(&place, first, data, part(weights, place.row, place.rows))?;
+                self.factor_stage::<E>(&place, equations, data, scratch)?;
             }
             let g = part_mut(self.g, 0, ld);
             assign(g, part(gradient, place.row, ld));
@@ -228,13 +236,16 @@ impl<T: Real> Riccati<'_, T> {
     fn factor_stage<E: Packed<T>>(
         &mut self,
         place: &Place,
-        first: First,
+        equations: &Equations<'_, T>,
         data: &[T],
-        weights: &[T],
+        scratch: &mut [T],
     ) -> Result<(), QpError> {
         let Place { nx, nu, n, ng, ld, next, ld_next, stage, .. } = *place;
+        let Equations { qp, first, objective, .. } = *equations;
+        let weights = part(equations.weights, place.row, place.rows);
         let matrix = Columns { data: part(data, 0, place.matrix()), ld };
-        let hessian = Source::Matrix(Columns { data: part(data, place.matrix(), place.hessian()), ld });
+        let hessian = if objective { part(data, place.matrix(), place.hessian()) } else { &[] };
+        let source = Source::Matrix(Columns { data: hessian, ld });
         let p = Columns { data: &*self.p, ld: ld_next };
         product::<T, E>(self.w, ld, Source::Zero, matrix, p, (n, 0..next, next), Part::Full);
         for (i, &weight) in part(weights, ld, ng).iter().enumerate() {
@@ -247,13 +258,13 @@ impl<T: Real> Riccati<'_, T> {
         // Columns are computed four at a time. The first with a control among them are needed whole.
         let whole = nx / 4 * 4;
         if stage > 0 || first == First::Free {
-            product::<T, E>(self.m, ld, hessian, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
+            product::<T, E>(self.m, ld, source, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
         }
-        product::<T, E>(self.m, ld, hessian, matrix, w, (n, whole..n, next + ng), Part::Full);
+        product::<T, E>(self.m, ld, source, matrix, w, (n, whole..n, next + ng), Part::Full);
         // Of the Hessian only the lower triangle is there: above are controls times states.
         let mixed = part_mut(self.m, nx * ld, nu * ld).chunks_exact_mut(ld.max(1));
         for (j, column) in mixed.enumerate() {
-            let row = data.get(place.matrix() + nx + j..).unwrap_or_default();
+            let row = hessian.get(nx + j..).unwrap_or_default();
             for (m, &s) in column.iter_mut().zip(row.iter().step_by(ld.max(1))).take(nx) {
                 *m = *m + s;
             }
@@ -267,13 +278,17 @@ impl<T: Real> Riccati<'_, T> {
 
         let inverse = part_mut(self.inverse, place.v, ld);
         let added = part_mut(self.added, place.v, ld);
-        let (before, panel) = self.m.split_at_mut_checked(nx * ld).unwrap_or_default();
-        let panel = part_mut(panel, 0, nu * ld);
+        let panel = part_mut(self.m, nx * ld, nu * ld);
         let pivots = Pivots { inverse: part_mut(inverse, nx, nu), added: part_mut(added, nx, nu), largest };
-        let not_convex = |index: usize, pivot: T| QpError::NotConvex { stage, index, pivot: pivot.to_f64() };
-        self.regularised += cholesky::<T, E>(panel, ld, nx, n, pivots).map_err(|(i, p)| not_convex(i, p))?;
+        let (regularised, negative) = cholesky::<T, E>(panel, ld, nx, n, pivots);
+        self.regularised += regularised;
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
         assign(part_mut(kept, 0, nu * ld), panel);
+        if let Some((index, pivot)) = negative {
+            self.verify(qp, place, (index, pivot), scratch)?;
+        }
+        let kept = part_mut(self.panels, place.factor, ld * place.pivots);
+        let (before, _) = self.m.split_at_checked(nx * ld).unwrap_or_default();
         if stage == 0 && first == First::Fixed {
             return Ok(());
         }
@@ -291,9 +306,68 @@ impl<T: Real> Riccati<'_, T> {
                 *start = p;
             }
         }
-        let pivots = Pivots { inverse: part_mut(inverse, 0, nx), added: part_mut(added, 0, nx), largest };
-        self.regularised +=
-            cholesky::<T, E>(start, ld, 0, nx, pivots).map_err(|(i, p)| not_convex(nu + i, p))?;
+        let (inverse, added) = (part_mut(self.inverse, place.v, nx), part_mut(self.added, place.v, nx));
+        let (regularised, negative) =
+            cholesky::<T, E>(start, ld, 0, nx, Pivots { inverse, added, largest });
+        self.regularised += regularised;
+        match negative {
+            Some((index, pivot)) => self.verify(qp, place, (nu + index, pivot), scratch),
+            None => Ok(()),
+        }
+    }
+
+    /// An error if the Hessian curves downwards along the direction in which a pivot is negative: that of one control (behind
+    /// the controls, of a state at the start), with which the ones before it and all that come later move such that the rest of
+    /// `dᵀ M d` vanishes. Otherwise the pivot is rounding.
+    fn verify(
+        &mut self,
+        qp: QpView<'_, T>,
+        from: &Place,
+        (index, pivot): (usize, T),
+        direction: &mut [T],
+    ) -> Result<(), QpError> {
+        let (mut curvature, mut size) = (T::ZERO, T::ZERO);
+        let mut rest = direction.get_mut(from.row..).unwrap_or_default();
+        for place in Places::<T>::new(qp.dims).skip(from.stage) {
+            let Place { nx, nu, n, ld, next, .. } = place;
+            let data = part(qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let (panel, inverse) =
+                (part(self.panels, place.factor, ld * place.pivots), part(self.inverse, place.v, ld));
+            let v = part_mut(take_mut(&mut rest, place.rows), 0, ld);
+            let state = index.checked_sub(nu);
+            let (begin, from_here) = (if state.is_some() { 0 } else { nx }, place.stage == from.stage);
+            // The state comes from the stage before.
+            let given = if from_here { 0 } else { nx };
+            v.iter_mut().skip(given).for_each(|v| *v = T::ZERO);
+            if from_here {
+                let columns = panel.get(if state.is_some() { nu * ld } else { 0 }..).unwrap_or_default();
+                unit(part_mut(v, begin, ld - begin), columns, ld, begin, part(inverse, begin, ld - begin), state.unwrap_or(index));
+            }
+            if !from_here || state.is_some() {
+                let u = part_mut(self.g, 0, nu);
+                u.fill(T::ZERO);
+                add_transposed::<T, T>(u, Columns { data: panel, ld }, v, nx, nu);
+                substitute(u, panel, ld, nx, part(inverse, nx, nu));
+                assign(part_mut(v, nx, nu), u);
+            }
+            let coming = part_mut(rest, 0, next);
+            coming.fill(T::ZERO);
+            add_transposed::<T, T>(coming, matrix, v, n, next);
+            let product = part_mut(self.g, 0, ld);
+            product.fill(T::ZERO);
+            let hessian = part(data, place.matrix(), place.hessian());
+            symmetric::<T, T>(product, hessian, ld, v, n);
+            let largest = larger::<T, T>(T::ZERO, hessian);
+            for (&v, &product) in v.iter().zip(&*product) {
+                curvature = curvature + v * product;
+                size = size + largest * v * v;
+            }
+        }
+        let rounding = T::from_f64(64.0 * T::EPSILON) * size;
+        if pivot.is_finite() && curvature.is_finite() && curvature < -rounding {
+            return Err(QpError::NotConvex { stage: from.stage, index, pivot: pivot.to_f64() });
+        }
         Ok(())
     }
 
@@ -362,6 +436,20 @@ fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse:
     }
 }
 
+/// `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables before `index`.
+fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T], index: usize) {
+    if let Some(d) = d.get_mut(index) {
+        *d = T::ONE;
+    }
+    for i in (0..index).rev() {
+        let column = part(panel, i * ld + row, index + 1);
+        let sum = column.iter().zip(&*d).skip(i + 1).fold(T::ZERO, |sum, (&l, &d)| sum - l * d);
+        if let (Some(d), Some(&inverse)) = (d.get_mut(i), inverse.get(i)) {
+            *d = sum * inverse;
+        }
+    }
+}
+
 /// What is kept of pivots.
 struct Pivots<'a, T> {
     inverse: &'a mut [T],
@@ -372,10 +460,7 @@ struct Pivots<'a, T> {
 
 /// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the other rows of the panel are
 /// multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were replaced by something large: the solution then does
-/// not move in their direction.
-///
-/// # Errors
-/// A pivot that is negative by more than rounding, and its index.
+/// not move in their direction. And the first of them that is negative, which may be rounding, and its index.
 #[inline(always)]
 fn cholesky<T: Real, E: Packed<T>>(
     panel: &mut [T],
@@ -383,10 +468,9 @@ fn cholesky<T: Real, E: Packed<T>>(
     row: usize,
     rows: usize,
     pivots: Pivots<'_, T>,
-) -> Result<usize, (usize, T)> {
+) -> (usize, Option<(usize, T)>) {
     let Pivots { inverse, added, largest } = pivots;
-    let mut regularised = 0;
-    let epsilon = T::from_f64(T::EPSILON);
+    let (mut regularised, mut negative) = (0, None);
     let noise = T::from_f64(T::EPSILON * 4.0) * T::from_whole(rows);
     for (diagonal, inverse) in
         panel.get(row..).unwrap_or_default().iter().step_by((ld + 1).max(1)).zip(&mut *inverse)
@@ -418,9 +502,8 @@ fn cholesky<T: Real, E: Packed<T>>(
             // `inverse` is still what the diagonal was before elimination.
             let is_positive = pivot > noise * *inverse;
             if !is_positive {
-                let is_noise = pivot >= -epsilon.sqrt() * largest;
-                if !is_noise {
-                    return Err((index, pivot));
+                if pivot < T::ZERO && negative.is_none() {
+                    negative = Some((index, pivot));
                 }
                 pivot = if largest > T::ZERO { largest } else { T::ONE };
                 *added = pivot - found;
@@ -435,5 +518,5 @@ fn cholesky<T: Real, E: Packed<T>>(
         }
         begin += width;
     }
-    Ok(regularised)
+    (regularised, negative)
 }
