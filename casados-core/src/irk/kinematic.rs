@@ -17,7 +17,7 @@ use crate::linalg::{
     subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Kinematic};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Felt, Kinematic};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
@@ -48,17 +48,15 @@ pub(super) fn minus_c<M: Dae, E: Plain, const S: usize>(
     jacobian.as_ref().get(of.entry as usize)?.first().copied()
 }
 
-/// The entries by which other equations feel a kinematic state: the slot, the values, whether they multiply its derivative.
+/// An entry by which an equation feels a kinematic state: its slot, its values, whether it multiplies the derivative.
 #[inline(always)]
 pub(super) fn felt<'a, M: Dae, E: Plain, const S: usize>(
-    of: &Kinematic,
+    of: &Felt,
     jacobian: &'a M::Jacobian<[E; S]>,
-) -> impl Iterator<Item = (usize, &'a [E; S], bool)> {
-    let felt = M::STRUCTURE.elimination.felt.get(of.first as usize..of.end as usize).unwrap_or_default();
-    felt.iter().filter_map(|&index| {
-        let (row, _, values) = entry::<M, _>(jacobian, index as usize)?;
-        Some((slot::<M>(row), values, (index as usize) < M::STRUCTURE.blocks[1]))
-    })
+) -> Option<(usize, &'a [E; S], bool)> {
+    let index = of.entry as usize;
+    let (row, _, values) = entry::<M, _>(jacobian, index)?;
+    Some((slot::<M>(row), values, index < M::STRUCTURE.blocks[1]))
 }
 
 /// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
@@ -149,8 +147,15 @@ pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: u
     minus_ha: &Block<E, S>,
     rows: &mut [Packet<E, S, W>],
 ) {
-    if rows.len() == M::Shape::NK {
-        each_row::<A, _>(&mut Rows::<M, E, S, W, WHAT> { jacobian, minus_ha: *minus_ha, rows });
+    if rows.len() != M::Shape::NK {
+        return;
+    }
+    let mut rows =
+        Rows::<M, E, S, W, WHAT> { jacobian, minus_ha: *minus_ha, rows, sum: [[E::from_f64(0.0); W]; S] };
+    if const { WHAT == ELIMINATE || WHAT == RECONSTRUCT_TRANSPOSED } {
+        each_row::<A, _>(&mut AtFelt(rows));
+    } else {
+        each_row::<A, _>(&mut rows);
     }
 }
 
@@ -158,6 +163,8 @@ struct Rows<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8
     jacobian: &'a M::Jacobian<[E; S]>,
     minus_ha: Block<E, S>,
     rows: &'a mut [Packet<E, S, W>],
+    /// What is known of a state between the first and the last entry by which it is felt.
+    sum: Packet<E, S, W>,
 }
 
 /// About how many instructions a product with `hA` takes.
@@ -165,66 +172,75 @@ const fn product<E>(stages: usize, width: usize) -> usize {
     if size_of::<E>() > 8 { stages * stages * width } else { stages * stages * width.div_ceil(4) }
 }
 
+/// Between a kinematic state and its velocity.
 impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for Rows<'_, M, E, S, W, WHAT> {
     const ROWS: usize = count::<M>();
-    const INSTRUCTIONS: usize = {
-        let felt = M::STRUCTURE.elimination.felt.len() / if Self::ROWS > 0 { Self::ROWS } else { 1 };
-        let own = 2 + product::<E>(S, W);
-        if WHAT == ELIMINATE || WHAT == RECONSTRUCT_TRANSPOSED { own + (felt + 1) * S * W.div_ceil(4) * 2 } else { own }
-    };
+    const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Self { jacobian, minus_ha, rows } = self;
-        let (Some(of), Some(&own)) = (kinematic::<M>(state), rows.get(state)) else { return };
-        match WHAT {
-            ELIMINATE => {
-                let mut moved = [[E::from_f64(0.0); W]; S];
-                subtract::<A, E, S, W>(&mut moved, minus_ha, &own);
-                for (slot, values, derivative) in felt::<M, E, S>(of, jacobian) {
-                    if let Some(row) = rows.get_mut(slot) {
-                        let by = if derivative { &own } else { &moved };
-                        subtract_diagonal::<A, E, S, W>(row, values, by);
-                    }
-                }
+        let Self { jacobian, minus_ha, rows, .. } = self;
+        let Some(of) = kinematic::<M>(state) else { return };
+        let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
+            return;
+        };
+        let (from, to) = if WHAT == RECONSTRUCT { (velocity, state) } else { (state, velocity) };
+        let Some(from) = rows.get(from) else { return };
+        let mut moved = [[E::from_f64(0.0); W]; S];
+        if WHAT == RECONSTRUCT {
+            subtract::<A, E, S, W>(&mut moved, minus_ha, from);
+        } else {
+            subtract_transposed::<A, E, S, W>(&mut moved, minus_ha, from);
+        }
+        if let Some(to) = rows.get_mut(to) {
+            subtract_diagonal::<A, E, S, W>(to, &[minus_c; S], &moved);
+        }
+    }
+}
+
+/// Between a kinematic state and the equations that feel it.
+struct AtFelt<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8>(
+    Rows<'a, M, E, S, W, WHAT>,
+);
+
+impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for AtFelt<'_, M, E, S, W, WHAT> {
+    const ROWS: usize = M::STRUCTURE.elimination.felt.len();
+    const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, index: usize) {
+        let Rows { jacobian, minus_ha, rows, sum } = &mut self.0;
+        let Some(of) = M::STRUCTURE.elimination.felt.get(index) else { return };
+        let Some((slot, values, derivative)) = felt::<M, E, S>(of, jacobian) else { return };
+        let (Some(&own), Some(&row)) = (rows.get(of.state as usize), rows.get(slot)) else { return };
+        let (mut own, mut row) = (own, row);
+        if of.first {
+            *sum = [[E::from_f64(0.0); W]; S];
+        }
+        if WHAT == ELIMINATE {
+            if of.first {
+                subtract::<A, E, S, W>(sum, minus_ha, &own);
             }
-            RECONSTRUCT_TRANSPOSED => {
-                let (mut own, mut sum) = (own, [[E::from_f64(0.0); W]; S]);
-                for (slot, values, derivative) in felt::<M, E, S>(of, jacobian) {
-                    let Some(row) = rows.get(slot) else { continue };
-                    if derivative {
-                        subtract_diagonal::<A, E, S, W>(&mut own, values, row);
-                    } else {
-                        subtract_diagonal::<A, E, S, W>(&mut sum, values, row);
-                    }
-                }
-                // `own + (hA)ᵀ sum`
-                subtract_transposed::<A, E, S, W>(&mut own, minus_ha, &sum);
-                if let Some(row) = rows.get_mut(state) {
-                    *row = own;
-                }
+            subtract_diagonal::<A, E, S, W>(&mut row, values, if derivative { &own } else { sum });
+            if let Some(to) = rows.get_mut(slot) {
+                *to = row;
             }
-            _ => {
-                let (Some(minus_c), Some(velocity)) = (minus_c::<M, E, S>(of, jacobian), velocity::<M>(of)) else {
-                    return;
-                };
-                let (from, to) = if WHAT == RECONSTRUCT { (velocity, state) } else { (state, velocity) };
-                let mut moved = [[E::from_f64(0.0); W]; S];
-                let Some(from) = rows.get(from) else { return };
-                if WHAT == RECONSTRUCT {
-                    subtract::<A, E, S, W>(&mut moved, minus_ha, from);
-                } else {
-                    subtract_transposed::<A, E, S, W>(&mut moved, minus_ha, from);
-                }
-                if let Some(to) = rows.get_mut(to) {
-                    subtract_diagonal::<A, E, S, W>(to, &[minus_c; S], &moved);
-                }
-            }
+            return;
+        }
+        if derivative {
+            subtract_diagonal::<A, E, S, W>(&mut own, values, &row);
+        } else {
+            subtract_diagonal::<A, E, S, W>(sum, values, &row);
+        }
+        if of.last {
+            // `own + (hA)ᵀ sum`
+            subtract_transposed::<A, E, S, W>(&mut own, minus_ha, sum);
+        }
+        if let (true, Some(to)) = (derivative || of.last, rows.get_mut(of.state as usize)) {
+            *to = own;
         }
     }
 }
 
 /// A panel of forward sensitivities.
-#[derive(Clone, Copy)]
 pub(super) struct Forward<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// `V` at the start of the step.
@@ -273,13 +289,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
     /// Subtracts `f_q̇ c V_v` from the equations that feel derivatives.
     #[inline(always)]
     pub fn subtract_derivatives<A: Arithmetic>(&self, rows: &mut [Packet<E, S, W>]) {
-        for state in 0..if const { feels_derivatives::<M>() } { count::<M>() } else { 0 } {
-            let Some(of) = kinematic::<M>(state) else { continue };
-            let own = self.own::<A>(of);
-            for (slot, values, _) in felt::<M, E, S>(of, self.jacobian).filter(|felt| felt.2) {
-                if let Some(row) = rows.get_mut(slot) {
-                    subtract_diagonal::<A, E, S, W>(row, values, &[own; S]);
-                }
+        if const { !feels_derivatives::<M>() } {
+            return;
+        }
+        for felt_by in M::STRUCTURE.elimination.felt {
+            let of = kinematic::<M>(felt_by.state as usize);
+            if let (Some(of), Some((slot, values, true))) = (of, felt::<M, E, S>(felt_by, self.jacobian))
+                && let Some(row) = rows.get_mut(slot)
+            {
+                let own = self.own::<A>(of);
+                subtract_diagonal::<A, E, S, W>(row, values, &[own; S]);
             }
         }
     }
@@ -292,22 +311,40 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
         rows: &mut [Packet<E, S, W>],
         viewer: &mut impl Viewer<E, S, W>,
     ) {
-        for state in 0..count::<M>() {
-            let Some(of) = kinematic::<M>(state) else { continue };
-            let mut packet = [self.own::<A>(of); S];
-            if let (Some(velocity), Some(minus_c)) =
-                (velocity::<M>(of), minus_c::<M, E, S>(of, self.jacobian))
-                && let Some(dk) = rows.get(velocity)
-            {
-                let mut moved = [[E::from_f64(0.0); W]; S];
-                subtract::<A, E, S, W>(&mut moved, minus_ha, dk);
-                subtract_diagonal::<A, E, S, W>(&mut packet, &[minus_c; S], &moved);
-            }
-            if let Some(row) = rows.get_mut(state) {
-                *row = packet;
-            }
-            viewer.see::<A>(state, &packet);
+        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha: *minus_ha, rows, viewer });
+    }
+}
+
+/// See [`Forward::reconstruct`].
+struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
+    of: &'b Forward<'a, M, E, D, S, W>,
+    minus_ha: Block<E, S>,
+    rows: &'b mut [Packet<E, S, W>],
+    viewer: &'b mut V,
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, const W: usize> AtRow
+    for Reconstruct<'_, '_, M, E, D, V, S, W>
+{
+    const ROWS: usize = count::<M>();
+    const INSTRUCTIONS: usize = 4 + product::<E>(S, W);
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Self { of: forward, minus_ha, rows, viewer } = self;
+        let Some(of) = kinematic::<M>(state) else { return };
+        let mut packet = [forward.own::<A>(of); S];
+        if let (Some(velocity), Some(minus_c)) =
+            (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian))
+            && let Some(dk) = rows.get(velocity)
+        {
+            let mut moved = [[E::from_f64(0.0); W]; S];
+            subtract::<A, E, S, W>(&mut moved, minus_ha, dk);
+            subtract_diagonal::<A, E, S, W>(&mut packet, &[minus_c; S], &moved);
         }
+        if let Some(row) = rows.get_mut(state) {
+            *row = packet;
+        }
+        viewer.see::<A>(state, &packet);
     }
 }
 
@@ -315,7 +352,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
 const fn feels_derivatives<M: Dae>() -> bool {
     let (felt, mut index) = (M::STRUCTURE.elimination.felt, 0);
     while index < felt.len() {
-        if (felt[index] as usize) < M::STRUCTURE.blocks[1] {
+        if (felt[index].entry as usize) < M::STRUCTURE.blocks[1] {
             return true;
         }
         index += 1;
@@ -455,23 +492,26 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Missing<'_, M, E, S> {
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, points, f, a, h } = self;
         let nodes = super::right_side::nodes(a, h);
+        for felt in M::STRUCTURE.elimination.felt {
+            let of = kinematic::<M>(felt.state as usize);
+            let missing = of.and_then(|of| f.as_ref().get(of.equation as usize)).map(|own| own[0]);
+            let (Some(missing), Some((row, _, values))) = (missing, entry::<M, _>(jacobian, felt.entry as usize))
+            else {
+                continue;
+            };
+            let Some(f) = f.as_mut().get_mut(row) else { continue };
+            let share = values[0] * missing;
+            for (f, &node) in f.iter_mut().zip(&nodes) {
+                let derivative = (felt.entry as usize) < M::STRUCTURE.blocks[1];
+                *f = A::subtract(*f, share, if derivative { E::from_f64(1.0) } else { node });
+            }
+        }
         for state in 0..count::<M>() {
             let Some(of) = kinematic::<M>(state) else { continue };
             let Some(own) = f.as_mut().get_mut(of.equation as usize) else { continue };
-            let missing = own[0];
-            *own = [E::from_f64(0.0); S];
+            let missing = core::mem::replace(own, [E::from_f64(0.0); S])[0];
             for k in points.as_mut().get_mut(state).into_iter().flatten() {
                 *k = *k - missing;
-            }
-            let felt = M::STRUCTURE.elimination.felt.get(of.first as usize..of.end as usize);
-            for &index in felt.unwrap_or_default() {
-                let Some((row, _, felt)) = entry::<M, _>(jacobian, index as usize) else { continue };
-                let Some(f) = f.as_mut().get_mut(row) else { continue };
-                let share = felt[0] * missing;
-                for (f, &node) in f.iter_mut().zip(&nodes) {
-                    let derivative = (index as usize) < M::STRUCTURE.blocks[1];
-                    *f = A::subtract(*f, share, if derivative { E::from_f64(1.0) } else { node });
-                }
             }
         }
     }
@@ -516,16 +556,19 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Rounded<'_, M, E, S> {
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, f, a, h } = self;
         let minus_ha = coupling(a, h);
-        for state in 0..count::<M>() {
-            let Some(of) = kinematic::<M>(state) else { continue };
-            let Some(&residual) = f.as_ref().get(of.equation as usize) else { continue };
-            let moved = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
-            let felt = M::STRUCTURE.elimination.felt.get(of.first as usize..of.end as usize);
-            for &index in felt.unwrap_or_default() {
-                let Some((row, _, felt)) = entry::<M, _>(jacobian, index as usize) else { continue };
-                let Some(f) = f.as_mut().get_mut(row) else { continue };
-                let derivative = (index as usize) < M::STRUCTURE.blocks[1];
-                A::subtract_products(f, felt, if derivative { &residual } else { &moved });
+        for felt in M::STRUCTURE.elimination.felt {
+            let of = kinematic::<M>(felt.state as usize);
+            let residual = of.and_then(|of| f.as_ref().get(of.equation as usize)).copied();
+            let (Some(mut residual), Some((row, _, values))) =
+                (residual, entry::<M, _>(jacobian, felt.entry as usize))
+            else {
+                continue;
+            };
+            if felt.entry as usize >= M::STRUCTURE.blocks[1] {
+                residual = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
+            }
+            if let Some(f) = f.as_mut().get_mut(row) {
+                A::subtract_products(f, values, &residual);
             }
         }
     }

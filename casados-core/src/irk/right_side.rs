@@ -7,9 +7,9 @@
 
 use super::directions::{Directions, panel_of};
 use super::evaluate::entry;
-use super::kinematic::{Forward, felt};
+use super::kinematic::{Forward, felt, minus_c};
 use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
-use crate::model::Dae;
+use crate::model::{Dae, Felt};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
@@ -34,44 +34,58 @@ pub(super) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     pub directions: PhantomData<D>,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
-    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
-    const INSTRUCTIONS: usize = 3 * S;
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
+    /// Subtracts from one column of an equation.
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, row: usize) {
+    fn subtract(&mut self, slot: usize, column: usize, values: &[E; S]) {
         let nk = M::Shape::NK;
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let Some(column) = direction::<M, E, D>(c) else { return };
         let (begin, width) = panel_of::<E>(column, D::COUNT, S);
         let place = begin * nk * S + (column - begin);
-        let dy = &mut *self.dy;
-        at_entry::<M, E, S>(self.jacobian, self.nodes, (slot::<M>(r), values), |slot, values| {
-            for (stage, &value) in values.iter().enumerate() {
-                if let Some(to) = dy.get_mut(place + (slot * S + stage) * width) {
-                    *to = *to - value;
-                }
+        for (stage, &value) in values.iter().enumerate() {
+            if let Some(to) = self.dy.get_mut(place + (slot * S + stage) * width) {
+                *to = *to - value;
             }
-        });
+        }
     }
 }
 
-/// What an entry in the equation of a slot subtracts from one column: its values there, or, through a kinematic state, in the equations that feel it.
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
+    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`, and those by which kinematic states are felt.
+    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] + M::STRUCTURE.elimination.felt.len();
+    const INSTRUCTIONS: usize = 3 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let entries = const { M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] };
+        if row >= entries {
+            let Some(felt) = M::STRUCTURE.elimination.felt.get(row - entries) else { return };
+            let through = through::<M, E, S>(self.jacobian, self.nodes, felt);
+            let Some((slot, velocity, products)) = through else { return };
+            if let Some(column) = direction::<M, E, D>(velocity) {
+                self.subtract(slot, column, &products);
+            }
+            return;
+        }
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let (None, Some(column)) = (kinematic::<M>(slot::<M>(r)), direction::<M, E, D>(c)) else { return };
+        self.subtract(slot::<M>(r), column, values);
+    }
+}
+
+/// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`, with its slot and the variable.
 #[inline(always)]
-fn at_entry<M: Dae, E: Lanes, const S: usize>(
+fn through<M: Dae, E: Lanes, const S: usize>(
     jacobian: &M::Jacobian<[E; S]>,
     nodes: &[E; S],
-    (slot, values): (usize, &[E; S]),
-    mut subtract: impl FnMut(usize, &[E; S]),
-) {
-    let Some(of) = kinematic::<M>(slot) else { return subtract(slot, values) };
-    for (slot, &(mut products), derivative) in felt::<M, E, S>(of, jacobian) {
-        for (product, &node) in products.iter_mut().zip(nodes) {
-            let factor = if derivative { values[0] } else { node * values[0] };
-            *product = -(*product * factor);
-        }
-        subtract(slot, &products);
+    of: &Felt,
+) -> Option<(usize, usize, [E; S])> {
+    let kinematic = kinematic::<M>(of.state as usize)?;
+    let minus_c = minus_c::<M, E, S>(kinematic, jacobian)?;
+    let (slot, &(mut products), derivative) = felt::<M, E, S>(of, jacobian)?;
+    for (product, &node) in products.iter_mut().zip(nodes) {
+        let factor = if derivative { minus_c } else { node * minus_c };
+        *product = -(*product * factor);
     }
+    Some((slot, kinematic.velocity as usize, products))
 }
 
 /// An entry of the Jacobian, by columns.
@@ -94,22 +108,40 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
             *packet = [[E::from_f64(0.0); W]; S];
         }
     }
+    for felt in M::STRUCTURE.elimination.felt {
+        let Some((slot, velocity, products)) = through::<M, E, S>(jacobian, nodes, felt) else { continue };
+        let column = direction::<M, E, D>(velocity).and_then(|column| column.checked_sub(begin));
+        if let Some(column) = column.filter(|&column| column < W) {
+            subtract_at(dy, slot, column, &products);
+        }
+    }
     while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed) {
         placed += 1;
         let Some(column) = direction::<M, E, D>(c) else { continue };
         if column >= begin + W {
             return placed - 1;
         }
-        at_entry::<M, E, S>(jacobian, nodes, (slot::<M>(r), values), |slot, values| {
-            let Some(packet) = dy.get_mut(slot) else { return };
-            for (row, &value) in packet.iter_mut().zip(values) {
-                if let Some(to) = row.get_mut(column - begin) {
-                    *to = *to - value;
-                }
-            }
-        });
+        if kinematic::<M>(slot::<M>(r)).is_none() {
+            subtract_at(dy, slot::<M>(r), column - begin, values);
+        }
     }
     placed
+}
+
+/// Subtracts from one column of a row.
+#[inline(always)]
+fn subtract_at<E: Lanes, const S: usize, const W: usize>(
+    dy: &mut [Packet<E, S, W>],
+    slot: usize,
+    column: usize,
+    values: &[E; S],
+) {
+    let Some(packet) = dy.get_mut(slot) else { return };
+    for (row, &value) in packet.iter_mut().zip(values) {
+        if let Some(to) = row.get_mut(column) {
+            *to = *to - value;
+        }
+    }
 }
 
 /// The direction that a variable other than `ẋ` is, if it is one.

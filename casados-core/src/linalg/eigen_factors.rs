@@ -112,16 +112,11 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
 
     /// `b_r ← b_r − (f_q̇ + hμ f_q) b_q` for each kinematic state `q`.
     fn eliminate(&self, rows: &mut Rows<M, T>) {
-        let (plan, blocks) = (&M::STRUCTURE.elimination, M::STRUCTURE.blocks);
-        for state in 0..plan.kinematic.len() {
-            let Some(of) = kinematic::<M>(state) else { continue };
-            let [[own]] = rows[state];
-            let moved = self.scale * own;
-            for &entry in plan.felt.get(of.first as usize..of.end as usize).unwrap_or_default() {
-                let (row, value) = (M::STRUCTURE.jacobian.at(entry as usize).0, self.jacobian[entry as usize]);
-                let [[to]] = &mut rows[slot::<M>(row)];
-                *to = *to - if (entry as usize) < blocks[1] { own } else { moved }.scaled(value);
-            }
+        for felt in M::STRUCTURE.elimination.felt {
+            let (entry, [[own]]) = (felt.entry as usize, rows[felt.state as usize]);
+            let own = if entry < M::STRUCTURE.blocks[1] { own } else { self.scale * own };
+            let [[to]] = &mut rows[slot::<M>(M::STRUCTURE.jacobian.at(entry).0)];
+            *to = *to - own.scaled(self.jacobian[entry]);
         }
     }
 
@@ -171,14 +166,13 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
         let square = *scale * *scale;
         for of in plan.assembly {
             let Some([[to]]) = blocks.get_mut(of.block as usize) else { continue };
-            let mut element = Complex::zero();
-            for term in plan.terms.get(of.terms()).unwrap_or_default() {
-                let Some(&(mut value)) = jacobian.get(term.entry as usize) else { continue };
-                // An index that marks what is not there lies outside of the Jacobian.
-                if let Some(&minus_c) = jacobian.get(term.by as usize) {
+            let mut element = if of.first { Complex::zero() } else { *to };
+            // An index that marks what is not there lies outside of the Jacobian.
+            if let Some(&(mut value)) = jacobian.get(of.entry as usize) {
+                if let Some(&minus_c) = jacobian.get(of.by as usize) {
                     value = -(minus_c * value);
                 }
-                element = match term.order {
+                element = match of.order {
                     0 => element.plus(value),
                     1 => element + scale.scaled(value),
                     _ => element + square.scaled(value),

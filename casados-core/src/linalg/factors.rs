@@ -145,27 +145,23 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
             return;
         }
         let Some(to) = blocks.get_mut(of.block as usize) else { return };
-        let mut block = [[E::from_f64(0.0); S]; S];
-        for term in plan.terms.get(of.terms()).unwrap_or_default() {
-            let Some(&(mut values)) = jacobian.get(term.entry as usize) else { continue };
-            // An index that marks what is not there lies outside of the Jacobian.
-            if let Some(minus_c) = jacobian.get(term.by as usize) {
-                for (value, &minus_c) in values.iter_mut().zip(minus_c) {
-                    *value = -(*value * minus_c);
+        let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
+        // An index that marks what is not there lies outside of the Jacobian.
+        if let Some(&(mut values)) = jacobian.get(of.entry as usize) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
+                for value in &mut values {
+                    *value = -(*value * minus_c[0]);
                 }
             }
-            let power = match term.order {
-                0 => {
-                    for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
-                        column[stage] = column[stage] + value;
-                    }
-                    continue;
+            if of.order == 0 {
+                for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
+                    column[stage] = column[stage] + value;
                 }
-                1 => &self.coupling,
-                _ => &self.square,
-            };
-            for (column, power) in block.iter_mut().zip(power) {
-                A::subtract_products(column, &values, power);
+            } else {
+                let power = if of.order == 1 { &self.coupling } else { &self.square };
+                for (column, power) in block.iter_mut().zip(power) {
+                    A::subtract_products(column, &values, power);
+                }
             }
         }
         *to = block;

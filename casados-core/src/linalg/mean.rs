@@ -110,14 +110,13 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_
         }
         let Some([[to]]) = blocks.get_mut(of.block as usize) else { return };
         let [scale, square] = self.scales;
-        let mut element = Complex::zero();
-        for term in plan.terms.get(of.terms()).unwrap_or_default() {
-            let Some(mut value) = jacobian.get(term.entry as usize).map(Self::total) else { continue };
-            // An index that marks what is not there lies outside of the Jacobian.
-            if let Some(minus_c) = jacobian.get(term.by as usize) {
+        let mut element = if of.first { Complex::zero() } else { *to };
+        // An index that marks what is not there lies outside of the Jacobian.
+        if let Some(mut value) = jacobian.get(of.entry as usize).map(Self::total) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
                 value = -(minus_c[0] * value);
             }
-            element = match term.order {
+            element = match of.order {
                 0 => element.plus((E::from_f64(Self::SHARE) * value).coarse()),
                 1 => element + scale.scaled(value.coarse()),
                 _ => element + square.scaled(value.coarse()),

@@ -14,18 +14,16 @@ pub struct Elimination {
     pub left: &'static [Left],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
     pub updates: &'static [Update],
-    /// For each block what it is made of before elimination, those of a kind one after the other, fill first.
+    /// What blocks are made of before elimination, those of a kind one after the other, fill first.
     pub assembly: &'static [Assembly],
-    /// What blocks are made of.
-    pub terms: &'static [BlockTerm],
     /// For each equation its slot; of a [kinematic](Kinematic) state its own.
     pub slot_of_equation: &'static [u32],
     /// The pivots, supernode by supernode.
     pub supernodes: &'static [Supernode],
     /// For each state whether it is kinematic, and what it follows from; empty if none is.
     pub kinematic: &'static [Kinematic],
-    /// The entries of `f_ẋ` and `f_x` by which other equations feel kinematic states.
-    pub felt: &'static [u32],
+    /// The entries of `f_ẋ` and `f_x` by which other equations feel kinematic states, state by state.
+    pub felt: &'static [Felt],
 }
 
 impl Elimination {
@@ -36,7 +34,6 @@ impl Elimination {
         left: &[],
         updates: &[],
         assembly: &[],
-        terms: &[],
         slot_of_equation: &[],
         supernodes: &[],
         kinematic: &[],
@@ -95,7 +92,7 @@ pub struct Pivot {
 /// k_q = c (x_v + hA k_v)        or        k_q = c v
 /// ```
 ///
-/// and its column of the Newton matrix, multiplied by `c hA`, is a part of that of `v`: see [`BlockTerm`].
+/// and its column of the Newton matrix, multiplied by `c hA`, is a part of that of `v`: see [`Assembly`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kinematic {
     /// Its equation, or [`Kinematic::NONE`].
@@ -104,15 +101,24 @@ pub struct Kinematic {
     pub entry: u32,
     /// The variable `v`.
     pub velocity: u32,
-    /// Where in [`Elimination::felt`] the entries of other equations begin
-    pub first: u32,
-    /// and end.
-    pub end: u32,
 }
 
 impl Kinematic {
     /// The state is not kinematic.
     pub const NONE: u32 = u32::MAX;
+}
+
+/// An entry of `f_ẋ` or `f_x` by which an equation feels a kinematic state that is not determined by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Felt {
+    /// The entry.
+    pub entry: u32,
+    /// The state.
+    pub state: u32,
+    /// It is the first one of the state.
+    pub first: bool,
+    /// It is the last one.
+    pub last: bool,
 }
 
 impl Pivot {
@@ -164,43 +170,28 @@ pub struct Update {
     pub first: bool,
 }
 
-/// A block of the Newton matrix before elimination: the sum of its terms, zero where there is only fill.
+/// A term `c diag(f) (hA)^order` of a block of the Newton matrix before elimination, with an entry `f` of the Jacobian at all stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assembly {
     /// The block.
     pub block: u32,
-    /// Where in [`Elimination::terms`] its terms begin
-    pub first: u32,
-    /// and end.
-    pub end: u32,
-}
-
-impl Assembly {
-    /// Whether elimination alone puts anything there.
-    #[must_use]
-    pub const fn is_fill(&self) -> bool {
-        self.first == self.end
-    }
-    /// Its terms, in [`Elimination::terms`].
-    #[must_use]
-    #[inline(always)]
-    pub const fn terms(&self) -> core::ops::Range<usize> {
-        self.first as usize..self.end as usize
-    }
-}
-
-/// A term `c diag(f) (hA)^order` of a block, with an entry `f` of the Jacobian at all stages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BlockTerm {
-    /// The entry `f`.
+    /// The entry `f`, or [`Assembly::NONE`]: the block is fill.
     pub entry: u32,
-    /// The entry that is `−c`, if `f` multiplies a [kinematic](Kinematic) state; or [`BlockTerm::ONE`].
+    /// The entry that is `−c`, if `f` multiplies a [kinematic](Kinematic) state; or [`Assembly::NONE`] of one.
     pub by: u32,
     /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more for those that multiply a kinematic state.
     pub order: u32,
+    /// It is the first term of its block.
+    pub first: bool,
 }
 
-impl BlockTerm {
-    /// `c = 1`
-    pub const ONE: u32 = u32::MAX;
+impl Assembly {
+    /// No entry.
+    pub const NONE: u32 = u32::MAX;
+
+    /// Whether elimination alone puts anything there.
+    #[must_use]
+    pub const fn is_fill(&self) -> bool {
+        self.entry == Self::NONE
+    }
 }

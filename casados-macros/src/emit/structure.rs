@@ -139,12 +139,12 @@ fn elimination(analysis: &Analysis) -> TokenStream {
     let [pivots, left, supernodes] = pivots(&analysis.elimination, &slots);
     let positions: HashMap<_, _> =
         positions.iter().map(|position| ((position.row, position.column), position)).collect();
-    let (assembly, terms) = assembly(plan, &positions);
+    let assembly = assembly(plan, &positions);
     let updates = updates(plan, &positions);
-    let (kinematic, felt) = self::kinematic(model.variables.x.len(), kinematic);
-    let [slots, slot_of_equation, felt] = [&slots, &slot_of_equation, &felt].map(|table| numbers(table));
+    let [kinematic, felt] = self::kinematic(model.variables.x.len(), kinematic);
+    let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, BlockTerm, Kinematic, Left, Pivot, Supernode, Update};
+        use #krate::model::{Assembly, Felt, Kinematic, Left, Pivot, Supernode, Update};
         const fn pivot(
             [slot, equation]: [u32; 2],
             [block, upper, end]: [u32; 3],
@@ -163,14 +163,14 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         const fn left(block: u32, slot: u32) -> Left {
             Left { block, slot }
         }
-        const fn assembly(block: u32, first: u32, end: u32) -> Assembly {
-            Assembly { block, first, end }
+        const fn assembly(block: u32, entry: u32, by: u32, order: u32, first: bool) -> Assembly {
+            Assembly { block, entry, by, order, first }
         }
-        const fn term(entry: u32, by: u32, order: u32) -> BlockTerm {
-            BlockTerm { entry, by, order }
+        const fn kinematic(equation: u32, entry: u32, velocity: u32) -> Kinematic {
+            Kinematic { equation, entry, velocity }
         }
-        const fn kinematic(equation: u32, entry: u32, velocity: u32, first: u32, end: u32) -> Kinematic {
-            Kinematic { equation, entry, velocity, first, end }
+        const fn felt(entry: u32, state: u32, first: bool, last: bool) -> Felt {
+            Felt { entry, state, first, last }
         }
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },
@@ -178,11 +178,10 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             left: &const { [#(#left),*] },
             updates: &const { [#(#updates),*] },
             assembly: &const { [#(#assembly),*] },
-            terms: &const { [#(#terms),*] },
             slot_of_equation: &[#(#slot_of_equation),*],
             supernodes: &const { [#(#supernodes),*] },
             kinematic: &const { [#(#kinematic),*] },
-            felt: &[#(#felt),*],
+            felt: &const { [#(#felt),*] },
         }
     }}
 }
@@ -220,26 +219,25 @@ fn pivots(elimination: &Elimination, slots: &[u32]) -> [Vec<TokenStream>; 3] {
 }
 
 /// What blocks are made of, those of a kind one after the other, fill first: what is done to them then has no branches that nobody can foresee.
-fn assembly(
-    plan: &Plan,
-    positions: &HashMap<(u32, u32), &Position>,
-) -> (Vec<TokenStream>, Vec<TokenStream>) {
-    let of = |place: &(u32, u32)| positions.get(place).map_or(&[][..], |position| &position.terms);
-    let mut blocks: Vec<(&[Term], u32)> = plan.blocks.iter().map(of).zip(0..).collect();
-    let kind = |terms: &[Term]| terms.iter().map(|term| (term.order, term.by.is_some())).collect::<Vec<_>>();
-    blocks.sort_by_key(|&(terms, block)| (kind(terms), block));
-    let (mut assembly, mut all) = (Vec::new(), Vec::new());
-    for (terms, block) in blocks {
-        let begin = all.len();
-        all.extend(terms.iter().map(|&Term { entry, by, order }| {
-            let [entry, by, order] = [entry, by.unwrap_or(u32::MAX), order].map(Literal::u32_unsuffixed);
-            quote!(term(#entry, #by, #order))
-        }));
-        let ([begin, end], block) =
-            ([begin, all.len()].map(Literal::usize_unsuffixed), Literal::u32_unsuffixed(block));
-        assembly.push(quote!(assembly(#block, #begin, #end)));
+fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<TokenStream> {
+    let mut rows = Vec::new();
+    for (place, block) in plan.blocks.iter().zip(0u32..) {
+        let terms = positions.get(place).map_or(&[][..], |position| &position.terms);
+        if terms.is_empty() {
+            rows.push((None, true, block));
+        }
+        rows.extend(terms.iter().enumerate().map(|(index, &term)| (Some(term), index == 0, block)));
     }
-    (assembly, all)
+    rows.sort_by_key(|&(term, first, block)| (term.map(|term| (term.order, term.by.is_some())), !first, block));
+    let none = Term { entry: u32::MAX, by: None, order: 0 };
+    rows.into_iter()
+        .map(|(term, first, block)| {
+            let Term { entry, by, order } = term.unwrap_or(none);
+            let [block, entry, by, order] =
+                [block, entry, by.unwrap_or(u32::MAX), order].map(Literal::u32_unsuffixed);
+            quote!(assembly(#block, #entry, #by, #order, #first))
+        })
+        .collect()
 }
 
 /// For each update its block, and whether nothing is there before.
@@ -255,18 +253,21 @@ fn updates(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Token
 }
 
 /// A row for each state, none if no state is kinematic; and the entries by which others feel them.
-fn kinematic(nx: usize, kinematic: &[Kinematic]) -> (Vec<TokenStream>, Vec<u32>) {
-    let (mut rows, mut felt) = (Vec::new(), Vec::new());
+fn kinematic(nx: usize, kinematic: &[Kinematic]) -> [Vec<TokenStream>; 2] {
+    let (mut rows, mut all) = (Vec::new(), Vec::new());
     for state in 0..if kinematic.is_empty() { 0 } else { nx as u32 } {
-        let begin = felt.len() as u32;
-        let row = kinematic.iter().find(|of| of.state == state).map(|of| {
-            felt.extend(&of.felt);
-            [of.equation, of.entry, of.velocity, begin, felt.len() as u32]
-        });
-        let row = row.unwrap_or([u32::MAX, u32::MAX, u32::MAX, 0, 0]).map(Literal::u32_unsuffixed);
+        let of = kinematic.iter().find(|of| of.state == state);
+        let row = of.map_or([u32::MAX; 3], |of| [of.equation, of.entry, of.velocity]);
+        let row = row.map(Literal::u32_unsuffixed);
         rows.push(quote!(kinematic(#(#row),*)));
+        let felt = of.map_or(&[][..], |of| &of.felt);
+        all.extend(felt.iter().enumerate().map(|(index, &entry)| {
+            let [entry, state] = [entry, state].map(Literal::u32_unsuffixed);
+            let [first, last] = [index == 0, index + 1 == felt.len()];
+            quote!(felt(#entry, #state, #first, #last))
+        }));
     }
-    (rows, felt)
+    [rows, all]
 }
 
 fn numbers(list: &[u32]) -> Vec<Literal> {
