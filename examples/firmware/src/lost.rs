@@ -15,7 +15,7 @@ impl<M: Dae> Dae for Lost<M> {
     type Hessian<T: casados::shape::Plain> = M::Hessian<T>;
     type Factors<B: casados::shape::Plain> = M::Factors<B>;
     const STRUCTURE: Structure = Structure {
-        elimination: Elimination { assembly: &[], led: &[], ..M::STRUCTURE.elimination },
+        elimination: Elimination { assembly: &[], ..M::STRUCTURE.elimination },
         ..M::STRUCTURE
     };
 
