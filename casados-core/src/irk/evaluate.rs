@@ -6,9 +6,7 @@
 use super::kinematic::{self, are_together, derivative, unknowns};
 use super::record::{Coefficients, Times, Work};
 use super::stages::Stages;
-use crate::linalg::{
-    self,     Arithmetic, AtRow, Block, Kernel, are_finite, coupling, dispatch, each_row,
-};
+use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, are_finite, coupling, dispatch, each_row};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};

@@ -13,8 +13,8 @@ use super::directions::Directions;
 use super::evaluate::{entry, stages};
 use super::record::{Coefficients, Linearization, Work};
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, Packet, Viewer, coupling, dispatch, each_row, kinematic, slot, subtract,
-    subtract_diagonal, subtract_transposed,
+    Arithmetic, AtRow, Block, Kernel, Packet, Viewer, coupling, dispatch, each_row, kinematic, slot,
+    subtract, subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Felt, Kinematic};
@@ -202,7 +202,9 @@ struct AtFelt<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: 
     Rows<'a, M, E, S, W, WHAT>,
 );
 
-impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for AtFelt<'_, M, E, S, W, WHAT> {
+impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
+    for AtFelt<'_, M, E, S, W, WHAT>
+{
     const ROWS: usize = M::STRUCTURE.elimination.felt.len();
     const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
     #[inline(always)]
@@ -333,8 +335,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, con
         let Self { of: forward, minus_ha, rows, viewer } = self;
         let Some(of) = kinematic::<M>(state) else { return };
         let mut packet = [forward.own::<A>(of); S];
-        if let (Some(velocity), Some(minus_c)) =
-            (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian))
+        if let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian))
             && let Some(dk) = rows.get(velocity)
         {
             let mut moved = [[E::from_f64(0.0); W]; S];
@@ -495,7 +496,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Missing<'_, M, E, S> {
         for felt in M::STRUCTURE.elimination.felt {
             let of = kinematic::<M>(felt.state as usize);
             let missing = of.and_then(|of| f.as_ref().get(of.equation as usize)).map(|own| own[0]);
-            let (Some(missing), Some((row, _, values))) = (missing, entry::<M, _>(jacobian, felt.entry as usize))
+            let (Some(missing), Some((row, _, values))) =
+                (missing, entry::<M, _>(jacobian, felt.entry as usize))
             else {
                 continue;
             };

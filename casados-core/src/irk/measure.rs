@@ -1,7 +1,7 @@
 //! How large an increment of Newton's method is, relative to the unknowns, and what that means for kinematic states.
 
-use super::kinematic::{count, is_any, minus_c, unknowns, velocity};
 use super::increment::{part, part_mut};
+use super::kinematic::{count, is_any, minus_c, unknowns, velocity};
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
@@ -57,7 +57,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             norm = sum.max(norm);
         }
         let norm = E::from_f64(TYPICAL) * norm * h.abs();
-        let mut velocities = Velocities::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
+        let mut velocities =
+            Velocities::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
         each_row::<A, _>(&mut velocities);
         velocities.most
     }
@@ -144,7 +145,9 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Followed { jacobian, points, .. } = self.followed;
         let Some(of) = kinematic::<M>(state) else { return };
-        let (Some(own), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else { return };
+        let (Some(own), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
+            return;
+        };
         let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
         let (Some(weight), Some(k)) = (weights.get_mut(own), points.as_ref().get(state)) else { return };
         let bound = self.norm * minus_c.abs();

@@ -32,7 +32,7 @@ use super::increment::{Largest, PlaceResidual, Subtract, Update};
 use super::measure::{Followed, Measure};
 use super::progress::{Look, Progress, Verdict, remaining};
 use super::record::{Coefficients, Linearization, Work};
-use crate::linalg::dispatch;
+use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
@@ -193,14 +193,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 } else {
                     self.evaluate_jacobian();
                 }
-                match (basis, self.mean.get_mut()) {
-                    (Some(basis), Some(factors)) if mean => {
-                        factors.factor(&self.linear.jacobian, self.first_only, basis, h);
-                    }
-                    _ => {
-                        kept = None;
-                        self.factor(coefficients);
-                    }
+                if !(mean && self.factor_mean(basis)) {
+                    kept = None;
+                    self.factor(coefficients);
                 }
             }
             if ask && iteration == 0 {
@@ -229,12 +224,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             iteration += 1;
             statistics.iterations += 1;
-            match (basis, self.mean.get_mut()) {
-                (Some(basis), Some(factors)) if mean => factors.solve(basis, &self.f, &mut self.increment),
-                _ => {
-                    self.place_residual();
-                    kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
-                }
+            if !(mean && self.solve_mean(basis)) {
+                self.place_residual();
+                kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             }
             let floor = E::from_f64(rounding / tolerance);
             let followed = &Followed::<M, E, S> {
@@ -334,6 +326,30 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let zero = E::from_f64(0.0);
         Solved { converged: E::le(zero, zero), exact: false }
+    }
+
+    /// Factors of the mean Jacobian, if there is memory for them. Of one stage or two there is no eigenbasis, and nothing is compiled.
+    #[inline(always)]
+    fn factor_mean(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
+        if const { S > 2 }
+            && let (Some(basis), Some(factors)) = (basis, self.mean.get_mut())
+        {
+            factors.factor(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
+            return true;
+        }
+        false
+    }
+
+    /// Solves with them.
+    #[inline(always)]
+    fn solve_mean(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
+        if const { S > 2 }
+            && let (Some(basis), Some(factors)) = (basis, self.mean.get_mut())
+        {
+            factors.solve(basis, &self.f, &mut self.increment);
+            return true;
+        }
+        false
     }
 
     /// Factors by blocks.

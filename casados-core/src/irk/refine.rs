@@ -61,11 +61,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     /// The largest correction of the sum of all directions, relative to each unknown; of a slope also to what it changes,
     /// `V_n / h`. The sum is where it was tried on the equations.
-    fn correction<F: Fallback>(
-        &self,
-        work: &mut Work<M, T, S, F>,
-        coefficients: &Coefficients<T, S>,
-    ) -> f64 {
+    fn correction<F: Fallback>(&self, work: &mut Work<M, T, S, F>, coefficients: &Coefficients<T, S>) -> f64 {
         let (nx, h) = (M::Shape::NX, work.inputs.time.step);
         work.probe_tangent();
         let Work { probe: [sum, tangent], increment, linear, .. } = work;

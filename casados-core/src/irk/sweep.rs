@@ -388,13 +388,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         let from = if unit { None } else { Some(v) };
         let ones = if unit { M::STRUCTURE.directions.get(column..).unwrap_or_default() } else { &[] };
         if let Some(to) = &mut self.result {
-            let end = Columns {
-                start: from,
-                ones,
-                dy,
-                unknowns: 0..nx,
-                minus_weights: &shared.minus_weights,
-            };
+            let end =
+                Columns { start: from, ones, dy, unknowns: 0..nx, minus_weights: &shared.minus_weights };
             self.sum = self.sum + end.write::<A>(&mut to.columns::<W>(column));
         } else {
             let next = panel_mut::<E, W>(self.next, column, nx);

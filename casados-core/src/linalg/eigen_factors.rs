@@ -79,7 +79,8 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         for (l, dense) in self.dense.iter_mut().enumerate() {
             dense.clear();
             each_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
-                let (r, c, value) = (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
+                let (r, c, value) =
+                    (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
                 let (re, im) = match place.order {
                     0 => (T::ONE, T::ZERO),
                     1 => scale.get(l),

@@ -27,7 +27,11 @@ pub fn slot<M: Dae>(equation: usize) -> usize {
 #[inline(always)]
 pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
     let kinematic = M::STRUCTURE.elimination.kinematic;
-    if slot < kinematic.len() && kinematic[slot].equation != Kinematic::NONE { Some(&kinematic[slot]) } else { None }
+    if slot < kinematic.len() && kinematic[slot].equation != Kinematic::NONE {
+        Some(&kinematic[slot])
+    } else {
+        None
+    }
 }
 
 /// The factors, by the plan or dense.
@@ -240,7 +244,8 @@ pub fn each_entry<M: Dae, V: Copy>(jacobian: &[V], mut at: impl FnMut(InDense, &
         if kinematic::<M>(slot).is_some() {
             continue;
         }
-        let (column, order) = (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
+        let (column, order) =
+            (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
         match kinematic::<M>(column) {
             None => at(InDense { slot, column, order }, values, None),
             Some(of) if (of.velocity as usize) < 2 * nx => {

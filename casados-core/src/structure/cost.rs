@@ -79,7 +79,8 @@ impl Structure {
             residual,
             residual_jacobian,
             iteration: 2 * s * s * nx + residual_jacobian + assembly + factorisation + solve + s * nk,
-            forward: directions * (2 * s * of_x + solve + 2 * s * nx + kinematic * (2 * s * s + 3 * s)) + s * of_w,
+            forward: directions * (2 * s * of_x + solve + 2 * s * nx + kinematic * (2 * s * s + 3 * s))
+                + s * of_w,
             adjoint: s * nx + solve + kinematic * 4 * s * s + 2 * s * (felt + of_x + of_w),
             hessian: s * u64::from(self.operations.hessian)
                 + directions * 2 * s * s * curved_states

@@ -184,10 +184,9 @@ impl Structure {
             });
             words(f, "", states)?;
         }
-        let order = pivots.iter().map(|pivot| Assignment {
-            unknown: self.unknown(pivot.slot),
-            equation: pivot.equation as usize,
-        });
+        let order = pivots
+            .iter()
+            .map(|pivot| Assignment { unknown: self.unknown(pivot.slot), equation: pivot.equation as usize });
         title(f, "  order")?;
         writeln!(f, "each unknown ← the equation that it is found from")?;
         words(f, "", order)

@@ -228,7 +228,9 @@ fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Toke
         }
         rows.extend(terms.iter().enumerate().map(|(index, &term)| (Some(term), index == 0, block)));
     }
-    rows.sort_by_key(|&(term, first, block)| (term.map(|term| (term.order, term.by.is_some())), !first, block));
+    rows.sort_by_key(|&(term, first, block)| {
+        (term.map(|term| (term.order, term.by.is_some())), !first, block)
+    });
     let none = Term { entry: u32::MAX, by: None, order: 0 };
     rows.into_iter()
         .map(|(term, first, block)| {

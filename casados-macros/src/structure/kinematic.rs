@@ -22,11 +22,7 @@ pub struct Kinematic {
 }
 
 /// The kinematic states, ascending: as many as there can be.
-pub fn find(
-    model: &Model,
-    (jacobian, blocks): (&[Entry], [usize; 6]),
-    trivial: &[u32],
-) -> Vec<Kinematic> {
+pub fn find(model: &Model, (jacobian, blocks): (&[Entry], [usize; 6]), trivial: &[u32]) -> Vec<Kinematic> {
     let nx = model.variables.x.len() as u32;
     let mut candidates: BTreeMap<u32, Kinematic> = BTreeMap::new();
     for row in homogeneous(model, trivial) {
