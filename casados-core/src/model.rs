@@ -8,8 +8,8 @@ use crate::scalar::{Lanes, Scalar, Tangent};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
-    Assembly, Cost, Elimination, Fold, Follower, Led, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
-    Steady, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    Assembly, Cost, Elimination, Felt, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
+    Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 

@@ -43,7 +43,7 @@ impl Complex {
     pub fn abs(self) -> f64 {
         self.re.hypot(self.im)
     }
-    fn times(self, b: Self) -> Self {
+    pub fn times(self, b: Self) -> Self {
         Self { re: self.re * b.re - self.im * b.im, im: self.re * b.im + self.im * b.re }
     }
     fn minus(self, b: Self) -> Self {
