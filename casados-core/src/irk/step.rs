@@ -2,8 +2,9 @@
 
 use super::compensated;
 use super::evaluate::{dot, not_finite};
+use super::pivoted::unknown_name;
 use super::record::{Coefficients, Linearization, Step, Validity, Work};
-use crate::error::Error;
+use crate::error::{Error, Place};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -158,6 +159,10 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
+            }
+            if let (Some(unknown), true) = (solved.undetermined, finite) {
+                let at = Place { step: n, stage: 0, iteration: 1 };
+                return Err(Error::Singular { unknown: unknown_name::<M>(unknown), at });
             }
             self.start(coefficients, from, n, None, y);
             if !matches!(from, From::Record(_)) {
