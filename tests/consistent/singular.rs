@@ -105,7 +105,8 @@ fn stiff_equations_are_not_refused() {
     for p in [1.0, 1e6, 1e12, 1e15] {
         for steps in [1, 3] {
             let options = Options { steps, ..Default::default() };
-            for h in [1e-3, 0.6, 1e3] {
+            // Beyond 1e16 the digits of the slow motion are none.
+            for h in [1e-3, 0.6, 1e3].into_iter().filter(|h| h * p < 1e16) {
                 let mut irk = Irk::<Reactions, RadauIIA<3>>::new(options).unwrap();
                 irk.set_parameters(&Vector1::new(p)).unwrap();
                 for x0 in [[1.0, 0.0, 0.0], [0.0; 3], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {

@@ -5,7 +5,7 @@
 //! equation is the reason to look: an iteration leads from any point to the solution of linear equations, so that from a few points
 //! around it solutions differ by what rounding makes of the residual there, and are known to the digits that they have in common
 //! (stochastic arithmetic: J. Vignes, Math. Comput. Simul. 35 (1993)). What is looked at are residuals as the model evaluates them: a
-//! matrix may be as stiff as it likes.
+//! matrix may be as stiff as it likes. Where the planned elimination is to blame, pivoting the whole matrix tells.
 
 use super::record::{Coefficients, Work};
 use crate::linalg::follows;
@@ -42,7 +42,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 continue;
             };
             let own = size(y, x.as_ref().get(slot).copied(), h);
-            small = E::or(small, E::lt(bound * own, size(&inverse[0], None, h) * terms[0]));
+            small = E::or(small, E::lt(bound * own, inverse[0][0].abs() * terms[0]));
         }
         E::any(small)
     }
@@ -110,9 +110,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 }
 
-/// The size of an unknown at its stages; of a derivative at least one by which a state changes in a step by a part of itself.
+/// The size of an unknown at its stages; of a derivative at least one by which a state changes in a step by a part of itself, and
+/// infinite in an interval without length, in which it changes nothing. Below normal numbers there are no digits to be lost.
 fn size<E: Lanes, const S: usize>(y: &[E; S], x: Option<E>, h: E) -> E {
-    let own = y.iter().fold(E::from_f64(0.0), |size, y| y.abs().max(size));
-    let zero = E::from_f64(0.0);
-    x.map_or(own, |x| E::select(Scalar::eq(h, zero), zero, E::from_f64(CHANGE) * x.abs() / h).max(own))
+    let least = E::from_f64(E::SMALLEST / E::EPSILON);
+    let own = y.iter().fold(least, |size, y| y.abs().max(size));
+    let infinite = E::from_f64(f64::INFINITY);
+    x.map_or(own, |x| {
+        let resting = E::from_f64(CHANGE) * x.abs() / h;
+        E::select(Scalar::eq(h, E::from_f64(0.0)), infinite, resting.max(own))
+    })
 }
