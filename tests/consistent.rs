@@ -4,6 +4,8 @@
 mod calls;
 #[path = "consistent/roots.rs"]
 mod roots;
+#[path = "consistent/singular.rs"]
+mod singular;
 
 use casados::prelude::*;
 use nalgebra::{Vector1, vector};

@@ -404,8 +404,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
         // The error of the iteration is the same in step after step, and where nothing is damped it adds up over as many as
         // there are, like 1/(2s) of a power of the tolerance. To be small beside the tolerance then, it may be the tolerance to the power
-        // of 1 + 1/(2s); of Radau methods to the half of that. It stays above rounding.
-        let steps = if B::ENDS_ON_STAGE { 0.5 } else { 1.0 };
+        // of 1 + 1/(2s); of Radau methods, which damp, to two fifths of that. It stays above rounding.
+        let steps = if B::ENDS_ON_STAGE { 0.4 } else { 1.0 };
         let wanted = Scalar::powf(finest, (s - 1.0 + steps) / (s + 1.0)).min(0.03);
         *newton_tolerance = wanted.max(10.0 * T::EPSILON.to_f64() / finest);
         self.measure();

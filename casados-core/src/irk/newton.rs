@@ -24,7 +24,8 @@
 //! solved in the eigenbasis of the tableau, in numbers that may be [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for
 //! each stage.
 //!
-//! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost.
+//! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost; and whether
+//! they [determine](super::doubt) a solution.
 //!
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
@@ -64,6 +65,8 @@ pub(crate) struct Solved<E: Lanes> {
     pub converged: E::Mask,
     /// Whether the factors that are there are those of the solution.
     pub exact: bool,
+    /// An unknown of linear equations that they do not determine, in some lane that has not converged for that.
+    pub undetermined: Option<usize>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
@@ -146,6 +149,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
         let mut renewals = 0;
+        // Of old factors it is known already.
+        let mut factored = false;
         let mut near = cfg!(feature = "alloc") && Self::EXACT && self.near && mean;
         let mut renew = if mean {
             !self.validity.mean
@@ -188,6 +193,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
                 mean = basis.is_some() && !near && (simplified || renewals < MEANS);
                 renewals += usize::from(renew);
+                factored = true;
                 if mean && !*compensated {
                     self.evaluate_middle(coefficients, step, x, y, asked);
                 } else {
@@ -210,9 +216,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             if exact && iteration > 0 {
                 self.validity.factors = true;
-                let satisfied = self.is_satisfied();
+                let mut satisfied = self.is_satisfied();
                 if E::all(satisfied) || iteration == REFINEMENTS {
-                    return Solved { converged: satisfied, exact: true };
+                    let mut undetermined = None;
+                    if factored && self.has_small_pivot(x, y) {
+                        let (determined, unknown) = self.is_determined(coefficients, step, x, y);
+                        (satisfied, undetermined) = (E::and(satisfied, determined), unknown);
+                    }
+                    return Solved { converged: satisfied, exact: true, undetermined };
                 }
             }
             // The first increments of what begins far away may grow.
@@ -261,7 +272,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             if iteration == most {
                 (self.validity.factors, self.validity.mean) = (false, false);
-                return Solved { converged: progress.converged, exact: false };
+                return Solved { converged: progress.converged, exact: false, undetermined: None };
             }
             if iteration > 1 && renewals > FAR && verdict.grows {
                 // The mean of the stages does not do.
@@ -325,7 +336,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
         }
         let zero = E::from_f64(0.0);
-        Solved { converged: E::le(zero, zero), exact: false }
+        Solved { converged: E::le(zero, zero), exact: false, undetermined: None }
     }
 
     /// Factors of the mean Jacobian, if there is memory for them. Of one stage or two there is no eigenbasis, and nothing is compiled.
@@ -373,7 +384,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 
     /// The residual in the slots of the equations.
-    fn place_residual(&mut self) {
+    pub(super) fn place_residual(&mut self) {
         dispatch(PlaceResidual::<M, E, S> { f: &self.f, increment: &mut self.increment });
     }
 
@@ -382,6 +393,6 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.validity.rate = progress.slowest_rate();
         let any = E::any(progress.converged);
         (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
-        Solved { converged: progress.converged, exact: false }
+        Solved { converged: progress.converged, exact: false, undetermined: None }
     }
 }

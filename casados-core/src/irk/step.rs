@@ -2,8 +2,9 @@
 
 use super::compensated;
 use super::evaluate::{dot, not_finite};
+use super::pivoted::unknown_name;
 use super::record::{Coefficients, Linearization, Step, Validity, Work};
-use crate::error::Error;
+use crate::error::{Error, Place};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -153,21 +154,30 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             return Ok(false);
         }
         let Step { x, y } = step;
+        let mut undetermined = None;
         if !M::STRUCTURE.elimination.pivots.is_empty() {
             let solved = self.newton(coefficients, None, options, n, x, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
             }
+            undetermined = solved.undetermined;
             self.start(coefficients, from, n, None, y);
             if !matches!(from, From::Record(_)) {
                 stay(before, y);
             }
         }
         if !F::KEPT {
-            return Err(Error::NotPivoted { step: n });
+            return Err(
+                undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular::<M>(unknown, n))
+            );
         }
         match self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics) {
+            // Of the whole matrix, pivoted, it is asked again.
+            Ok(()) if undetermined.is_some() => match self.is_determined(coefficients, n, x, y).1 {
+                Some(unknown) => Err(singular::<M>(unknown, n)),
+                None => Ok(false),
+            },
             Ok(()) => Ok(false),
             Err(error) if n == 0 => Err(self.explain_start(error, from)),
             Err(error) => Err(error),
@@ -225,6 +235,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             self.validity = Validity { factors: true, mean: false, rate: 0.0 };
         }
     }
+}
+
+/// The equations of a step do not determine an unknown.
+fn singular<M: Dae>(unknown: usize, step: usize) -> Error {
+    Error::Singular { unknown: unknown_name::<M>(unknown), at: Place { step, stage: 0, iteration: 1 } }
 }
 
 /// Algebraic states as at the last stage of the step before: on its branch.
