@@ -17,7 +17,7 @@ use awe::Awe;
 use casados::batch::{self, Slice};
 use casados::error::Argument;
 use casados::memory::Heap;
-use casados::model::{VectorP, VectorU, VectorX};
+use casados::model::{Kinematic, VectorP, VectorU, VectorX};
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use casados::shape::Matrix;
@@ -181,8 +181,7 @@ fn pendulums() -> Test {
     Ok(())
 }
 
-/// Three states that follow another one, the control and the parameter, and are felt by three more: registers leave the derivatives of their
-/// stages out.
+/// Three kinematic states, that follow another one, the control and the parameter, and are felt by three more.
 #[ode]
 fn followers(x: [f64; 6], u: f64, p: f64) -> [f64; 6] {
     let [a, b, c, v, w, y] = x;
@@ -197,10 +196,10 @@ fn followers(x: [f64; 6], u: f64, p: f64) -> [f64; 6] {
 }
 
 #[test]
-fn implied_states() -> Test {
-    let steady = Followers::STRUCTURE.elimination.steady;
-    let implied: Vec<usize> = (0..steady.len()).filter(|&state| steady[state].implied).collect();
-    assert_eq!(implied, [0, 1, 2]);
+fn kinematic_states() -> Test {
+    let of = Followers::STRUCTURE.elimination.kinematic;
+    let found: Vec<usize> = (0..of.len()).filter(|&state| of[state].equation != Kinematic::NONE).collect();
+    assert_eq!(found, [0, 1, 2]);
     for count in COUNTS {
         let horizon = Horizon::<Followers> {
             x0: (0..count).map(|k| SVector::from_fn(|i, _| ((3 * k + i) as f64).sin())).collect(),

@@ -4,7 +4,7 @@
 //! them before committing them, as somebody who sees the model for the first time.
 
 use casados::Dae;
-use casados::model::{Assembly, Cost, Pivot, Structure};
+use casados::model::{Cost, Structure};
 use casados::prelude::*;
 use std::cell::Cell;
 use std::ops::{Add, Div, Mul, Sub};
@@ -144,34 +144,16 @@ fn inverse(a: &Matrix) -> Matrix {
 /// the largest error of a solution of which every element is one.
 fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let plan = &structure.elimination;
-    let n = plan.pivots.len();
+    let n = plan.slot_of_equation.len();
     let mut blocks = vec![vec![vec![Counted(0.0); s]; s]; plan.slots.len()];
     let mut random = casados::testing::Random::new(7);
-    let coupling: Matrix =
-        (0..s).map(|_| (0..s).map(|_| Counted(0.1 * random.symmetric())).collect()).collect();
-    let scaled = |pivot: &Pivot| s > 1 && pivot.scaled;
-    for entry in plan.assembly.iter().filter(|entry| !entry.is_fill()) {
-        for (i, row) in blocks[entry.block as usize].iter_mut().enumerate() {
-            for (j, element) in row.iter_mut().enumerate() {
-                let is_diagonal = entry.state == Assembly::NONE && i != j;
-                *element = Counted(if is_diagonal { 0.0 } else { 0.1 * random.symmetric() });
+    for term in plan.assembly.iter().filter(|term| !term.is_fill()) {
+        for (i, row) in blocks[term.block as usize].iter_mut().enumerate() {
+            for (j, element) in row.iter_mut().enumerate().filter(|&(j, _)| term.order > 0 || i == j) {
+                *element = Counted(0.1 * random.symmetric());
             }
         }
     }
-    // Rows of one matrix, each scaled, where the plan says so.
-    let scales: Vec<Vec<Counted>> =
-        blocks.iter().map(|block| block.iter().map(|row| row[0]).collect()).collect();
-    for lower in plan.pivots.iter().filter(|pivot| scaled(pivot)).flat_map(Pivot::lower) {
-        for ((row, coupling), scale) in blocks[lower].iter_mut().zip(&coupling).zip(&scales[lower]) {
-            *row = coupling.iter().map(|element| Counted(scale.0 * element.0)).collect();
-        }
-    }
-    // `t − diag(scale) a`
-    let subtract_scaled = |t: &mut Matrix, scale: &[Counted], a: &Matrix| {
-        for ((t, a), scale) in t.iter_mut().zip(a).zip(scale) {
-            t.iter_mut().zip(a).for_each(|(t, a)| *t = *t - *scale * *a);
-        }
-    };
     for pivot in plan.pivots {
         for (i, row) in blocks[pivot.block as usize].iter_mut().enumerate() {
             // Diagonally dominant, and an identity where the plan says so.
@@ -197,16 +179,6 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let ((), factorisation) = count(|| {
         let mut updates = plan.updates.iter();
         for pivot in plan.pivots {
-            if scaled(pivot) {
-                let products: Vec<Matrix> =
-                    pivot.upper().map(|upper| product(&coupling, &blocks[upper])).collect();
-                for lower in pivot.lower() {
-                    for (product, target) in products.iter().zip(&mut updates) {
-                        subtract_scaled(&mut blocks[target.block as usize], &scales[lower], product);
-                    }
-                }
-                continue;
-            }
             if !pivot.identity {
                 let inverse = inverse(&blocks[pivot.block as usize]);
                 pivot.lower().for_each(|lower| blocks[lower] = product(&blocks[lower], &inverse));
@@ -224,13 +196,6 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let ((), solve) = count(|| {
         for pivot in plan.pivots {
             let packet = rows[pivot.slot as usize].clone();
-            if scaled(pivot) {
-                let packet = product(&coupling, &packet);
-                pivot.lower().for_each(|lower| {
-                    subtract_scaled(&mut rows[plan.slots[lower] as usize], &scales[lower], &packet);
-                });
-                continue;
-            }
             pivot.lower().for_each(|lower| {
                 subtract(&mut rows[plan.slots[lower] as usize], &blocks[lower], &packet);
             });
@@ -246,7 +211,8 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
             }
         }
     });
-    let error = rows.iter().flatten().map(|row| (row[0].0 - 1.0).abs()).fold(0.0, f64::max);
+    let found = plan.pivots.iter().map(|pivot| &rows[pivot.slot as usize]);
+    let error = found.flatten().map(|row| (row[0].0 - 1.0).abs()).fold(0.0, f64::max);
     (factorisation, solve, error)
 }
 

@@ -46,7 +46,6 @@ impl Dae for Oscillator {
             &Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
             &[2, 3, 4, 5],
         ),
-        folded: &[],
         lone: &[],
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,

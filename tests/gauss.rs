@@ -29,11 +29,11 @@ macro_rules! run {
     ($stages:literal, $options:expr) => {{
         let mut gauss = Adaptive::<Bell, Gauss<$stages>>::new($options).unwrap();
         gauss.set_time(-5.0).unwrap();
-        gauss.solve(&Vector1::new(1.0 / 26.0), &vector![], -0.5).unwrap();
+        gauss.solve(&Vector1::new(1.0 / 26.0), &vector![], 4.5).unwrap();
         let steps = gauss.statistics().steps;
         // To rounding.
         gauss.freeze().unwrap();
-        let x = gauss.solve(&Vector1::new(1.0 / 26.0), &vector![], -0.5).unwrap().x[0];
+        let x = gauss.solve(&Vector1::new(1.0 / 26.0), &vector![], 4.5).unwrap().x[0];
         ((x - 0.8).abs(), steps)
     }};
 }

@@ -20,6 +20,8 @@ mod elementary;
 mod forms;
 #[path = "language/iterators.rs"]
 mod iterators;
+#[path = "language/macros.rs"]
+mod macros;
 #[path = "language/nalgebra.rs"]
 mod nalgebra_values;
 #[path = "language/statements.rs"]

@@ -1,8 +1,8 @@
-//! What is left out where equations are trivial, `q̇ = c v`: below their pivots in forward sensitivities, and rows of `D` in second
-//! derivatives. Held against differences of what they are derivatives of, with the plan of elimination and without.
+//! Kinematic states, with equations `q̇ = c v`: they are no unknowns of iterations, of the elimination or of derivatives. Held against
+//! differences of what they are derivatives of, with the plan of elimination and without.
 
 use casados::irk::Integrator;
-use casados::model::{Follower, Steady};
+use casados::model::Kinematic;
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
 use casados::{Method, Shape, Statistics};
@@ -130,13 +130,20 @@ where
     Ok(())
 }
 
+/// The kinematic states of a model, none of which has a pivot.
+fn kinematic<M: Dae>() -> Vec<usize> {
+    let plan = &M::STRUCTURE.elimination;
+    let is_kinematic = |&state: &usize| plan.kinematic[state].equation != Kinematic::NONE;
+    let found: Vec<usize> = (0..plan.kinematic.len()).filter(is_kinematic).collect();
+    assert!(plan.pivots.iter().all(|pivot| !found.contains(&(pivot.slot as usize))));
+    assert_eq!(plan.pivots.len() + found.len(), plan.slot_of_equation.len());
+    found
+}
+
 #[test]
 fn derivatives_are_those_of_the_solution() -> Test {
-    let plan = &<Points<0> as Dae>::STRUCTURE.elimination;
-    let steady: Vec<usize> = (0..8).filter(|&slot| plan.steady[slot].entry != Steady::NONE).collect();
-    assert_eq!(steady, [0, 1, 2]);
-    let structure = &<Points<1> as Dae>::STRUCTURE;
-    assert_eq!((structure.folded.len(), structure.lone.len()), (3, 1));
+    assert_eq!(kinematic::<Points<0>>(), [0, 1, 2]);
+    assert_eq!(<Points<1> as Dae>::STRUCTURE.lone.len(), 1);
     check(steps::<Points<0>, Gauss<2>, 2>()?, false)?;
     check(steps::<Points<0>, Gauss<1>, 1>()?, false)?;
     check(steps::<Points<0>, RadauIIA<3>, 3>()?, false)?;
@@ -151,7 +158,7 @@ fn without_the_plan() -> Test {
     check(steps::<Lost<Points<1>>, Gauss<2>, 2>()?, true)
 }
 
-/// States that follow another one, a control and a parameter in every iteration, each felt by three more: `a`, `b`, `c`.
+/// Kinematic states that follow another one, a control and a parameter, each felt by three more: `a`, `b`, `c`.
 #[dae(CURVED = [0, 1])]
 fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2]) -> [f64; 6] {
     let [a, b, c, v, w, y] = x;
@@ -166,14 +173,12 @@ fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2
     ]
 }
 
-/// Where states follow others no iteration finds them: the solution is that of the whole matrix, whose iterations find them all.
+/// No iteration finds kinematic states: the solution is that of the whole matrix, whose iterations go on until every equation is satisfied.
 fn same_as_whole<B: Method<S>, const S: usize, const CURVED: usize>(options: Options) -> Test
 where
     Led<CURVED>: Dae<Shape = <Led<0> as Dae>::Shape>,
 {
-    let followers = <Led<CURVED> as Dae>::STRUCTURE.elimination.followers;
-    let follows: Vec<bool> = followers.iter().map(|of| of.entry != Follower::NONE).collect();
-    assert_eq!(follows, [true, true, true, false, false, false]);
+    assert_eq!(kinematic::<Led<CURVED>>(), [0, 1, 2]);
     let (at, whole) = (W::from(BEGIN), Options { newton: Newton::default(), ..options });
     let (x, u, p) = split(&at);
     let mut led = Integrator::<Led<CURVED>, B, S, f64, Heap>::new(options)?;
@@ -190,7 +195,7 @@ where
 }
 
 #[test]
-fn states_follow_in_every_iteration() -> Test {
+fn kinematic_states_follow_in_every_iteration() -> Test {
     let ordinary = Options { steps: 3, ..Default::default() };
     let fixed = |count| Newton { fixed_iterations: Some(count), ..Default::default() };
     let by = |jacobian| Options { newton: Newton { jacobian, ..Default::default() }, ..ordinary };
@@ -248,7 +253,7 @@ fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1
     f
 }
 
-/// Newton's method finds the solution of linear equations in one iteration if states that are left out have gone into the right columns, and its systems
+/// Newton's method finds the solution of linear equations in one iteration if columns of kinematic states are part of the right ones, and its systems
 /// are solved.
 fn one_iteration<M, B: Method<S>, const S: usize, const NX: usize>(x: SVector<f64, NX>) -> Test
 where
@@ -293,12 +298,9 @@ where
 }
 
 #[test]
-fn states_that_are_left_out_go_into_whom_they_follow() -> Test {
-    let plan = &<Gone as Dae>::STRUCTURE.elimination;
-    let absorbed: Vec<bool> = plan.followers.iter().map(|of| of.absorbed).collect();
-    // Of two that follow one the first goes.
-    assert_eq!(absorbed, [false, true, true, true, false, false, false]);
-    assert!(plan.followers[0].entry != Follower::NONE && plan.led.len() < plan.assembly.len());
+fn columns_of_kinematic_states_are_part_of_those_of_their_velocities() -> Test {
+    // Two follow one.
+    assert_eq!(kinematic::<Gone>(), [0, 1, 2, 3]);
     let x = vector![0.4, -0.3, 0.8, 0.5, -0.6, 0.1, 0.7];
     one_iteration::<Gone, Gauss<1>, 1, 7>(x)?;
     one_iteration::<Gone, Gauss<2>, 2, 7>(x)?;
@@ -314,7 +316,8 @@ fn supernodes_are_solved_together() -> Test {
         assert!(plan.supernodes.iter().any(|of| of.count == count), "{count} in {:?}", plan.supernodes);
     }
     let total: u32 = plan.supernodes.iter().map(|of| of.count).sum();
-    assert_eq!(total as usize, plan.pivots.len() - 1);
+    assert_eq!(total as usize, plan.pivots.len());
+    assert_eq!(kinematic::<Knots<61>>(), [60]);
     let (few, many) = (SVector::from_fn(|i, _| (i as f64).sin()), SVector::from_fn(|i, _| (i as f64).sin()));
     one_iteration::<Knots<11>, RadauIIA<3>, 3, 11>(few)?;
     one_iteration::<Knots<11>, Gauss<4>, 4, 11>(few)?;
@@ -369,7 +372,7 @@ macro_rules! side_by_side {
 
 #[test]
 fn registers_meet_the_same_pivots() -> Test {
-    assert_ne!(<Swing as Dae>::STRUCTURE.elimination.steady[0].entry, Steady::NONE);
+    assert_eq!(kinematic::<Swing>(), [0]);
     side_by_side!(Swing, Gauss<1>, 2);
     side_by_side!(Swing, Gauss<2>, 2);
     side_by_side!(Swing, RadauIIA<3>, 2);

@@ -46,6 +46,20 @@ pub enum Error {
         /// Where.
         at: Place,
     },
+    /// The model has no finite value where Newton's method starts, or where it leads from there, because of the value of an
+    /// algebraic state.
+    NonFiniteStart {
+        /// What was evaluated.
+        quantity: Quantity,
+        /// The equation, the row of the residual.
+        equation: usize,
+        /// The value.
+        value: f64,
+        /// The algebraic state with another value of which the equation has one, and where it started.
+        started: Started,
+        /// Where.
+        at: Place,
+    },
     /// The Newton matrix is singular to rounding: with this step size the equations do not determine the
     /// unknowns.
     Singular {
@@ -74,6 +88,8 @@ pub enum Error {
         increment: f64,
         /// Where it ended.
         at: Place,
+        /// An algebraic state of these, and its start value; if there is one, and the start was no continuation of a solution.
+        started: Option<Started>,
     },
     /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive integration starts, or Newton's
     /// method does not find them from the values of `set_start`.
@@ -185,7 +201,21 @@ pub enum Refusal {
     Singular,
     /// The model returned an infinite value or NaN, or the numbers overflowed.
     NotFinite,
+    /// The interval is shorter than the distance of the time from the next number.
+    Resolution,
 }
+
+/// An algebraic state, and where Newton's method started for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Started {
+    /// Its name.
+    pub unknown: &'static str,
+    /// Its start value.
+    pub value: f64,
+}
+
+/// How other start values are given.
+const OTHER_START: &str = "give it a `nominal(z = ..)` in the attribute of the model, or call `set_start` with values near the solution";
 
 /// Where in a run: all counted from zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -261,6 +291,20 @@ impl fmt::Display for Argument {
     }
 }
 
+impl Quantity {
+    /// What is not finite, and its value.
+    fn write(self, f: &mut fmt::Formatter<'_>, equation: usize, value: f64) -> fmt::Result {
+        match self {
+            Quantity::Residual => write!(f, "equation {equation} of the model is {value}"),
+            Quantity::Jacobian => write!(f, "a derivative of equation {equation} of the model is {value}"),
+            Quantity::Adjoint => write!(f, "the adjoint of the model is {value} for variable {equation}"),
+            Quantity::Hessian => {
+                write!(f, "a second derivative of the model is {value} for variable {equation}")
+            }
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "step {}, stage {}, iteration {}", self.step, self.stage, self.iteration)
@@ -287,40 +331,56 @@ impl fmt::Display for Error {
             Error::StartNotGiven => {
                 f.write_str("the start values are `Start::Given`: call `set_start` before the first step")
             }
-            Error::NonFiniteModel { quantity, equation, value, at } => match quantity {
-                Quantity::Residual => write!(f, "equation {equation} of the model is {value} at {at}"),
-                Quantity::Jacobian => {
-                    write!(f, "a derivative of equation {equation} of the model is {value} at {at}")
-                }
-                Quantity::Adjoint => {
-                    write!(f, "the adjoint of the model is {value} for variable {equation} at {at}")
-                }
-                Quantity::Hessian => {
-                    write!(f, "a second derivative of the model is {value} for variable {equation} at {at}")
-                }
-            },
+            Error::NonFiniteModel { quantity, equation, value, at } => {
+                quantity.write(f, equation, value)?;
+                write!(f, " at {at}")
+            }
+            Error::NonFiniteStart {
+                quantity,
+                equation,
+                value,
+                started: Started { unknown, value: start },
+                at,
+            } => {
+                quantity.write(f, equation, value)?;
+                write!(f, " at {at}; `{unknown}` started at {start}: {OTHER_START}")
+            }
             Error::Singular { unknown, at } => write!(
                 f,
                 "the Newton matrix is singular in the column of `{unknown}` at {at}: with this step size the \
-                 equations do not determine it"
+                 equations do not determine it there; if they do elsewhere, start there: `nominal(..)` in the attribute \
+                 of the model, or `set_start`"
             ),
             Error::NotPivoted { step } => write!(
                 f,
                 "step {step} was not solved with the planned elimination, and the integrator has no memory to pivot the \
                  whole matrix"
             ),
-            Error::NotConverged { residual, equation, unknown, increment, at } => write!(
-                f,
-                "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
-                 relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
-            ),
+            Error::NotConverged { residual, equation, unknown, increment, at, started } => {
+                write!(
+                    f,
+                    "Newton's method did not converge: at {at} the residual of equation {equation} is {residual:e} \
+                     relative to its terms, and the last increment of `{unknown}` is {increment:e} relative to its size"
+                )?;
+                match started {
+                    Some(Started { unknown, value }) => write!(
+                        f,
+                        "; `{unknown}` started at {value}: if the equations have a solution, {OTHER_START}"
+                    ),
+                    None => Ok(()),
+                }
+            }
             Error::InconsistentStart { t, equation, residual, unknown, value, singular } => {
                 write!(f, "there are no consistent derivatives and algebraic states at t = {t}: ")?;
                 match singular {
                     true => write!(f, "the equations do not determine `{unknown}`, which is at {value:e}")?,
                     false => write!(f, "Newton's method does not settle, with `{unknown}` at {value:e}")?,
                 }
-                write!(f, " where equation {equation} has the residual {residual:e}")
+                write!(
+                    f,
+                    " where equation {equation} has the residual {residual:e}; if there are some elsewhere, start there: \
+                     `nominal(..)` in the attribute of the model, or `set_start`"
+                )
             }
             Error::Overflow { step, index } => {
                 write!(
@@ -337,6 +397,7 @@ impl fmt::Display for Error {
                     Refusal::NotConverged => "Newton's method does not converge",
                     Refusal::Singular => "the Newton matrix is singular",
                     Refusal::NotFinite => "the model is not finite",
+                    Refusal::Resolution => "the time does not resolve it",
                 };
                 write!(f, "the step size falls to {h:e} at t = {t}: {reason}")
             }

@@ -8,8 +8,8 @@ use crate::scalar::{Lanes, Scalar, Tangent};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
-    Assembly, Cost, Elimination, Fold, Follower, Led, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
-    Steady, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    Assembly, Cost, Elimination, Felt, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
+    Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 
@@ -71,6 +71,13 @@ pub trait Dae: 'static {
     type Factors<B: Plain>: Array<B>;
     /// What is known about the model before it runs.
     const STRUCTURE: Structure;
+    /// Where Newton's method starts if a call gives no start values: one for each unknown `(ẋ, z)`, or none at all for
+    /// zeros. `#[dae]` takes them from `nominal(..)` and `range(..)` of its attribute. Where equations have several roots
+    /// these decide for one; see [`Start`](crate::options::Start).
+    const START: &'static [f64] = &[];
+    /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said so: one for each, or
+    /// none at all. Integrators do not read it; the checks of `testing` do.
+    const RANGES: &'static [Range] = &[];
 
     /// The residual `f(v)`.
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>);
@@ -126,6 +133,26 @@ pub trait Dae: 'static {
     #[must_use]
     fn describe() -> &'static Structure {
         const { &Self::STRUCTURE }
+    }
+}
+
+/// From where to where a variable may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// The smallest value.
+    pub low: f64,
+    /// The largest value.
+    pub high: f64,
+}
+
+impl Range {
+    /// Anywhere.
+    pub const ANY: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
+    /// Whether a value lies inside; NaN does not.
+    #[must_use]
+    pub fn contains(&self, value: f64) -> bool {
+        self.low <= value && value <= self.high
     }
 }
 

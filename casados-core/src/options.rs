@@ -2,10 +2,15 @@
 
 use crate::error::Error;
 
+/// Solutions without a digit that is right are none.
+const COARSEST: f64 = 0.1;
+/// Newton's method is there after a few dozens, or never.
+const MOST_ITERATIONS: usize = 10_000;
+
 /// What can be chosen about an integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Steps of equal size in one interval.
+    /// Steps of equal size in one interval, at least one.
     pub steps: usize,
     /// How the stages of an implicit method are solved; explicit methods do not read it.
     pub newton: Newton,
@@ -18,7 +23,7 @@ pub struct Options {
 }
 
 impl Default for Options {
-    /// One step; Newton to rounding, from zero.
+    /// One step; Newton to rounding, from the nominal values of the model.
     fn default() -> Self {
         Self { steps: 1, newton: Newton::default(), start: Start::default(), compensated: false }
     }
@@ -29,13 +34,13 @@ impl Default for Options {
 pub struct Newton {
     /// The iteration ends when its error is expected below this, relative to the size of each unknown
     /// (of a derivative `ẋ` also below `|x/h|`, the change that rounds to none in `x`).
-    /// Zero, the default, means rounding: a few units in the last place of the number type.
+    /// Between zero and 0.1; zero, the default, means rounding: a few units in the last place of the number type.
     pub tolerance: f64,
-    /// With a tolerance: more iterations than these are the error `NotConverged`.
+    /// With a tolerance: more iterations than these are the error `NotConverged`. Between 1 and 10000; 50 by default.
     pub max_iterations: usize,
     /// Which Jacobian the iteration takes. Sensitivities always take the one of the solution.
     pub jacobian: Jacobian,
-    /// Exactly these iterations, and no test for convergence: the same run time in every call.
+    /// Exactly these iterations, between 1 and 10000, and no test for convergence: the same run time in every call.
     pub fixed_iterations: Option<usize>,
 }
 
@@ -70,23 +75,33 @@ impl Jacobian {
     }
 }
 
-/// Where Newton's method starts.
+/// Where Newton's method starts in the first step of a call.
+///
+/// In the steps after it the start is the polynomial through the stages of the step before; with five stages or more the
+/// algebraic states start at those of its last stage. So a call stays on the branch on which its first step was.
+///
+/// Where the equations have several roots, as `z² = x` does, the start decides for one, and a root that nobody wants
+/// looks like any other: say where the model lives, `#[dae(nominal(z = 0.1))]`, or give values with `set_start`. Where a
+/// residual has no value at `z = 0`, as that of `ln z`, or a matrix there is singular, as that of `z² = x`, there is no
+/// solution without such values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// `ẋ = 0`, `z = 0` in the first step, the polynomial of the step before in the others: the same input gives the
-    /// same bits in every call.
+    /// The values of `set_start` if it was called, else the nominal values of the model, [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or, where there is none, at the
+    /// geometric mean of a `range(..)` that does not contain zero; else at zero. `ẋ` is zero, unless the equations are
+    /// nonlinear in it and it has a nominal value. The same input gives the same bits in every call.
     #[default]
+    Nominal,
+    /// `ẋ = 0` and `z = 0`, whatever the nominal values are.
     Zero,
-    /// The values given with `set_start` in the first step, the polynomial of the step before in the others.
+    /// The values of `set_start`; an error if it was not called.
     Given,
-    /// The stages of the same step in the last successful call; zero (or the given values, if there
-    /// are any) in the first one.
+    /// The stages of the same step in the last successful call; in the first one as with `Nominal`. A branch that was found once is kept from call to call, until `reset`.
     Warm,
 }
 
 impl Options {
     /// Stages lifted to the level of a problem of optimal control, which then solves their equations too: each call takes one iteration,
-    /// from the stages of the last one (in the first call from zero). Stages converge with the iterates instead of in every one of them,
+    /// from the stages of the last one (in the first call from the nominal values). Stages converge with the iterates instead of in every one of them,
     /// and at convergence agree with those of any other options (R. Quirynen, S. Gros, M. Diehl, "Lifted implicit integrators for
     /// direct optimal control", CDC 2015). Until then ends of intervals have errors of second order in the last step; derivatives are exact
     /// at the stages that there are. Whether that saves more than an iteration more of the problem costs is to be measured.
@@ -110,14 +125,17 @@ impl Options {
             return invalid("steps", 0.0, "an interval has at least one step");
         }
         let newton = &self.newton;
-        if !(newton.tolerance >= 0.0 && newton.tolerance.is_finite()) {
-            return invalid("newton.tolerance", newton.tolerance, "a tolerance is a number not below zero");
+        if !(0.0..=COARSEST).contains(&newton.tolerance) {
+            return invalid("newton.tolerance", newton.tolerance, "a tolerance is between 0 and 0.1");
         }
-        if newton.max_iterations == 0 {
-            return invalid("newton.max_iterations", 0.0, "Newton's method takes at least one iteration");
-        }
-        if newton.fixed_iterations == Some(0) {
-            return invalid("newton.fixed_iterations", 0.0, "Newton's method takes at least one iteration");
+        let limits = [
+            ("newton.max_iterations", Some(newton.max_iterations)),
+            ("newton.fixed_iterations", newton.fixed_iterations),
+        ];
+        for (option, iterations) in limits {
+            if let Some(count) = iterations.filter(|count| !(1..=MOST_ITERATIONS).contains(count)) {
+                return invalid(option, count as f64, "Newton's method takes between 1 and 10000 iterations");
+            }
         }
         Ok(())
     }

@@ -14,7 +14,15 @@ mod fuzz;
 
 use proc_macro::TokenStream;
 
+/// Bytes of the stack that an expansion has; pages that nobody touches cost nothing. An unoptimised
+/// parser takes up to 23 kB for a level, and [`language::tokens::check`] bounds the levels.
+const STACK: usize = 1 << 29;
+
 /// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
+///
+/// What a model may contain is in `docs/language.md`. In `f64` the residual has the bits of the function,
+/// but structural zeros are zeros: `0.0 * y` is dropped, whatever `y` is when it runs. Conditions of the
+/// compiler (`#[cfg]`) are refused inside of a model.
 #[proc_macro_attribute]
 pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Dae, attribute.into(), item.into()).into()
@@ -39,7 +47,17 @@ fn expand(
     attribute: proc_macro2::TokenStream,
     item: proc_macro2::TokenStream,
 ) -> proc_macro2::TokenStream {
-    if let Err(error) = language::nesting::check(&attribute).and(language::nesting::check(&item)) {
+    // What is long without brackets (sums, chains of methods, `else if`) nests in the syntax tree.
+    stacker::grow(STACK, || expand_within(form, attribute, item))
+}
+
+fn expand_within(
+    form: language::Form,
+    attribute: proc_macro2::TokenStream,
+    item: proc_macro2::TokenStream,
+) -> proc_macro2::TokenStream {
+    let checks = [language::tokens::check(&attribute), language::tokens::check(&item)];
+    if let Some(error) = checks.into_iter().find_map(Result::err) {
         let error = error.to_compile_error();
         return quote::quote! { #item #error };
     }

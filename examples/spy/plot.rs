@@ -126,8 +126,8 @@ fn draw_factors(structure: &Structure, panel: &Panel) -> Drawn {
         format!("Factors in the order of elimination, {} blocks, {fill} of them fill", plan.slots.len());
     panel.area.draw(&Text::new(title, (panel.left, 8), text(18)))?;
     panel.block("pivots, L below, U above", size, 0..size)?;
-    // When each slot is eliminated.
-    let mut position = vec![0; size];
+    // When each slot is eliminated; kinematic states are not.
+    let mut position = vec![0; plan.slot_of_equation.len()];
     for (order, pivot) in plan.pivots.iter().enumerate() {
         position[pivot.slot as usize] = order;
     }

@@ -284,3 +284,21 @@ fn differences_by_parameters() -> Test {
     }
     Ok(())
 }
+
+/// A stage that there is not has no derivatives, however large its number is.
+#[test]
+fn stages_that_there_are_not() -> Test {
+    let ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
+        .terminal_cost(GeneralCost::<Energy>::new())
+        .on(Horizon::uniform(3, 0.1))?;
+    let result = Sensitivities::<f64>::new(&ocp)?;
+    assert_eq!([result.dx(3).len(), result.du(2).len(), result.gain(2).len()], [9, 3, 3]);
+    // Products with the sizes of matrices overflow.
+    for stage in [4, usize::MAX, usize::MAX / 9 + 1, 1 << 63] {
+        assert!(result.dx(stage).is_empty() && result.dx_dp(stage).is_empty());
+        assert!(
+            result.du(stage).is_empty() && result.du_dp(stage).is_empty() && result.gain(stage).is_empty()
+        );
+    }
+    Ok(())
+}

@@ -5,8 +5,10 @@
 mod data;
 
 mod chain;
+mod classes;
 mod errors;
 mod hard;
+mod known;
 #[cfg(feature = "clarabel")]
 mod random;
 

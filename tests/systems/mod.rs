@@ -176,7 +176,6 @@ macro_rules! system {
                             &all::<{ NV - 1 }>(),
                         )
                     },
-                    folded: &[],
                     lone: &[],
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
                     elimination: Elimination::NONE,

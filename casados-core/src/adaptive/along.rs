@@ -29,21 +29,16 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Inte
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<&'a Nominal<M, T>, Error> {
-        self.integrator.solve_along(x0, u, t_end, Some(self.integrand))
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
+        self.integrator.solve_along(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Integrator::forward`]; the integral and its derivatives.
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn forward(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<&'a Forward<M, T>, Error> {
-        self.integrator.forward_along(x0, u, t_end, Some(self.integrand))
+    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error> {
+        self.integrator.forward_along(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
@@ -54,10 +49,10 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Inte
         self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&'a Adjoint<M, T>, Error> {
-        self.integrator.adjoint_along(x0, u, t_end, lambda, Some(self.integrand))
+        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
     }
 
     /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
@@ -68,10 +63,10 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Inte
         self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&'a Hessian<M, T>, Error> {
-        self.integrator.hessian_along(x0, u, t_end, lambda, Some(self.integrand))
+        self.integrator.hessian_along(x0, u, h, lambda, Some(self.integrand))
     }
 }
 
@@ -168,21 +163,16 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
     ///
     /// # Errors
     /// See [`Hybrid`]; [`Error::Grazing`].
-    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<&'a Solution<M, T>, Error> {
-        self.integrator.solve_along(x0, u, t_end, Some(self.integrand))
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Solution<M, T>, Error> {
+        self.integrator.solve_along(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Hybrid::forward`]; the integral and its derivatives.
     ///
     /// # Errors
     /// See [`Hybrid`].
-    pub fn forward(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<HybridForward<M, T>, Error> {
-        self.integrator.forward_along(x0, u, t_end, Some(self.integrand))
+    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<HybridForward<M, T>, Error> {
+        self.integrator.forward_along(x0, u, h, Some(self.integrand))
     }
 
     /// See [`Hybrid::adjoint`]; the gradient is that of `λᵀx` and the integral.
@@ -193,9 +183,9 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Hybr
         self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
-        self.integrator.adjoint_along(x0, u, t_end, lambda, Some(self.integrand))
+        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
     }
 }

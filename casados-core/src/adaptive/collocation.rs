@@ -8,7 +8,10 @@
 
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
-use super::stages::{Convergence, FAST, Failure, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start};
+use super::stages::{
+    Convergence, FAST, Failure, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start, Transported,
+};
+use super::transport::Transport;
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, dispatch, slot};
@@ -26,6 +29,9 @@ use core::marker::PhantomData;
 /// Increments that shrink no more are rounding errors, if they are this small beside what is tolerated: of a state near zero that
 /// follows from large ones by an equation, they may be above the tolerance of the iteration.
 const NOISE: f64 = 0.01;
+
+/// An estimate that is smaller lets the next step grow, whatever it is of.
+const UNDOUBTED: f64 = 0.25;
 
 /// Memory of a step.
 #[derive(Zeroable)]
@@ -62,6 +68,7 @@ pub struct Collocation<M: Dae, B, T: Real, const S: usize, const G: usize> {
     /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
     factors: [f64; S],
     basis: Eigenbasis<T, S, PARTS>,
+    transport: Transport,
     memory: Box<Memory<M, T, S, G>>,
     method: PhantomData<fn() -> B>,
 }
@@ -90,6 +97,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
             right: from_fn(|part| groups(S, |i| right[part][i])),
             lagrange: tableau.lagrange(0.0).map(T::from_f64),
             factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
+            transport: Transport::new::<T, S>(basis.values()),
             basis,
             tableau,
             memory,
@@ -173,26 +181,59 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         }
     }
 
-    /// The estimated error of `x` at the end, where nothing is a stage.
+    /// The larger one of the two estimates, from the defect at the point that is there.
     ///
-    /// It is how far the extrapolated derivative is from the solution at the state that was reached. Of stiff components
+    /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where nothing is a stage it is how far
+    /// the extrapolated derivative is from the solution at the state that was reached: of stiff components
     /// this is their error, which no method with `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the
-    /// solve takes it out of the estimate.
-    fn error_at_end(&mut self, start: &Start<'_, M, T>, residuals: &mut usize) -> Result<f64, Failure> {
+    /// solve takes it out of the estimate. The second, of the states, is that of [`Transport`].
+    fn estimate(
+        &mut self,
+        start: &Start<'_, M, T>,
+        at_end: bool,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure> {
         self.defect(start.h, residuals)?;
-        let states = self.memory.error.as_ref().get(..M::Shape::NX).unwrap_or_default();
-        Ok(norm(states, start.scale.as_ref()))
+        let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
+        let errors = self.memory.error.as_ref().get(..counted).unwrap_or_default();
+        let first = norm(errors, start.scale.as_ref());
+        let larger = self.second(first, start);
+        if at_end || !start.known || larger <= first.max(UNDOUBTED) {
+            return Ok(larger);
+        }
+        // Newton's method leaves a residual of algebraic equations at the start, which does not shrink with the step: not
+        // of this step, and without it only the second estimate is below its tolerance.
+        let mut defect = self.memory.f_point;
+        self.memory.point = *start.point;
+        self.evaluate_point(residuals)?;
+        for (defect, left) in defect.as_mut().iter_mut().zip(self.memory.f_point.as_ref()) {
+            *defect = *defect - *left;
+        }
+        self.filter(start.h, &mut defect);
+        Ok(self.second(first, start))
+    }
+
+    /// The larger one of an estimate and the second one, of the defect that was filtered last.
+    fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
+        let [error, bent] = self.transported(start.h);
+        let asked =
+            start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
+        let relative = error.as_ref().iter().zip(bent.as_ref()).zip(asked);
+        self.transport.larger(first, relative.map(|((error, bent), asked)| (*error * asked, *bent * asked)))
+    }
+
+    /// The residual at the point that is there.
+    fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
+        let Memory { point, f_point, .. } = &mut *self.memory;
+        *residuals += 1;
+        M::residual::<T>(point, f_point);
+        if not_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
     }
 
     /// The estimated error of `(x, z)` from the defect at the point that is there.
     fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
-        let Memory { point, f_point, .. } = &mut *self.memory;
-        *residuals += 1;
-        M::residual::<T>(point, f_point);
-        if not_finite(f_point.as_ref()).is_some() {
-            return Err(Failure::NotFinite);
-        }
-        let mut error = *f_point;
+        self.evaluate_point(residuals)?;
+        let mut error = self.memory.f_point;
         self.filter(h, &mut error);
         self.memory.error = error;
         Ok(())
@@ -348,19 +389,32 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
 
     fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>) {
         let Memory { rows, factors, .. } = &mut *self.memory;
-        // The real system is the first, if there is one.
+        // The same in the systems of all eigenvalues.
         for (equation, f) in residual.as_ref().iter().enumerate() {
-            let [[row]] = &mut rows[slot::<M>(equation)];
-            *row = Complex::zero();
-            row.set(0, (-*f, T::ZERO));
+            rows[slot::<M>(equation)] = [[Complex::real(-*f)]];
         }
         factors.solve(rows);
-        // Of methods with an even number of stages it is complex; the error is the real part.
+        // The real one is the first. Of methods with an even number of stages there is none; the error is the real part.
         let (re, im) = self.basis.values().scaled(h).get(0);
         for (index, (error, [[row]])) in residual.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
             let (real, imaginary) = row.get(0);
             *error = if index < M::Shape::NX { re * real - im * imaginary } else { real };
         }
+    }
+
+    fn transported(&self, h: T) -> Transported<M, T> {
+        let mut errors = Transported::<M, T>::zeroed();
+        for (error, weights) in errors.iter_mut().zip(self.transport.weights()) {
+            let weights = weights.map(T::from_f64);
+            for (error, [[row]]) in error.as_mut().iter_mut().zip(self.memory.rows.as_ref()) {
+                *error = h * dot(&weights, &row.parts);
+            }
+        }
+        errors
+    }
+
+    fn transport(&self) -> &Transport {
+        &self.transport
     }
 
     fn unknowns(&self, to: &mut Vec<T>) {
@@ -373,22 +427,18 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         let mut point = ArrayV::<M, T>::zeroed();
         let at_end = self.estimates(start, &mut point);
         self.memory.point = point;
-        if at_end {
-            return self.error_at_end(start, residuals);
-        }
         // What the method misses is how far the derivative of its polynomial, extrapolated to the start of the step,
         // is from the solution there.
-        self.defect(start.h, residuals)?;
-        let error = norm(self.memory.error.as_ref(), start.scale.as_ref());
-        if !(again && error >= 1.0) {
+        let error = self.estimate(start, at_end, residuals)?;
+        if at_end || !(again && error >= 1.0) {
             return Ok(error);
         }
+        self.memory.point = point;
         let states = &mut self.memory.point.as_mut()[M::Shape::NX..];
         for (state, error) in states.iter_mut().zip(self.memory.error.as_ref()) {
             *state = *state + *error;
         }
-        self.defect(start.h, residuals)?;
-        Ok(norm(self.memory.error.as_ref(), start.scale.as_ref()))
+        self.estimate(start, at_end, residuals)
     }
 
     fn accept(&mut self) {

@@ -67,6 +67,19 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         Ok(statistics.residuals + statistics.jacobians)
     }
 
+    /// As [`Consistent::solve`], from start values that may be far away: an error says what they have to do with it.
+    ///
+    /// # Errors
+    /// As [`Consistent::solve`]; [`Error::NonFiniteStart`].
+    pub fn solve_from_afar(&mut self, at: &At<'_, M, T>, y: &mut ArrayK<M, T>) -> Result<usize, Error> {
+        let start = *y;
+        let solved = self.solve(at, y);
+        match (&mut self.euler, solved) {
+            (Some(euler), Err(error)) => Err(euler.explain_from(error, start.as_ref())),
+            (_, solved) => solved,
+        }
+    }
+
     /// The derivatives of `z`, from `(ẋ, z)`.
     ///
     /// # Errors

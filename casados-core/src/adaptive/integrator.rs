@@ -1,6 +1,6 @@
 //! The adaptive integrator as its users see it.
 
-use super::consistent::Consistent;
+use super::consistent::{Consistent, place_inputs};
 use super::options::{AdaptiveOptions, check_absolute, check_relative};
 use super::run::{Accepted, Base, Run, Span};
 use super::sealed::{Engine, Kind};
@@ -8,7 +8,7 @@ use super::sensitivities::{Frozen, Memory};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::Variational;
-use crate::error::{Argument, Error};
+use crate::error::{Argument, Error, Refusal};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::quadrature::{Along, reborrow};
@@ -22,14 +22,17 @@ use core::marker::PhantomData;
 
 /// An adaptive integrator of the method `B` for the model `M`; see [`Adaptive`](super::Adaptive).
 ///
-/// All calls take the state at the start of the interval, the control, and the time at its end, which may lie before
-/// the start. They return a reference to results in the memory of the integrator.
+/// All calls take the state at the start of the interval, the control, and the length `h` of the interval, as those of
+/// [`Irk`](crate::Irk) and [`Erk`](crate::Erk) do; it may be negative or zero. The interval begins at the time of
+/// [`set_time`](Self::set_time). Times that are asked for or returned, as in [`dense`](Self::dense), are times, not distances from
+/// the start. All calls return a reference to results in the memory of the integrator.
 ///
 /// # Errors
 /// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`]; [`Error::InconsistentStart`] if there are no
 /// consistent `ẋ` and `z` at the start, [`Error::Singular`] if no step can be solved; [`Error::NonFiniteModel`] if the
 /// model has no finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
-/// [`Error::OutOfMemory`]. Then the integrator is usable.
+/// [`Error::OutOfMemory`]. Then the integrator is usable, and steps that are frozen stay so; until a call succeeds there is no
+/// dense output and nothing to be frozen, [`Error::NoResult`].
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) options: AdaptiveOptions,
     pub(super) base: Box<Base<M, T>>,
@@ -62,6 +65,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let mut base: Box<Base<M, T>> = try_zeroed_box().map_err(|()| out_of_memory)?;
         base.rtol.as_mut().fill(T::from_f64(options.rtol));
         base.atol.as_mut().fill(T::from_f64(options.atol));
+        for (given, start) in base.given.as_mut().iter_mut().zip(M::START) {
+            *given = T::from_f64(*start);
+        }
         Ok(Self {
             options,
             base,
@@ -101,8 +107,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// Start values `ẋ` and `z` from which consistent ones are found; zero if never set. Where there are several
-    /// solutions they decide for one.
+    /// Start values `ẋ` and `z` from which consistent ones are found; if never set, the nominal values of the model,
+    /// [`Dae::START`]. Where there are several solutions they decide for one.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
@@ -172,7 +178,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let scales = || x0.as_slice().iter().chain(u.as_slice()).chain(p.as_slice());
         if let Some(scale) = scales().find(|scale| !(scale.is_finite() && **scale >= T::ZERO)) {
             let (option, value) = ("sensitivity_scales", scale.to_f64());
-            return Err(Error::InvalidOption { option, value, reason: "a magnitude is not negative" });
+            return Err(Error::InvalidOption {
+                option,
+                value,
+                reason: "a magnitude is finite and not below 0",
+            });
         }
         for (to, from) in self.base.magnitudes.as_mut().iter_mut().zip(scales()) {
             *to = *from;
@@ -198,31 +208,39 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.tape.entries().iter().map(|entry| entry.t).chain(end)
     }
 
-    /// `x` and `z` at the end, and the consistent `z` at the start.
+    /// `x` and `z` at the end of an interval of length `h`, and the consistent `z` at its start.
     ///
     /// # Errors
     /// See [`Integrator`].
-    pub fn solve(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<&Nominal<M, T>, Error> {
-        if self.frozen.is_some() {
-            let span = self.begin(x0, u, t_end)?;
-            self.check_frozen(span)?;
+    ///
+    /// ```
+    /// # use casados_core::{Adaptive, AdaptiveOptions, Dae, Error, Radau, model::{VectorU, VectorX}};
+    /// # fn example<Reactor: Dae>(x0: VectorX<Reactor, f64>, u: VectorU<Reactor, f64>) -> Result<(), Error> {
+    /// let mut radau = Adaptive::<Reactor, Radau>::new(AdaptiveOptions::default())?;
+    /// radau.set_time(1.0)?;
+    /// let end = radau.solve(&x0, &u, 0.1)?.x; // at t = 1.1
+    /// let middle = radau.dense(1.05)?.x;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
+        self.last = None;
+        let span = if self.frozen.is_some() {
+            let span = self.begin_frozen(x0, u, h)?;
             let Self { base, consistent, tape, state, .. } = self;
             let given = base.given;
             Frozen { base, consistent, tape, span, given, chosen: false }.solve::<B>(state, x0, None)?;
+            span
         } else {
-            let record = self.options.keep_steps;
-            self.run(x0, u, t_end, record, |_, _| Ok(()))?;
-        }
+            let (t_end, record) = (self.end(h)?, self.options.keep_steps);
+            self.run(x0, u, t_end, record, |_, _| Ok(()))?
+        };
+        self.last = Some(span);
         Ok(&self.base.result)
     }
 
-    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times while the integration
-    /// passes them; steps need not be remembered for it.
+    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times, which lie between the start
+    /// `t` and `t + h`, while the integration passes them; steps need not be remembered for it.
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::OutsideInterval`] of a time that is outside or before the one that precedes it.
@@ -230,12 +248,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         times: &[T],
         mut output: impl FnMut(T, &Dense<M, T>),
     ) -> Result<&Nominal<M, T>, Error> {
+        self.last = None;
         check(Argument::T, times)?;
-        let (start, end) = (self.start, t_end);
+        let (start, end) = (self.start, self.end(h)?);
         let mut before = start;
         for t in times {
             if !inside(*t, before, end) {
@@ -245,7 +264,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             before = *t;
         }
         if self.frozen.is_some() {
-            self.solve(x0, u, t_end)?;
+            self.solve(x0, u, h)?;
             for t in times {
                 output(*t, self.dense(*t)?);
             }
@@ -253,7 +272,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         }
         let mut times = times.iter().copied().peekable();
         let record = self.options.keep_steps;
-        self.run(x0, u, t_end, record, |step, dense| {
+        let span = self.run(x0, u, end, record, |step, dense| {
             while let Some(t) = times.next_if(|t| inside(*t, start, step.end)) {
                 (step.evaluate)(t, dense)?;
                 output(t, dense);
@@ -266,13 +285,14 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         for t in times {
             output(t, dense);
         }
+        self.last = Some(span);
         Ok(&self.base.result)
     }
 
-    /// The solution at a time inside the interval of the last successful call.
+    /// The solution at the time `t`, as the model sees it: inside the interval of the last call.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if steps are not remembered; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::NoResult`], also if that call failed or steps are not remembered; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         check(Argument::T, &[t])?;
         let span = self.last.ok_or(Error::NoResult)?;
@@ -304,13 +324,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     ///
     /// # Errors
     /// See [`Integrator`]; those of Newton's method with steps that are kept.
-    pub fn forward(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<&Forward<M, T>, Error> {
-        self.forward_along(x0, u, t_end, None)
+    pub fn forward(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Forward<M, T>, Error> {
+        self.forward_along(x0, u, h, None)
     }
 
     /// As [`Integrator::forward`], with an integrand.
@@ -318,13 +333,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error> {
-        self.steps(x0, u, t_end)?;
-        let (mut frozen, state, memory, _) = self.parts()?;
+        let span = self.steps(x0, u, h)?;
+        let (mut frozen, state, memory, _) = self.parts(span)?;
         frozen.forward::<B>(state, x0, memory, None, along)?;
-        Ok(&memory.hessian.first.forward)
+        Ok(&self.done(span)?.hessian.first.forward)
     }
 
     /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as [`Integrator::forward`].
@@ -335,10 +350,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.adjoint_along(x0, u, t_end, lambda, None)
+        self.adjoint_along(x0, u, h, lambda, None)
     }
 
     /// As [`Integrator::adjoint`], with an integrand.
@@ -346,16 +361,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
+        self.last = None;
         check(Argument::Lambda, lambda.as_slice())?;
-        self.steps(x0, u, t_end)?;
-        let (mut frozen, state, memory, _) = self.parts()?;
+        let span = self.steps(x0, u, h)?;
+        let (mut frozen, state, memory, _) = self.parts(span)?;
         frozen.solve::<B>(state, x0, reborrow(&mut along))?;
         frozen.adjoint::<B>(state, lambda, memory, along)?;
-        Ok(&memory.adjoint)
+        Ok(&self.done(span)?.adjoint)
     }
 
     /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as [`Integrator::forward`].
@@ -366,10 +382,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
-        self.hessian_along(x0, u, t_end, lambda, None)
+        self.hessian_along(x0, u, h, lambda, None)
     }
 
     /// As [`Integrator::hessian`], with an integrand.
@@ -377,17 +393,18 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
+        self.last = None;
         check(Argument::Lambda, lambda.as_slice())?;
-        self.steps(x0, u, t_end)?;
-        let (mut frozen, state, memory, history) = self.parts()?;
+        let span = self.steps(x0, u, h)?;
+        let (mut frozen, state, memory, history) = self.parts(span)?;
         history.clear();
         frozen.forward::<B>(state, x0, memory, Some(history), reborrow(&mut along))?;
         frozen.hessian::<B>(state, lambda, memory, history, along)?;
-        Ok(&memory.hessian)
+        Ok(&self.done(span)?.hessian)
     }
 
     /// As [`Integrator::solve`], with an integrand: the steps are taken again, to rounding.
@@ -395,12 +412,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
-        self.steps(x0, u, t_end)?;
-        let (mut frozen, state, ..) = self.parts()?;
+        let span = self.steps(x0, u, h)?;
+        let (mut frozen, state, ..) = self.parts(span)?;
         frozen.solve::<B>(state, x0, along)?;
+        self.last = Some(span);
         Ok(&self.base.result)
     }
 
@@ -423,13 +441,22 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.frozen = None;
     }
 
+    /// The end of an interval of this length.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not resolve.
+    pub(super) fn end(&self, h: T) -> Result<T, Error> {
+        check(Argument::H, &[h])?;
+        let end = self.start + h;
+        if end == self.start && h != T::ZERO {
+            let (t, h) = (self.start.to_f64(), h.to_f64());
+            return Err(Error::StepSizeUnderflow { t, h, reason: Refusal::Resolution });
+        }
+        Ok(end)
+    }
+
     /// What every call begins with.
-    pub(super) fn begin(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<Span<T>, Error> {
+    fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
         self.statistics = AdaptiveStatistics::default();
         check(Argument::X0, x0.as_slice())?;
         check(Argument::U, u.as_slice())?;
@@ -450,33 +477,43 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The steps that derivatives are taken of: chosen now, or frozen.
-    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+    /// The steps that derivatives are taken of: chosen now, or frozen. Until these are there, there is no result.
+    fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        self.last = None;
         self.reserve()?;
         if self.frozen.is_some() {
-            let span = self.begin(x0, u, t_end)?;
-            return self.check_frozen(span);
+            return self.begin_frozen(x0, u, h);
         }
+        let t_end = self.end(h)?;
         self.run(x0, u, t_end, true, |_, _| Ok(()))
     }
 
+    /// What a call with frozen steps begins with.
+    ///
     /// # Errors
     /// [`Error::OutsideInterval`] if the interval is not that of the frozen steps.
-    fn check_frozen(&self, span: Span<T>) -> Result<(), Error> {
-        let Some(frozen) = self.frozen else { return Ok(()) };
+    fn begin_frozen(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        let t_end = self.end(h)?;
+        let span = self.begin(x0, u, t_end)?;
+        let Some(frozen) = self.frozen else { return Ok(span) };
         let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());
         for (t, expected) in [(span.start, frozen.start), (span.end, frozen.end)] {
             if t != expected {
                 return Err(Error::OutsideInterval { t: t.to_f64(), start, end });
             }
         }
-        Ok(())
+        // Dense output of explicit methods takes steps again.
+        let Base { point, u, parameters, .. } = &mut *self.base;
+        place_inputs::<M, T>(point.as_mut(), u, parameters);
+        Ok(span)
     }
 
     #[allow(clippy::type_complexity)]
-    fn parts(&mut self) -> Result<(Frozen<'_, M, T>, &mut B::State, &mut Memory<M, T>, &mut Vec<T>), Error> {
-        let Self { base, consistent, tape, last, state, memory, history, frozen, .. } = self;
-        let span = last.ok_or(Error::NoResult)?;
+    fn parts(
+        &mut self,
+        span: Span<T>,
+    ) -> Result<(Frozen<'_, M, T>, &mut B::State, &mut Memory<M, T>, &mut Vec<T>), Error> {
+        let Self { base, consistent, tape, state, memory, history, frozen, .. } = self;
         let missing = Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() };
         let memory = memory.as_deref_mut().ok_or(missing)?;
         let given = base.given;
@@ -484,6 +521,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok((Frozen { base, consistent, tape, span, given, chosen }, state, memory, history))
     }
 
+    /// There is a result, with derivatives.
+    fn done(&mut self, span: Span<T>) -> Result<&Memory<M, T>, Error> {
+        self.last = Some(span);
+        self.memory.as_deref().ok_or(Error::OutOfMemory { bytes: size_of::<Memory<M, T>>() })
+    }
+
+    /// Integrates to a time; there is a result as soon as the caller says so.
     pub(super) fn run(
         &mut self,
         x0: &VectorX<M, T>,
@@ -491,7 +535,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         t_end: T,
         record: bool,
         mut after: impl FnMut(&mut Accepted<'_, M, T>, &mut Dense<M, T>) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    ) -> Result<Span<T>, Error> {
         self.last = None;
         let span = self.begin(x0, u, t_end)?;
         let Self { options, base, consistent, state, tape, statistics, sensitivities, .. } = self;
@@ -499,8 +543,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         let sensitivities = sensitivities.as_deref_mut();
         let mut run = Run { options, base, consistent, tape, record, sensitivities, statistics };
         B::integrate(state, &mut run, x0, span, &mut after)?;
-        self.last = Some(span);
-        Ok(())
+        Ok(span)
     }
 }
 

@@ -40,6 +40,7 @@ mod stages;
 mod start;
 mod statistics;
 mod tape;
+mod transport;
 mod variational;
 
 pub use events::{

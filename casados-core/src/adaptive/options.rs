@@ -5,17 +5,17 @@ use crate::error::Error;
 /// What can be chosen about an adaptive integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptiveOptions {
-    /// Relative tolerance of the error of one step.
+    /// Relative tolerance of the error of one step, between 10 ε of the number type and 1.
     pub rtol: f64,
-    /// Absolute tolerance of the error of one step.
+    /// Absolute tolerance of the error of one step, finite and above zero.
     pub atol: f64,
-    /// The first step; chosen if it is not given.
+    /// The length of the first step, finite and above zero; chosen if it is not given.
     pub initial_step: Option<f64>,
-    /// No step is longer.
+    /// No step is longer; above zero, infinite by default.
     pub max_step: f64,
-    /// A step that would have to be shorter is the error `StepSizeUnderflow`.
+    /// A step that would have to be shorter is the error `StepSizeUnderflow`; between zero, the default, and `max_step`.
     pub min_step: f64,
-    /// More steps than these, refused ones included, are the error `TooManySteps`.
+    /// More steps than these, refused ones included, are the error `TooManySteps`; at least one.
     pub max_steps: usize,
     /// Whether steps are remembered: dense output over the whole interval and sensitivities need them.
     pub keep_steps: bool,
@@ -49,13 +49,13 @@ impl AdaptiveOptions {
         if let Some(step) = self.initial_step
             && !(step > 0.0 && step.is_finite())
         {
-            return invalid("initial_step", step, "a step has a positive length");
+            return invalid("initial_step", step, "a step has a finite length above 0");
         }
         if self.max_step.is_nan() || self.max_step <= 0.0 {
-            return invalid("max_step", self.max_step, "a step has a positive length");
+            return invalid("max_step", self.max_step, "a step has a length above 0");
         }
         if !(self.min_step >= 0.0 && self.min_step <= self.max_step) {
-            return invalid("min_step", self.min_step, "it is not between zero and the longest step");
+            return invalid("min_step", self.min_step, "it is between 0 and `max_step`");
         }
         if self.max_steps == 0 {
             return invalid("max_steps", 0.0, "an interval has at least one step");
@@ -73,7 +73,7 @@ pub(super) fn check_relative(rtol: f64, epsilon: f64) -> Result<(), Error> {
     Err(Error::InvalidOption {
         option: "rtol",
         value: rtol,
-        reason: "a relative tolerance is between ten units of rounding and one",
+        reason: "a relative tolerance is between 10 ε of the number type and 1",
     })
 }
 
@@ -83,5 +83,9 @@ pub(super) fn check_absolute(atol: f64) -> Result<(), Error> {
     if atol > 0.0 && atol.is_finite() {
         return Ok(());
     }
-    Err(Error::InvalidOption { option: "atol", value: atol, reason: "an absolute tolerance is above zero" })
+    Err(Error::InvalidOption {
+        option: "atol",
+        value: atol,
+        reason: "an absolute tolerance is finite and above 0",
+    })
 }

@@ -38,7 +38,8 @@ use bytemuck::Zeroable;
 /// ```
 ///
 /// The first interval begins at the time that was set ([`Integrator::set_time`]), each of the others at the end of the one
-/// before. Steps end where intervals end.
+/// before. Steps end where intervals end. `ends` are times as the model sees them, not lengths, and so is that of
+/// [`dense`](Self::dense).
 ///
 /// # Errors
 /// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for each interval;
@@ -46,8 +47,9 @@ use bytemuck::Zeroable;
 pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     segments: Vec<Segment<M, T>>,
-    /// How many of them belong to the last successful call.
+    /// How many of them there are, and whether the last call succeeded with them.
     count: usize,
+    solved: bool,
     frozen: bool,
     statistics: AdaptiveStatistics,
     nominal: Nominal<M, T>,
@@ -113,7 +115,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     pub fn new(integrator: Integrator<M, B, T>) -> Self {
         let nominal = Nominal::zeroed();
         let statistics = AdaptiveStatistics::default();
-        Self { integrator, segments: Vec::new(), count: 0, frozen: false, statistics, nominal }
+        Self { integrator, segments: Vec::new(), count: 0, solved: false, frozen: false, statistics, nominal }
     }
 
     /// The integrator, to set its parameters or its start time.
@@ -141,6 +143,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         if self.frozen {
             self.replay(x0, None)?;
         }
+        self.solved = true;
         Ok(&self.nominal)
     }
 
@@ -154,14 +157,19 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     ) -> Result<&Nominal<M, T>, Error> {
         self.steps(x0, controls, ends)?;
         self.replay(x0, along)?;
+        self.solved = true;
         Ok(&self.nominal)
     }
 
-    /// The solution at a time inside the last successful call's intervals; where two of them meet, that of the first.
+    /// The solution at the time `t`, as the model sees it, inside the intervals of the last call; where two of them meet, that of
+    /// the first.
     ///
     /// # Errors
-    /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
+        if !self.solved {
+            return Err(Error::NoResult);
+        }
         let Self { integrator, segments, count, nominal, .. } = self;
         dense(integrator, segments.get_mut(..*count).unwrap_or_default(), nominal, t)
     }
@@ -177,7 +185,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
     ) -> Result<PiecewiseForward<M, T>, Error> {
         self.steps(x0, controls, ends)?;
-        self.sweep(x0, false, None, None)
+        let forward = self.sweep(x0, false, None, None)?;
+        self.solved = true;
+        Ok(forward)
     }
 
     /// As [`Piecewise::forward`], with an integrand.
@@ -191,7 +201,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         self.steps(x0, controls, ends)?;
         let mut sums = Sums::new(self.count, integrand, false)?;
         let forward = self.sweep(x0, false, Some(integrand), Some(&mut sums))?;
-        Ok((forward, Q::derivatives(&sums)?))
+        let derivatives = Q::derivatives(&sums)?;
+        self.solved = true;
+        Ok((forward, derivatives))
     }
 
     /// As [`Piecewise::hessian`], with an integrand.
@@ -203,6 +215,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         lambda: &VectorX<M, T>,
         integrand: &mut Q,
     ) -> Result<(PiecewiseHessian<M, T>, Q::Derivatives), Error> {
+        self.solved = false;
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         let mut sums = Sums::new(self.count, integrand, true)?;
@@ -234,6 +247,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         lambda: &VectorX<M, T>,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
+        self.solved = false;
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         self.replay(x0, reborrow(&mut along))?;
@@ -251,6 +265,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             grad_u.as_mut_slice().copy_from_slice(memory.adjoint.grad_u.as_slice());
             axpy(T::ONE, memory.adjoint.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
+        self.solved = true;
         Ok(result)
     }
 
@@ -265,6 +280,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         ends: &[T],
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
+        self.solved = false;
         check(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         let forward = self.sweep(x0, true, None, None)?;
@@ -308,16 +324,19 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let result = PiecewiseHessian { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp };
         match sum.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(Error::Overflow { step: 0, index }),
-            None => Ok(result),
+            None => {
+                self.solved = true;
+                Ok(result)
+            }
         }
     }
 
     /// Following calls take the steps of the last successful one, whatever they are given, and solve them to rounding.
     ///
     /// # Errors
-    /// [`Error::NoResult`]
+    /// [`Error::NoResult`], also if that call failed.
     pub fn freeze(&mut self) -> Result<(), Error> {
-        if self.count == 0 {
+        if !self.solved {
             return Err(Error::NoResult);
         }
         for segment in &mut self.segments {
@@ -332,8 +351,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         self.frozen = false;
     }
 
-    /// Takes all steps, or prepares those that are kept for other controls.
+    /// Takes all steps, or prepares those that are kept for other controls. There is a result as soon as the caller says so.
     fn steps(&mut self, x0: &VectorX<M, T>, controls: &[VectorU<M, T>], ends: &[T]) -> Result<(), Error> {
+        self.solved = false;
         let count = ends.len();
         if controls.len() != count || count == 0 {
             return Err(Error::Intervals { controls: controls.len(), ends: count });

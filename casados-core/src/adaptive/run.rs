@@ -8,7 +8,7 @@ use super::sealed::Family;
 use super::stages::{Convergence, FAST, Failure, Start};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
-use super::variational::Variational;
+use super::variational::{Tolerances, Variational};
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae, VectorP, VectorU, VectorX};
@@ -52,8 +52,10 @@ pub struct Base<M: Dae, T: Plain> {
     pub atol: ArrayK<M, T>,
     /// as the method needs them,
     tight: ArrayK<M, (T, T)>,
-    /// and the reciprocals of the errors that they tolerate.
+    /// the reciprocals of the errors that they tolerate,
     pub(super) scale: ArrayK<M, T>,
+    /// and how many times as large those of the tolerances are that were asked for.
+    asked: ArrayK<M, T>,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
@@ -126,7 +128,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         self.prepare(x0, span)?;
         self.begin_sensitivities(x0, span.start)?;
         let mut level = 0;
-        self.tighten(B::STAGES);
+        self.tighten::<B>(B::STAGES);
         let mut stages = levels.get::<B>(level)?;
         let length = span.end - span.start;
         let direction = if length < T::ZERO { -1.0 } else { 1.0 };
@@ -170,7 +172,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     levels.change::<B>(level, next)?;
                     (level, settled, changed) = (next, 1, true);
                     stages = levels.get::<B>(level)?;
-                    self.tighten(stages.count());
+                    self.tighten::<B>(stages.count());
                     controller.forget();
                 }
             }
@@ -179,7 +181,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 None => stages.begin(&self.base.point),
             }
             if need == Need::Jacobian {
-                let start = Start { point: &self.base.point, scale: &self.base.scale, h };
+                let start = Start {
+                    point: &self.base.point,
+                    scale: &self.base.scale,
+                    asked: &self.base.asked,
+                    known: accepted_h.is_some(),
+                    h,
+                };
                 // In the middle of the step, as far as that is foreseen: nearer to all stages than the start is. Where the
                 // step fails, at the start.
                 current = accepted_h.is_none() || rejected;
@@ -230,7 +238,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             self.check_step(t, h, refusal)?;
             tried += 1;
-            let start = Start { point: &self.base.point, scale: &self.base.scale, h };
+            let start = Start {
+                point: &self.base.point,
+                scale: &self.base.scale,
+                asked: &self.base.asked,
+                known: accepted_h.is_some(),
+                h,
+            };
             let residuals = &mut self.statistics.residuals;
             let outcome = stages.solve(&start, self.base.newton_tolerance, &mut convergence, residuals);
             self.statistics.iterations += convergence.iterations;
@@ -242,12 +256,12 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             });
             let outcome = outcome.and_then(|error| match &mut self.sensitivities {
                 Some(sensitivities) if error < 1.0 => {
-                    let Base { point, u, parameters, tight, .. } = &*self.base;
+                    let Base { point, u, parameters, tight, rtol, atol, .. } = &*self.base;
                     let mut x = VectorX::<M, T>::zeroed();
                     x.as_mut_slice().copy_from_slice(&point.as_ref()[nx..2 * nx]);
                     let at = At { x: &x, u, p: parameters, t };
                     sensitivities
-                        .implicit(stages, at, level, &start, tight, again)
+                        .implicit(stages, at, level, &start, &Tolerances { tight, rtol, atol }, again)
                         .map(|other| error.max(other))
                 }
                 _ => Ok(error),
@@ -370,22 +384,29 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     }
 
     /// Tolerances of the estimate: it is of lower order than the method, `s` instead of `2s − 1`.
-    fn tighten(&mut self, stages: usize) {
+    fn tighten<B: Family>(&mut self, stages: usize) {
         let s = stages as f64;
         let exponent = (s + 1.0) / (2.0 * s);
-        let Base { tight, rtol, atol, newton_tolerance, .. } = &mut *self.base;
+        let Base { tight, asked, rtol, atol, newton_tolerance, .. } = &mut *self.base;
         let mut finest: f64 = 1.0;
         let mut before = (T::ZERO, T::ZERO);
-        for ((tight, rtol), atol) in tight.as_mut().iter_mut().zip(rtol.as_ref()).zip(atol.as_ref()) {
+        let asked = asked.as_mut().iter_mut();
+        for (((tight, asked), rtol), atol) in
+            tight.as_mut().iter_mut().zip(asked).zip(rtol.as_ref()).zip(atol.as_ref())
+        {
             // Mostly they are all the same.
             if before.0 != *rtol {
                 before = (*rtol, T::from_f64(0.1 * Scalar::powf(rtol.to_f64(), exponent)));
             }
-            *tight = (before.1, before.1 / *rtol * *atol);
+            *asked = before.1 / *rtol;
+            *tight = (before.1, *asked * *atol);
             finest = finest.min(before.1.to_f64());
         }
-        // Where the error of the iteration is small beside that of the step, and above rounding.
-        let wanted = Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03);
+        // The error of the iteration is the same in step after step, and where nothing is damped it adds up over as many as
+        // there are, like 1/(2s) of a power of the tolerance. To be small beside the tolerance then, it may be the tolerance to the power
+        // of 1 + 1/(2s); of Radau methods, which damp, to two fifths of that. It stays above rounding.
+        let steps = if B::ENDS_ON_STAGE { 0.4 } else { 1.0 };
+        let wanted = Scalar::powf(finest, (s - 1.0 + steps) / (s + 1.0)).min(0.03);
         *newton_tolerance = wanted.max(10.0 * T::EPSILON.to_f64() / finest);
         self.measure();
     }

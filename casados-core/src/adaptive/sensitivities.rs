@@ -71,7 +71,7 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
         *start = self.given;
         let at = At { x: x0, u, p: parameters, t: self.span.start };
         if M::Shape::NZ > 0 {
-            self.consistent.solve(&at, start)?;
+            self.consistent.solve_from_afar(&at, start)?;
         }
         result.z0.as_mut_slice().copy_from_slice(&start.as_ref()[M::Shape::NX..]);
         (result.x, result.z) = (*x0, result.z0);

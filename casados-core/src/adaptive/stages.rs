@@ -1,6 +1,7 @@
 //! What a run asks of a step with any number of stages.
 
-use crate::model::{ArrayK, ArrayV, Dae};
+use super::transport::Transport;
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
@@ -19,8 +20,12 @@ pub(super) const FAST: f64 = 1e-3;
 pub struct Start<'a, M: Dae, T: Real> {
     /// The variables at its start: a solution of the equations.
     pub point: &'a ArrayV<M, T>,
-    /// Reciprocals of the tolerated errors of `(x, z)`.
+    /// Reciprocals of the tolerated errors of `(x, z)`, as the estimate of lower order needs them,
     pub scale: &'a ArrayK<M, T>,
+    /// and how many times as large those of the tolerances are that were asked for.
+    pub asked: &'a ArrayK<M, T>,
+    /// Whether `ẋ` and `z` there are those of a stage of the step before.
+    pub known: bool,
     /// Its length.
     pub h: T,
 }
@@ -53,6 +58,9 @@ impl Default for Convergence {
         Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: 1.0 }
     }
 }
+
+/// An error of the states, and `(hJ)⁻²` times it.
+pub type Transported<M, T> = [ArrayX<M, T>; 2];
 
 /// A step with any number of stages.
 pub trait Stages<M: Dae, T: Real> {
@@ -95,6 +103,10 @@ pub trait Stages<M: Dae, T: Real> {
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
     /// From a residual there to the estimated error of `(x, z)`, in its place.
     fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>);
+    /// What a step of length `h` makes of the residual that was filtered last: see [`Transport`].
+    fn transported(&self, h: T) -> Transported<M, T>;
+    /// How the size of what is transported is judged.
+    fn transport(&self) -> &Transport;
     /// The unknowns of the step that was solved last, stages innermost, at the end of a list.
     fn unknowns(&self, to: &mut Vec<T>);
     /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a stage: else they are

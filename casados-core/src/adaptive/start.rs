@@ -19,7 +19,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         }
         *start = *given;
         let at = At { x: x0, u, p: parameters, t: span.start };
-        match self.consistent.solve(&at, start) {
+        match self.consistent.solve_from_afar(&at, start) {
             Ok(points) => self.statistics.residuals += points,
             // Without algebraic states all equations may still be solvable: the matrix of ẋ has not full rank.
             Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => {

@@ -21,6 +21,8 @@ pub struct Entry<T> {
 #[derive(Debug)]
 pub struct Tape<T> {
     entries: Vec<Entry<T>>,
+    /// As they were when they were kept.
+    kept: Vec<Entry<T>>,
     numbers: Vec<T>,
     /// The numbers of steps that are being taken again.
     again: Vec<T>,
@@ -28,7 +30,7 @@ pub struct Tape<T> {
 
 impl<T> Default for Tape<T> {
     fn default() -> Self {
-        Self { entries: Vec::new(), numbers: Vec::new(), again: Vec::new() }
+        Self { entries: Vec::new(), kept: Vec::new(), numbers: Vec::new(), again: Vec::new() }
     }
 }
 
@@ -75,14 +77,26 @@ impl<T: Real> Tape<T> {
         }
     }
 
-    /// The steps fill another interval, each its part of it.
+    /// Remembers the lengths of the steps.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub fn keep(&mut self) -> Result<(), Error> {
+        let bytes = size_of_val(self.entries.as_slice());
+        self.kept.clear();
+        self.kept.try_reserve(self.entries.len()).map_err(|_| Error::OutOfMemory { bytes })?;
+        self.kept.extend_from_slice(&self.entries);
+        Ok(())
+    }
+
+    /// The steps that were kept fill another interval, each its part of it; whatever they were stretched to before.
     pub fn stretch(&mut self, start: T, end: T) {
-        let (Some(first), Some(last)) = (self.entries.first(), self.entries.last()) else { return };
+        let (Some(first), Some(last)) = (self.kept.first(), self.kept.last()) else { return };
         let (begin, length) = (first.t, last.t + last.h - first.t);
         let factor = (end - start) / length;
         if factor.is_finite() {
-            for entry in &mut self.entries {
-                (entry.t, entry.h) = (start + factor * (entry.t - begin), factor * entry.h);
+            for (entry, kept) in self.entries.iter_mut().zip(&self.kept) {
+                (entry.t, entry.h) = (start + factor * (kept.t - begin), factor * kept.h);
             }
         }
     }

@@ -17,7 +17,7 @@ use super::norm::mean;
 use super::pairs::Pair;
 use super::replay::{Replay, Taken};
 use super::sealed::Engine;
-use super::stages::{Failure, MOST, Stages, Start};
+use super::stages::{Failure, MOST, Stages, Start, Transported};
 use crate::error::Error;
 use crate::linalg::axpy;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, Ode};
@@ -80,6 +80,15 @@ struct Memory<M: Dae, T: Plain> {
     f: ArrayK<M, T>,
     point: ArrayV<M, T>,
     magnitudes: ArrayW<M, T>,
+}
+
+/// Tolerances of `(x, z)`.
+pub struct Tolerances<'a, M: Dae, T: Real> {
+    /// As the estimate of lower order needs them,
+    pub tight: &'a ArrayK<M, (T, T)>,
+    /// and as they were asked for.
+    pub rtol: &'a ArrayK<M, T>,
+    pub atol: &'a ArrayK<M, T>,
 }
 
 /// The derivatives along a run.
@@ -204,7 +213,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
         at: At<'_, M, T>,
         level: usize,
         start: &Start<'_, M, T>,
-        tolerances: &ArrayK<M, (T, T)>,
+        tolerances: &Tolerances<'_, M, T>,
         again: bool,
     ) -> Result<f64, Failure> {
         let diverges = |_: Error| Failure::Diverges;
@@ -230,13 +239,17 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 stages.filter(start.h, &mut error);
                 // As for the states: what is extrapolated of `z` is not kept.
                 let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
-                relative = measure(
-                    &error.as_ref()[..counted],
-                    [before.as_ref(), after.as_ref()]
-                        .map(|v| v.get(direction).map_or(&[][..], |v| v.as_ref())),
-                    tolerances.as_ref().iter().copied(),
-                    magnitudes[direction],
-                );
+                let states = [before.as_ref(), after.as_ref()]
+                    .map(|v| v.get(direction).map_or(&[][..], |v| v.as_ref()));
+                let magnitude = magnitudes[direction];
+                let tight = tolerances.tight.as_ref().iter().copied();
+                let first = measure(&error.as_ref()[..counted], states, tight, magnitude);
+                let asked = tolerances.rtol.as_ref().iter().zip(tolerances.atol.as_ref());
+                let scales = scales(states, asked.map(|(rtol, atol)| (*rtol, *atol)), magnitude);
+                let [transported, bent]: Transported<M, T> = stages.transported(start.h);
+                let pairs = transported.as_ref().iter().zip(bent.as_ref()).zip(scales);
+                let pairs = pairs.map(|((error, bent), scale)| (*error / scale, *bent / scale));
+                relative = stages.transport().larger(first, pairs);
                 if at_end || look > 0 || !(again && relative >= 1.0) {
                     break;
                 }
@@ -330,16 +343,29 @@ fn variation<M: Dae, T: Real>(
     }
 }
 
-/// The root of the mean of the squares relative to what is tolerated: `(rtol, atol)`.
-fn measure<T: Real>(
+/// What is tolerated of a column: `(rtol, atol)` are of the states.
+fn scales<'a, T: Real>(
+    [before, after]: [&'a [T]; 2],
+    tolerances: impl Iterator<Item = (T, T)> + 'a,
+    magnitude: T,
+) -> impl Iterator<Item = T> + 'a {
+    before
+        .iter()
+        .zip(after)
+        .zip(tolerances)
+        .map(move |((before, after), (rtol, atol))| atol / magnitude + rtol * before.abs().max(after.abs()))
+}
+
+/// The root of the mean of the squares relative to what is tolerated.
+fn measure<'a, T: Real>(
     error: &[T],
-    [before, after]: [&[T]; 2],
-    tolerances: impl Iterator<Item = (T, T)>,
+    states: [&'a [T]; 2],
+    tolerances: impl Iterator<Item = (T, T)> + 'a,
     magnitude: T,
 ) -> f64 {
     let mut sum = 0.0;
-    for (((error, before), after), (rtol, atol)) in error.iter().zip(before).zip(after).zip(tolerances) {
-        let relative = (*error / (atol / magnitude + rtol * before.abs().max(after.abs()))).to_f64();
+    for (error, scale) in error.iter().zip(scales(states, tolerances, magnitude)) {
+        let relative = (*error / scale).to_f64();
         sum += relative * relative;
     }
     mean(sum, error.len())

@@ -36,6 +36,8 @@ pub struct Group<M: Dae, E: Lanes, const S: usize> {
     pub statistics: Statistics,
     work: Place<Work<M, E, S>>,
     steps: Places<Step<M, E, S>>,
+    /// Whether start values were given.
+    given: bool,
     /// The warm start.
     record: Places<Step<M, E, S>>,
     lambda: Place<ArrayX<M, E>>,
@@ -69,7 +71,8 @@ macro_rules! pass {
         let from = match $group.options.start {
             Start::Warm if $warm => From::Record(Heap::tape(&mut $group.record, count)?),
             Start::Zero => From::Zero,
-            Start::Given | Start::Warm => From::Given,
+            _ if $group.given => From::Given,
+            _ => From::Nominal,
         };
         Pass {
             options: &$group.options,
@@ -89,6 +92,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             statistics: Statistics::default(),
             work: Default::default(),
             steps: Default::default(),
+            given: false,
             record: Default::default(),
             lambda: Default::default(),
             nu: Default::default(),
@@ -137,6 +141,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         ));
         let time = &mut work.inputs.time;
         time.step = time.interval / E::from_f64(count as f64);
+        self.given = given.is_some();
         let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
         for (given, to) in given.iter().flatten().zip([xdot, z]) {
             dispatch(Pack { from: &[*given; MOST_LANES], to });

@@ -81,8 +81,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         })
     }
 
-    /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals: read with
-    /// [`Start::Given`], and with [`Start::Warm`] where there is no warm start.
+    /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals, instead of the nominal values of the model: with
+    /// [`Start::Zero`] they are not read, and with [`Start::Warm`] only where there is no warm start.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.

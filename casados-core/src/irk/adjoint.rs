@@ -94,7 +94,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         if *sourced {
             dispatch(Add { to: mu.as_mut().as_flattened_mut(), from: source.as_ref().as_flattened() });
         }
-        linear.factors.solve_transposed(mu);
+        linear.solve_transposed((coefficients, h), mu);
     }
 
     /// `λ_n` from `λ_{n+1}` and `μ`.

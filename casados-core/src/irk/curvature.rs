@@ -7,7 +7,7 @@
 use super::directions::{NEAREST, panel, panels, width};
 use super::multiply::multiply;
 use crate::linalg::{Arithmetic, Kernel, is_long};
-use crate::model::{Dae, NO_COLUMN, Steady};
+use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::Array;
 use core::marker::PhantomData;
@@ -108,10 +108,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
     ) {
         let all = M::STRUCTURE.curved.len() * S;
         let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
-        let each = count / M::STRUCTURE.curved.len().max(1);
         panels!(M::STRUCTURE.directions.len(), E, S, row, V => {
             if row >= column {
-                let count = Reach::<M>::needed::<V>(row) * each;
                 let g = g.get(of_g..of_g + count).unwrap_or_default();
                 let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
                 let (sum, fresh) = (&mut *self.sum, self.fresh && of_d == 0);
@@ -132,71 +130,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
                 }
             }
         });
-    }
-}
-
-/// Which rows of `D` have anything in some columns: that of an input has a one in its own, and that of a state which an input drives alone
-/// (`ẋ = c u`, as far as [`Steady`] says so) something in that of the input and of its own start.
-struct Reach<M>(PhantomData<M>);
-
-/// Columns of a group, about which one answer is given.
-const GROUP: usize = 4;
-/// Groups about which something is known: behind them all variables are needed.
-const GROUPS: usize = 64;
-
-impl<M: Dae> Reach<M> {
-    /// For each group of columns how many curved variables, from the first on, have all those that have anything there.
-    const NEEDED: [usize; GROUPS] = {
-        let structure = &M::STRUCTURE;
-        let (mut needed, mut c) = ([0; GROUPS], 0);
-        while c < structure.curved.len() {
-            match Self::directions(structure.curved[c] as usize) {
-                Some(directions) => {
-                    let mut index = 0;
-                    while index < directions.len() {
-                        let column = structure.column_of_direction[directions[index]];
-                        if column != NO_COLUMN && (column as usize) < GROUP * GROUPS {
-                            needed[column as usize / GROUP] = c + 1;
-                        }
-                        index += 1;
-                    }
-                }
-                None => needed = [c + 1; GROUPS],
-            }
-            c += 1;
-        }
-        needed
-    };
-
-    /// The elements of `w` that a variable depends on, if they are few.
-    const fn directions(variable: usize) -> Option<[usize; 2]> {
-        let structure = &M::STRUCTURE;
-        let (nx, shift) = (structure.x.len(), structure.x.len() + structure.z.len());
-        let steady = structure.elimination.steady;
-        if variable >= nx + shift {
-            return Some([variable - shift; 2]);
-        }
-        if variable < nx || variable >= 2 * nx || variable - nx >= steady.len() {
-            return None;
-        }
-        let entry = steady[variable - nx].entry;
-        if entry == Steady::NONE {
-            return None;
-        }
-        let (_, driver) = structure.jacobian.at(entry as usize);
-        if driver < nx + shift { None } else { Some([variable - nx, driver - shift]) }
-    }
-
-    /// How many curved variables are needed for `V` columns.
-    #[inline(always)]
-    fn needed<const V: usize>(column: usize) -> usize {
-        let groups = Self::NEEDED.get(column / GROUP..(column + V).div_ceil(GROUP));
-        let Some(groups) = groups else { return M::STRUCTURE.curved.len() };
-        let mut needed = 0;
-        for &group in groups {
-            needed = if group > needed { group } else { needed };
-        }
-        needed
     }
 }
 

@@ -13,6 +13,7 @@
 use super::curvature::{COLUMNS, row_of};
 use super::curved_advance::{Advance, Inverse, add_stages, columns, is_direct};
 use super::directions::{Identity, before, panel_of, panels};
+use super::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
 use super::multiply::multiply_panel;
 use super::record::{Coefficients, Linearization, Work};
 use super::sweep::Phase;
@@ -190,6 +191,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
             let sum: &[R] = if self.last { &[] } else { self.sum };
             RightHandSide { g, minus_ha: &self.minus_ha, minus_hb: &self.minus_hb, sum, column }
                 .all::<A, M>(m);
+            around::<A, M, E, S, W, CONDENSE_TRANSPOSED>(self.jacobian, &self.minus_ha, m);
         }
         if self.phase == Phase::Whole {
             let own = self.ahead.get(column * M::Shape::NX..).unwrap_or_default();
@@ -198,6 +200,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Panels<'_, M, E, R, S> {
             sweeps::<A, M, E, [E; W], S, W, TransposedDown, TransposedUp>(self.factors, m, 0, ahead);
         }
         if self.phase != Phase::Before {
+            around::<A, M, E, S, W, RECONSTRUCT_TRANSPOSED>(self.jacobian, &self.minus_ha, m);
             let Self { jacobian, sum, first, last, inverse, placed, .. } = self;
             Advance::<M, E, R, S, W> {
                 jacobian,

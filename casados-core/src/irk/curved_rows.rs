@@ -2,26 +2,22 @@
 
 use super::curvature::row_of;
 use super::directions::Directions;
-use super::implied::leader;
 use crate::linalg::{Arithmetic, Block, Packet};
 use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
+use core::marker::PhantomData;
 
 /// What they are made by.
-pub(super) struct CurvedRows<'a, M: Dae, E: Plain, D, const S: usize> {
-    pub jacobian: &'a M::Jacobian<[E; S]>,
-    /// `h c_i`
-    pub nodes: &'a [E; S],
+pub(super) struct CurvedRows<'a, M, E: Plain, D, const S: usize> {
     /// `−hA`
     pub minus_ha: Block<E, S>,
-    /// `(hA)²`, if a state is [implied](crate::model::Steady::implied).
-    pub square: &'a Block<E, S>,
     pub directions: &'a D,
+    pub model: PhantomData<M>,
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> CurvedRows<'_, M, E, D, S> {
-    /// Those of a panel, from the derivatives of its stages, without those of implied states.
+    /// Those of a panel, from the derivatives of its stages.
     #[inline(always)]
     pub fn panel<A: Arithmetic, const W: usize>(
         &self,
@@ -35,31 +31,17 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> CurvedRows<'_, M, E, D,
             let variable = variable as usize;
             if (nx..2 * nx).contains(&variable) {
                 let (Some(dk), Some(start)) = (dy.get(variable - nx), v.get(variable - nx)) else { continue };
-                let leader = leader::<M, E, S>(self.jacobian, variable - nx);
                 for i in 0..S {
                     let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) else { continue };
                     let mut row = *start;
-                    if let Some(leader) = leader {
-                        leader.add_state::<A, M, W>(&mut row, self.nodes[i], v);
-                        if let Some(dk) = leader.state::<M>().and_then(|state| dy.get(state)) {
-                            for (column, dk) in self.square.iter().zip(dk) {
-                                A::subtract_row(&mut row, leader.minus_c * column[i], dk);
-                            }
-                        }
-                    } else {
-                        for (column, dk) in self.minus_ha.iter().zip(dk) {
-                            A::subtract_row(&mut row, column[i], dk);
-                        }
+                    for (column, dk) in self.minus_ha.iter().zip(dk) {
+                        A::subtract_row(&mut row, column[i], dk);
                     }
                     *d = row;
-                    if let Some(leader) = leader {
-                        leader.add_input::<M, D, W>(d, self.nodes[i], self.directions, column);
-                    }
                 }
             } else if variable < 2 * nx + nz {
                 let unknown = if variable < nx { variable } else { variable - nx };
                 let Some(own) = dy.get(unknown) else { continue };
-                // Of a state that is implied no equation feels the derivative but its own, which is linear.
                 for (i, own) in own.iter().enumerate() {
                     if let Some(d) = d.get_mut(row_of::<M, E, S>(c, i)) {
                         *d = *own;

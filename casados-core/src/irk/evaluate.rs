@@ -3,12 +3,10 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
 //! has registers of that many numbers, one call of the model computes them all.
 
-use super::follow::{are_together, follower, led};
+use super::kinematic::{self, are_together, derivative, unknowns};
 use super::record::{Coefficients, Times, Work};
 use super::stages::Stages;
-use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, are_finite, coupling, dispatch, each_row, follows, has_followers,
-};
+use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, are_finite, coupling, dispatch, each_row};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
 use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};
@@ -38,16 +36,16 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         dispatch(Place::<M, E, S, false> { points: &mut self.points, jacobian, x, y, a, c, time, step });
     }
 
-    /// The same, with the `k_i` of states that [follow](super::follow) those that they follow, whatever is in their places.
+    /// The same, with the `k_i` of [kinematic](super::kinematic) states as they follow from others, whatever is in their places.
     #[inline]
-    pub(crate) fn place_led(
+    pub(crate) fn place_unknowns(
         &mut self,
         coefficients: &Coefficients<E, S>,
         step: usize,
         x: &ArrayX<M, E>,
         y: &ArrayK<M, [E; S]>,
     ) {
-        if const { !has_followers::<M>() } {
+        if const { !kinematic::is_any::<M>() } {
             return self.place(coefficients, step, x, y);
         }
         let Coefficients { a, c, .. } = coefficients;
@@ -86,7 +84,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         dispatch(Middle::<M, E, S> { points: &mut self.points });
         self.at_stage::<true>(0);
         self.first_only = true;
-        self.place_led(coefficients, step, x, y);
+        self.place_unknowns(coefficients, step, x, y);
         if residual {
             self.at_stage::<false>(0);
         } else {
@@ -193,8 +191,8 @@ impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
     }
 }
 
-/// See [`Work::place`] and [`Work::place_led`].
-struct Place<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
+/// See [`Work::place`] and [`Work::place_unknowns`].
+struct Place<'a, M: Dae, E: Plain, const S: usize, const UNKNOWNS: bool> {
     points: &'a mut ArrayV<M, [E; S]>,
     jacobian: &'a M::Jacobian<[E; S]>,
     x: &'a ArrayX<M, E>,
@@ -205,7 +203,7 @@ struct Place<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     step: usize,
 }
 
-impl<M: Dae, E: Lanes, const S: usize, const LED: bool> Kernel for Place<'_, M, E, S, LED> {
+impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_, M, E, S, UNKNOWNS> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -223,8 +221,8 @@ impl<M: Dae, E: Lanes, const S: usize, const LED: bool> Kernel for Place<'_, M, 
             return;
         }
         let minus_ha = coupling(a, h);
-        // Of those that follow, which are most often the first or the last, there is nothing to copy.
-        let (first, end) = if LED { const { led::<M>() } } else { (0, y.len()) };
+        // Of kinematic states, which are most often the first or the last, there is nothing to copy.
+        let (first, end) = if UNKNOWNS { const { unknowns::<M>() } } else { (0, y.len()) };
         let k = first..nx.min(end).max(first);
         let (xdot, rest) = points.split_at_mut(nx);
         let (xi, rest) = rest.split_at_mut(nx);
@@ -234,30 +232,30 @@ impl<M: Dae, E: Lanes, const S: usize, const LED: bool> Kernel for Place<'_, M, 
         let places = own_xdot.unwrap_or_default().iter_mut().zip(own_xi.unwrap_or_default());
         let own_y = y.get(k.clone()).unwrap_or_default();
         for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(k).zip(own_y) {
-            if !(LED && (const { !are_together::<M>() }) && follows::<M>(state).is_some()) {
+            if !(UNKNOWNS && (const { !are_together::<M>() }) && linalg::kinematic::<M>(state).is_some()) {
                 (*xdot, *xi) = (*k, stages::<A, E, S>(x, &minus_ha, k));
             }
         }
-        if LED {
-            each_row::<A, _>(&mut Followers::<M, E, S> { points, jacobian, x, minus_ha });
+        if UNKNOWNS {
+            each_row::<A, _>(&mut Reconstruct::<M, E, S> { points, jacobian, x, minus_ha });
         }
     }
 }
 
-/// Those of states that follow, and their states, once that of whom they follow is there.
-struct Followers<'a, M: Dae, E: Plain, const S: usize> {
+/// Kinematic states and their derivatives, once their velocities are there.
+struct Reconstruct<'a, M: Dae, E: Plain, const S: usize> {
     points: &'a mut [[E; S]],
     jacobian: &'a M::Jacobian<[E; S]>,
     x: &'a [E],
     minus_ha: Block<E, S>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Followers<'_, M, E, S> {
-    const ROWS: usize = M::STRUCTURE.elimination.followers.len();
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Reconstruct<'_, M, E, S> {
+    const ROWS: usize = kinematic::count::<M>();
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Some(k) = follower::<M, E, S>(state, self.jacobian, self.points) else { return };
+        let Some(k) = derivative::<M, E, S>(state, self.jacobian, self.points) else { return };
         let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
         *xdot = k;
         if let Some(xi) = self.points.get_mut(M::Shape::NX + state) {

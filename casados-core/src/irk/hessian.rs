@@ -12,7 +12,7 @@ use super::along::Along;
 use super::curvature::{COLUMNS, Subtract};
 use super::curved_adjoint::{Back, is_worth};
 use super::evaluate::not_finite;
-use super::folds::{Fold, Lone};
+use super::lone::Lone;
 use super::record::{Coefficients, Linearization, Step, Work, copy};
 use super::stages::Stages;
 use super::step::check;
@@ -172,9 +172,6 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
     ) {
         let last = n + 1 == count;
         let Self { g, sum, entries, .. } = self;
-        if const { !M::STRUCTURE.folded.is_empty() } {
-            dispatch(Fold::<M, E, S> { entries: entries.as_mut(), model: PhantomData });
-        }
         let (entries, d, sum) =
             (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
         if const { is_worth::<M, E, S>() } {

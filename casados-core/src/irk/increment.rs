@@ -1,13 +1,13 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use super::follow::led;
+use super::kinematic::unknowns;
 use super::measure::{Followed, Measure};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, follows, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
-/// The residual in the slots of the equations; states that [follow](super::follow) others have none.
+/// The residual in the slots of the equations; that of kinematic states is zero.
 pub(super) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
     pub f: &'a ArrayK<M, [E; S]>,
     pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
@@ -28,13 +28,11 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, equation: usize) {
         let slot = slot::<M>(equation);
-        let follower = follows::<M>(slot);
-        if follower.is_some_and(|follower| !follower.asked) {
+        if kinematic::<M>(slot).is_some() {
             return;
         }
         if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
-            let zero = [E::from_f64(0.0); S];
-            to.as_flattened_mut().copy_from_slice(if follower.is_some() { &zero } else { f });
+            to.as_flattened_mut().copy_from_slice(f);
         }
     }
 }
@@ -161,15 +159,15 @@ fn subtract<E: Lanes, const S: usize, const N: usize>(
     }
 }
 
-/// What belongs to unknowns that iterations find, as far as that is a part of it: those that [follow](super::follow) others have no increments.
+/// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
 #[inline(always)]
 pub(super) fn part<M: Dae, T>(of: &[T]) -> &[T] {
-    of.get(const { led::<M>().0 }..const { led::<M>().1 }).unwrap_or_default()
+    of.get(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
 }
 
 #[inline(always)]
 pub(super) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
-    of.get_mut(const { led::<M>().0 }..const { led::<M>().1 }).unwrap_or_default()
+    of.get_mut(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
 }
 
 /// What is known of the increments of some unknowns, in `N` strands.

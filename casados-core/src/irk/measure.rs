@@ -1,8 +1,8 @@
-//! How large an increment of Newton's method is, relative to the unknowns, and what that means for states that follow them.
+//! How large an increment of Newton's method is, relative to the unknowns, and what that means for kinematic states.
 
-use super::follow::{leader, led};
 use super::increment::{part, part_mut};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, has_followers};
+use super::kinematic::{count, is_any, minus_c, unknowns, velocity};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 use crate::shape::Plain;
@@ -33,7 +33,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
         let (increments, last) = part::<M, _>(increment.as_ref()).as_chunks::<4>();
         let (own_weights, last_weights) = part_mut::<M, _>(weights.as_mut()).as_chunks_mut::<4>();
         let (own_sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
-        let mut states = x.as_ref().get(const { led::<M>().0 }..).unwrap_or_default();
+        let mut states = x.as_ref().get(const { unknowns::<M>().0 }..).unwrap_or_default();
         let mut some = Relative { largest: [zero; 4], sum: [zero; 4], per_step };
         for (((y, increments), weights), sizes) in ys.iter().zip(increments).zip(own_weights).zip(own_sizes) {
             some.take(&mut states, y, increments, weights, sizes);
@@ -45,7 +45,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             others.take(&mut states, y, increment, weight, size);
         }
         let most = size_of([some.total(), others.total()]);
-        if const { !has_followers::<M>() } {
+        if const { !is_any::<M>() } {
             return most;
         }
         let mut norm = zero;
@@ -57,9 +57,10 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             norm = sum.max(norm);
         }
         let norm = E::from_f64(TYPICAL) * norm * h.abs();
-        let mut led = Leaders::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
-        each_row::<A, _>(&mut led);
-        led.most
+        let mut velocities =
+            Velocities::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
+        each_row::<A, _>(&mut velocities);
+        velocities.most
     }
 }
 
@@ -123,8 +124,8 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
     }
 }
 
-/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where what `q` follows is much smaller than its change within the step.
-struct Leaders<'a, M: Dae, E: Plain, const S: usize> {
+/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its change within the step.
+struct Velocities<'a, M: Dae, E: Plain, const S: usize> {
     followed: &'a Followed<'a, M, E, S>,
     x: &'a ArrayX<M, E>,
     increment: &'a ArrayK<M, [[E; 1]; S]>,
@@ -137,15 +138,18 @@ struct Leaders<'a, M: Dae, E: Plain, const S: usize> {
     most: E,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> AtRow for Leaders<'_, M, E, S> {
-    const ROWS: usize = M::STRUCTURE.elimination.followers.len();
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
+    const ROWS: usize = count::<M>();
     const INSTRUCTIONS: usize = 8;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Followed { jacobian, points, .. } = self.followed;
-        let Some((leader, minus_c)) = leader::<M, E, S>(state, jacobian) else { return };
+        let Some(of) = kinematic::<M>(state) else { return };
+        let (Some(own), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
+            return;
+        };
         let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
-        let (Some(weight), Some(k)) = (weights.get_mut(leader), points.as_ref().get(state)) else { return };
+        let (Some(weight), Some(k)) = (weights.get_mut(own), points.as_ref().get(state)) else { return };
         let bound = self.norm * minus_c.abs();
         // At one stage it is large enough nearly always.
         if !E::any(E::lt(*weight * k[0].abs(), bound)) {
@@ -159,7 +163,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Leaders<'_, M, E, S> {
         for k in k {
             size = k.abs().max(size);
         }
-        if let (Some(to), Some(increment)) = (sizes.get_mut(leader), self.increment.as_ref().get(leader)) {
+        if let (Some(to), Some(increment)) = (sizes.get_mut(own), self.increment.as_ref().get(own)) {
             *weight = (bound / size).max(*weight);
             let mut largest = E::from_f64(0.0);
             for [delta] in increment {
@@ -171,11 +175,11 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Leaders<'_, M, E, S> {
     }
 }
 
-/// So much of their bound increments of followers typically are: `Σ_j a_ij Δ_j` sums up to half of the largest `Σ_j |a_ij| |Δ_j|` if they have one
+/// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to half of the largest `Σ_j |a_ij| |Δ_j|` if they have one
 /// sign at all stages, and less if not. (With the bound itself 5 masses take an iteration more in each step than their own increments ask for.)
 const TYPICAL: f64 = 0.25;
 
-/// Who [follows](super::follow) unknowns, whose increments count for them too.
+/// What increments of velocities are measured by too: `k_q` of [kinematic](super::kinematic) states.
 pub(super) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// Where their `k` are.

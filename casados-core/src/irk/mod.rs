@@ -13,7 +13,7 @@
 //! accurate methods its value at the end is the last stage.
 //!
 //! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its `progress`, and, where that does
-//! not arrive, `pivoted`, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`
+//! not arrive, `pivoted`, what errors say about where it `started`, and the `doubt` about linear equations, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`
 //! by products of panels (`curvature`) or by a `curved_adjoint` of large models,
 //! `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
 //! `sensitivities` what users see.
@@ -27,14 +27,14 @@ mod curved_advance;
 mod curved_rows;
 mod dense;
 mod directions;
+mod doubt;
 mod evaluate;
-mod folds;
-mod follow;
 mod forward;
 mod hessian;
-mod implied;
 mod increment;
 mod integrator;
+mod kinematic;
+mod lone;
 mod measure;
 mod multiply;
 mod newton;
@@ -46,6 +46,7 @@ mod right_side;
 mod run;
 mod sensitivities;
 mod stages;
+mod started;
 mod step;
 mod sums;
 mod sweep;

@@ -14,8 +14,8 @@
 //! terms: more cannot be known. (Where a model rests, unknowns are differences of large terms that cancel: they have no digits
 //! by which an increment could be small.)
 //!
-//! States that [follow](crate::model::Follower) another one, as `q` in `q̇ = v`, are no unknowns here: their `k` is that of whom they follow before
-//! each iteration and after the last, whatever start values are given for it.
+//! [Kinematic](crate::model::Kinematic) states, as `q` in `q̇ = v`, are no unknowns: their `k` follows from that of `v` before each iteration and
+//! after the last, whatever start values are given for it.
 //!
 //! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
 //! values is kept as long as the iterations that are still expected with it cost less than a new one. How many that are is known from
@@ -24,16 +24,16 @@
 //! solved in the eigenbasis of the tableau, in numbers that may be [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for
 //! each stage.
 //!
-//! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost.
+//! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost; and whether
+//! they [determine](super::doubt) a solution.
 //!
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
-use super::follow::blocks_of_iteration;
 use super::increment::{Largest, PlaceResidual, Subtract, Update};
 use super::measure::{Followed, Measure};
 use super::progress::{Look, Progress, Verdict, remaining};
 use super::record::{Coefficients, Linearization, Work};
-use crate::linalg::dispatch;
+use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::{Jacobian, Newton, Options};
@@ -65,6 +65,8 @@ pub(crate) struct Solved<E: Lanes> {
     pub converged: E::Mask,
     /// Whether the factors that are there are those of the solution.
     pub exact: bool,
+    /// An unknown of linear equations that they do not determine, in some lane that has not converged for that.
+    pub undetermined: Option<usize>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
@@ -74,17 +76,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         M::STRUCTURE.operations.residual as f64 + blocks * S as f64 + 1.0
     };
 
-    /// The same in the eigenbasis, of the blocks that it needs. (With all of them the mean Jacobian is renewed where iterations with the old one
-    /// would have done: 33 masses take 28 % more, 3 and 5 take 10 %. Factors by blocks are counted with all: they are needed for derivatives in
-    /// any case, and 5 masses with two stages would take 9 % more.)
-    const ITERATION_OF_MEAN: f64 = {
-        let blocks = blocks_of_iteration::<M>() as f64;
-        M::STRUCTURE.operations.residual as f64 + blocks * S as f64 + 1.0
-    };
-
-    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis. States that iterations leave
-    /// out of the elimination count: without them factors would seem cheap enough to be renewed where iterations with the old ones do (7 masses
-    /// with two stages take 3 % more, their adjoints 5 %; 13 and 33 masses with four stages take 9 and 7 % more).
+    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis.
     const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
         let (s, inverses) = (S as f64, 4.0 * plan.pivots.len() as f64);
@@ -92,9 +84,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let jacobian = operations.residual_jacobian as f64;
         // One for all stages, where they are not evaluated side by side.
         let middle = if E::LANES > 1 { jacobian / s } else { jacobian };
-        let (updates, means) = (plan.products(s) + inverses, plan.products(1.0) + inverses);
-        let of_blocks = (jacobian + updates * s * s) / Self::ITERATION;
-        [of_blocks, (middle + means * 4.0) / Self::ITERATION_OF_MEAN]
+        let products = plan.products() + inverses;
+        let of_blocks = (jacobian + products * s * s) / Self::ITERATION;
+        [of_blocks, (middle + products * 4.0) / Self::ITERATION]
     };
 
     /// The cost of a residual, in iterations.
@@ -121,10 +113,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             Some(count) => self.iterate(coefficients, kept, jacobian, count, step, x, y, statistics),
             None => self.converge(coefficients, kept, options, step, x, y, statistics),
         };
-        self.follow(coefficients, x, y);
+        self.reconstruct(coefficients, x, y);
         if options.compensated {
             self.place_compensated(coefficients, x, y);
-            self.follow_compensated(y);
+            self.reconstruct_compensated(y);
         }
         solved
     }
@@ -157,6 +149,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         // Exact factors of the step before are the best there are, and cost nothing.
         let mut mean = basis.is_some() && !self.validity.factors;
         let mut renewals = 0;
+        // Of old factors it is known already.
+        let mut factored = false;
         let mut near = cfg!(feature = "alloc") && Self::EXACT && self.near && mean;
         let mut renew = if mean {
             !self.validity.mean
@@ -170,21 +164,21 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let ask = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
         let mut first = E::from_f64(0.0);
         let mut iteration = 0;
-        // Nothing will be written where states follow others.
+        // Nothing will be written where states are kinematic.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
-        let mut expect = self.expects_followers(renew);
+        let mut missing = self.is_missing(renew);
         loop {
-            if expect {
+            if missing {
                 self.place(coefficients, step, x, y);
             } else {
-                self.place_led(coefficients, step, x, y);
+                self.place_unknowns(coefficients, step, x, y);
             }
             // The first iteration of nonlinear equations is far away in any case.
             let compensate = *compensated && (iteration > 0 || exact);
             if compensate {
-                self.follow(coefficients, x, y);
+                self.reconstruct(coefficients, x, y);
                 self.place_compensated(coefficients, x, y);
-                self.follow_compensated(y);
+                self.reconstruct_compensated(y);
                 self.place_compensated(coefficients, x, y);
             }
             let asked = ask && iteration == 1;
@@ -199,36 +193,37 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
                 mean = basis.is_some() && !near && (simplified || renewals < MEANS);
                 renewals += usize::from(renew);
+                factored = true;
                 if mean && !*compensated {
                     self.evaluate_middle(coefficients, step, x, y, asked);
                 } else {
                     self.evaluate_jacobian();
                 }
-                match (basis, self.mean.get_mut()) {
-                    (Some(basis), Some(factors)) if mean => {
-                        factors.factor(&self.linear.jacobian, self.first_only, basis, h);
-                    }
-                    _ => {
-                        kept = None;
-                        self.factor(coefficients);
-                    }
+                if !(mean && self.factor_mean(basis)) {
+                    kept = None;
+                    self.factor(coefficients);
                 }
             }
             if ask && iteration == 0 {
                 first = dispatch(Largest { residual: self.f.as_ref().as_flattened() });
             }
-            if core::mem::take(&mut expect) {
-                self.expect_followers(coefficients);
+            if core::mem::take(&mut missing) {
+                self.eliminate_missing(coefficients);
             }
             if compensate {
                 self.correct_residual();
-                self.correct_followers(coefficients);
+                self.eliminate_rounded(coefficients);
             }
             if exact && iteration > 0 {
                 self.validity.factors = true;
-                let satisfied = self.is_satisfied();
+                let mut satisfied = self.is_satisfied();
                 if E::all(satisfied) || iteration == REFINEMENTS {
-                    return Solved { converged: satisfied, exact: true };
+                    let mut undetermined = None;
+                    if factored && self.has_small_pivot(x, y) {
+                        let (determined, unknown) = self.is_determined(coefficients, step, x, y);
+                        (satisfied, undetermined) = (E::and(satisfied, determined), unknown);
+                    }
+                    return Solved { converged: satisfied, exact: true, undetermined };
                 }
             }
             // The first increments of what begins far away may grow.
@@ -240,12 +235,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             iteration += 1;
             statistics.iterations += 1;
-            match (basis, self.mean.get_mut()) {
-                (Some(basis), Some(factors)) if mean => factors.solve(basis, &self.f, &mut self.increment),
-                _ => {
-                    self.place_residual();
-                    kept.unwrap_or(&self.linear).factors.solve_led(&mut self.increment);
-                }
+            if !(mean && self.solve_mean(basis)) {
+                self.place_residual();
+                kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             }
             let floor = E::from_f64(rounding / tolerance);
             let followed = &Followed::<M, E, S> {
@@ -280,7 +272,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             if iteration == most {
                 (self.validity.factors, self.validity.mean) = (false, false);
-                return Solved { converged: progress.converged, exact: false };
+                return Solved { converged: progress.converged, exact: false, undetermined: None };
             }
             if iteration > 1 && renewals > FAR && verdict.grows {
                 // The mean of the stages does not do.
@@ -316,14 +308,14 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let valid = self.validity.factors
             && (M::STRUCTURE.constant_matrix
                 || jacobian == Jacobian::Simplified && !M::STRUCTURE.linear_in_state);
-        // Nothing will be written where states follow others.
+        // Nothing will be written where states are kinematic.
         self.increment.as_mut().fill([[E::from_f64(0.0)]; S]);
         for iteration in 0..count {
-            let expect = self.expects_followers(!valid);
-            if expect {
+            let missing = self.is_missing(!valid);
+            if missing {
                 self.place(coefficients, step, x, y);
             } else {
-                self.place_led(coefficients, step, x, y);
+                self.place_unknowns(coefficients, step, x, y);
             }
             if valid || iteration > 0 && jacobian == Jacobian::Frozen {
                 statistics.residuals += 1;
@@ -335,44 +327,64 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 kept = None;
                 self.factor(coefficients);
             }
-            if expect {
-                self.expect_followers(coefficients);
+            if missing {
+                self.eliminate_missing(coefficients);
             }
             statistics.iterations += 1;
             self.place_residual();
-            kept.unwrap_or(&self.linear).factors.solve_led(&mut self.increment);
+            kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
             dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
         }
         let zero = E::from_f64(0.0);
-        Solved { converged: E::le(zero, zero), exact: false }
+        Solved { converged: E::le(zero, zero), exact: false, undetermined: None }
     }
 
-    /// Factors by blocks; of all unknowns where derivatives will take them, too.
+    /// Factors of the mean Jacobian, if there is memory for them. Of one stage or two there is no eigenbasis, and nothing is compiled.
+    #[inline(always)]
+    fn factor_mean(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
+        if const { S > 2 }
+            && let (Some(basis), Some(factors)) = (basis, self.mean.get_mut())
+        {
+            factors.factor(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
+            return true;
+        }
+        false
+    }
+
+    /// Solves with them.
+    #[inline(always)]
+    fn solve_mean(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
+        if const { S > 2 }
+            && let (Some(basis), Some(factors)) = (basis, self.mean.get_mut())
+        {
+            factors.solve(basis, &self.f, &mut self.increment);
+            return true;
+        }
+        false
+    }
+
+    /// Factors by blocks.
     fn factor(&mut self, coefficients: &Coefficients<E, S>) {
         let (Linearization { jacobian, factors }, h) = (&mut self.linear, self.inputs.time.step);
-        if const { M::STRUCTURE.linear_in_state || M::STRUCTURE.constant_matrix } {
-            factors.factor_by_plan(jacobian, &coefficients.a, h);
-        } else {
-            factors.factor_led_by_plan(jacobian, &coefficients.a, h);
-        }
+        factors.factor_by_plan(jacobian, &coefficients.a, h);
     }
 
     /// Whether the residual that an increment leaves, of the `first` one, lets so many iterations be expected that new factors cost less.
-    /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well.
+    /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well. Where it leaves more than there
+    /// was, another increment by the same factors would be longer than the first, and may lead to another root than Newton's
+    /// method does.
     fn leaves_much(&self, first: E, tolerance: f64, cheap: bool) -> bool {
         let left = dispatch(Largest { residual: self.f.as_ref().as_flattened() }) / first;
         let expensive = STILL[usize::from(cheap)] + Self::RESIDUAL + Self::RENEWAL[usize::from(cheap)];
         let mut cell: E::Cell = Zeroable::zeroed();
         left.store(&mut cell);
-        let slowest = (0..E::LANES)
-            .map(|lane| E::lane(&cell, lane))
-            .filter(|&left| left < 1.0 / 16.0)
-            .fold(0.0, f64::max);
-        remaining(true, 1.0, slowest, tolerance) > expensive
+        let lanes = || (0..E::LANES).map(|lane| E::lane(&cell, lane));
+        let slowest = lanes().filter(|&left| left < 1.0 / 16.0).fold(0.0, f64::max);
+        remaining(true, 1.0, slowest, tolerance) > expensive || lanes().any(|left| left >= 1.0)
     }
 
     /// The residual in the slots of the equations.
-    fn place_residual(&mut self) {
+    pub(super) fn place_residual(&mut self) {
         dispatch(PlaceResidual::<M, E, S> { f: &self.f, increment: &mut self.increment });
     }
 
@@ -381,6 +393,6 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.validity.rate = progress.slowest_rate();
         let any = E::any(progress.converged);
         (self.validity.factors, self.validity.mean) = (any && !mean, any && mean);
-        Solved { converged: progress.converged, exact: false }
+        Solved { converged: progress.converged, exact: false, undetermined: None }
     }
 }

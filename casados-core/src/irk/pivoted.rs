@@ -75,6 +75,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                         unknown: unknown_name::<M>(last.unknown),
                         increment: last.size.to_f64(),
                         at: Place { step, stage, iteration },
+                        started: None,
                     });
                 }
             }
@@ -86,7 +87,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                     *to = f.map(|f| [f]);
                 }
             }
-            self.linear.factors.solve(&mut self.increment);
+            self.linear.solve((coefficients, self.inputs.time.step), &mut self.increment);
             let increment = self.update(y);
             iteration += 1;
             statistics.iterations += 1;

@@ -57,7 +57,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
             end: end.map(E::from_f64),
             // Polynomials of higher degree are not worth much outside of their interval.
             next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
-            basis: if S < 3 || !mean { None } else { Eigenbasis::new(&tableau) },
+            basis: if const { S < 3 } || !mean { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
     }

@@ -43,7 +43,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     ) {
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
-            let correction = self.correction(work);
+            let correction = self.correction(work, coefficients);
             // Also if it is not a number: then there is nothing to be refined with.
             if !(correction > ROUNDING * T::EPSILON && correction < 0.5 * last) {
                 return;
@@ -61,7 +61,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     /// The largest correction of the sum of all directions, relative to each unknown; of a slope also to what it changes,
     /// `V_n / h`. The sum is where it was tried on the equations.
-    fn correction<F: Fallback>(&self, work: &mut Work<M, T, S, F>) -> f64 {
+    fn correction<F: Fallback>(&self, work: &mut Work<M, T, S, F>, coefficients: &Coefficients<T, S>) -> f64 {
         let (nx, h) = (M::Shape::NX, work.inputs.time.step);
         work.probe_tangent();
         let Work { probe: [sum, tangent], increment, linear, .. } = work;
@@ -70,7 +70,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                 *to = tangent.map(|element| [element]);
             }
         }
-        linear.factors.solve(increment);
+        linear.solve((coefficients, h), increment);
         let mut largest = 0.0f64;
         for (unknown, correction) in increment.as_ref().iter().enumerate() {
             let own = if unknown < nx { unknown } else { unknown + nx };
@@ -123,7 +123,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
                     }
                 }
             }
-            work.linear.factors.solve::<[T; W]>(&mut right);
+            work.linear.solve::<W>((coefficients, work.inputs.time.step), &mut right);
             let dy = R::flat_mut(self.dy_mut());
             let (dy, _) = panel_mut::<T, W>(dy, column, nk * S).as_chunks_mut::<S>();
             for (rows, corrections) in dy.iter_mut().zip(right.as_ref()) {

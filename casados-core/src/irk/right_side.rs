@@ -1,26 +1,18 @@
-//! Right-hand sides of forward sensitivities, `−(f_x,i V_n + f_w,i)` in the slots of the equations.
+//! Right-hand sides of forward sensitivities, `−(f_x,i V_n + f_w,i)` in the slots of the equations, from which
+//! [kinematic](super::kinematic) states have been eliminated:
+//!
+//! ```text
+//! −(f_x,i V_n + f_q,i h c_i c V_v + f_q̇,i c V_v + f_w,i)
+//! ```
 
 use super::directions::{Directions, panel_of};
 use super::evaluate::entry;
-use super::implied::leader;
-use crate::linalg::{Arithmetic, AtRow, Packet, each_row, implied, is_implied, is_short, slot};
-use crate::model::{Dae, Steady};
+use super::kinematic::{Forward, felt, minus_c};
+use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
+use crate::model::{Dae, Felt};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
-
-/// What is known of a [steady](Steady) state, if a state is.
-#[inline(always)]
-fn steady<M: Dae>(state: usize) -> Option<Steady> {
-    let steady = *M::STRUCTURE.elimination.steady.get(state)?;
-    (steady.entry != Steady::NONE).then_some(steady)
-}
-
-/// Whether a steady state is subtracted from the equation of a slot: one that comes later.
-#[inline(always)]
-fn is_later<M: Dae>(slot: usize, than: &Steady) -> bool {
-    matches!(M::STRUCTURE.elimination.steady.get(slot), Some(of) if of.turn > than.turn)
-}
 
 /// `h c_i`, as sums of the rows of `hA`.
 #[inline(always)]
@@ -34,8 +26,7 @@ pub(super) fn nodes<E: Lanes, const S: usize>(a: &[[E; S]; S], h: E) -> [E; S] {
     nodes
 }
 
-/// `−(f_x,i V_0 + f_w,i)`, where every direction is an element of `w`: entries of the Jacobian go to their places in all panels. Steady
-/// states have been subtracted.
+/// The same where every direction is an element of `w` and `V_n` the unit matrix: entries of the Jacobian go to their places in all panels.
 pub(super) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     pub nodes: &'a [E; S],
@@ -43,45 +34,58 @@ pub(super) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     pub directions: PhantomData<D>,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
-    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`.
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1];
-    const INSTRUCTIONS: usize = 3 * S;
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S> {
+    /// Subtracts from one column of an equation.
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, row: usize) {
+    fn subtract(&mut self, slot: usize, column: usize, values: &[E; S]) {
         let nk = M::Shape::NK;
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
-        let Some(column) = direction::<M, E, D>(c) else { return };
         let (begin, width) = panel_of::<E>(column, D::COUNT, S);
         let place = begin * nk * S + (column - begin);
-        let of = slot::<M>(r);
-        let Some(steady) = steady::<M>(of) else {
-            for (stage, &value) in values.iter().enumerate() {
-                if let Some(to) = self.dy.get_mut(place + (of * S + stage) * width) {
-                    *to = *to - value;
-                }
-            }
-            return;
-        };
-        // All stages are the first.
-        if !is_implied::<E, S>(&steady)
-            && let Some(to) = self.dy.get_mut(place + of * S * width)
-        {
-            *to = -values[0];
-        }
-        for index in steady.first..steady.end {
-            let Some((r, _, felt)) = by_column::<M, _>(self.jacobian, index as usize) else { continue };
-            let of = slot::<M>(r);
-            if !is_later::<M>(of, &steady) {
-                continue;
-            }
-            for (stage, (&felt, &node)) in felt.iter().zip(self.nodes).enumerate() {
-                if let Some(to) = self.dy.get_mut(place + (of * S + stage) * width) {
-                    *to = *to + felt * node * values[0];
-                }
+        for (stage, &value) in values.iter().enumerate() {
+            if let Some(to) = self.dy.get_mut(place + (slot * S + stage) * width) {
+                *to = *to - value;
             }
         }
     }
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
+    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`, and those by which kinematic states are felt.
+    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] + M::STRUCTURE.elimination.felt.len();
+    const INSTRUCTIONS: usize = 3 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let entries = const { M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] };
+        if row >= entries {
+            let Some(felt) = M::STRUCTURE.elimination.felt.get(row - entries) else { return };
+            let through = through::<M, E, S>(self.jacobian, self.nodes, felt);
+            let Some((slot, velocity, products)) = through else { return };
+            if let Some(column) = direction::<M, E, D>(velocity) {
+                self.subtract(slot, column, &products);
+            }
+            return;
+        }
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[1] + row) else { return };
+        let (None, Some(column)) = (kinematic::<M>(slot::<M>(r)), direction::<M, E, D>(c)) else { return };
+        self.subtract(slot::<M>(r), column, values);
+    }
+}
+
+/// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`, with its slot and the variable.
+#[inline(always)]
+fn through<M: Dae, E: Lanes, const S: usize>(
+    jacobian: &M::Jacobian<[E; S]>,
+    nodes: &[E; S],
+    of: &Felt,
+) -> Option<(usize, usize, [E; S])> {
+    let kinematic = kinematic::<M>(of.state as usize)?;
+    let minus_c = minus_c::<M, E, S>(kinematic, jacobian)?;
+    let (slot, &(mut products), derivative) = felt::<M, E, S>(of, jacobian)?;
+    for (product, &node) in products.iter_mut().zip(nodes) {
+        let factor = if derivative { minus_c } else { node * minus_c };
+        *product = -(*product * factor);
+    }
+    Some((slot, kinematic.velocity as usize, products))
 }
 
 /// An entry of the Jacobian, by columns.
@@ -100,13 +104,15 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
     begin: usize,
 ) -> usize {
     for (slot, packet) in dy.iter_mut().enumerate() {
-        // Of steady states the first stage is looked at, if any.
-        let stages = match steady::<M>(slot) {
-            Some(steady) => usize::from(!is_implied::<E, S>(&steady)),
-            None => S,
-        };
-        for row in packet.iter_mut().take(stages) {
-            *row = [E::from_f64(0.0); W];
+        if kinematic::<M>(slot).is_none() {
+            *packet = [[E::from_f64(0.0); W]; S];
+        }
+    }
+    for felt in M::STRUCTURE.elimination.felt {
+        let Some((slot, velocity, products)) = through::<M, E, S>(jacobian, nodes, felt) else { continue };
+        let column = direction::<M, E, D>(velocity).and_then(|column| column.checked_sub(begin));
+        if let Some(column) = column.filter(|&column| column < W) {
+            subtract_at(dy, slot, column, &products);
         }
     }
     while let Some((r, c, values)) = by_column::<M, _>(jacobian, placed) {
@@ -115,27 +121,8 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
         if column >= begin + W {
             return placed - 1;
         }
-        let of = slot::<M>(r);
-        let Some(steady) = steady::<M>(of) else {
-            subtract_at(dy, of, column - begin, values);
-            continue;
-        };
-        // All stages are the first.
-        if !is_implied::<E, S>(&steady)
-            && let Some(to) = dy.get_mut(of).and_then(|packet| packet.first_mut()?.get_mut(column - begin))
-        {
-            *to = -values[0];
-        }
-        for index in steady.first..steady.end {
-            let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
-            if !is_later::<M>(slot::<M>(r), &steady) {
-                continue;
-            }
-            let mut products = *felt;
-            for (product, &node) in products.iter_mut().zip(nodes) {
-                *product = -(*product * node * values[0]);
-            }
-            subtract_at(dy, slot::<M>(r), column - begin, &products);
+        if kinematic::<M>(slot::<M>(r)).is_none() {
+            subtract_at(dy, slot::<M>(r), column - begin, values);
         }
     }
     placed
@@ -157,53 +144,6 @@ fn subtract_at<E: Lanes, const S: usize, const W: usize>(
     }
 }
 
-/// The right-hand side that a steady state has at all stages.
-#[inline(always)]
-fn own<A: Arithmetic, M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
-    jacobian: &M::Jacobian<[E; S]>,
-    v: &[[E; W]],
-    directions: &D,
-    column: usize,
-    state: usize,
-) -> Option<[E; W]> {
-    let (_, c, values) = entry::<M, _>(jacobian, steady::<M>(state)?.entry as usize)?;
-    let value = *values.first()?;
-    let mut row = [E::from_f64(0.0); W];
-    if c < 2 * M::Shape::NX {
-        A::subtract_row(&mut row, value, v.get(c - M::Shape::NX)?);
-    } else {
-        directions.add(c - M::Shape::NX - M::Shape::NZ, -value, column, &mut row);
-    }
-    Some(row)
-}
-
-/// Makes a right-hand side of which steady states have been subtracted that of the whole system again.
-#[inline(always)]
-pub(super) fn restore<A: Arithmetic, M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
-    jacobian: &M::Jacobian<[E; S]>,
-    nodes: &[E; S],
-    v: &[[E; W]],
-    (directions, column): (&D, usize),
-    dy: &mut [Packet<E, S, W>],
-) {
-    for state in 0..M::Shape::NX {
-        let Some(steady) = steady::<M>(state) else { continue };
-        let own = own::<A, M, E, D, S, W>(jacobian, v, directions, column, state);
-        let Some(own) = own else { continue };
-        for index in steady.first..steady.end {
-            let Some((r, _, felt)) = by_column::<M, _>(jacobian, index as usize) else { continue };
-            let of = slot::<M>(r);
-            let (true, Some(packet)) = (is_later::<M>(of, &steady), dy.get_mut(of)) else { continue };
-            for ((row, &felt), &node) in packet.iter_mut().zip(felt).zip(nodes) {
-                A::subtract_row(row, -(felt * node), &own);
-            }
-        }
-        if let Some(packet) = dy.get_mut(state) {
-            *packet = [own; S];
-        }
-    }
-}
-
 /// The direction that a variable other than `ẋ` is, if it is one.
 #[inline(always)]
 fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
@@ -217,21 +157,17 @@ fn direction<M: Dae, E, D: Directions<E>>(variable: usize) -> Option<usize> {
     }
 }
 
-/// `−(f_x,i V_n + f_w,i)` of a panel; steady states have been subtracted.
+/// The same of a panel, whatever `V_n` is.
 pub(super) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
-    pub jacobian: &'a M::Jacobian<[E; S]>,
+    pub kinematic: Forward<'a, M, E, D, S, W>,
     pub nodes: &'a [E; S],
-    pub v: &'a [[E; W]],
-    pub directions: &'a D,
     pub dy: &'a mut [Packet<E, S, W>],
-    pub column: usize,
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
     /// The first entry of `f_x`.
     const FIRST: usize = M::STRUCTURE.blocks[1];
-    /// Whether a straight line begins with zeros everywhere. (Where numbers are registers, 3 masses with four stages take 2 % less when each
-    /// row begins with its first entry; of plain numbers they take 3 % more.)
+    /// Whether a straight line begins with zeros everywhere: of plain numbers that is less than a row that begins with its first entry.
     const AT_ONCE: bool = size_of::<E>() <= 8;
 
     #[inline(always)]
@@ -239,26 +175,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         if const { Self::AT_ONCE && is_short::<A, Self>() } {
             self.dy.fill([[E::from_f64(0.0); W]; S]);
         }
-        // What multiplies `f_x` lies where their right-hand sides do, until all others are there.
-        for state in 0..M::STRUCTURE.elimination.steady.len() {
-            if let Some(leader) = leader::<M, E, S>(self.jacobian, state) {
-                let (Some(v), Some(to)) = (self.v.get(state), self.dy.get_mut(state)) else { continue };
-                for (to, &node) in to.iter_mut().zip(self.nodes) {
-                    let mut row = *v;
-                    leader.add_state::<A, M, W>(&mut row, node, self.v);
-                    *to = row;
-                    leader.add_input::<M, D, W>(to, node, self.directions, self.column);
-                }
-            } else if let (Some(own), Some(v), Some(to)) =
-                (self.own::<A>(state), self.v.get(state), self.dy.get_mut(state))
-            {
-                for (to, &node) in to.iter_mut().zip(self.nodes) {
-                    let mut row = *v;
-                    A::subtract_row(&mut row, -node, &own);
-                    *to = row;
-                }
-            }
-        }
+        self.kinematic.place::<A>(self.nodes, self.dy);
         if const { is_short::<A, Self>() } {
             each_row::<A, _>(&mut self);
             if const { !Self::AT_ONCE } {
@@ -267,23 +184,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
         } else {
             self.row_by_row::<A>();
         }
-        let Self { jacobian, directions, column, .. } = self;
+        self.kinematic.subtract_derivatives::<A>(self.dy);
+        let Forward { jacobian, directions, column, .. } = self.kinematic;
         each_row::<A, _>(&mut Inputs::<M, E, D, S, W> { jacobian, directions, dy: &mut *self.dy, column });
-        for state in 0..M::STRUCTURE.elimination.steady.len() {
-            if implied::<M, E, S>(state).is_some() {
-                continue;
-            }
-            let Some(own) = self.own::<A>(state) else { continue };
-            if let Some(to) = self.dy.get_mut(state).and_then(|packet| packet.first_mut()) {
-                *to = own;
-            }
-        }
-    }
-
-    /// The right-hand side of a steady state.
-    #[inline(always)]
-    fn own<A: Arithmetic>(&self, state: usize) -> Option<[E; W]> {
-        own::<A, M, E, D, S, W>(self.jacobian, self.v, self.directions, self.column, state)
     }
 
     /// Each row in registers, and written once; zeros where equations have no states.
@@ -291,41 +194,34 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     fn row_by_row<A: Arithmetic>(&mut self) {
         let (mut packet, mut last) = ([[E::from_f64(0.0); W]; S], 0);
         for row in 0..Self::ROWS {
-            let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
+            let Some((r, c, values)) = entry::<M, _>(self.kinematic.jacobian, Self::FIRST + row) else {
+                return;
+            };
             if last != r {
                 self.put(last, &packet);
                 self.clear(last + 1, r);
                 (packet, last) = ([[E::from_f64(0.0); W]; S], r);
             }
-            if !self.subtract::<A>(&mut packet, slot::<M>(r), c - M::Shape::NX, values) {
-                return;
-            }
+            self.subtract::<A>(&mut packet, c - M::Shape::NX, values);
         }
         self.put(last, &packet);
         self.clear(last + 1, M::Shape::NK);
     }
 
-    /// `packet − f_x,i V`, of one state, in the equation of a slot. Whether there is one.
+    /// `packet − f_x,i V`, of one state.
     #[inline(always)]
-    fn subtract<A: Arithmetic>(
-        &self,
-        packet: &mut Packet<E, S, W>,
-        slot: usize,
-        state: usize,
-        values: &[E; S],
-    ) -> bool {
-        if matches!(steady::<M>(state), Some(steady) if is_later::<M>(slot, &steady)) {
-            let Some(x) = self.dy.get(state) else { return false };
+    fn subtract<A: Arithmetic>(&self, packet: &mut Packet<E, S, W>, state: usize, values: &[E; S]) {
+        if kinematic::<M>(state).is_some() {
+            let Some(x) = self.dy.get(state) else { return };
             for ((row, &value), x) in packet.iter_mut().zip(values).zip(x) {
                 A::subtract_row(row, value, x);
             }
-            return true;
+            return;
         }
-        let Some(v) = self.v.get(state) else { return false };
+        let Some(v) = self.kinematic.v.get(state) else { return };
         for (row, &value) in packet.iter_mut().zip(values) {
             A::subtract_row(row, value, v);
         }
-        true
     }
 
     /// The equation that follows that of the entry before this one.
@@ -337,7 +233,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'
     #[inline(always)]
     fn put(&mut self, equation: usize, packet: &Packet<E, S, W>) {
         let slot = slot::<M>(equation);
-        if steady::<M>(slot).is_some() {
+        if kinematic::<M>(slot).is_some() {
             return;
         }
         if let Some(to) = self.dy.get_mut(slot) {
@@ -359,7 +255,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
     const INSTRUCTIONS: usize = 2 + S * if size_of::<E>() > 8 { 3 * W } else { 4 * W.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
-        let Some((r, c, values)) = entry::<M, _>(self.jacobian, Self::FIRST + row) else { return };
+        let Some((r, c, values)) = entry::<M, _>(self.kinematic.jacobian, Self::FIRST + row) else { return };
         let slot = slot::<M>(r);
         let next = Self::after(row);
         // The first entry of an equation has nothing to add to.
@@ -369,16 +265,17 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         } else {
             self.clear(next, r);
         }
-        if steady::<M>(slot).is_some() || !self.subtract::<A>(&mut packet, slot, c - M::Shape::NX, values) {
+        if kinematic::<M>(slot).is_some() {
             return;
         }
+        self.subtract::<A>(&mut packet, c - M::Shape::NX, values);
         if let Some(to) = self.dy.get_mut(slot) {
             *to = packet;
         }
     }
 }
 
-/// `−f_w,i` of a panel, of controls and parameters, but for steady states.
+/// `−f_w,i` of a panel, of controls and parameters.
 struct Inputs<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     directions: &'a D,
@@ -394,7 +291,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> AtRow f
         let shift = M::Shape::NX + M::Shape::NZ;
         let Some((r, c, values)) = entry::<M, _>(self.jacobian, M::STRUCTURE.blocks[3] + row) else { return };
         let slot = slot::<M>(r);
-        let (None, Some(packet)) = (steady::<M>(slot), self.dy.get_mut(slot)) else { return };
+        let (None, Some(packet)) = (kinematic::<M>(slot), self.dy.get_mut(slot)) else { return };
         for (row, &value) in packet.iter_mut().zip(values) {
             self.directions.add(c - shift, -value, self.column, row);
         }

@@ -157,8 +157,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             Start::Zero => From::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
             Start::Warm if self.warm => From::Record(kept),
-            Start::Warm if !self.given => From::Zero,
-            Start::Given | Start::Warm => From::Given,
+            _ if self.given => From::Given,
+            _ => From::Nominal,
         };
         work.integrate(
             coefficients,
@@ -198,6 +198,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn points(&mut self) -> Result<&ArrayV<M, [T; S]>, Error> {
         Ok(&W::nominal(&mut self.work)?.points)
+    }
+
+    /// The error of the last call, whose first step started at `y`, with what that has to do with it.
+    #[cfg(feature = "alloc")]
+    pub fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
+        let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());
+        W::nominal(&mut self.work).map_or(error, |work| work.explain_from(error, start))
     }
 
     /// The stages of every step, as a warm start.

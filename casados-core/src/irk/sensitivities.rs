@@ -178,7 +178,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
-    /// The solution at a time inside the interval of the last successful call, and its derivatives with
+    /// The solution at the time `t`, as the model sees it, inside the interval of the last successful call, and its derivatives with
     /// respect to `x₀`, `u` and `p`.
     ///
     /// The stages of that call are differentiated step by step up to the one that contains the time; times
@@ -196,7 +196,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let done = self.sweep.take().filter(|done| *done <= point.step);
         let mut parts = last;
         parts.work.inputs = parts.work.kept;
-        parts.work.place_inputs();
+        // Factors that are there may be those of a call that failed.
+        parts.work.begin();
         let first = done.map_or(0, |done| done + 1);
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;

@@ -2,8 +2,9 @@
 
 use super::compensated;
 use super::evaluate::{dot, not_finite};
+use super::pivoted::unknown_name;
 use super::record::{Coefficients, Linearization, Step, Validity, Work};
-use crate::error::Error;
+use crate::error::{Error, Place};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -14,6 +15,8 @@ use crate::statistics::Statistics;
 
 /// Where the unknowns of the stages start.
 pub(crate) enum From<'a, M: Dae, E: Lanes, const S: usize> {
+    /// At the start values of the model.
+    Nominal,
     Zero,
     Given,
     Record(&'a [Step<M, E, S>]),
@@ -30,7 +33,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.rest.as_mut().fill(E::from_f64(0.0));
     }
 
-    /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued.
+    /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued, or if that is not worth
+    /// much its algebraic states.
     pub(crate) fn start(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -49,15 +53,24 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             (_, Some(before), Some(next)) => {
                 dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
             }
-            (From::Zero, ..) => {
+            (From::Nominal | From::Zero, ..) => {
                 y.as_mut().fill([E::from_f64(0.0); S]);
                 self.alike = M::STRUCTURE.autonomous;
+                if matches!(from, From::Nominal) {
+                    for (y, start) in y.as_mut().iter_mut().zip(M::START) {
+                        *y = [E::from_f64(*start); S];
+                    }
+                    self.alike &= const { starts_at_rest::<M>() };
+                }
             }
             (From::Given, ..) => {
                 for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
                     *y = [*given; S];
                 }
             }
+        }
+        if coefficients.next.is_none() && !matches!(from, From::Record(_) | From::Solved(_)) {
+            stay(before, y);
         }
     }
 
@@ -141,19 +154,34 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             return Ok(false);
         }
         let Step { x, y } = step;
+        let mut undetermined = None;
         if !M::STRUCTURE.elimination.pivots.is_empty() {
             let solved = self.newton(coefficients, None, options, n, x, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
             }
+            undetermined = solved.undetermined;
             self.start(coefficients, from, n, None, y);
+            if !matches!(from, From::Record(_)) {
+                stay(before, y);
+            }
         }
         if !F::KEPT {
-            return Err(Error::NotPivoted { step: n });
+            return Err(
+                undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular::<M>(unknown, n))
+            );
         }
-        self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics)?;
-        Ok(false)
+        match self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics) {
+            // Of the whole matrix, pivoted, it is asked again.
+            Ok(()) if undetermined.is_some() => match self.is_determined(coefficients, n, x, y).1 {
+                Some(unknown) => Err(singular::<M>(unknown, n)),
+                None => Ok(false),
+            },
+            Ok(()) => Ok(false),
+            Err(error) if n == 0 => Err(self.explain_start(error, from)),
+            Err(error) => Err(error),
+        }
     }
 
     /// The linearisation at the solution of a step, `exact` if the factors that are there are its own.
@@ -207,6 +235,36 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             self.validity = Validity { factors: true, mean: false, rate: 0.0 };
         }
     }
+}
+
+/// The equations of a step do not determine an unknown.
+fn singular<M: Dae>(unknown: usize, step: usize) -> Error {
+    Error::Singular { unknown: unknown_name::<M>(unknown), at: Place { step, stage: 0, iteration: 1 } }
+}
+
+/// Algebraic states as at the last stage of the step before: on its branch.
+pub(crate) fn stay<M: Dae, E: Lanes, const S: usize>(
+    before: Option<&Step<M, E, S>>,
+    y: &mut ArrayK<M, [E; S]>,
+) {
+    let Some(before) = before else { return };
+    for (y, before) in y.as_mut().iter_mut().zip(before.y.as_ref()).skip(M::Shape::NX) {
+        if let Some(&last) = before.last() {
+            *y = [last; S];
+        }
+    }
+}
+
+/// Whether every `ẋ` starts at zero: then states are the same at all stages.
+const fn starts_at_rest<M: Dae>() -> bool {
+    let mut unknown = 0;
+    while unknown < M::Shape::NX && unknown < M::START.len() {
+        if M::START[unknown] != 0.0 {
+            return false;
+        }
+        unknown += 1;
+    }
+    true
 }
 
 /// Algebraic states at a point of the polynomial through the stages.

@@ -3,14 +3,14 @@
 
 use super::curved_rows::CurvedRows;
 use super::directions::{Directions, NEAREST, panel, panel_mut, panels};
-use super::implied::{Weighted, is_found};
+use super::kinematic::Forward;
 use super::record::{Coefficients, Linearization, Work, copy};
-use super::right_side::{Later, Scatter, nodes, place, restore};
+use super::right_side::{Later, Scatter, nodes, place};
 use super::sums::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::write::{Columns, Target};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, STEADY, Up, Viewer, coupling, dispatch, each_row,
-    implied, is_long, is_short, product, sweeps,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
+    is_short, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -29,7 +29,7 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
     end: bool,
     /// The first of them is what it is at the start of an interval, where that is always the same.
     begun: bool,
-    /// `d(k, z)/dw` at its stages, but for [implied](crate::model::Steady::implied) ones.
+    /// `d(k, z)/dw` at its stages.
     dy: Aligned<ArrayK<M, [R; S]>>,
     /// Weighted sums over all columns of `dy` and of `V_n`, in strands.
     pub(super) sums: Aligned<ArrayK<M, [[T; STRANDS]; S]>>,
@@ -253,12 +253,13 @@ struct Step<'a, M: Dae, E: Plain, D, G, const S: usize> {
 }
 
 /// What all panels share.
-struct Shared<'a, M: Dae, E: Plain, D, const S: usize> {
+struct Shared<E, const S: usize> {
     /// `h c_i`
     nodes: [E; S],
-    weighted: Weighted<'a, M, E, D, S>,
-    /// `(hA)²`, where that is asked for.
-    square: Block<E, S>,
+    /// `−hA`
+    minus_ha: Block<E, S>,
+    /// `−h b_i`
+    minus_weights: [E; S],
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Step<'_, M, E, D, G, S> {
@@ -288,21 +289,19 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
                 directions: PhantomData,
             });
         }
-        let Self { jacobian, coefficients, h, directions, .. } = self;
-        let mut square = [[E::from_f64(0.0); S]; S];
-        if const { !is_found::<M, E, S>() } && self.curved.is_some() {
-            let minus_ha = &coupling(&coefficients.a, h);
-            square = product::<A, E, S>(minus_ha, minus_ha);
+        let Self { coefficients, h, .. } = self;
+        let mut minus_weights = coefficients.b;
+        for weight in &mut minus_weights {
+            *weight = -(h * *weight);
         }
-        let weighted = Weighted::of_step(jacobian, (coefficients, h), directions);
-        let shared = &Shared { nodes, weighted, square };
+        let shared = &Shared { nodes, minus_ha: coupling(&coefficients.a, h), minus_weights };
         panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column, shared));
         // Nothing times what is not finite is not a number.
         E::from_f64(0.0) * self.sum
     }
 }
 
-impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'a, M, E, D, G, S> {
+impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
     /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
         let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
@@ -316,12 +315,12 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
     }
 
     #[inline(always)]
-    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, shared: &Shared<'a, M, E, D, S>) {
+    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, shared: &Shared<E, S>) {
         self.before::<A, W>(column, &shared.nodes);
         let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
         let minus_weights = &minus_weights::<E, W>(column, self.second);
         if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
-            sweeps::<A, M, E, [E; W], S, W, Down<STEADY>, Up<STEADY>>(self.factors, dy, 0, &mut ());
+            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
         } else if self.phase == Phase::Whole {
             let ahead = match &self.result {
                 Some(to) if self.distant => Ahead(to.following::<W>(column)),
@@ -329,7 +328,7 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
             };
             let sums = &mut *self.sums;
             let viewer = &mut Summed { sums, minus_weights, ahead };
-            sweeps::<A, M, E, [E; W], S, W, Down<STEADY>, Up<STEADY>>(self.factors, dy, 0, viewer);
+            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, viewer);
         }
         self.after::<A, W>(column, minus_weights, shared);
     }
@@ -346,13 +345,10 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
         }
         let (jacobian, directions) = (self.jacobian, self.directions);
         if !(self.first && D::SPARSE) {
-            Later::<M, E, D, S, W> { jacobian, nodes, v, directions, dy: &mut *dy, column }.all::<A>();
+            let kinematic = Forward { jacobian, v, directions, column };
+            Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
         } else if const { !Self::is_small::<A>() } {
             self.placed = place::<M, E, D, S, W>(jacobian, nodes, self.placed, dy, column);
-        }
-        // Factors of the whole matrix know of no order.
-        if self.phase == Phase::Before {
-            restore::<A, M, E, D, S, W>(jacobian, nodes, v, (directions, column), dy);
         }
     }
 
@@ -362,7 +358,7 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
         &mut self,
         column: usize,
         minus_weights: &[E; W],
-        shared: &Shared<'a, M, E, D, S>,
+        shared: &Shared<E, S>,
     ) {
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let v = panel::<E, W>(self.v, column, nx);
@@ -370,13 +366,17 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
         if self.phase == Phase::Before || v.len() != nx || dy.len() != nk {
             return;
         }
-        if self.phase == Phase::After || const { Self::sums_late::<A>() } {
-            let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
+        let late = self.phase == Phase::After || const { Self::sums_late::<A>() };
+        let (jacobian, directions) = (self.jacobian, self.directions);
+        let kinematic = Forward::<M, E, D, S, W> { jacobian, v, directions, column };
+        let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
+        if late {
+            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
             for (slot, packet) in dy.iter().enumerate() {
-                if implied::<M, E, S>(slot).is_none() {
-                    sums.see::<A>(slot, packet);
-                }
+                sums.see::<A>(slot, packet);
             }
+        } else {
+            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
         }
         let unit = self.first && D::SPARSE;
         if !unit {
@@ -388,22 +388,17 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
         let from = if unit { None } else { Some(v) };
         let ones = if unit { M::STRUCTURE.directions.get(column..).unwrap_or_default() } else { &[] };
         if let Some(to) = &mut self.result {
-            let end = Columns {
-                start: from,
-                ones,
-                of: (v, dy),
-                unknowns: 0..nx,
-                column,
-                weighted: &shared.weighted,
-            };
+            let end =
+                Columns { start: from, ones, dy, unknowns: 0..nx, minus_weights: &shared.minus_weights };
             self.sum = self.sum + end.write::<A>(&mut to.columns::<W>(column));
         } else {
             let next = panel_mut::<E, W>(self.next, column, nx);
             for (n, (to, dk)) in next.iter_mut().zip(dy.iter()).enumerate() {
                 let mut row = from.and_then(|v| v.get(n)).copied().unwrap_or([E::from_f64(0.0); W]);
-                shared.weighted.add::<A, W>(&mut row, (n, dk), (v, dy));
+                for (&weight, dk) in shared.minus_weights.iter().zip(dk) {
+                    A::subtract_row(&mut row, weight, dk);
+                }
                 *to = row;
-                shared.weighted.add_input(to, n, column);
             }
             for (c, &state) in ones.iter().enumerate().take(W) {
                 if let Some(row) = next.get_mut(state as usize) {
@@ -414,10 +409,7 @@ impl<'a, M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<
         if let Some(curved) = &mut self.curved {
             let count = M::STRUCTURE.curved.len();
             let d = panel_mut::<E, W>(curved, column, count * S);
-            let minus_ha = coupling(&self.coefficients.a, self.h);
-            let Shared { nodes, square, .. } = shared;
-            let (jacobian, directions) = (self.jacobian, self.directions);
-            CurvedRows::<M, E, D, S> { jacobian, nodes, minus_ha, square, directions }
+            CurvedRows::<M, E, D, S> { minus_ha: shared.minus_ha, directions, model: PhantomData }
                 .panel::<A, W>(v, dy, d, column);
         }
     }

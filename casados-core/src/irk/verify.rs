@@ -10,11 +10,10 @@
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
 use super::evaluate::entry;
-use super::implied::{Leader, leader};
 use super::record::{Coefficients, Linearization, Work};
 use super::sums::{STRANDS, total};
 use super::sweep::Sweep;
-use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, implied, slot};
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};
 use crate::scalar::{Field, Lanes};
@@ -216,9 +215,6 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
             *sizes = sizes_of(values);
         }
         for (unknown, stages) in stage_sums.iter().enumerate() {
-            if implied::<M, E, S>(unknown).is_some() {
-                continue;
-            }
             let mut sum = [zero; S];
             for (sum, strands) in sum.iter_mut().zip(stages) {
                 *sum = total(strands);
@@ -231,20 +227,6 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
             } else {
                 (probe[nx + unknown], sizes[nx + unknown]) = (sum, size);
             }
-        }
-        // Implied by what is there now.
-        for state in 0..M::STRUCTURE.elimination.steady.len() {
-            let Some(Leader { minus_c, variable }) = leader::<M, E, S>(jacobian, state) else { continue };
-            if variable >= nv {
-                continue;
-            }
-            let (mut sum, mut size) = (probe[variable], sizes[variable]);
-            for (sum, size) in sum.iter_mut().zip(&mut size) {
-                (*sum, *size) = (-(minus_c * *sum), minus_c.abs() * *size);
-            }
-            let xi = moved::<A, E, S>(total(&start_sums[state]), &minus_ha, (&sum, &size));
-            (probe[state], sizes[state]) = (sum, size);
-            (probe[nx + state], sizes[nx + state]) = xi;
         }
         sums.as_mut().fill([zero; S]);
         terms.as_mut().fill([zero; S]);

@@ -1,13 +1,12 @@
 //! What derivatives over a step are written to: matrices of results, and rows of `D` at a stage.
 
 use super::directions::{Directions, Identity, panel, panels};
-use super::implied::Weighted;
 use super::record::Coefficients;
 use super::sweep::Sweep;
 use crate::linalg::{Arithmetic, Kernel, Packet, dispatch};
 use crate::model::{ArrayW, Dae};
 use crate::scalar::Lanes;
-use crate::shape::{Array, Plain, Shape};
+use crate::shape::{Array, Shape};
 use core::marker::PhantomData;
 use core::ops::Range;
 
@@ -158,12 +157,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
         let Self { v, dy, weights, to, .. } = self;
         let (nx, nk) = (M::Shape::NX, M::Shape::NK);
         let unknowns = if ALGEBRAIC { nx..nk } else { 0..nx };
-        let weighted = &Weighted::<M, E, D, S>::of_all(weights);
+        let mut minus_weights = *weights;
+        for weight in &mut minus_weights {
+            *weight = -*weight;
+        }
         let mut sum = E::from_f64(0.0);
         panels!(D::COUNT, E, S, column, W => {
             let v = v.map(|v| panel::<E, W>(v, column, nx)).filter(|v| v.len() == unknowns.len());
             let (dy, _) = panel::<E, W>(dy, column, nk * S).as_chunks::<S>();
-            let columns = Columns { start: v, ones: &[], of: (&[], dy), unknowns: unknowns.clone(), column, weighted };
+            let unknowns = unknowns.clone();
+            let columns = Columns { start: v, ones: &[], dy, unknowns, minus_weights: &minus_weights };
             sum = sum + columns.write::<A>(&mut to.columns::<W>(column));
         });
         // Nothing times what is not finite is not a number.
@@ -172,30 +175,28 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize, const ALG
 }
 
 /// `V + Σ_i weight_i dy_i` of a panel.
-pub(super) struct Columns<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+pub(super) struct Columns<'a, E, const S: usize, const W: usize> {
     /// What is added to. Nothing stands for zero, or for the unit matrix.
     pub start: Option<&'a [[E; W]]>,
     /// In which row each column of the unit matrix has its one; empty without one.
     pub ones: &'a [u32],
-    /// `V` at the start of the step, and the derivatives of its stages.
-    pub of: (&'a [[E; W]], &'a [Packet<E, S, W>]),
+    /// The derivatives of the stages.
+    pub dy: &'a [Packet<E, S, W>],
     /// The unknown of each row.
     pub unknowns: Range<usize>,
-    /// The first column.
-    pub column: usize,
-    pub weighted: &'a Weighted<'a, M, E, D, S>,
+    /// `−weight_i`
+    pub minus_weights: &'a [E; S],
 }
 
 /// So many rows are computed before they are written, each number to its column.
 const ROWS: usize = 4;
 
-impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Columns<'_, M, E, D, S, W> {
+impl<E: Lanes, const S: usize, const W: usize> Columns<'_, E, S, W> {
     /// Writes its columns; their sum, which is finite only if all of them are.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub fn write<A: Arithmetic>(&self, to: &mut [&mut [E]; W]) -> E {
         let mut sums = [E::from_f64(0.0); W];
-        let (_, dy) = self.of;
-        let (blocks, rest) = dy.get(self.unknowns.clone()).unwrap_or_default().as_chunks::<ROWS>();
+        let (blocks, rest) = self.dy.get(self.unknowns.clone()).unwrap_or_default().as_chunks::<ROWS>();
         for (n, dy) in blocks.iter().enumerate() {
             self.rows::<A, ROWS>(n * ROWS, dy, to, &mut sums);
         }
@@ -205,18 +206,6 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Columns
         for (to, &row) in to.iter_mut().zip(self.ones) {
             if let Some(one) = to.get_mut(row as usize) {
                 *one = *one + E::from_f64(1.0);
-            }
-        }
-        for (n, unknown) in self.unknowns.clone().enumerate() {
-            if !self.weighted.has_input(unknown) {
-                continue;
-            }
-            let mut row = [E::from_f64(0.0); W];
-            self.weighted.add_input(&mut row, unknown, self.column);
-            for (to, &element) in to.iter_mut().zip(&row) {
-                if let Some(to) = to.get_mut(n) {
-                    *to = *to + element;
-                }
             }
         }
         let mut sum = E::from_f64(0.0);
@@ -237,8 +226,10 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Columns
     ) {
         let v = self.start.and_then(|v| v.get(begin..)?.first_chunk::<R>());
         let mut rows = v.copied().unwrap_or([[E::from_f64(0.0); W]; R]);
-        for (r, (row, dk)) in rows.iter_mut().zip(dy).enumerate() {
-            self.weighted.add::<A, W>(row, (self.unknowns.start + begin + r, dk), self.of);
+        for (row, dk) in rows.iter_mut().zip(dy) {
+            for (&weight, dk) in self.minus_weights.iter().zip(dk) {
+                A::subtract_row(row, weight, dk);
+            }
             for (sum, &element) in sums.iter_mut().zip(&*row) {
                 *sum = *sum + element;
             }

@@ -69,14 +69,13 @@ pub fn subtract<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     }
 }
 
-/// `packet − diag(first column of block) · other`
+/// `packet − diag(scale) · other`
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub fn subtract_scaled<A: Arithmetic, E: Field, const S: usize, const W: usize>(
+pub fn subtract_diagonal<A: Arithmetic, E: Field, const S: usize, const W: usize>(
     packet: &mut Packet<E, S, W>,
-    block: &Block<E, S>,
+    scale: &[E; S],
     other: &Packet<E, S, W>,
 ) {
-    let Some(scale) = block.first() else { return };
     if const { W == 1 } {
         let (mut target, mut x) = ([E::from_f64(0.0); S], [E::from_f64(0.0); S]);
         target.copy_from_slice(packet.as_flattened());

@@ -4,14 +4,13 @@
 use super::block::Block;
 use super::complex::Complex;
 use super::dense::Dense;
-use super::factors::slot;
+use super::factors::{each_entry, kinematic, slot};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::ALL;
 use super::sparse::{self, Planned};
 use super::substitution;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::Real;
-use crate::shape::{Aligned, Plain};
+use crate::shape::{Aligned, Plain, Shape};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -29,6 +28,9 @@ pub type Rows<M, T> = ArrayK<M, [[Complex<T, PARTS>; 1]; 1]>;
 #[zeroable(bound = "T: Zeroable")]
 pub struct EigenFactors<M: Dae, T: Plain> {
     blocks: Aligned<M::Factors<[[Complex<T, PARTS>; 1]; 1]>>,
+    /// The Jacobian, and `hμ`: what kinematic states are eliminated by.
+    jacobian: M::Jacobian<T>,
+    scale: Complex<T, PARTS>,
     /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
     dense: [Dense<M, T, 2>; LANES],
     is_dense: bool,
@@ -57,6 +59,7 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
         h: T,
     ) -> Result<bool, usize> {
         let scale = values.scaled(h);
+        (self.jacobian, self.scale) = (*jacobian, scale);
         self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
         if self.is_dense {
             self.factor_dense(jacobian, &scale)?;
@@ -72,21 +75,23 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
 
     /// By pivoting whole matrices.
     fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> Result<(), usize> {
-        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+        let square = *scale * *scale;
         for (l, dense) in self.dense.iter_mut().enumerate() {
             dense.clear();
-            let (re, im) = scale.get(l);
-            for e in 0..blocks[3] {
-                let (r, c) = pattern.at(e);
-                let (r, value) = (slot::<M>(r), jacobian[e]);
-                if e >= blocks[1] && e < blocks[2] {
-                    dense.add_row(r, c - nx, 0, value, &[re, -im]);
-                    dense.add_row(r, c - nx, 1, value, &[im, re]);
-                } else {
-                    let c = if e < blocks[1] { c } else { c - nx };
-                    dense.add(r, c, 0, value);
-                    dense.add(r, c, 1, value);
-                }
+            each_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
+                let (r, c, value) =
+                    (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
+                let (re, im) = match place.order {
+                    0 => (T::ONE, T::ZERO),
+                    1 => scale.get(l),
+                    _ => square.get(l),
+                };
+                dense.add_row(r, c, 0, value, &[re, -im]);
+                dense.add_row(r, c, 1, value, &[im, re]);
+            });
+            // Their rows stay.
+            for state in (0..M::Shape::NX).filter(|&state| kinematic::<M>(state).is_some()) {
+                (0..2).for_each(|part| dense.add(state, state, part, T::ONE));
             }
             dense.factor().map_err(|(unknown, _)| unknown)?;
         }
@@ -95,12 +100,37 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
 
     /// Solves all systems in place; equations are in their slots.
     pub fn solve(&self, rows: &mut Rows<M, T>) {
+        self.eliminate(rows);
         if self.is_dense {
             self.solve_dense(rows);
         } else {
             let blocks = self.blocks.as_ref();
-            let factors = Planned::<M, _, 1> { model: PhantomData, blocks, coupling: &[[Complex::zero()]] };
+            let factors = Planned::<M, _, 1> { model: PhantomData, blocks };
             substitution::solve(factors, rows.as_mut());
+        }
+        self.reconstruct(rows);
+    }
+
+    /// `b_r ← b_r − (f_q̇ + hμ f_q) b_q` for each kinematic state `q`.
+    fn eliminate(&self, rows: &mut Rows<M, T>) {
+        for felt in M::STRUCTURE.elimination.felt {
+            let (entry, [[own]]) = (felt.entry as usize, rows[felt.state as usize]);
+            let own = if entry < M::STRUCTURE.blocks[1] { own } else { self.scale * own };
+            let [[to]] = &mut rows[slot::<M>(M::STRUCTURE.jacobian.at(entry).0)];
+            *to = *to - own.scaled(self.jacobian[entry]);
+        }
+    }
+
+    /// `y_q = b_q + c hμ y_v`
+    fn reconstruct(&self, rows: &mut Rows<M, T>) {
+        let nx = M::Shape::NX;
+        for state in 0..M::STRUCTURE.elimination.kinematic.len() {
+            let Some(of) = kinematic::<M>(state) else { continue };
+            if (of.velocity as usize) < 2 * nx {
+                let [[velocity]] = rows[of.velocity as usize - nx];
+                let [[to]] = &mut rows[state];
+                *to = *to - (self.scale * velocity).scaled(self.jacobian[of.entry as usize]);
+            }
         }
     }
 
@@ -134,18 +164,24 @@ impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
     fn run<A: Arithmetic>(self) -> bool {
         let Self { jacobian, scale, blocks, .. } = self;
         let plan = &M::STRUCTURE.elimination;
-        for entry in plan.assembly {
-            let Some([[to]]) = blocks.get_mut(entry.block as usize) else { continue };
+        let square = *scale * *scale;
+        for of in plan.assembly {
+            let Some([[to]]) = blocks.get_mut(of.block as usize) else { continue };
+            let mut element = if of.first { Complex::zero() } else { *to };
             // An index that marks what is not there lies outside of the Jacobian.
-            let state = jacobian.get(entry.state as usize);
-            let mut element = state.map_or_else(Complex::zero, |state| scale.scaled(*state));
-            if let Some(direct) = jacobian.get(entry.direct as usize) {
-                element = element.plus(*direct);
+            if let Some(&(mut value)) = jacobian.get(of.entry as usize) {
+                if let Some(&minus_c) = jacobian.get(of.by as usize) {
+                    value = -(minus_c * value);
+                }
+                element = match of.order {
+                    0 => element.plus(value),
+                    1 => element + scale.scaled(value),
+                    _ => element + square.scaled(value),
+                };
             }
             *to = element;
         }
-        sparse::Factor::<M, _, 1, ALL> { coupling: &[[Complex::zero()]], blocks, model: PhantomData }
-            .run::<A>();
+        sparse::Factor::<M, _, 1> { blocks, model: PhantomData }.run::<A>();
         // A pivot that vanishes leaves infinite elements or NaN.
         let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
         pivots.fold(true, |finite, [[element]]| finite & element.is_finite())

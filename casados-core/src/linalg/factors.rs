@@ -3,14 +3,14 @@
 use super::block::{Block, coupling};
 use super::dense::Dense;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{fill, follows, has_followers, is_fill, is_led, row_of, rows};
+use super::kernels::axpy;
 use super::sparse::{self, Planned};
 use super::straight::{AtRow, each_row};
 use super::substitution;
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
-use crate::model::{ArrayK, Dae};
+use crate::model::{ArrayK, Dae, Kinematic};
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Aligned, Array, Plain, assign};
+use crate::shape::{Aligned, Array, Plain, Shape, assign};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -23,13 +23,22 @@ pub fn slot<M: Dae>(equation: usize) -> usize {
     }
 }
 
+/// What is known of the state of a slot, if it is [kinematic](Kinematic).
+#[inline(always)]
+pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
+    let kinematic = M::STRUCTURE.elimination.kinematic;
+    if slot < kinematic.len() && kinematic[slot].equation != Kinematic::NONE {
+        Some(&kinematic[slot])
+    } else {
+        None
+    }
+}
+
 /// The factors, by the plan or dense.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
     blocks: Aligned<M::Factors<Block<T, S>>>,
-    /// `−hA` of the blocks.
-    coupling: Block<T, S>,
     /// Memory that is touched only where the plan is not good enough.
     dense: F::Place<Dense<M, T, S>>,
     /// Whether the dense factors are the ones that hold.
@@ -48,23 +57,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
     /// that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
-        let Self { coupling, blocks, .. } = self;
-        dispatch(Assemble::<M, E, S, false> { jacobian, a, h, coupling, blocks });
-        sparse::factor::<M, E, S>(coupling, blocks.as_mut());
+        let blocks = &mut self.blocks;
+        dispatch(Assemble::<M, E, S> { jacobian, a, h, blocks });
+        sparse::factor::<M, E, S>(blocks.as_mut());
     }
 
-    /// The same for [`solve_led`](Self::solve_led) alone: states that have gone into [those that they follow](crate::model::Led) are left out.
-    pub fn factor_led_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
-        if const { !is_led::<M>() } {
-            return self.factor_by_plan(jacobian, a, h);
-        }
-        self.is_dense = false;
-        let Self { coupling, blocks, .. } = self;
-        dispatch(Assemble::<M, E, S, true> { jacobian, a, h, coupling, blocks });
-        sparse::factor_led::<M, E, S>(coupling, blocks.as_mut());
-    }
-
-    /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots.
+    /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots. Rows of kinematic states stay.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) => dense.solve(b),
@@ -72,25 +70,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         }
     }
 
-    /// Solves `J X = B` in place but for states that [follow](super::follows), where there is nothing.
-    pub fn solve_led<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
-        if const { !has_followers::<M>() } {
-            return self.solve(b);
-        }
-        match self.dense() {
-            Some(dense) => {
-                dense.solve(b);
-                for (slot, row) in b.as_mut().iter_mut().enumerate() {
-                    if follows::<M>(slot).is_some() {
-                        *row = Zeroable::zeroed();
-                    }
-                }
-            }
-            None => substitution::solve_led(self.planned(), b.as_mut()),
-        }
-    }
-
-    /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their slots.
+    /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their slots. Rows of kinematic states stay.
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) => dense.solve_transposed(b),
@@ -100,7 +80,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
 
     /// The factors by the plan.
     pub fn planned(&self) -> Planned<'_, M, E, S> {
-        Planned { model: PhantomData, blocks: self.blocks.as_ref(), coupling: &self.coupling }
+        Planned { model: PhantomData, blocks: self.blocks.as_ref() }
     }
 
     /// Whether the factors that are there are those of the plan.
@@ -121,39 +101,33 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
             assign(to, from);
         } else {
             assign(&mut self.blocks, &other.blocks);
-            self.coupling = other.coupling;
         }
     }
 }
 
-/// All blocks of the Newton matrix, each written once; or of that without states that have gone into those that they follow.
-struct Assemble<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
+/// All blocks of the Newton matrix, each written once.
+struct Assemble<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     a: &'a [[E; S]; S],
     h: E,
-    /// Becomes `−hA`.
-    coupling: &'a mut Block<E, S>,
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> Kernel for Assemble<'_, M, E, S, LED> {
+impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { jacobian, a, h, coupling: to, blocks } = self;
+        let Self { jacobian, a, h, blocks } = self;
         let coupling = coupling(a, h);
-        *to = coupling;
         let mut square = [[E::from_f64(0.0); S]; S];
-        if LED {
-            A::subtract_blocks(&mut square, &coupling, &coupling);
-        }
-        each_row::<A, _>(&mut Rows::<M, E, S, LED> { jacobian, coupling, square, blocks });
+        A::subtract_blocks(&mut square, &coupling, &coupling);
+        each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, coupling, square, blocks });
     }
 }
 
 /// See [`Assemble`].
-struct Rows<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
+struct Rows<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `−hA`
     coupling: Block<E, S>,
@@ -162,47 +136,35 @@ struct Rows<'a, M: Dae, E: Plain, const S: usize, const LED: bool> {
     blocks: &'a mut M::Factors<Block<E, S>>,
 }
 
-impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> AtRow for Rows<'_, M, E, S, LED> {
-    const ROWS: usize = rows::<M>(LED);
-    const SIMPLE: usize = fill::<M>(LED);
+impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
     const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
+        let plan = &M::STRUCTURE.elimination;
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some((own, led)) = row_of::<M>(LED, row) else { return };
-        if const { sparse::begins_with_update::<M, E>() } && is_fill(own, led) {
+        let Some(of) = plan.assembly.get(row) else { return };
+        if const { sparse::begins_with_update::<M, E>() } && of.is_fill() {
             return;
         }
-        let Some(to) = blocks.get_mut(own.block as usize) else { return };
+        let Some(to) = blocks.get_mut(of.block as usize) else { return };
+        let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
         // An index that marks what is not there lies outside of the Jacobian.
-        let (state, direct) = (jacobian.get(own.state as usize), jacobian.get(own.direct as usize));
-        let mut block = [[E::from_f64(0.0); S]; S];
-        if let Some(state) = state {
-            if (const { S > 1 }) && own.scaled {
-                to[0] = *state;
-                return;
-            }
-            for (column, ha) in block.iter_mut().zip(&self.coupling) {
-                A::subtract_products(column, state, ha);
-            }
-        }
-        if let Some(direct) = direct {
-            for (stage, (column, &direct)) in block.iter_mut().zip(direct).enumerate() {
-                column[stage] = column[stage] + direct;
-            }
-        }
-        if LED
-            && let Some(led) = led
-            && let Some(minus_c) = jacobian.get(led.by as usize)
-        {
-            let ways = [(led.direct, &self.coupling), (led.state, &self.square)];
-            for (entry, columns) in ways {
-                let Some(&(mut felt)) = jacobian.get(entry as usize) else { continue };
-                for (felt, &minus_c) in felt.iter_mut().zip(minus_c) {
-                    *felt = -(*felt * minus_c);
+        if let Some(&(mut values)) = jacobian.get(of.entry as usize) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
+                for value in &mut values {
+                    *value = -(*value * minus_c[0]);
                 }
-                for (column, ha) in block.iter_mut().zip(columns) {
-                    A::subtract_products(column, &felt, ha);
+            }
+            if of.order == 0 {
+                for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
+                    column[stage] = column[stage] + value;
+                }
+            } else {
+                let power = if of.order == 1 { &self.coupling } else { &self.square };
+                for (column, power) in block.iter_mut().zip(power) {
+                    A::subtract_products(column, &values, power);
                 }
             }
         }
@@ -211,11 +173,11 @@ impl<M: Dae, E: Field + Plain, const S: usize, const LED: bool> AtRow for Rows<'
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some((own, _)) = row_of::<M>(LED, row) else { return };
+        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
         if const { sparse::begins_with_update::<M, E>() } {
             return;
         }
-        if let Some(block) = self.blocks.as_mut().get_mut(own.block as usize) {
+        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
             *block = [[E::from_f64(0.0); S]; S];
         }
     }
@@ -232,23 +194,65 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
         a: &[[T; S]; S],
         h: T,
     ) -> Result<(), Option<(usize, usize)>> {
-        let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
         let Some(dense) = self.dense.get_mut() else { return Err(None) };
         self.is_dense = true;
         dense.clear();
-        for (e, values) in jacobian.as_ref().iter().enumerate().take(blocks[3]) {
-            let (r, c) = pattern.at(e);
-            let r = slot::<M>(r);
-            for (stage, value) in values.iter().enumerate() {
-                if e < blocks[1] {
-                    dense.add(r, c, stage, *value);
-                } else if e < blocks[2] {
-                    dense.add_row(r, c - nx, stage, h * *value, &a[stage]);
-                } else {
-                    dense.add(r, c - nx, stage, *value);
+        let square = {
+            let mut square = [[T::ZERO; S]; S];
+            for (to, row) in square.iter_mut().zip(a) {
+                for (&factor, a) in row.iter().zip(a) {
+                    axpy(factor, a, to);
                 }
             }
+            square
+        };
+        each_entry::<M, _>(jacobian.as_ref(), |place, values, minus_c| {
+            let c = minus_c.and_then(|minus_c| minus_c.first()).map_or(T::ONE, |&minus_c| -minus_c);
+            for (stage, &value) in values.iter().enumerate() {
+                let (r, column, value) = (place.slot, place.column, c * value);
+                match place.order {
+                    0 => dense.add(r, column, stage, value),
+                    1 => dense.add_row(r, column, stage, h * value, &a[stage]),
+                    _ => dense.add_row(r, column, stage, h * h * value, &square[stage]),
+                }
+            }
+        });
+        // Their rows stay.
+        for state in (0..M::Shape::NX).filter(|&state| kinematic::<M>(state).is_some()) {
+            (0..S).for_each(|stage| dense.add(state, state, stage, T::ONE));
         }
         dense.factor().map_err(Some)
+    }
+}
+
+/// Where an entry of the Jacobian goes in a whole matrix, which has kinematic states, but nothing in their columns.
+pub struct InDense {
+    /// The row.
+    pub slot: usize,
+    /// The unknown.
+    pub column: usize,
+    /// It multiplies so many factors `hA`.
+    pub order: u32,
+}
+
+/// The entries of `f_ẋ`, `f_x` and `f_z`, but for those of equations of kinematic states, each with `−c` if it belongs to such a state.
+pub fn each_entry<M: Dae, V: Copy>(jacobian: &[V], mut at: impl FnMut(InDense, &V, Option<&V>)) {
+    let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+    for (e, values) in jacobian.iter().enumerate().take(blocks[3]) {
+        let (r, c) = pattern.at(e);
+        let slot = slot::<M>(r);
+        if kinematic::<M>(slot).is_some() {
+            continue;
+        }
+        let (column, order) =
+            (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
+        match kinematic::<M>(column) {
+            None => at(InDense { slot, column, order }, values, None),
+            Some(of) if (of.velocity as usize) < 2 * nx => {
+                let place = InDense { slot, column: of.velocity as usize - nx, order: order + 1 };
+                at(place, values, jacobian.get(of.entry as usize));
+            }
+            Some(_) => {}
+        }
     }
 }

@@ -4,7 +4,6 @@
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{fill, is_fill, is_led, row_of, rows};
 use super::mean_solve::Solve;
 use super::sparse;
 use super::straight::{AtRow, each_row};
@@ -49,11 +48,10 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         } else {
             dispatch(AssembleMean::<M, E, S, false> { jacobian, values, h, blocks });
         }
-        sparse::factor_led::<M, _, 1>(&[[Complex::zero()]], self.blocks.as_mut());
+        sparse::factor::<M, _, 1>(self.blocks.as_mut());
     }
 
-    /// Solves the Newton system of the stages, but for states that [follow](super::follows): what is in the rows of the solution that belong to
-    /// them stays there.
+    /// Solves the Newton system of the stages: what is in the rows of the solution that belong to kinematic states stays there.
     pub fn solve(
         &mut self,
         basis: &Eigenbasis<E, S, S>,
@@ -67,7 +65,7 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     }
 }
 
-/// `f_ẋ + hμ f_x` and `f_z` of the mean Jacobian, and what of it has gone into the columns of others, each block written once.
+/// `Σ c f (hμ)^order` of the mean Jacobian, each block written once.
 struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// The eigenvalues `μ`.
@@ -99,44 +97,41 @@ struct Rows<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_, M, E, S, FIRST_ONLY> {
-    const ROWS: usize = rows::<M>(is_led::<M>());
-    const SIMPLE: usize = fill::<M>(is_led::<M>());
+    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
     const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
+        let plan = &M::STRUCTURE.elimination;
         let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
-        let Some((own, led)) = row_of::<M>(is_led::<M>(), row) else { return };
-        if const { sparse::begins_with_update::<M, Number<E, S>>() } && is_fill(own, led) {
+        let Some(of) = plan.assembly.get(row) else { return };
+        if const { sparse::begins_with_update::<M, Number<E, S>>() } && of.is_fill() {
             return;
         }
-        let Some([[to]]) = blocks.get_mut(own.block as usize) else { return };
+        let Some([[to]]) = blocks.get_mut(of.block as usize) else { return };
         let [scale, square] = self.scales;
-        let mut element = match jacobian.get(own.state as usize) {
-            Some(state) => scale.scaled(Self::total(state).coarse()),
-            None => Complex::zero(),
-        };
-        if let Some(direct) = jacobian.get(own.direct as usize) {
-            element = element.plus((E::from_f64(Self::SHARE) * Self::total(direct)).coarse());
-        }
-        if let Some(led) = led
-            && let Some([minus_c, ..]) = jacobian.get(led.by as usize).map(<[E; S]>::as_slice)
-        {
-            for (entry, scale) in [(led.direct, scale), (led.state, square)] {
-                if let Some(felt) = jacobian.get(entry as usize) {
-                    element = element - scale.scaled((*minus_c * Self::total(felt)).coarse());
-                }
+        let mut element = if of.first { Complex::zero() } else { *to };
+        // An index that marks what is not there lies outside of the Jacobian.
+        if let Some(mut value) = jacobian.get(of.entry as usize).map(Self::total) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
+                value = -(minus_c[0] * value);
             }
+            element = match of.order {
+                0 => element.plus((E::from_f64(Self::SHARE) * value).coarse()),
+                1 => element + scale.scaled(value.coarse()),
+                _ => element + square.scaled(value.coarse()),
+            };
         }
         *to = element;
     }
     /// Fill.
     #[inline(always)]
     fn simple(&mut self, row: usize) {
-        let Some((own, _)) = row_of::<M>(is_led::<M>(), row) else { return };
+        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
         if const { sparse::begins_with_update::<M, Number<E, S>>() } {
             return;
         }
-        if let Some(block) = self.blocks.as_mut().get_mut(own.block as usize) {
+        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
             *block = [[Complex::zero()]];
         }
     }

@@ -6,13 +6,12 @@
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
 use super::fused::{Arithmetic, Kernel};
-use super::left_out::{follows, has_followers};
 use super::mean::{Number, coarse};
 use super::straight::{AtSupernode, is_long, supernodes_from_first, supernodes_from_last};
-use crate::model::{ArrayK, Dae, Follower, Pivot};
+use crate::model::{ArrayK, Dae, Pivot};
 use crate::scalar::Lanes;
 
-/// From equations through `I + L` to rows in the eigenbasis, and through `P + U` to unknowns, but for states that [follow](super::follows).
+/// From equations through `I + L` to rows in the eigenbasis, and through `P + U` to unknowns.
 pub struct Solve<'a, M: Dae, E: Lanes, const S: usize> {
     pub basis: &'a Eigenbasis<E, S, S>,
     pub f: &'a ArrayK<M, [E; S]>,
@@ -63,21 +62,13 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
     const INSTRUCTIONS: usize = PER_BLOCK;
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        if let Some(follower) = follower::<M, P>(pivots) {
-            // It has no right-hand side.
-            if let (true, Some(row)) = (follower.asked, self.rows.get_mut(pivots[0].slot as usize)) {
-                *row = Complex::zero();
-            }
-            return;
-        }
         let mut sums = [Complex::zero(); P];
         for (sum, pivot) in sums.iter_mut().zip(pivots) {
             if let Some(f) = self.f.as_ref().get(pivot.equation as usize) {
                 *sum = coarse(self.basis.split::<A>(f));
             }
         }
-        let left = if const { has_followers::<M>() } { pivots[0].left_led() } else { pivots[0].left(1) };
-        for left in M::STRUCTURE.elimination.left.get(left).unwrap_or_default() {
+        for left in M::STRUCTURE.elimination.left.get(pivots[0].left()).unwrap_or_default() {
             // Blocks of their rows lie one after the other.
             let blocks = self.blocks.get(left.block as usize..).and_then(|blocks| blocks.first_chunk::<P>());
             let (Some(blocks), Some(row)) = (blocks, self.rows.get(left.slot as usize)) else { continue };
@@ -106,10 +97,6 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
     const INSTRUCTIONS: usize = PER_BLOCK;
     #[inline(always)]
     fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        let follower = follower::<M, P>(pivots);
-        if follower.is_some_and(|follower| !follower.asked) {
-            return;
-        }
         let beside = pivots[P - 1].upper();
         let slots = M::STRUCTURE.elimination.slots.get(beside).unwrap_or_default();
         let (mut sums, mut own): (_, [&[Number<E, S>]; P]) = ([Complex::zero(); P], [&[]; P]);
@@ -145,16 +132,10 @@ impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
             if let Some(row) = self.rows.get_mut(slot) {
                 *row = sum;
             }
-            if let (None, Some(solution)) = (follower, self.solution.as_mut().get_mut(slot)) {
+            if let Some(solution) = self.solution.as_mut().get_mut(slot) {
                 let sum = Complex { parts: sum.parts.map(E::fine) };
                 solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&sum));
             }
         }
     }
-}
-
-/// What is known of a supernode that is a state which follows, and then is alone.
-#[inline(always)]
-fn follower<M: Dae, const P: usize>(pivots: [&'static Pivot; P]) -> Option<&'static Follower> {
-    if P == 1 { follows::<M>(pivots[0].slot as usize) } else { None }
 }

@@ -6,6 +6,7 @@
 //!
 //! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
 //! by the plan of the model (`sparse`, `substitution`, `transposed`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
+//! [Kinematic](crate::model::Kinematic) states have slots, but neither pivots nor blocks: what is there stays there.
 //! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
 //! iterations that need not be exact (`mean`, solved supernode by supernode in `mean_solve`), `EigenFactors` for steps of variable size.
 //!
@@ -21,7 +22,6 @@ mod eigen_factors;
 mod factors;
 mod fused;
 mod kernels;
-mod left_out;
 mod mean;
 mod mean_solve;
 mod packets;
@@ -32,16 +32,15 @@ mod substitution;
 mod transposed;
 mod twice;
 
-pub(crate) use block::{Block, Packet, coupling, product};
+pub(crate) use block::{Block, Packet, coupling, subtract, subtract_diagonal, subtract_transposed};
 #[cfg(feature = "alloc")]
 pub(crate) use complex::Complex;
 pub(crate) use eigen::Eigenbasis;
 #[cfg(feature = "alloc")]
 pub(crate) use eigen_factors::{EigenFactors, PARTS, Rows};
-pub use factors::{Factors, slot};
+pub use factors::{Factors, kinematic, slot};
 pub(crate) use fused::{Arithmetic, Kernel, dispatch};
 pub(crate) use kernels::{are_finite, axpy};
-pub(crate) use left_out::{STEADY, follows, has_followers, implied, is_follower, is_implied};
 pub(crate) use mean::MeanFactors;
 pub(crate) use prefetch::Ahead;
 pub(crate) use sparse::Planned;

@@ -6,9 +6,7 @@
 //! M = (I + L) (P + U)        L_ik = B_ik P_k⁻¹,   B_ij ← B_ij − L_ik B_kj
 //! ```
 //!
-//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above. Below a pivot that is the
-//! identity, as that of `q̇ = v`, blocks are often still `diag(f_x,i) hA`: of these only `f_x,i` is stored, and `hA` is applied
-//! once for the whole column. Everything is
+//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above. Everything is
 //! indexed by *slots*: a slot is an unknown, and also the equation that determines it in the plan. So right-hand side
 //! and solution share one array, and no permutation is ever applied.
 //!
@@ -17,7 +15,6 @@
 
 use super::block::{Block, inverse, product};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{ALL, LED, is_absorbed};
 use super::straight::{AtPivot, from_first, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
@@ -28,8 +25,6 @@ pub struct Planned<'a, M, E, const S: usize> {
     pub model: PhantomData<M>,
     /// `P⁻¹`, `L`, `U`.
     pub blocks: &'a [Block<E, S>],
-    /// `−hA`, which the columns of pivots that are `scaled` share. Nothing for one stage.
-    pub coupling: &'a Block<E, S>,
 }
 
 impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
@@ -41,23 +36,17 @@ impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
 
 /// Factorises in place: `blocks` holds the matrix (fill zero, unless it [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot block
 /// that is singular leaves elements that are not finite.
-pub fn factor<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
-    dispatch(Factor::<M, E, S, ALL> { coupling, blocks, model: PhantomData });
-}
-
-/// The same without states that have gone into [those that they follow](crate::model::Led).
-pub fn factor_led<M: Dae, E: Field, const S: usize>(coupling: &Block<E, S>, blocks: &mut [Block<E, S>]) {
-    dispatch(Factor::<M, E, S, LED> { coupling, blocks, model: PhantomData });
+pub fn factor<M: Dae, E: Field, const S: usize>(blocks: &mut [Block<E, S>]) {
+    dispatch(Factor::<M, E, S> { blocks, model: PhantomData });
 }
 
 /// See [`factor`].
-pub(super) struct Factor<'a, M, E, const S: usize, const PIVOTS: u8> {
-    pub coupling: &'a Block<E, S>,
+pub(super) struct Factor<'a, M, E, const S: usize> {
     pub blocks: &'a mut [Block<E, S>],
     pub model: PhantomData<M>,
 }
 
-impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> Kernel for Factor<'_, M, E, S, PIVOTS> {
+impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
     type Number = E;
     type Output = ();
     const WIDE: bool = is_long::<M, S>();
@@ -69,42 +58,12 @@ impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> Kernel for Factor<'_, M
     }
 }
 
-impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> AtPivot for Factor<'_, M, E, S, PIVOTS> {
+impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
     const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
     const UPDATES: bool = true;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [Update]) {
-        let Self { coupling, blocks, .. } = self;
-        if is_absorbed::<M>(PIVOTS, pivot) {
-            return;
-        }
-        if is_scaled::<S>(pivot) {
-            let width = pivot.upper().len();
-            for (index, upper) in pivot.upper().enumerate() {
-                let Some(upper) = blocks.get(upper) else { continue };
-                let mut product = [[E::from_f64(0.0); S]; S];
-                A::subtract_blocks(&mut product, coupling, upper);
-                let targets = updates.get(index..).unwrap_or_default().iter().step_by(width);
-                for (lower, target) in pivot.lower().zip(targets) {
-                    let Some(Some(&scale)) = blocks.get(lower).map(|lower| lower.first()) else {
-                        continue;
-                    };
-                    let Some(block) = blocks.get_mut(target.block as usize) else { continue };
-                    if is_first::<M, E, PIVOTS>(target) {
-                        let mut sum = [[E::from_f64(0.0); S]; S];
-                        for (column, product) in sum.iter_mut().zip(&product) {
-                            A::subtract_products(column, &scale, product);
-                        }
-                        *block = sum;
-                        continue;
-                    }
-                    for (column, product) in block.iter_mut().zip(&product) {
-                        A::subtract_products(column, &scale, product);
-                    }
-                }
-            }
-            return;
-        }
+        let blocks = &mut *self.blocks;
         if !pivot.identity {
             let Some(block) = blocks.get_mut(pivot.block as usize) else { return };
             let inverse = inverse::<A, E, S>(block);
@@ -121,7 +80,7 @@ impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> AtPivot for Factor<'_, 
                 for (upper, target) in pivot.upper().zip(&mut updates) {
                     let Some(&upper) = blocks.get(upper) else { continue };
                     if let Some(block) = blocks.get_mut(target.block as usize) {
-                        update::<A, M, E, S, PIVOTS>(block, target, &lower, &upper);
+                        update::<A, M, E, S>(block, target, &lower, &upper);
                     }
                 }
             }
@@ -134,7 +93,7 @@ impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> AtPivot for Factor<'_, 
             for (upper, target) in pivot.upper().zip(&mut updates) {
                 let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
                 if let (Some(upper), Some(block)) = (upper, block) {
-                    update::<A, M, E, S, PIVOTS>(block, target, &lower, upper);
+                    update::<A, M, E, S>(block, target, &lower, upper);
                 }
             }
         }
@@ -143,13 +102,13 @@ impl<M: Dae, E: Field, const S: usize, const PIVOTS: u8> AtPivot for Factor<'_, 
 
 /// `block − lower · upper`
 #[inline(always)]
-fn update<A: Arithmetic, M: Dae, E: Field, const S: usize, const PIVOTS: u8>(
+fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
     block: &mut Block<E, S>,
     target: &Update,
     lower: &Block<E, S>,
     upper: &Block<E, S>,
 ) {
-    if is_first::<M, E, PIVOTS>(target) {
+    if const { begins_with_update::<M, E>() } && target.first {
         let mut sum = [[E::from_f64(0.0); S]; S];
         A::subtract_blocks(&mut sum, lower, upper);
         *block = sum;
@@ -162,18 +121,6 @@ fn update<A: Arithmetic, M: Dae, E: Field, const S: usize, const PIVOTS: u8>(
 pub const fn begins_with_update<M: Dae, E>() -> bool {
     let plan = &M::STRUCTURE.elimination;
     align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
-}
-
-/// Whether nothing is there before an update.
-#[inline(always)]
-const fn is_first<M: Dae, E, const PIVOTS: u8>(update: &Update) -> bool {
-    (const { begins_with_update::<M, E>() }) && if PIVOTS == LED { update.first_led } else { update.first }
-}
-
-/// Whether the blocks of its column hold only what scales the rows of `hA`. With one stage there is nothing to share.
-#[inline(always)]
-pub fn is_scaled<const S: usize>(pivot: &Pivot) -> bool {
-    (const { S > 1 }) && pivot.scaled
 }
 
 /// Always; but the optimiser then knows their number, and with it how often loops over constant tables go round.

@@ -3,12 +3,11 @@
 //! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each other. Where one column fills
 //! registers, what is added to a row is added in them instead, and stored once.
 
-use super::block::{Block, Packet, negate, subtract, subtract_scaled};
+use super::block::{Block, Packet, negate, subtract};
 use super::fused::{Arithmetic, Kernel, dispatch};
-use super::left_out::{ALL, LED, STEADY, follows, is_left_out, is_not_found, is_steady};
 use super::packets::{is_zero, load, store, subtract_of};
 use super::prefetch::Ahead;
-use super::sparse::{Planned, beside, has_all, is_scaled};
+use super::sparse::{Planned, beside, has_all};
 use super::straight::{AtPivot, from_first, from_last, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;
@@ -49,31 +48,21 @@ pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
 ) {
-    dispatch(Solve::<M, E, R, S, ALL> { factors, rows });
+    dispatch(Solve::<M, E, R, S> { factors, rows });
 }
 
-/// Solves `M X = R` in place, where states that [follow](follows) have no right-hand side: they are found only if they are asked for.
-pub fn solve_led<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
-    factors: Planned<'_, M, E, S>,
-    rows: &mut [[R; S]],
-) {
-    dispatch(Solve::<M, E, R, S, LED> { factors, rows });
-}
-
-struct Solve<'a, M, E, R, const S: usize, const PIVOTS: u8> {
+struct Solve<'a, M, E, R, const S: usize> {
     factors: Planned<'a, M, E, S>,
     rows: &'a mut [[R; S]],
 }
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize, const PIVOTS: u8> Kernel
-    for Solve<'_, M, E, R, S, PIVOTS>
-{
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
     const WIDE: bool = is_long::<M, S>();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        packets!(Down<PIVOTS>, Up<PIVOTS>: self);
+        packets!(Down, Up: self);
     }
 }
 
@@ -85,7 +74,7 @@ pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     dispatch(SolveTransposed(Solve { factors, rows }));
 }
 
-struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S, ALL>);
+struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
 
 impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
     type Number = E;
@@ -162,8 +151,6 @@ pub struct Sweep<'a, M, E, R, V, const S: usize, const W: usize> {
 
 /// A triangular system.
 pub trait System {
-    /// Whether it looks at the pivots that follow, on the way from the last to the first.
-    const OTHERS: bool = false;
     /// What is done at a pivot.
     fn at<
         A: Arithmetic,
@@ -176,7 +163,6 @@ pub trait System {
     >(
         sweep: &mut Sweep<'_, M, E, R, V, S, W>,
         pivot: &'static Pivot,
-        others: &'static [Pivot],
     );
 }
 
@@ -190,29 +176,26 @@ impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const
         let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
         4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
     };
-    const OTHERS: bool = Y::OTHERS;
     #[inline(always)]
-    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [Update]) {
-        Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot, others);
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], _: &'static [Update]) {
+        Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot);
         self.0.viewer.pass();
     }
 }
 
 /// One of the systems, of which each has its own instructions.
 macro_rules! system {
-    ($(#[$text:meta])* $name:ident $(<const $pivots:ident>)?, $others:literal: |$sweep:ident, $pivot:ident, $of_others:ident| $what:expr) => {
+    ($(#[$text:meta])* $name:ident: $what:ident) => {
         $(#[$text])*
-        pub struct $name$(<const $pivots: u8>)?;
+        pub struct $name;
 
-        impl$(<const $pivots: u8>)? System for $name$(<$pivots>)? {
-            const OTHERS: bool = $others;
+        impl System for $name {
             #[inline(always)]
             fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>(
-                $sweep: &mut Sweep<'_, M, E, R, V, S, W>,
-                $pivot: &'static Pivot,
-                $of_others: &'static [Pivot],
+                sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+                pivot: &'static Pivot,
             ) {
-                $what
+                sweep.$what::<A>(pivot);
             }
         }
     };
@@ -220,89 +203,31 @@ macro_rules! system {
 
 system!(
     /// `I + L`
-    Down<const PIVOTS>, false: |sweep, pivot, others| if !is_left_out::<M>(PIVOTS, pivot) {
-        sweep.down::<A, PIVOTS>(pivot, others);
-    }
+    Down: down
 );
 system!(
     /// `P + U`
-    Up<const PIVOTS>, false: |sweep, pivot, _others| if !(is_left_out::<M>(PIVOTS, pivot)
-        && is_not_found::<M, E, S>(PIVOTS, pivot.slot as usize))
-    {
-        sweep.up::<A, PIVOTS>(pivot);
-    }
+    Up: up
 );
 system!(
     /// `(P + U)ᵀ`
-    TransposedDown, false: |sweep, pivot, _others| sweep.transposed_down::<A>(pivot)
+    TransposedDown: transposed_down
 );
 system!(
     /// `(I + L)ᵀ`
-    TransposedUp, true: |sweep, pivot, others| sweep.transposed_up::<A>(pivot, others)
+    TransposedUp: transposed_up
 );
 
 impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
     Sweep<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
-    fn down<A: Arithmetic, const PIVOTS: u8>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
+    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         // What is added to a row is added in registers where one column fills them.
         if const { align_of::<E>() > 8 && goes_by_rows::<M>(size_of::<Block<E, S>>()) } {
-            self.down_by_rows::<A, PIVOTS>(pivot);
-            if !is_scaled::<S>(pivot) {
-                return;
-            }
-        }
-        // Where nothing is optimised this would only take long to compile.
-        if const { W > 1 && S > 2 && A::FUSED } && is_scaled::<S>(pivot) {
-            match (pivot.beside, others) {
-                (0, _) => return,
-                (2, [second, ..]) => return self.down_beside::<A, 2>([pivot, second]),
-                (3, [second, third, ..]) => return self.down_beside::<A, 3>([pivot, second, third]),
-                _ => {}
-            }
-        }
-        self.down_by_columns::<A>(pivot);
-    }
-
-    /// Scaled pivots with the same rows below them, stage by stage: what is subtracted from a row for all of them stays in registers.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn down_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        let Self { factors, rows, column, .. } = self;
-        let mut zero = true;
-        for pivot in pivots {
-            zero &= pivot.slot as usize >= rows.len()
-                || is_zero::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        }
-        if zero {
-            return;
-        }
-        let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
-        let Some(below) = below::<M, E, S, P>(*factors, &pivots, slots.len()) else { return };
-        for stage in 0..S {
-            let mut products = [[E::from_f64(0.0); W]; P];
-            for (product, pivot) in products.iter_mut().zip(pivots) {
-                let Some(row) = rows.get(pivot.slot as usize) else { continue };
-                for (ha, row) in factors.coupling.iter().zip(row) {
-                    let Some(row) = row.as_ref().get(*column..).and_then(|row| row.first_chunk()) else {
-                        continue;
-                    };
-                    A::subtract_row(product, ha[stage], row);
-                }
-            }
-            for (index, &other) in slots.iter().enumerate() {
-                let Some(target) = rows.get_mut(other as usize).and_then(|row| row.get_mut(stage)) else {
-                    continue;
-                };
-                let target = target.as_mut().get_mut(*column..).and_then(|row| row.first_chunk_mut());
-                let Some(target) = target else { continue };
-                let mut sum = *target;
-                for (product, below) in products.iter().zip(below) {
-                    let Some(scale) = below.get(index).and_then(|block| block.first()) else { continue };
-                    A::subtract_row(&mut sum, scale[stage], product);
-                }
-                *target = sum;
-            }
+            self.down_by_rows::<A>(pivot);
+        } else {
+            self.down_by_columns::<A>(pivot);
         }
     }
 
@@ -325,20 +250,6 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
         {
             return;
         }
-        if is_scaled::<S>(pivot) {
-            let mut product = [[E::from_f64(0.0); W]; S];
-            let Some(row) = rows.get(slot) else { return };
-            subtract_of::<A, E, R, S, W>(&mut product, factors.coupling, row, *column);
-            for (block, other) in beside(*factors, pivot.lower()) {
-                if other >= rows.len() {
-                    continue;
-                }
-                let mut target = load(rows, other, *column);
-                subtract_scaled::<A, E, S, W>(&mut target, block, &product);
-                store(rows, other, *column, &target);
-            }
-            return;
-        }
         for (block, other) in beside(*factors, pivot.lower()) {
             if other >= rows.len() {
                 continue;
@@ -349,40 +260,30 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
         }
     }
 
-    /// What pivots before this one that are not scaled subtract from its row.
+    /// What pivots before this one subtract from its row.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn down_by_rows<A: Arithmetic, const PIVOTS: u8>(&mut self, pivot: &'static Pivot) {
+    fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, .. } = self;
         let slot = pivot.slot as usize;
-        if slot >= rows.len() {
+        if slot >= rows.len() || pivot.left().is_empty() {
             return;
         }
-        if !pivot.left(S).is_empty() {
-            let mut packet = load(rows, slot, *column);
-            for left in M::STRUCTURE.elimination.left.get(pivot.left(S)).unwrap_or_default() {
-                if PIVOTS == STEADY && is_steady::<M>(left.slot as usize)
-                    || PIVOTS == LED && follows::<M>(left.slot as usize).is_some()
-                {
-                    continue;
-                }
-                let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
-                let (Some(block), Some(other)) = (block, other) else { continue };
-                subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
-            }
-            store(rows, slot, *column, &packet);
+        let mut packet = load(rows, slot, *column);
+        for left in M::STRUCTURE.elimination.left.get(pivot.left()).unwrap_or_default() {
+            let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
+            let (Some(block), Some(other)) = (block, other) else { continue };
+            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
         }
+        store(rows, slot, *column, &packet);
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn up<A: Arithmetic, const PIVOTS: u8>(&mut self, pivot: &'static Pivot) {
+    fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         let Self { factors, rows, column, viewer } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        if PIVOTS == STEADY && pivot.steady {
-            packet = [packet[0]; S];
-        }
         for (block, other) in beside(*factors, pivot.upper()) {
             if other >= rows.len() {
                 continue;
@@ -415,26 +316,9 @@ const fn goes_by_rows<M: Dae>(block: usize) -> bool {
     let pivots = M::STRUCTURE.elimination.pivots;
     let (mut longest, mut index) = (0, 0);
     while index < pivots.len() {
-        let left = pivots[index].left[2] - pivots[index].left[0];
+        let left = pivots[index].left[1] - pivots[index].left[0];
         longest = if left > longest { left } else { longest };
         index += 1;
     }
     block <= 256 || longest <= 8
-}
-
-/// The blocks below pivots: so many below each, but the optimiser does not know.
-#[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn below<'a, M: Dae, E, const S: usize, const P: usize>(
-    factors: Planned<'a, M, E, S>,
-    pivots: &[&'static Pivot; P],
-    count: usize,
-) -> Option<[&'a [Block<E, S>]; P]> {
-    let mut below: [&[Block<E, S>]; P] = [&[]; P];
-    for (below, pivot) in below.iter_mut().zip(pivots) {
-        *below = factors.blocks.get(pivot.lower())?;
-        if below.len() != count {
-            return None;
-        }
-    }
-    Some(below)
 }

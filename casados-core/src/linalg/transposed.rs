@@ -1,13 +1,13 @@
 //! Right-hand sides by the transposed factors of a plan: what is done at a pivot on the way through `(P + U)ᵀ` and `(I + L)ᵀ`.
 //!
 //! A row of `(I + L)ᵀ` is a column of `L`, so that on the way back what is added to a row is added in registers, and stored once. Packets
-//! take two blocks at a time, or rows that several pivots share, so that additions need not wait for each other.
+//! take two blocks at a time, so that additions need not wait for each other.
 
-use super::block::{Block, negate, subtract_scaled, subtract_transposed};
+use super::block::{Block, negate, subtract_transposed};
 use super::fused::Arithmetic;
 use super::packets::{load, store};
-use super::sparse::{Planned, beside, is_scaled};
-use super::substitution::{Sweep, below};
+use super::sparse::{Planned, beside};
+use super::substitution::Sweep;
 use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
@@ -38,44 +38,23 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize> S
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot]) {
+    pub(super) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
         // Where nothing is optimised this would only take long to compile.
         if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
-            if !is_scaled::<S>(pivot) {
-                return self.transposed_up_in_strands::<A>(pivot);
-            }
-            return match (pivot.beside, others) {
-                (0, _) => {}
-                (2, [second, ..]) => self.transposed_up_beside::<A, 2>([pivot, second]),
-                (3, [second, third, ..]) => self.transposed_up_beside::<A, 3>([pivot, second, third]),
-                _ => self.transposed_up_beside::<A, 1>([pivot]),
-            };
+            return self.transposed_up_in_strands::<A>(pivot);
         }
         let Self { factors, rows, column, .. } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
         let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
-        if is_scaled::<S>(pivot) {
-            let mut sum = [[E::from_f64(0.0); W]; S];
-            for index in pivot.lower().rev() {
-                let Some((block, other)) = one(*factors, index) else { continue };
-                if other >= rows.len() {
-                    continue;
-                }
-                let other = load(rows, other, *column);
-                subtract_scaled::<A, E, S, W>(&mut sum, block, &other);
+        for index in pivot.lower().rev() {
+            let Some((block, other)) = one(*factors, index) else { continue };
+            if other >= rows.len() {
+                continue;
             }
-            subtract_transposed::<A, E, S, W>(&mut packet, factors.coupling, &sum);
-        } else {
-            for index in pivot.lower().rev() {
-                let Some((block, other)) = one(*factors, index) else { continue };
-                if other >= rows.len() {
-                    continue;
-                }
-                let other = load(rows, other, *column);
-                subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
-            }
+            let other = load(rows, other, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
         }
         store(rows, pivot.slot as usize, *column, &packet);
     }
@@ -114,41 +93,6 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize> S
             A::subtract_row(row, E::from_f64(-1.0), strand);
         }
         store(rows, slot, *column, &packet);
-    }
-
-    /// Scaled pivots with the same rows below them: a row is fetched once for all of them.
-    #[inline(always)]
-    fn transposed_up_beside<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
-        let Self { factors, rows, column, .. } = self;
-        let slots = M::STRUCTURE.elimination.slots.get(pivots[0].lower()).unwrap_or_default();
-        let Some(below) = below::<M, E, S, P>(*factors, &pivots, slots.len()) else { return };
-        let mut sums = [[[E::from_f64(0.0); W]; S]; P];
-        let mut index = slots.len();
-        while index > 0 {
-            index -= 1;
-            let Some(&other) = slots.get(index) else { return };
-            if other as usize >= rows.len() {
-                return;
-            }
-            let other = load::<E, R, S, W>(rows, other as usize, *column);
-            for (sum, below) in sums.iter_mut().zip(below) {
-                if let Some(block) = below.get(index) {
-                    subtract_scaled::<A, E, S, W>(sum, block, &other);
-                }
-            }
-        }
-        for (pivot, sum) in pivots.iter().zip(&sums) {
-            let Some(row) = rows.get_mut(pivot.slot as usize) else { return };
-            for (ha, row) in factors.coupling.iter().zip(row) {
-                let columns = row.as_mut().get_mut(*column..).and_then(|row| row.first_chunk_mut());
-                let Some(columns) = columns else { continue };
-                let mut packet = *columns;
-                for (&ha, sum) in ha.iter().zip(sum) {
-                    A::subtract_row(&mut packet, ha, sum);
-                }
-                *columns = packet;
-            }
-        }
     }
 }
 

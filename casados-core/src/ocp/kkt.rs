@@ -1,8 +1,8 @@
 //! The conditions of optimality at a point: those of the problem where the QP was written at this point.
 
 use crate::qp::{
-    Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, part,
-    part_mut, scale, subtract, subtract_column, symmetric,
+    Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, larger,
+    part, part_mut, scale, subtract, subtract_column, symmetric,
 };
 use crate::scalar::{Packed, Real, Registers};
 
@@ -94,8 +94,5 @@ fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 /// The larger size; NaN stays.
 #[inline(always)]
 pub(super) fn grow<T: Real>(largest: &mut f64, value: T) {
-    let size = value.abs().to_f64();
-    if size.is_nan() || size > *largest {
-        *largest = size;
-    }
+    *largest = larger(*largest, value.abs().to_f64());
 }

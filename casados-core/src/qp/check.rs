@@ -7,7 +7,7 @@ use super::error::{Field, QpError};
 use super::layout::StageDims;
 use super::problem::{Bounds, QpView, Stage};
 use super::solution::{Solution, SolutionStage};
-use super::statistics::Residuals;
+use super::statistics::{Residuals, larger, positive};
 use crate::scalar::Real;
 
 /// Finds numbers that make no sense.
@@ -169,10 +169,7 @@ pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
 }
 
 fn largest(of: &mut f64, value: f64) {
-    // NaN stays.
-    if value.is_nan() || value.abs() > *of {
-        *of = value.abs();
-    }
+    *of = larger(*of, value.abs());
 }
 fn at<T: Real>(vector: &[T], index: usize) -> f64 {
     vector.get(index).map_or(0.0, |v| v.to_f64())
@@ -271,19 +268,19 @@ pub(crate) fn bounds<T: Real>(
             ),
         ];
         for (slack, multiplier, linear, quadratic) in sides {
-            largest(&mut residuals.inequalities, (-multiplier).max(0.0));
+            largest(&mut residuals.inequalities, positive(-multiplier));
             if slack == f64::INFINITY {
                 largest(&mut residuals.complementarity, multiplier);
             } else if linear == f64::INFINITY {
-                largest(&mut residuals.inequalities, (-slack).max(0.0));
-                largest(&mut residuals.complementarity, slack.max(0.0) * multiplier);
+                largest(&mut residuals.inequalities, positive(-slack));
+                largest(&mut residuals.complementarity, positive(slack) * multiplier);
             } else {
-                let violation = (-slack).max(0.0);
+                let violation = positive(-slack);
                 let force = linear + quadratic * violation;
                 penalties += violation * (linear + 0.5 * quadratic * violation);
-                largest(&mut residuals.inequalities, (multiplier - force).max(0.0));
-                largest(&mut residuals.complementarity, slack.max(0.0) * multiplier);
-                largest(&mut residuals.complementarity, violation * (force - multiplier).max(0.0));
+                largest(&mut residuals.inequalities, positive(multiplier - force));
+                largest(&mut residuals.complementarity, positive(slack) * multiplier);
+                largest(&mut residuals.complementarity, violation * positive(force - multiplier));
             }
         }
     }

@@ -141,6 +141,15 @@ pub enum QpError {
         /// What they reached.
         residuals: Residuals,
     },
+    /// An option of a solver is out of range.
+    InvalidOption {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// Memory could not be allocated.
     OutOfMemory {
         /// How much was asked for.
@@ -210,6 +219,9 @@ impl fmt::Display for QpError {
             }
             Self::Stalled { iterations, residuals } => {
                 write!(f, "no progress after {iterations} iterations: {residuals}")
+            }
+            Self::InvalidOption { name, value, allowed } => {
+                write!(f, "the option {name} of the solver is {value:e}; it may be {allowed}")
             }
             Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }

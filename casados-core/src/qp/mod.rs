@@ -91,3 +91,4 @@ pub(crate) use interior::{
 };
 pub(crate) use layout::{Places, assign, end, pad, part, part_mut, take_mut};
 pub(crate) use problem::Arrays;
+pub(crate) use statistics::larger;

@@ -1,6 +1,6 @@
 //! What a step of an implicit method costs, counted from the structure.
 
-use super::Structure;
+use super::{Kinematic, Structure};
 
 /// Floating-point operations of one step with `s` stages: additions, subtractions, multiplications, divisions and
 /// elementary functions, one each.
@@ -12,13 +12,11 @@ use super::Structure;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Factors of the Newton matrix: for each pivot that is no identity an inverse and a product for each block of
-    /// its `L`; a subtracted product for each update. Of a pivot that is [`scaled`](super::Pivot::scaled) (and two stages or
-    /// more) a product for each block of its `U`, and `2s²` for each update. Without a plan LU factors of the whole matrix of
-    /// `n = s nk` rows, `n (n − 1)(4n + 1)/6`.
+    /// its `L`; a subtracted product for each update. Without a plan LU factors of the whole matrix of `n = s nk` rows,
+    /// `n (n − 1)(4n + 1)/6`.
     pub factorisation: u64,
     /// A solve with one right-hand side, transposed or not: a subtracted product for each block beside the diagonal and a product for
-    /// each pivot that is no identity; a product for each that is scaled, and then `2s` for each block of its `L`. Without a plan
-    /// `2n² − n`.
+    /// each pivot that is no identity. Without a plan `2n² − n`.
     pub solve: u64,
     /// `f` at all stages: `s` times [`Operations::residual`](super::Operations::residual).
     pub residual: u64,
@@ -29,11 +27,11 @@ pub struct Cost {
     /// `s nk` for the new unknowns.
     pub iteration: u64,
     /// Forward sensitivities in the directions that count, of [`Structure::directions`]: right-hand sides `f_x V + f_w`, `2s` for each
-    /// entry of `f_x` in each direction and `s` for each of `f_u`, `f_p`; a solve for each; and
-    /// `2s nx` for each for the sum over the stages; less what [`Steady`](super::Steady) states spare of the solve, for `2s` in each direction. The
-    /// factors are those of Newton's method.
+    /// entry of `f_x` in each direction and `s` for each of `f_u`, `f_p`; a solve for each; `2s² + 3s` for each [`Kinematic`](super::Kinematic)
+    /// state; and `2s nx` for each for the sum over the stages. The factors are those of Newton's method.
     pub forward: u64,
-    /// An adjoint: the right-hand side, `s nx`; a solve; and `2s` for each entry of `f_x`, `f_u`, `f_p`.
+    /// An adjoint: the right-hand side, `s nx`; a solve; `4s²` for each kinematic state and `2s` for each entry by which others feel it; and
+    /// `2s` for each entry of `f_x`, `f_u`, `f_p`.
     pub adjoint: u64,
     /// Second derivatives, beside forward and adjoint: `∇²(μᵀ f)` at all stages, `D` of the states that are curved, `2s²` for each
     /// in each direction, and the lower triangle of `Dᵀ ∇²(μᵀ f) D`: `4s` for each non-zero (`2s` on the diagonal) in each direction,
@@ -60,6 +58,9 @@ impl Structure {
             end.saturating_sub(begin) as u64
         };
         let (of_x, of_w) = (entries(1), entries(3) + entries(4));
+        let plan = &self.elimination;
+        let kinematic = plan.kinematic.iter().filter(|of| of.equation != Kinematic::NONE).count() as u64;
+        let felt = plan.felt.len() as u64;
         let (directions, curved) = (self.directions.len() as u64, self.curved.len() as u64);
         let (residual, residual_jacobian) =
             (s * u64::from(self.operations.residual), s * u64::from(self.operations.residual_jacobian));
@@ -78,20 +79,14 @@ impl Structure {
             residual,
             residual_jacobian,
             iteration: 2 * s * s * nx + residual_jacobian + assembly + factorisation + solve + s * nk,
-            forward: directions * (2 * s * of_x + solve + 2 * s * nx - self.spared(s)) + s * of_w,
-            adjoint: s * nx + solve + 2 * s * (of_x + of_w),
+            forward: directions * (2 * s * of_x + solve + 2 * s * nx + kinematic * (2 * s * s + 3 * s))
+                + s * of_w,
+            adjoint: s * nx + solve + kinematic * 4 * s * s + 2 * s * (felt + of_x + of_w),
             hessian: s * u64::from(self.operations.hessian)
                 + directions * 2 * s * s * curved_states
                 + directions * 2 * s * self.symmetric.len() as u64
                 + directions * (directions + 1) / 2 * 2 * s * curved,
         }
-    }
-
-    /// What is not done below the pivots of steady states.
-    fn spared(&self, s: u64) -> u64 {
-        let steady = self.elimination.pivots.iter().filter(|pivot| pivot.steady);
-        let shared = if s > 1 { 2 * s * s } else { 0 };
-        steady.map(|pivot| 2 * s * (pivot.lower().len() as u64 - 1) + shared).sum()
     }
 
     /// Of a factorisation, and of a solve.
@@ -107,11 +102,6 @@ impl Structure {
             pivots = others;
             let (lower, upper) = (pivot.lower(), pivot.upper());
             let (lower, upper) = ((lower.end - lower.start) as u64, (upper.end - upper.start) as u64);
-            if pivot.scaled && s > 1 {
-                factorisation += upper * (2 * cube - square + 2 * square * lower);
-                solve += 2 * square * (1 + upper) - s + 2 * s * lower;
-                continue;
-            }
             factorisation += 2 * cube * lower * upper;
             solve += 2 * square * (lower + upper);
             if !pivot.identity {

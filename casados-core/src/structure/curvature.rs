@@ -19,18 +19,6 @@ pub struct Term {
     pub rows: u32,
 }
 
-/// The second derivative in `ẋ_j`, where a [trivial](super::Structure::trivial) equation says that `ẋ_j = c v` at every stage, and no other one
-/// knows `ẋ_j`: `c²` times as much in `v` is the same.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fold {
-    /// The entry of the Hessian on the diagonal of `ẋ_j`.
-    pub entry: u32,
-    /// That on the diagonal of `v`.
-    pub into: u32,
-    /// `c²`
-    pub factor: f64,
-}
-
 /// The second derivative in a control or a parameter that no other one knows. Its row of `D_i` has one element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lone {

@@ -1,6 +1,6 @@
 //! A model describes itself: the text of a [`Structure`].
 
-use super::{Cost, Elimination, Structure};
+use super::{Cost, Elimination, Kinematic, Structure};
 use core::fmt::{self, Display, Formatter, Write};
 
 /// Columns of the text.
@@ -141,7 +141,7 @@ impl Structure {
             "{} of {} in the lower triangle, of {} of {variables} variables",
             self.hessian.len(),
             variables * (variables + 1) / 2,
-            self.curved.len() + self.folded.len() + self.lone.len(),
+            self.curved.len() + self.lone.len(),
         )?;
         title(f, "directions")?;
         let directions = self.x.len() + self.u.len() + self.p.len();
@@ -159,11 +159,13 @@ impl Structure {
     }
 
     fn elimination(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Elimination { pivots, slots, slot_of_equation, .. } = self.elimination;
+        let Elimination { pivots, slots, kinematic, .. } = self.elimination;
         title(f, "elimination")?;
         if pivots.is_empty() {
             return writeln!(f, "no plan: the whole matrix is pivoted");
         }
+        let is_kinematic = |&(_, of): &(u32, &Kinematic)| of.equation != Kinematic::NONE;
+        let kinematic = || (0..).zip(kinematic).filter(is_kinematic);
         let identities = pivots.iter().filter(|pivot| pivot.identity).count();
         let fill = self.elimination.fill();
         writeln!(
@@ -173,10 +175,18 @@ impl Structure {
             slots.len().saturating_sub(fill),
             pivots.len(),
         )?;
-        let order = pivots.iter().map(|pivot| {
-            let equation = slot_of_equation.iter().position(|&slot| slot == pivot.slot);
-            Assignment { unknown: self.unknown(pivot.slot), equation: equation.unwrap_or_default() }
-        });
+        if kinematic().count() > 0 {
+            title(f, "  kinematic")?;
+            writeln!(f, "each follows from the variable of its equation, and is no unknown")?;
+            let states = kinematic().map(|(state, of)| Assignment {
+                unknown: self.unknown(state),
+                equation: of.equation as usize,
+            });
+            words(f, "", states)?;
+        }
+        let order = pivots
+            .iter()
+            .map(|pivot| Assignment { unknown: self.unknown(pivot.slot), equation: pivot.equation as usize });
         title(f, "  order")?;
         writeln!(f, "each unknown ← the equation that it is found from")?;
         words(f, "", order)

@@ -6,8 +6,8 @@ mod describe;
 mod elimination;
 
 pub use cost::Cost;
-pub use curvature::{Fold, Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
-pub use elimination::{Assembly, Elimination, Follower, Led, Left, Pivot, Steady, Supernode, Update};
+pub use curvature::{Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
+pub use elimination::{Assembly, Elimination, Felt, Kinematic, Left, Pivot, Supernode, Update};
 
 /// What is known about a model before it runs.
 #[derive(Clone, Copy, Debug)]
@@ -59,13 +59,11 @@ pub struct Structure {
     pub directions: &'static [u32],
     /// For each direction its position in `directions`, or [`NO_COLUMN`]: what [`columns`] makes of them.
     pub column_of_direction: &'static [u32],
-    /// Variables that occur in the pattern of the Hessian, ascending, less those of `folded` and `lone`: only their rows of `D_i` enter
+    /// Variables that occur in the pattern of the Hessian, ascending, less those of `lone`: only their rows of `D_i` enter
     /// second derivatives.
     pub curved: &'static [u32],
     /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`] makes of it.
     pub symmetric: &'static [Term],
-    /// Derivatives `ẋ_j` that occur in the Hessian's diagonal only, and are a multiple of another variable that occurs there.
-    pub folded: &'static [Fold],
     /// Controls and parameters that occur in the Hessian's diagonal only.
     pub lone: &'static [Lone],
     /// Numbers of arithmetic operations.

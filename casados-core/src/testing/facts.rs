@@ -64,21 +64,6 @@ pub(super) fn compare<M: Dae>(
     report.compare("entries by column", "pattern", number, 0.0, found, |i| format!("number {i}"));
 
     let diagonal = |entry: u32| structure.hessian.rows.get(entry as usize).copied();
-    // As the trivial equation of the derivative says.
-    let entries = jacobian(v);
-    let factor = |own: u32, other: u32| {
-        let (own, other) = (own as usize, other as usize);
-        let row =
-            structure.trivial.iter().map(|&row| row as usize).find(|&row| entries[(row, own)] != 0.0)?;
-        Some((entries[(row, other)] / entries[(row, own)]).powi(2))
-    };
-    let found = structure.folded.iter().enumerate().map(|(i, fold)| {
-        let expected =
-            diagonal(fold.entry).zip(diagonal(fold.into)).and_then(|(own, other)| factor(own, other));
-        let expected = expected.unwrap_or(f64::NAN);
-        (i, Entry { value: fold.factor, expected, tolerance: 4.0 * f64::EPSILON * expected })
-    });
-    report.compare("folded derivatives", "Jacobian", number, 0.0, found, |i| format!("number {i}"));
     // What is left out must not be felt: no entry in the columns of the others.
     let mut absent = |what: &'static str, count: usize, listed: &[u32], entries: &dyn Fn(usize) -> usize| {
         let others = (0..count).filter(|&i| !listed.contains(&(i as u32)));
@@ -94,9 +79,8 @@ pub(super) fn compare<M: Dae>(
         let pattern = [structure.hessian.rows, structure.hessian.columns];
         pattern.iter().flat_map(|list| list.iter()).filter(|&&variable| variable as usize == i).count()
     };
-    let folded = structure.folded.iter().map(|fold| fold.entry);
     let lone = structure.lone.iter().map(|lone| lone.entry);
-    let apart = folded.chain(lone).filter_map(diagonal);
+    let apart = lone.filter_map(diagonal);
     let listed: Vec<u32> = structure.curved.iter().copied().chain(apart).collect();
     absent("curved variables", time, &listed, &curved);
     let influential: Vec<u32> =

@@ -17,15 +17,16 @@ pub struct Points<M: Dae> {
 }
 
 impl<M: Dae> Points<M> {
-    /// As many random points, every variable in `[-1, 1]` unless a range is set for it.
+    /// As many random points, every variable in its range of the model, [`Dae::RANGES`], or in `[-1, 1]` if there is none, unless
+    /// another one is set for it.
     #[must_use]
     pub fn random(count: usize) -> Self {
-        Self {
-            given: Vec::new(),
-            count,
-            seed: 1,
-            ranges: core::iter::repeat_n((-1.0, 1.0), M::Shape::NV).collect(),
-        }
+        let range = |variable: usize| {
+            let range =
+                M::RANGES.get(variable).filter(|range| range.low.is_finite() && range.high.is_finite());
+            range.map_or((-1.0, 1.0), |range| (range.low, range.high))
+        };
+        Self { given: Vec::new(), count, seed: 1, ranges: (0..M::Shape::NV).map(range).collect() }
     }
 
     /// These points, `v = (ẋ, x, z, u, p, t)`.

@@ -17,6 +17,8 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// The first entries that are wrong.
     pub wrong: Vec<Deviation>,
+    /// What is not wrong, and hardly meant: a solution outside of the ranges of the model.
+    pub warnings: Vec<String>,
 }
 
 /// The comparison of one quantity with one reference.
@@ -71,7 +73,7 @@ pub(super) struct Entry {
 
 impl Report {
     pub(super) fn new(title: String) -> Self {
-        Self { title, rows: Vec::new(), wrong: Vec::new() }
+        Self { title, rows: Vec::new(), wrong: Vec::new(), warnings: Vec::new() }
     }
 
     /// Whether nothing is wrong, and every row has said something.
@@ -195,6 +197,9 @@ impl fmt::Display for Report {
                 wrong.tolerance,
                 wrong.point
             )?;
+        }
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
         }
         let total: usize = self.rows.iter().map(|row| row.wrong).sum();
         if total > self.wrong.len() {

@@ -33,6 +33,9 @@ const DEVIATIONS: f64 = 32.0;
 ///   (`λᵀ (S v) = (Sᵀ λ)ᵀ v` for all `v`);
 /// - the Hessian is symmetric, and agrees with differences of the gradient.
 ///
+/// The report warns where a state, differential or algebraic, is outside of its `range(..)` of the model: of several roots of the
+/// equations the integrator may have taken another one than is meant.
+///
 /// Errors are those of the integrator at the given inputs.
 pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
     integrator: &mut I,
@@ -47,6 +50,7 @@ pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
     let mut report = Report::new(format!("sensitivities of {}", type_name::<I>()));
 
     let solved = interval.solve(integrator)?;
+    warn::<M>(&mut report, &solved);
     let (states, derivatives) = interval.forward(integrator)?;
     let (adjoint_states, gradient) = interval.adjoint(integrator, &lambda)?;
     let all = interval.hessian(integrator, &lambda)?;
@@ -170,6 +174,9 @@ pub fn check_exact<M: Dae, I: Integrator<M>>(
     for i in 0..nx {
         let lambda: Vec<f64> = (0..nx).map(|j| f64::from(u8::from(i == j))).collect();
         let answer = interval.hessian(fine, &lambda)?;
+        if i == 0 {
+            warn::<M>(&mut report, &answer.states);
+        }
         let rough = interval.hessian(coarse, &lambda)?;
         let noise = noise(fine, &interval, &lambda, &answer)?;
         let mut compare = |quantity,
@@ -225,6 +232,22 @@ pub fn check_exact<M: Dae, I: Integrator<M>>(
         }
     }
     Ok(report)
+}
+
+/// Warns where states `(x, z, z0)` are outside of the ranges of the model.
+fn warn<M: Dae>(report: &mut Report, states: &[f64]) {
+    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+    for (i, &value) in states.iter().enumerate() {
+        let variable = nx + if i < nx + nz { i } else { i - nz };
+        let Some(range) = M::RANGES.get(variable).filter(|range| !range.contains(value)) else { continue };
+        let (name, crate::model::Range { low, high }) = (state_name::<M>(i), range);
+        let root = if i < nx {
+            ""
+        } else {
+            ": if this is another root, give start values, `nominal(z = ..)` or `set_start`"
+        };
+        report.warnings.push(format!("{name} is {value:e}, outside of its range {low:e}..={high:e}{root}"));
+    }
 }
 
 /// A direction in the space of `w`, in which differences are taken.

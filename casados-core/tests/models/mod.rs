@@ -89,7 +89,6 @@ impl Dae for Nonlinear {
                 &[0, 1, 2, 3, 4, 5, 6],
             )
         },
-        folded: &[],
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
@@ -189,7 +188,6 @@ impl Dae for Linear {
         column_of_direction: &[0, 1, 2],
         curved: &[1, 4],
         symmetric: &const { symmetric::<2, 2>(&Pattern { rows: &[4], columns: &[1] }, &[1, 4]) },
-        folded: &[],
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
@@ -261,7 +259,6 @@ impl Dae for Fragile {
         column_of_direction: &[0, 1],
         curved: &[1, 2, 3],
         symmetric: &const { symmetric::<3, 3>(&Pattern { rows: &[1, 3], columns: &[1, 2] }, &[1, 2, 3]) },
-        folded: &[],
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
@@ -330,7 +327,6 @@ impl Dae for Algebraic {
         column_of_direction: &[0],
         curved: &[0],
         symmetric: &const { symmetric::<1, 1>(&Pattern { rows: &[0], columns: &[0] }, &[0]) },
-        folded: &[],
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
@@ -439,7 +435,6 @@ impl Dae for Rod {
         symmetric: &const {
             symmetric::<N, N>(&Pattern { rows: &ROD_HESSIAN, columns: &ROD_HESSIAN }, &ROD_HESSIAN)
         },
-        folded: &[],
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,

@@ -1,5 +1,6 @@
 //! Dual models: `Dae` by the arithmetic of dual numbers at run time.
 
+use super::domain;
 use crate::language::Form;
 use crate::language::dual::{Argument, Model};
 use crate::language::signature::Role;
@@ -49,6 +50,7 @@ pub fn write(model: &Model) -> TokenStream {
     let text = name.to_string();
     let crate::language::Variables { x, z, u, p } = variables;
 
+    let domain = domain::write(krate, &model.variables, &model.samplings, |_| true);
     let call = quote!(#function::<#(#generics),*>(#(#arguments),*));
     let returned = if model.scalar { quote!([#call]) } else { quote!(::core::convert::Into::into(#call)) };
     let value = match form {
@@ -94,6 +96,7 @@ pub fn write(model: &Model) -> TokenStream {
                 type Jacobian<T: #krate::shape::Plain> = [T; #lj];
                 type Hessian<T: #krate::shape::Plain> = [T; #lh];
                 type Factors<B: #krate::shape::Plain> = [B; 0];
+                #domain
                 const STRUCTURE: #krate::model::Structure = {
                     const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::dual::jacobian_pattern::<
                         #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>,

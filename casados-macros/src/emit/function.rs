@@ -33,58 +33,58 @@ pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
             const STRUCTURE: #krate::function::FunctionStructure = #structure;
 
             #[inline]
-            fn value<S: #krate::Lanes>(v: &[S::Cell; #lv], y: &mut [S::Cell; #ly]) {
-                code::value::<S>(#c v, y);
+            fn value<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_y: &mut [S::Cell; #ly]) {
+                code::value::<S>(#c casados_v, casados_y);
             }
 
             #[inline]
-            fn jacobian_constants<S: #krate::Lanes>(jacobian: &mut [S::Cell; #lj]) {
-                code::jacobian_constants::<S>(#c jacobian);
+            fn jacobian_constants<S: #krate::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
+                code::jacobian_constants::<S>(#c casados_jacobian);
             }
 
             #[inline]
             fn value_jacobian<S: #krate::Lanes>(
-                v: &[S::Cell; #lv],
-                y: &mut [S::Cell; #ly],
-                jacobian: &mut [S::Cell; #lj],
+                casados_v: &[S::Cell; #lv],
+                casados_y: &mut [S::Cell; #ly],
+                casados_jacobian: &mut [S::Cell; #lj],
             ) {
-                code::value_jacobian::<S>(#c v, y, jacobian);
+                code::value_jacobian::<S>(#c casados_v, casados_y, casados_jacobian);
             }
 
             #[inline]
-            fn adjoint<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #ly], gradient: &mut [S::Cell; #lv]) {
-                code::adjoint::<S>(#c v, mu, gradient);
-                S::from_f64(0.0).store(&mut gradient[#last]);
+            fn adjoint<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #ly], casados_gradient: &mut [S::Cell; #lv]) {
+                code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
+                S::from_f64(0.0).store(&mut casados_gradient[#last]);
             }
 
             #[inline]
-            fn time_derivative<S: #krate::Lanes>(v: &[S::Cell; #lv], rate: &mut [S::Cell; #ly]) {
-                for rate in rate.iter_mut() {
-                    S::from_f64(0.0).store(rate);
+            fn time_derivative<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_rate: &mut [S::Cell; #ly]) {
+                for casados_rate in casados_rate.iter_mut() {
+                    S::from_f64(0.0).store(casados_rate);
                 }
-                code::time_derivative::<S>(#c v, rate);
+                code::time_derivative::<S>(#c casados_v, casados_rate);
             }
 
             #[inline]
-            fn hessian<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #ly], hessian: &mut [S::Cell; #lh]) {
-                code::hessian::<S>(#c v, mu, hessian);
+            fn hessian<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #ly], casados_hessian: &mut [S::Cell; #lh]) {
+                code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
 
         #[automatically_derived]
         impl #krate::GraphFunction for #ty {
-            fn value_of<S: #krate::Scalar<Cell = S>>(v: &[S], y: &mut [S]) {
-                if let (Some(v), Some(y)) = (v.first_chunk(), y.first_chunk_mut()) {
-                    code::value::<S>(#c v, y);
+            fn value_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_y: &mut [S]) {
+                if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_y)) = (casados_v.first_chunk(), casados_y.first_chunk_mut()) {
+                    code::value::<S>(#c casados_v, casados_y);
                 }
             }
 
-            fn adjoint_of<S: #krate::Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]) {
-                if let (Some(v), Some(mu), Some(gradient)) =
-                    (v.first_chunk(), mu.first_chunk(), gradient.first_chunk_mut())
+            fn adjoint_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
+                if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_mu), ::core::option::Option::Some(casados_gradient)) =
+                    (casados_v.first_chunk(), casados_mu.first_chunk(), casados_gradient.first_chunk_mut())
                 {
-                    code::adjoint::<S>(#c v, mu, gradient);
-                    S::from_f64(0.0).store(&mut gradient[#last]);
+                    code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
+                    S::from_f64(0.0).store(&mut casados_gradient[#last]);
                 }
             }
         }

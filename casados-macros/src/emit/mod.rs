@@ -4,6 +4,7 @@ mod chunk;
 mod code;
 mod divisor;
 mod documentation;
+mod domain;
 mod dual;
 mod function;
 mod model;
@@ -66,19 +67,7 @@ fn with_elementary_functions(item: TokenStream, krate: &syn::Path) -> TokenStrea
         #[allow(unused_imports)]
         use #krate::scalar::Float as _;
     };
-    match syn::parse2(item.clone()) {
-        Ok(syn::Item::Fn(mut function)) => {
-            function.block.stmts.insert(0, syn::Stmt::Item(syn::Item::Verbatim(import)));
-            function.into_token_stream()
-        }
-        Ok(syn::Item::Mod(mut module)) => {
-            if let Some((_, items)) = &mut module.content {
-                items.insert(0, syn::Item::Verbatim(import));
-            }
-            module.into_token_stream()
-        }
-        _ => item,
-    }
+    language::tokens::with(item, &import, &TokenStream::new())
 }
 
 /// The type of a model.
@@ -112,17 +101,13 @@ fn assemble(
             #implementations
         }),
         Place::Inside => {
-            let mut module: syn::ItemMod = syn::parse2(item)?;
+            let syn::ItemMod { ident, .. } = syn::parse2(item.clone())?;
             let inside = quote! {
                 #declaration
                 pub struct #name #generics;
                 #implementations
             };
-            let Some((_, items)) = &mut module.content else {
-                return Err(syn::Error::new_spanned(module, "a model needs a module with its content"));
-            };
-            items.push(syn::Item::Verbatim(inside));
-            let ident = &module.ident;
+            let module = language::tokens::with(item, &TokenStream::new(), &inside);
             Ok(quote! {
                 #[allow(dead_code)]
                 #module
@@ -140,6 +125,8 @@ pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error
     let error = error.to_compile_error();
     let stub = original(&item).map(|(name, item)| {
         let (visibility, parameters) = match &item {
+            // In an `impl` there is no place for a type.
+            syn::Item::Fn(function) if function.sig.receiver().is_some() => return TokenStream::new(),
             syn::Item::Fn(function) => (&function.vis, Some(&function.sig.generics)),
             syn::Item::Mod(module) => (&module.vis, None),
             _ => return TokenStream::new(),

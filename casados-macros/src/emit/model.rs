@@ -1,7 +1,7 @@
 //! The implementations of `Dae`, `GraphDae` and `Ode` for one model.
 
 use super::code::{self, MODEL, dimensions, ty};
-use super::structure;
+use super::{domain, structure};
 use crate::language::{Model, Variables};
 use crate::structure::{Analysis, Derivatives};
 use proc_macro2::{Literal, TokenStream};
@@ -20,6 +20,17 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
     let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
     let structure = structure::write(analysis);
+    // Nonlinear in the unknowns, whatever the states are.
+    let unknown = |variable: u32| match variable as usize {
+        derivative if derivative < nx => Some(derivative),
+        algebraic => (algebraic >= 2 * nx && algebraic < 2 * nx + nz).then(|| algebraic - nx),
+    };
+    let domain = domain::write(krate, variables, &model.samplings, |of| {
+        hessian.iter().any(|&(row, column, _)| {
+            let (row, column) = (unknown(row), unknown(column));
+            row.is_some() && column.is_some() && (row == Some(of) || column == Some(of))
+        })
+    });
     // Constants from outside are an argument: the module of the code sees no name of the user's.
     let c = (!opaque.is_empty()).then(|| quote!(&C,));
 
@@ -46,57 +57,58 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
             type Hessian<T: #krate::shape::Plain> = [T; #lh];
             type Factors<B: #krate::shape::Plain> = [B; #lb];
             const STRUCTURE: #krate::model::Structure = #structure;
+            #domain
 
             #[inline]
-            fn residual<S: #krate::Lanes>(v: &[S::Cell; #lv], f: &mut [S::Cell; #lk]) {
-                code::residual::<S>(#c v, f);
+            fn residual<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_f: &mut [S::Cell; #lk]) {
+                code::residual::<S>(#c casados_v, casados_f);
             }
 
             #[inline]
-            fn jacobian_constants<S: #krate::Lanes>(jacobian: &mut [S::Cell; #lj]) {
-                code::jacobian_constants::<S>(#c jacobian);
+            fn jacobian_constants<S: #krate::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
+                code::jacobian_constants::<S>(#c casados_jacobian);
             }
 
             #[inline]
             fn residual_jacobian<S: #krate::Lanes>(
-                v: &[S::Cell; #lv],
-                f: &mut [S::Cell; #lk],
-                jacobian: &mut [S::Cell; #lj],
+                casados_v: &[S::Cell; #lv],
+                casados_f: &mut [S::Cell; #lk],
+                casados_jacobian: &mut [S::Cell; #lj],
             ) {
-                code::residual_jacobian::<S>(#c v, f, jacobian);
+                code::residual_jacobian::<S>(#c casados_v, casados_f, casados_jacobian);
             }
 
             #[inline]
-            fn tangent<S: #krate::Lanes>(v: &[#krate::scalar::Tangent<S>; #lv], f: &mut [#krate::scalar::Tangent<S>; #lk]) {
-                code::residual::<#krate::scalar::Tangent<S>>(#c v, f);
+            fn tangent<S: #krate::Lanes>(casados_v: &[#krate::scalar::Tangent<S>; #lv], casados_f: &mut [#krate::scalar::Tangent<S>; #lk]) {
+                code::residual::<#krate::scalar::Tangent<S>>(#c casados_v, casados_f);
             }
 
             #[inline]
-            fn adjoint<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], gradient: &mut [S::Cell; #lv]) {
-                code::adjoint::<S>(#c v, mu, gradient);
-                S::from_f64(0.0).store(&mut gradient[#time]);
+            fn adjoint<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_gradient: &mut [S::Cell; #lv]) {
+                code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
+                S::from_f64(0.0).store(&mut casados_gradient[#time]);
             }
 
             #[inline]
-            fn hessian<S: #krate::Lanes>(v: &[S::Cell; #lv], mu: &[S::Cell; #lk], hessian: &mut [S::Cell; #lh]) {
-                code::hessian::<S>(#c v, mu, hessian);
+            fn hessian<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_hessian: &mut [S::Cell; #lh]) {
+                code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
 
         #[automatically_derived]
         impl #krate::GraphDae for #ty {
-            fn residual_of<S: #krate::Scalar<Cell = S>>(v: &[S], f: &mut [S]) {
-                if let (Some(v), Some(f)) = (v.first_chunk(), f.first_chunk_mut()) {
-                    code::residual::<S>(#c v, f);
+            fn residual_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_f: &mut [S]) {
+                if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_f)) = (casados_v.first_chunk(), casados_f.first_chunk_mut()) {
+                    code::residual::<S>(#c casados_v, casados_f);
                 }
             }
 
-            fn adjoint_of<S: #krate::Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]) {
-                if let (Some(v), Some(mu), Some(gradient)) =
-                    (v.first_chunk(), mu.first_chunk(), gradient.first_chunk_mut())
+            fn adjoint_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
+                if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_mu), ::core::option::Option::Some(casados_gradient)) =
+                    (casados_v.first_chunk(), casados_mu.first_chunk(), casados_gradient.first_chunk_mut())
                 {
-                    code::adjoint::<S>(#c v, mu, gradient);
-                    S::from_f64(0.0).store(&mut gradient[#time]);
+                    code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
+                    S::from_f64(0.0).store(&mut casados_gradient[#time]);
                 }
             }
         }

@@ -90,7 +90,7 @@ impl Arguments {
         sampling::resolve(&self.settings, variables)
     }
 
-    /// Dual models and functions have no plan that nominal values and ranges could improve.
+    /// Functions have no unknowns and no plan: there is nothing that nominal values and ranges could say.
     pub fn without_settings(&self, what: &str) -> Result<()> {
         let message =
             format!("{what} has no elimination plan: nominal values and ranges would change nothing");

@@ -2,7 +2,7 @@
 
 use super::attribute::Arguments;
 use super::signature::{self, Role};
-use super::{Form, Instance, Place, Variables, module};
+use super::{Form, Instance, Place, Sampling, Variables, module};
 use proc_macro2::{Ident, TokenStream};
 use quote::ToTokens;
 use syn::{Error, Expr, GenericParam, Item, ItemFn, Result, Type};
@@ -33,6 +33,8 @@ pub struct Model {
     pub instance: Vec<Instance>,
     /// Names of the variables.
     pub variables: Variables,
+    /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
+    pub samplings: Vec<Sampling>,
     /// The arguments of the function, in its order.
     pub arguments: Vec<Argument>,
     /// Its generic arguments, in its order: the type is `CasadosT`.
@@ -57,11 +59,11 @@ pub struct Argument {
 
 /// Reads an item if it is a dual model.
 pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Option<Source>> {
-    let (item, place, function, items, name, visibility, attributes) = match syn::parse2(item)? {
+    let (item, place, function, items, name, visibility, attributes) = match syn::parse2(item.clone())? {
         Item::Fn(function) => {
             let (name, visibility) = (function.sig.ident.clone(), function.vis.clone());
             let attributes = function.attrs.clone();
-            (function.to_token_stream(), Place::Beside, function, Vec::new(), name, visibility, attributes)
+            (item, Place::Beside, function, Vec::new(), name, visibility, attributes)
         }
         Item::Mod(mut module) => {
             let Ok(index) = module::model_function(form, &mut module) else { return Ok(None) };
@@ -69,7 +71,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
             let Some(Item::Fn(function)) = items.get(index).cloned() else { return Ok(None) };
             let (name, visibility) = (module.ident.clone(), module.vis.clone());
             let attributes = module.attrs.clone();
-            (module.to_token_stream(), Place::Inside, function, items, name, visibility, attributes)
+            (super::tokens::without_marks(item), Place::Inside, function, items, name, visibility, attributes)
         }
         _ => return Ok(None),
     };
@@ -85,7 +87,6 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
     }
     require_feature(&function, cfg!(feature = "num-dual"))?;
     let arguments = Arguments::read(attribute)?;
-    arguments.without_settings("a dual model")?;
     let mut consts = function.sig.generics.clone();
     consts.params =
         consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();
@@ -103,6 +104,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
                 documentation: super::documentation(&attributes),
                 generics: generics(&function, &instance)?,
                 instance,
+                samplings: arguments.samplings(&signature.variables)?,
                 variables: signature.variables,
                 arguments: signature.arguments,
                 equations: signature.equations,

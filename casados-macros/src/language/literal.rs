@@ -16,6 +16,11 @@ impl Evaluator {
             syn::Lit::Int(int) if int.suffix().starts_with('f') => {
                 self.float_literal(int.base10_digits(), int.suffix(), literal)
             }
+            syn::Lit::Int(int) if int.suffix() == "u128" => Err(error(
+                literal,
+                "a model has no `u128`, whose values exceed `i128`: write `f64` or `i128`",
+            )
+            .into()),
             syn::Lit::Int(int) => {
                 let value = int
                     .base10_parse::<i128>()

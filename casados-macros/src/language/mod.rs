@@ -15,13 +15,13 @@ mod expression;
 mod flatten;
 mod function;
 mod generics;
+mod hygiene;
 mod items;
 mod literal;
 mod methods;
 pub mod mistakes;
 mod model;
 mod module;
-pub mod nesting;
 mod operator;
 mod path;
 mod pattern;
@@ -32,6 +32,7 @@ pub mod signature;
 mod statement;
 #[cfg(test)]
 mod tests;
+pub mod tokens;
 mod types;
 mod user;
 mod value;
@@ -40,7 +41,6 @@ use crate::graph::{Graph, Node};
 use attribute::Arguments;
 use model::Template;
 use proc_macro2::{Span, TokenStream};
-use quote::ToTokens;
 pub use sampling::Sampling;
 
 /// Which attribute.
@@ -139,7 +139,10 @@ pub struct Variables {
 /// Reads an item.
 pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Result<Source> {
     let arguments = Arguments::read(attribute)?;
-    match syn::parse2(item)? {
+    let written = item.clone();
+    let mut parsed = syn::parse2(tokens::without_tests(item))?;
+    hygiene::separate(&mut parsed);
+    match parsed {
         syn::Item::Fn(function) => {
             let template = Template {
                 form,
@@ -151,7 +154,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
                 krate: arguments.krate.clone(),
             };
             let models = models(&arguments, &template)?;
-            Ok(Source { item: function.to_token_stream(), place: Place::Beside, models })
+            Ok(Source { item: written, place: Place::Beside, models })
         }
         syn::Item::Mod(mut module) => {
             let index = module::model_function(form, &mut module)?;
@@ -169,7 +172,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
                 krate: arguments.krate.clone(),
             };
             let models = models(&arguments, &template)?;
-            Ok(Source { item: module.to_token_stream(), place: Place::Inside, models })
+            Ok(Source { item: tokens::without_marks(written), place: Place::Inside, models })
         }
         other => Err(syn::Error::new_spanned(
             other,

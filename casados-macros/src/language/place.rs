@@ -141,6 +141,9 @@ impl Evaluator {
 
     /// Writes to a place.
     pub fn write(&mut self, place: &Place, value: Value, at: At) -> Result<()> {
+        if refers(&value, &place.cell) {
+            return Err(error(at, "a reference to a variable cannot be stored in that variable itself"));
+        }
         self.remember(&place.cell);
         place.set(value).ok_or_else(|| error(at, "the value does not fit where it is assigned to"))
     }
@@ -241,6 +244,19 @@ impl Evaluator {
                 self.read(&place, at)
             }
         }
+    }
+}
+
+/// Whether references in a value lead to a variable, directly or through other variables.
+fn refers(value: &Value, cell: &Cell) -> bool {
+    let any = |values: &[Value]| values.iter().any(|value| refers(value, cell));
+    match value {
+        Value::Reference(place) => Rc::ptr_eq(&place.cell, cell) || refers(&place.cell.borrow(), cell),
+        Value::Array(values) | Value::Tuple(values) => any(values),
+        Value::Struct(structure) => any(&structure.fields),
+        Value::Matrix(matrix) => any(&matrix.elements),
+        Value::Option(Some(value)) => refers(value, cell),
+        _ => false,
     }
 }
 

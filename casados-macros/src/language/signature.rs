@@ -94,7 +94,10 @@ pub fn arguments(form: Form, function: &ItemFn) -> Result<Vec<Argument>> {
 /// One argument, after those before it.
 fn argument(form: Form, input: &FnArg, before: &[Argument]) -> Result<Argument> {
     let FnArg::Typed(input) = input else {
-        return Err(Error::new_spanned(input, "a model is a function without `self`"));
+        return Err(Error::new_spanned(
+            input,
+            "a model is a function without `self`: write it outside of the `impl`",
+        ));
     };
     let role = role(form, &input.pat)?;
     if before.iter().any(|argument| argument.role == role) {
@@ -215,7 +218,9 @@ pub fn type_name(name: &Ident) -> Ident {
             camel.push_str(letters.as_str());
         }
     }
-    if !camel.starts_with(|first: char| first.is_alphabetic()) {
+    // Scripts without upper case would leave the name of the function.
+    let has_no_case = |first: char| first.is_alphabetic() && !first.is_uppercase() && !first.is_lowercase();
+    if !camel.starts_with(|first: char| first.is_alphabetic()) || camel.starts_with(has_no_case) {
         camel.insert(0, 'M');
     }
     Ident::new(&camel, name.span())

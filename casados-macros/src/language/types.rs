@@ -192,7 +192,12 @@ impl Evaluator {
                 }
             }
             _ => {
-                if let Some(ty) = IntegerType::named(&name) {
+                if name == "u128" {
+                    return Err(error(
+                        last,
+                        "a model has no `u128`, whose values exceed `i128`: write `f64` or `i128`",
+                    ));
+                } else if let Some(ty) = IntegerType::named(&name) {
                     Type::Integer(ty)
                 } else if let Some((rows, columns)) = matrix_alias(&name) {
                     Type::Matrix(Some(rows), Some(columns))

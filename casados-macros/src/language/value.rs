@@ -137,7 +137,6 @@ pub enum IntegerType {
     U16,
     U32,
     U64,
-    U128,
     Usize,
 }
 
@@ -156,7 +155,6 @@ impl IntegerType {
             "u16" => U16,
             "u32" => U32,
             "u64" => U64,
-            "u128" => U128,
             "usize" => Usize,
             _ => return None,
         })
@@ -176,7 +174,6 @@ impl IntegerType {
             U16 => "u16",
             U32 => "u32",
             U64 => "u64",
-            U128 => "u128",
             Usize => "usize",
         }
     }
@@ -189,7 +186,7 @@ impl IntegerType {
             I16 | U16 => 16,
             I32 | U32 => 32,
             I64 | U64 | Isize | Usize => 64,
-            I128 | U128 => 128,
+            I128 => 128,
         }
     }
 
@@ -204,10 +201,9 @@ impl IntegerType {
         if self.signed() { i128::MIN >> (128 - self.bits()) } else { 0 }
     }
 
-    /// The largest value (of `u128` as far as the evaluator goes).
+    /// The largest value.
     pub fn max(self) -> i128 {
         match self {
-            IntegerType::U128 => i128::MAX,
             _ if self.signed() => i128::MAX >> (128 - self.bits()),
             _ => (1i128 << self.bits()) - 1,
         }

@@ -43,7 +43,7 @@ impl Complex {
     pub fn abs(self) -> f64 {
         self.re.hypot(self.im)
     }
-    fn times(self, b: Self) -> Self {
+    pub fn times(self, b: Self) -> Self {
         Self { re: self.re * b.re - self.im * b.im, im: self.re * b.im + self.im * b.re }
     }
     fn minus(self, b: Self) -> Self {
@@ -180,13 +180,22 @@ impl Active {
     }
 }
 
-/// The plan for a matrix of `size` equations and unknowns.
+/// A plan has no more updates than this; each is an element of a table. A full matrix of 66 equations has as
+/// many. Beyond it there is none, and the engine eliminates the whole matrix with pivots that it looks for.
+const UPDATES: usize = 100_000;
+
+/// The plan for a matrix of `size` equations and unknowns; an empty one where it would be too long.
 pub fn plan(size: usize, entries: &[Entry]) -> Plan {
     let mut active = Active::new(size, entries);
     let mut steps = Vec::with_capacity(size);
+    let mut updates = 0;
     for _ in 0..size {
         let Some((row, column)) = active.choose() else { break };
         let (lower, upper) = active.eliminate(row, column);
+        updates += lower.len() * upper.len();
+        if updates > UPDATES {
+            return Plan::default();
+        }
         steps.push((row, column, lower, upper));
     }
     in_order(&mut steps);

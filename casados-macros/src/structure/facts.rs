@@ -20,10 +20,8 @@ pub struct Facts {
     pub quadratures: Vec<u32>,
     /// Directions `(x₀, u, p)` that an equation depends on.
     pub directions: Vec<u32>,
-    /// Variables that occur in the Hessian, but for those of the next two.
+    /// Variables that occur in the Hessian, but for those of the next.
     pub curved: Vec<u32>,
-    /// Diagonal entries of the Hessian that belong to a derivative alone, `ẋ_j = c v`: the entry, that of `v`, and `c²`.
-    pub folded: Vec<(u32, u32, f64)>,
     /// Diagonal entries that belong to a control or a parameter alone: the entry, and the direction.
     pub lone: Vec<(u32, u32)>,
 }
@@ -60,7 +58,7 @@ pub fn find(
         outside.then(|| if variable < end_x { variable - nx } else { variable - end_z + nx })
     };
     let trivial: Vec<u32> = (0..).zip(&terms).filter(trivial).map(|(row, _)| row).collect();
-    let curved = Curved::find(graph, jacobian, &trivial, hessian, ends);
+    let curved = Curved::find(hessian, ends);
     Facts {
         linear_in_state: independent(&|variable| variable < end_z),
         constant_matrix: independent(&|variable| variable < end_z || variable == time),
@@ -73,7 +71,6 @@ pub fn find(
         quadratures: (0..nx).filter(|state| !used.contains(&(state + nx))).collect(),
         directions: used.iter().filter_map(direction).collect(),
         curved: curved.variables.into_iter().collect(),
-        folded: curved.folded,
         lone: curved.lone,
     }
 }
@@ -81,35 +78,19 @@ pub fn find(
 /// What second derivatives are made of.
 struct Curved {
     variables: BTreeSet<u32>,
-    folded: Vec<(u32, u32, f64)>,
     lone: Vec<(u32, u32)>,
 }
 
 impl Curved {
-    fn find(graph: &Graph, jacobian: &[Entry], trivial: &[u32], hessian: &[Entry], ends: [u32; 5]) -> Self {
+    fn find(hessian: &[Entry], ends: [u32; 5]) -> Self {
         let [nx, end_x, end_z, ..] = ends;
         let mut variables: BTreeSet<u32> = hessian.iter().flat_map(|entry| [entry.0, entry.1]).collect();
-        let diagonal = |variable: u32| (0..).zip(hessian).find(|(_, e)| (e.0, e.1) == (variable, variable));
         // The entry on the diagonal, if there is no other one.
         let alone = |variable: u32| {
-            let count = hessian.iter().filter(|entry| entry.0 == variable || entry.1 == variable).count();
-            diagonal(variable).filter(|_| count == 1).map(|(index, _)| index)
+            let mut own = (0..).zip(hessian).filter(|(_, e)| e.0 == variable || e.1 == variable);
+            let (index, entry) = own.next()?;
+            (own.next().is_none() && entry.0 == entry.1).then_some(index)
         };
-        let mut folded = Vec::new();
-        for &row in trivial {
-            let mut of_row = jacobian.iter().filter(|entry| entry.0 == row);
-            let (Some(own), Some(other)) = (of_row.next(), of_row.next()) else { continue };
-            let factor =
-                graph.value(own.2).zip(graph.value(other.2)).map(|(own, other)| (other / own).powi(2));
-            let (Some(entry), Some((into, _)), Some(factor)) = (alone(own.1), diagonal(other.1), factor)
-            else {
-                continue;
-            };
-            // Two equations may say what one derivative is.
-            if own.1 < nx && other.1 >= nx && factor.is_normal() && variables.remove(&own.1) {
-                folded.push((entry, into, factor));
-            }
-        }
         let inputs: Vec<u32> = variables.range(end_z..).copied().collect();
         let mut lone = Vec::new();
         for variable in inputs {
@@ -118,6 +99,6 @@ impl Curved {
                 lone.push((entry, variable - end_z + end_x - nx));
             }
         }
-        Self { variables, folded, lone }
+        Self { variables, lone }
     }
 }

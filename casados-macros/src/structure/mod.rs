@@ -3,10 +3,9 @@
 
 mod elimination;
 mod facts;
-pub mod followers;
 mod index;
+pub mod kinematic;
 mod samples;
-mod steady;
 pub mod supernodes;
 #[cfg(test)]
 mod tests;
@@ -15,7 +14,8 @@ use crate::graph::{self, Degree, Entry, Node};
 use crate::language::{Model, Sampling, Variables};
 pub use elimination::Plan;
 pub use facts::Facts;
-pub use samples::Position;
+pub use kinematic::Kinematic;
+pub use samples::{Position, Term};
 use std::collections::HashSet;
 
 /// The derivatives of a model or of a function of its variables.
@@ -64,19 +64,12 @@ pub struct Analysis {
 pub struct Elimination {
     /// The pivots in order, with the places of all blocks.
     pub plan: Plan,
-    /// The structural non-zeros of the Newton matrix.
+    /// The structural non-zeros of the Newton matrix, without kinematic states.
     pub positions: Vec<Position>,
     /// Pivots that are the identity, whatever the step size and the point.
     pub identity: Vec<bool>,
-    /// Of these the ones of whose column all blocks are `h diag(f_x) A`, with nothing added when the pivot's turn comes.
-    pub scaled: Vec<bool>,
-    /// For each state, if right-hand sides of its pivot are the same at all stages: the entry of the Jacobian they are made of, and
-    /// where in the entries by column those of its `f_x` begin and end.
-    pub steady: Vec<Option<[u32; 3]>>,
-    /// For each state, if it follows another one in every iteration of Newton's method.
-    pub followers: Vec<Option<followers::Follower>>,
-    /// What is left of the matrix where those that are absorbed are not in it; nothing if none is.
-    pub led: Vec<followers::Led>,
+    /// The kinematic states.
+    pub kinematic: Vec<Kinematic>,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -160,9 +153,6 @@ fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
     Derivatives { jacobian, blocks, constant, gradient, hessian, linear, operations }
 }
 
-/// One product with `hA` for a column costs less than one for each block from so many blocks on.
-const SHARED: usize = 3;
-
 /// Plans the elimination of the Newton matrix.
 fn elimination(
     model: &Model,
@@ -171,7 +161,8 @@ fn elimination(
     trivial: &[u32],
 ) -> Elimination {
     let Variables { x, z, u, p } = &model.variables;
-    let positions = samples::pattern(jacobian, blocks, x.len() as u32);
+    let (nx, kinematic) = (x.len() as u32, kinematic::find(model, (jacobian, blocks), trivial));
+    let positions = kinematic::condense(nx, &kinematic, samples::pattern(jacobian, blocks, nx));
     let mut samplings = model.samplings.clone();
     samplings.resize(2 * x.len() + z.len() + u.len() + p.len() + 1, Sampling::default());
     let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
@@ -187,24 +178,7 @@ fn elimination(
         .iter()
         .map(|&[block, ..]| original(block).is_some_and(|p| samples::is_identity(&model.graph, jacobian, p)))
         .collect();
-    let scaled: Vec<bool> = plan
-        .ranges
-        .iter()
-        .zip(&identity)
-        .map(|(&[block, upper, _], identity)| {
-            let mut lower = block + 1..upper;
-            *identity
-                && lower.len() >= SHARED
-                && lower.all(|block| original(block).is_some_and(|p| p.direct.is_none()))
-        })
-        .collect();
-    let steady = steady::find(x.len() as u32, (jacobian, blocks), trivial, &plan, &scaled);
-    let followers = followers::find(model, (jacobian, blocks), trivial, &plan, &identity);
-    let led = match followers.iter().flatten().any(|follower| follower.absorbed) {
-        true => followers::led(x.len() as u32, jacobian, &plan, &positions, &followers),
-        false => Vec::new(),
-    };
-    Elimination { plan, positions, identity, scaled, steady, followers, led }
+    Elimination { plan, positions, identity, kinematic }
 }
 
 /// As many equations as unknowns.

@@ -12,15 +12,23 @@ use std::collections::BTreeMap;
 const POINTS: usize = 12;
 const DRAWS: usize = 200;
 
-/// A structural non-zero of the Newton matrix, by its entries of the Jacobian.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A structural non-zero of the Newton matrix: a sum of terms.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Position {
     pub row: u32,
     pub column: u32,
-    /// The entry of `f_ẋ` or `f_z`.
-    pub direct: Option<u32>,
-    /// The entry of `f_x`.
-    pub state: Option<u32>,
+    pub terms: Vec<Term>,
+}
+
+/// `diag(f) (hA)^order`, times `c`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Term {
+    /// The entry of the Jacobian that is `f`.
+    pub entry: u32,
+    /// That which is `−c`; one if there is none.
+    pub by: Option<u32>,
+    /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more through a kinematic state.
+    pub order: u32,
 }
 
 /// The pattern `f_ẋ ∪ f_x ∪ f_z`, by row, then by column.
@@ -31,13 +39,13 @@ pub fn pattern(jacobian: &[(u32, u32, Node)], blocks: [usize; 6], nx: u32) -> Ve
         let column = if variable < nx { variable } else { variable - nx };
         let position = positions.entry((row, column)).or_default();
         (position.row, position.column) = (row, column);
-        let state = entry >= blocks[1] && entry < blocks[2];
-        *(if state { &mut position.state } else { &mut position.direct }) = Some(entry as u32);
+        let order = u32::from(entry >= blocks[1] && entry < blocks[2]);
+        position.terms.push(Term { entry: entry as u32, by: None, order });
     }
     positions.into_values().collect()
 }
 
-/// The non-zeros with their values `f_ẋ + hμ f_x` at sample points and sample values of `hμ`.
+/// The non-zeros with their values `Σ c f (hμ)^order` at sample points and sample values of `hμ`.
 pub fn sample(
     graph: &Graph,
     jacobian: &[(u32, u32, Node)],
@@ -65,8 +73,8 @@ pub fn sample(
         let point: Vec<f64> =
             samplings.iter().map(|sampling| coordinate(&mut random, draw, *sampling)).collect();
         let values = graph.evaluate(&nodes, Point { variables: &point, opaque: &constants, seeds: &[] });
-        let used = positions.iter().flat_map(|p| [p.direct, p.state]).flatten();
-        if used.clone().all(|entry| values[entry as usize].is_finite()) {
+        let mut used = positions.iter().flat_map(|position| &position.terms);
+        if used.all(|term| values[term.entry as usize].is_finite()) {
             found += 1;
             for _ in 0..2 {
                 // Eigenvalues of A lie in the right half-plane; the step size may be anything.
@@ -74,9 +82,14 @@ pub fn sample(
                 let angle = random.between(-1.4, 1.4);
                 let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
                 for (entry, position) in entries.iter_mut().zip(positions) {
-                    let value = |index: Option<u32>| index.map_or(0.0, |index| values[index as usize]);
-                    let (direct, state) = (value(position.direct), value(position.state));
-                    entry.values.push(Complex { re: direct + state * hmu.re, im: state * hmu.im });
+                    let mut value = Complex::default();
+                    for term in &position.terms {
+                        let c = term.by.map_or(1.0, |by| -values[by as usize]);
+                        let mut product = Complex { re: c * values[term.entry as usize], im: 0.0 };
+                        (0..term.order).for_each(|_| product = product.times(hmu));
+                        value = Complex { re: value.re + product.re, im: value.im + product.im };
+                    }
+                    entry.values.push(value);
                 }
             }
         }
@@ -86,8 +99,10 @@ pub fn sample(
 
 /// The block is the identity, whatever the step size and the point.
 pub fn is_identity(graph: &Graph, jacobian: &[(u32, u32, Node)], position: &Position) -> bool {
-    let direct = position.direct.and_then(|entry| graph.value(jacobian[entry as usize].2));
-    position.state.is_none() && direct == Some(1.0)
+    match position.terms[..] {
+        [Term { entry, order: 0, .. }] => graph.value(jacobian[entry as usize].2) == Some(1.0),
+        _ => false,
+    }
 }
 
 /// A coordinate of the point with this number.

@@ -2,25 +2,22 @@
 //! is looked up once (J. W. H. Liu, E. G. Ng, B. W. Peyton, On finding supernodes for sparse matrix computations, 1993).
 
 use super::elimination::Plan;
-use super::followers::Follower;
+use std::collections::HashMap;
 
 /// So many pivots at most does the engine take together.
 const MOST: usize = 4;
 
-/// How many pivots from each on are one, as iterations see the plan that leave out states which follow others; zero if one before has counted it. Those of `scaled`
-/// pivots, whose columns are not whole blocks, and of states that follow are alone.
-pub fn find(plan: &Plan, scaled: &[bool], followers: &[Option<Follower>]) -> Vec<u32> {
+/// How many pivots from each on are one; zero if one before has counted it.
+pub fn find(plan: &Plan) -> Vec<u32> {
     let Plan { pivots, ranges, blocks, .. } = plan;
-    let follows: Vec<bool> =
-        pivots.iter().map(|&(_, slot)| matches!(followers.get(slot as usize), Some(Some(_)))).collect();
-    let is_alone = |pivot: usize| follows[pivot] || scaled[pivot];
     // Blocks of `L` row by row.
-    let mut left = vec![Vec::new(); pivots.len()];
-    for (&[block, upper, _], _) in ranges.iter().zip(&follows).filter(|(_, follows)| !**follows) {
+    let mut left: HashMap<u32, Vec<u32>> = HashMap::new();
+    for &[block, upper, _] in ranges {
         for index in block + 1..upper {
-            left[blocks[index as usize].0 as usize].push(index);
+            left.entry(blocks[index as usize].0).or_default().push(index);
         }
     }
+    let left = |row: u32| left.get(&row).map_or(&[][..], Vec::as_slice);
     let rows = |from: u32, to: u32| blocks[from as usize..to as usize].iter().map(|block| block.0);
     let columns = |from: u32, to: u32| blocks[from as usize..to as usize].iter().map(|block| block.1);
     let goes_on = |&first: &usize| {
@@ -30,17 +27,16 @@ pub fn find(plan: &Plan, scaled: &[bool], followers: &[Option<Follower>]) -> Vec
         let below = std::iter::once(next_row).chain(rows(next_block + 1, next_upper));
         let beside = columns(next_upper, next_end).chain(std::iter::once(next_column));
         // Blocks of a column that belong to their rows lie one after the other.
-        let before = left[row as usize].iter().map(|index| index + 1).chain(std::iter::once(block + 1));
-        !is_alone(first + 1)
-            && rows(block + 1, upper).eq(below)
+        let before = left(row).iter().map(|index| index + 1).chain(std::iter::once(block + 1));
+        rows(block + 1, upper).eq(below)
             && columns(upper, end).eq(beside)
-            && left[next_row as usize].iter().copied().eq(before)
+            && left(next_row).iter().copied().eq(before)
     };
     let mut supernodes = vec![0; pivots.len()];
     let mut first = 0;
     while first < pivots.len() {
         let last = (pivots.len() - 1).min(first + MOST - 1);
-        let more = if is_alone(first) { 0 } else { (first..last).take_while(goes_on).count() };
+        let more = (first..last).take_while(goes_on).count();
         supernodes[first] = more as u32 + 1;
         first += more + 1;
     }
@@ -66,27 +62,16 @@ mod tests {
 
     #[test]
     fn a_full_matrix_is_one() {
-        assert_eq!(find(&of(3, |_, _| true), &[false; 3], &[]), [3, 0, 0]);
-        assert_eq!(find(&of(6, |_, _| true), &[false; 6], &[]), [4, 0, 0, 0, 2, 0]);
-    }
-
-    #[test]
-    fn who_follows_or_is_scaled_is_alone() {
-        let plan = of(3, |_, _| true);
-        let follower = Follower { entry: 0, first: 0, end: 0, asked: true, absorbed: false };
-        let mut followers = vec![None; 3];
-        followers[plan.pivots[1].1 as usize] = Some(follower);
-        assert_eq!(find(&plan, &[false; 3], &followers), [1, 1, 1]);
-        assert_eq!(find(&plan, &[false, true, false], &[]), [1, 1, 1]);
-        assert_eq!(find(&plan, &[true, false, false], &[]), [1, 2, 0]);
+        assert_eq!(find(&of(3, |_, _| true)), [3, 0, 0]);
+        assert_eq!(find(&of(6, |_, _| true)), [4, 0, 0, 0, 2, 0]);
     }
 
     #[test]
     fn points_beside_each_other_are_one_each() {
         let chain = of(12, |row, column| (row / 3).abs_diff(column / 3) <= 1);
-        assert_eq!(find(&chain, &[false; 12], &[]), [3, 0, 0, 3, 0, 0, 3, 0, 0, 3, 0, 0]);
+        assert_eq!(find(&chain), [3, 0, 0, 3, 0, 0, 3, 0, 0, 3, 0, 0]);
         let lines = of(4, |row, column| row.abs_diff(column) == 1);
-        assert_eq!(find(&lines, &[false; 4], &[])[..2], [1, 1]);
+        assert_eq!(find(&lines)[..2], [1, 1]);
     }
 
     #[test]
@@ -95,6 +80,6 @@ mod tests {
         let plan =
             of(4, |row, column| column == 3 || row == 3 || row * column == 2 || (row, column) == (1, 0));
         assert_eq!(plan.pivots, [(0, 0), (2, 2), (1, 1), (3, 3)]);
-        assert_eq!(find(&plan, &[false; 4], &[]), [1, 1, 2, 0]);
+        assert_eq!(find(&plan), [1, 1, 2, 0]);
     }
 }

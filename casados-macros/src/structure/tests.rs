@@ -1,4 +1,4 @@
-use super::{Analysis, Facts, analyse};
+use super::{Analysis, Elimination, Facts, Term, analyse};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use crate::language::{Model, Sampling, Variables};
 use proc_macro2::Span;
@@ -136,7 +136,6 @@ fn facts() {
         // x₀, x₁, u₀ and p₀; neither x₂ nor u₁.
         directions: vec![0, 1, 3, 5],
         curved: vec![3, 9],
-        folded: vec![],
         lone: vec![],
     };
     assert_eq!(build(true, true), expected);
@@ -167,10 +166,10 @@ fn trivial_rows() {
     assert!(trivial(|g, v| mul(g, v[4], v[1])).is_empty());
 }
 
-/// `ẋ₀ = 2 x₁`, `ẋ₁ = u`, and squares of all of them in `z`: of these only that of `x₁` needs its row of `D`.
+/// `ẋ₀ = 2 x₁`, `ẋ₁ = u`, and squares of all of them in `z`: that of `u` does not need its row of `D`.
 #[test]
 fn squares_of_what_is_a_multiple_of_others() {
-    let build = |product: bool| {
+    let facts = |product: bool| {
         accepted(model([2, 1, 1, 0], move |g, v| {
             let two = g.constant(2.0);
             let twice = mul(g, two, v[3]);
@@ -180,72 +179,26 @@ fn squares_of_what_is_a_multiple_of_others() {
                 third = sub(g, third, square);
             }
             if product {
-                let product = mul(g, v[0], v[2]);
+                let product = mul(g, v[5], v[2]);
                 third = sub(g, third, product);
             }
             vec![sub(g, v[0], twice), sub(g, v[1], v[5]), third]
         }))
         .facts
     };
-    let facts = build(false);
-    assert_eq!(facts.curved, [3]);
-    assert_eq!(facts.folded, [(0, 2, 4.0), (1, 3, 1.0)]);
-    assert_eq!(facts.lone, [(3, 2)]);
-    // Twice ẋ₀ = z₀: folded once.
-    let twice = accepted(model([1, 2, 0, 0], |g, v| {
-        let (square, other) = (mul(g, v[0], v[0]), mul(g, v[2], v[2]));
-        let squares = g.binary(Binary::Add, square, other);
-        let lengths = mul(g, v[1], v[1]);
-        let third = sub(g, squares, lengths);
-        vec![sub(g, v[0], v[2]), sub(g, v[0], v[1]), sub(g, v[3], third)]
-    }));
-    assert_eq!(twice.facts.trivial, [0, 1]);
-    assert_eq!((twice.facts.folded, twice.facts.curved), (vec![(0, 2, 1.0)], vec![1, 2]));
-    // ẋ₀ x₀ needs both.
-    let facts = build(true);
-    assert_eq!(facts.curved, [0, 2, 3]);
-    assert_eq!(facts.folded.len(), 1);
-}
-
-/// `q̇ = v` and an equation that feels `q`, or `q̇` too, or `v` by way of a control.
-#[test]
-fn states_whose_right_hand_sides_are_the_same_at_all_stages() {
-    let steady = |own: fn(&[Node]) -> Node, other: fn(&mut Graph, &[Node]) -> Node| {
-        accepted(model([4, 0, 1, 0], move |g, v| {
-            let first = own(v);
-            let mut f = vec![sub(g, v[0], first)];
-            for derivative in &v[1..4] {
-                let (force, product) = (other(g, v), mul(g, v[5], v[6]));
-                let (rest, product) = (sub(g, *derivative, force), mul(g, product, v[7]));
-                f.push(sub(g, rest, product));
-            }
-            f
-        }))
-        .elimination
-        .steady
-    };
-    let sine = |g: &mut Graph, v: &[Node]| g.unary(Unary::Sin, v[4]);
-    // Behind four entries of f_ẋ (0, 5); q is first by columns, felt by three.
-    assert_eq!(steady(|v| v[5], sine), [Some([4, 0, 3]), None, None, None]);
-    // The control, behind the entries of f_x.
-    assert_eq!(steady(|v| v[8], sine), [Some([16, 0, 3]), None, None, None]);
-    // The equation of q varies.
-    assert_eq!(steady(|v| v[4], sine), [None; 4]);
-    let with_derivative = |g: &mut Graph, v: &[Node]| {
-        let sine = g.unary(Unary::Sin, v[4]);
-        sub(g, sine, v[0])
-    };
-    assert_eq!(steady(|v| v[5], with_derivative), [None; 4]);
-    // Nobody feels q.
-    assert_eq!(steady(|v| v[5], |_, v| v[8]), [None; 4]);
+    let alone = facts(false);
+    assert_eq!((alone.curved, alone.lone), (vec![0, 1, 3], vec![(3, 2)]));
+    // u x₀ needs both.
+    let together = facts(true);
+    assert_eq!((together.curved, together.lone), (vec![0, 1, 2, 3, 5], Vec::new()));
 }
 
 /// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial as well.
 #[test]
-fn states_that_follow_others() {
+fn kinematic_states() {
     type Row = fn(&mut Graph, &[Node]) -> Node;
-    let followers = |own: Row, second: Option<Row>, other: Row| {
-        let found = accepted(model([4, 0, 1, 0], move |g, v| {
+    let analysis = |own: Row, second: Option<Row>, other: Row| {
+        accepted(model([4, 0, 1, 0], move |g, v| {
             let first = own(g, v);
             let mut f = vec![sub(g, v[0], first)];
             for derivative in &v[1..4] {
@@ -259,38 +212,59 @@ fn states_that_follow_others() {
             }
             f
         }))
-        .elimination
-        .followers;
-        found.iter().map(|of| of.map(|of| [of.entry, of.first, of.end])).collect::<Vec<_>>()
+    };
+    let kinematic = |own: Row, second: Option<Row>, other: Row| {
+        let found = analysis(own, second, other).elimination.kinematic;
+        found.into_iter().map(|of| (of.state, of.entry, of.velocity, of.felt)).collect::<Vec<_>>()
     };
     let sine: Row = |g, v| g.unary(Unary::Sin, v[4]);
-    // Behind four entries of f_ẋ (0, 5); q is first by columns, felt by three.
-    assert_eq!(followers(|_, v| v[5], None, sine), [Some([4, 0, 3]), None, None, None]);
+    // Behind four entries of f_ẋ (0, 5); three equations feel q.
+    assert_eq!(kinematic(|_, v| v[5], None, sine), [(0, 4, 5, vec![5, 9, 13])]);
     // The control, behind the entries of f_x.
-    assert_eq!(followers(|_, v| v[8], None, sine), [Some([16, 0, 3]), None, None, None]);
+    assert_eq!(kinematic(|_, v| v[8], None, sine), [(0, 16, 8, vec![4, 8, 12])]);
+    // Nobody feels q.
+    assert_eq!(kinematic(|_, v| v[5], None, |_, v| v[8]), [(0, 4, 5, vec![])]);
     // The equation varies; it has a constant; a function of time.
-    assert_eq!(followers(|_, v| v[4], None, sine), [None; 4]);
+    assert_eq!(kinematic(|_, v| v[4], None, sine), []);
     let shifted: Row = |g, v| {
         let constant = g.constant(-0.5);
         sub(g, v[5], constant)
     };
-    assert_eq!(followers(shifted, None, sine), [None; 4]);
+    assert_eq!(kinematic(shifted, None, sine), []);
     let timed: Row = |g, v| {
         let time = g.unary(Unary::Sin, v[9]);
         sub(g, v[5], time)
     };
-    assert_eq!(followers(timed, None, sine), [None; 4]);
+    assert_eq!(kinematic(timed, None, sine), []);
     // The others feel its derivative: behind seven entries of f_ẋ.
     let with_derivative: Row = |g, v| {
         let sine = g.unary(Unary::Sin, v[4]);
         sub(g, sine, v[0])
     };
-    assert_eq!(followers(|_, v| v[5], None, with_derivative), [Some([7, 0, 3]), None, None, None]);
+    let felt = vec![1, 3, 5, 8, 12, 16];
+    assert_eq!(kinematic(|_, v| v[5], None, with_derivative), [(0, 7, 5, felt)]);
     // One of two that follow each other, or of a row of them.
     for second in [(|_, v| v[4]) as Row, |_, v| v[6], |_, v| v[8]] {
-        let found = followers(|_, v| v[5], Some(second), sine);
-        assert_eq!(found.iter().flatten().count(), 1, "{found:?}");
+        let found = kinematic(|_, v| v[5], Some(second), sine);
+        assert_eq!(found.iter().map(|of| of.0).collect::<Vec<_>>(), [0]);
     }
+    // The others are the unknowns of the plan: the column of q is a part of that of its velocity.
+    let Elimination { plan, positions, .. } = analysis(|_, v| v[5], None, sine).elimination;
+    assert!(plan.pivots.len() == 3 && !plan.pivots.iter().any(|pivot| pivot.0 == 0 || pivot.1 == 0));
+    let of_velocity = positions.iter().find(|position| (position.row, position.column) == (2, 1));
+    let terms = of_velocity.map(|position| position.terms.clone());
+    let (own, through) = (Term { entry: 10, by: None, order: 1 }, Term { entry: 9, by: Some(4), order: 2 });
+    assert_eq!(terms, Some(vec![own, through]));
+}
+
+/// Of a row of four that follow one another, the last of them a control, every other one: as many as there can be.
+#[test]
+fn no_velocity_is_kinematic() {
+    let analysis = accepted(model([4, 0, 1, 0], |g, v| {
+        vec![sub(g, v[0], v[5]), sub(g, v[1], v[6]), sub(g, v[2], v[7]), sub(g, v[3], v[8])]
+    }));
+    let found: Vec<_> = analysis.elimination.kinematic.iter().map(|of| (of.state, of.velocity)).collect();
+    assert_eq!(found, [(0, 5), (2, 7)]);
 }
 
 #[test]

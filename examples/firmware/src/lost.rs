@@ -14,10 +14,8 @@ impl<M: Dae> Dae for Lost<M> {
     type Jacobian<T: casados::shape::Plain> = M::Jacobian<T>;
     type Hessian<T: casados::shape::Plain> = M::Hessian<T>;
     type Factors<B: casados::shape::Plain> = M::Factors<B>;
-    const STRUCTURE: Structure = Structure {
-        elimination: Elimination { assembly: &[], led: &[], ..M::STRUCTURE.elimination },
-        ..M::STRUCTURE
-    };
+    const STRUCTURE: Structure =
+        Structure { elimination: Elimination { assembly: &[], ..M::STRUCTURE.elimination }, ..M::STRUCTURE };
 
     fn residual<S: Lanes>(v: &ArrayV<M, S::Cell>, f: &mut ArrayK<M, S::Cell>) {
         M::residual::<S>(v, f);

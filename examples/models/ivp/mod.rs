@@ -7,3 +7,4 @@ pub mod chemistry;
 pub mod circuits;
 pub mod mechanics;
 pub mod oscillators;
+pub mod vibrations;

@@ -20,7 +20,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// those of the solution, as without it: they belong to this function up to the errors of its steps.
     ///
     /// # Errors
-    /// [`Error::NoResult`]. Of following calls [`Error::OutsideInterval`], if they ask for another interval, and
+    /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Of following calls [`Error::OutsideInterval`], if they ask for another interval, and
     /// [`Error::StepSizeUnderflow`], if an event cannot be found anymore.
     pub fn freeze(&mut self) -> Result<(), Error> {
         let asked = self.asked.ok_or(Error::NoResult)?;
@@ -29,6 +29,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         }
         for segment in self.segments.iter_mut().take(self.count) {
             (segment.kept, segment.chosen) = (segment.span, false);
+            segment.tape.keep()?;
         }
         self.frozen = Some(asked);
         Ok(())

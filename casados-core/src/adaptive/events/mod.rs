@@ -49,6 +49,9 @@ use bytemuck::allocation::try_zeroed_box;
 /// let end = ball.forward(&x0, &u, 3.0)?;      // end.x, end.dx_dx0, end.occurrences[0].t
 /// ```
 ///
+/// All calls take the length `h` of the interval, as those of the integrator. Times of events are times as the model sees them, and so
+/// is that of [`dense`](Self::dense).
+///
 /// # Errors
 /// Of every call: those of [`Integrator`]; [`Error::InconsistentStart`] after a jump too; [`Error::TooManyEvents`];
 /// [`Error::NonFiniteFunction`] of an event or a jump. Of calls with derivatives [`Error::Grazing`]: the time of the
@@ -61,7 +64,7 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     segments: Vec<Segment<M, T>>,
     /// How many of them belong to the last successful call.
     count: usize,
-    /// The interval that the last successful call was asked for, and that of steps and events that are kept.
+    /// The interval that the last call was asked for, if it succeeded, and that of steps and events that are kept.
     asked: Option<Span<T>>,
     frozen: Option<Span<T>>,
     statistics: AdaptiveStatistics,
@@ -74,7 +77,7 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
 pub struct Occurrence<M: Dae, T: Real = f64> {
     /// Which.
     pub event: usize,
-    /// When.
+    /// The time at which it happened: that of the model, not since the start of the interval.
     pub t: T,
     /// The state before it.
     pub before: VectorX<M, T>,
@@ -86,7 +89,7 @@ pub struct Occurrence<M: Dae, T: Real = f64> {
 pub struct Solution<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
-    /// The end: that of the interval, or the time of the event that ended the integration.
+    /// The time at the end: that of the interval, or the time of the event that ended the integration.
     pub t: T,
     /// Whether an event ended it: the last of the occurrences.
     pub terminal: bool,
@@ -190,22 +193,18 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     ///
     /// # Errors
     /// See [`Hybrid`].
-    pub fn solve(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        t_end: T,
-    ) -> Result<&Solution<M, T>, Error> {
-        self.trace(x0, u, t_end)?;
+    pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Solution<M, T>, Error> {
+        self.asked = Some(self.trace(x0, u, h)?);
         Ok(&self.solution)
     }
 
-    /// The solution at a time inside the interval of the last successful call; where it jumps, that before.
+    /// The solution at the time `t`, as the model sees it, inside the interval of the last call; where it jumps, that before.
     ///
     /// # Errors
-    /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
-        let Self { integrator, segments, count, solution, .. } = self;
+        let Self { integrator, segments, count, solution, asked, .. } = self;
+        asked.ok_or(Error::NoResult)?;
         dense(integrator, segments.get_mut(..*count).unwrap_or_default(), &solution.nominal, t)
     }
 
@@ -217,9 +216,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
     ) -> Result<HybridForward<M, T>, Error> {
-        self.forward_along(x0, u, t_end, None)
+        self.forward_along(x0, u, h, None)
     }
 
     /// As [`Hybrid::forward`], with an integrand.
@@ -227,11 +226,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         along: Along<'_, '_, M, T>,
     ) -> Result<HybridForward<M, T>, Error> {
-        self.trace(x0, u, t_end)?;
-        Ok(self.sweep(x0, false, along)?.0)
+        let span = self.trace(x0, u, h)?;
+        let (result, _) = self.sweep(x0, false, along)?;
+        self.asked = Some(span);
+        Ok(result)
     }
 
     /// Derivatives of all steps and over all events, and what is known about the moments of these; for `second` derivatives, what
@@ -343,10 +344,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
-        self.adjoint_along(x0, u, t_end, lambda, None)
+        self.adjoint_along(x0, u, h, lambda, None)
     }
 
     /// As [`Hybrid::solve`], with an integrand: the steps are taken again, to rounding.
@@ -354,11 +355,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Solution<M, T>, Error> {
-        self.trace(x0, u, t_end)?;
+        let span = self.trace(x0, u, h)?;
         self.replay(x0, along)?;
+        self.asked = Some(span);
         Ok(&self.solution)
     }
 
@@ -397,12 +399,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
+        self.asked = None;
         check(Argument::Lambda, lambda.as_slice())?;
-        self.trace(x0, u, t_end)?;
+        let span = self.trace(x0, u, h)?;
         let moments = self.replay(x0, reborrow(&mut along))?;
         let mut result = HybridAdjoint {
             solution: self.solution.clone(),
@@ -430,6 +433,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             axpy(T::ONE, gradient.grad_u.as_slice(), result.grad_u.as_mut_slice());
             axpy(T::ONE, gradient.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
+        self.asked = Some(span);
         Ok(result)
     }
 

@@ -83,11 +83,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
-        t_end: T,
+        h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<HybridHessian<M, T>, Error> {
+        self.asked = None;
         check(Argument::Lambda, lambda.as_slice())?;
-        self.trace(x0, u, t_end)?;
+        let span = self.trace(x0, u, h)?;
         let (forward, moments) = self.sweep(x0, true, None)?;
         let bytes = size_of::<Second<M, T>>();
         let mut second: Box<Second<M, T>> = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
@@ -146,6 +147,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         fill(&mut result.h_xp, |r, c| at(r, nx + nu + c));
         fill(&mut result.h_up, |r, c| at(nx + r, nx + nu + c));
         fill(&mut result.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
+        self.asked = Some(span);
         Ok(result)
     }
 

@@ -31,27 +31,25 @@ const GRAZING: f64 = 1e-8;
 type Found<T> = Option<(usize, T)>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Integrates to the end, from event to event.
-    pub(super) fn trace(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
+    /// Integrates an interval of length `h`, from event to event. There is a result as soon as the caller says so.
+    pub(super) fn trace(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
+        self.asked = None;
         self.statistics = AdaptiveStatistics::default();
         self.integrator.reserve()?;
         check(Argument::X0, x0.as_slice())?;
         let (start, given) = (self.integrator.start, self.integrator.base.given);
-        if let Some(frozen) = self.frozen {
-            let result = self.repeat(x0, u, t_end, frozen);
-            self.integrator.base.given = given;
-            return result;
-        }
-        (self.count, self.asked) = (0, None);
-        self.solution.occurrences.clear();
-        self.solution.terminal = false;
-        let result = self.follow(x0, u, t_end);
+        let t_end = self.integrator.end(h)?;
+        let result = match self.frozen {
+            Some(frozen) => self.repeat(x0, u, t_end, frozen),
+            None => {
+                self.count = 0;
+                self.solution.occurrences.clear();
+                self.solution.terminal = false;
+                self.follow(x0, u, t_end)
+            }
+        };
         (self.integrator.start, self.integrator.base.given) = (start, given);
-        match &result {
-            Ok(()) => self.asked = Some(Span { start, end: t_end }),
-            Err(_) => self.count = 0,
-        }
-        result
+        result.map(|()| Span { start, end: t_end })
     }
 
     fn follow(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {

@@ -34,7 +34,7 @@ use super::problem::Formulation;
 use super::sqp::Iteration;
 #[cfg(feature = "alloc")]
 use super::sqp::Log;
-use crate::qp::{Solution, StageDims, Store};
+use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;

@@ -3,9 +3,9 @@
 //! With the QP written at the iterate, one step of the interior point of QPs from there is a step of
 //! that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
 
-use crate::qp::interior::{Counts, Coupling, First, Iterate, Penalties, Sides, count, is_first_fixed};
+use crate::qp::interior::{Counts, Coupling, First, Iterate, Penalties, Reading, Sides, count, is_first_fixed};
 use super::run::Work;
-use crate::qp::{Field, Places, QpError, QpView, SolutionView, Store, assign};
+use crate::qp::{Field, InteriorPointOptions, Places, QpError, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers};
 
 /// What is known about the sides of a problem before any memory is touched.
@@ -17,12 +17,26 @@ pub(super) struct Lengths {
 }
 
 impl Lengths {
-    /// Of a problem with its penalties as they are, or with all bounds soft.
-    pub fn of<T: Real>(qp: QpView<'_, T>, penalties: Penalties<T>) -> Self {
-        let fixed = is_first_fixed(qp);
-        let counts = count(qp, fixed, penalties);
-        Self { counts, fixed, numbers: Iterate::<T>::memory(qp.dims, &counts) }
+    /// Of a problem with its penalties as they are.
+    pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
+        let reading = reading(qp);
+        let counts = count(qp, &reading);
+        Self { counts, fixed: reading.fixed, numbers: Iterate::<T>::memory(qp.dims, &counts) }
     }
+
+    /// Of the same problem with every bound soft, equations too.
+    pub fn all_soft<T: Real>(&self, qp: QpView<'_, T>) -> Self {
+        let Counts { lower, upper, equations, .. } = self.counts;
+        let (lower, upper) = (lower + equations, upper + equations);
+        let counts = Counts { lower, upper, soft: lower + upper, equations };
+        Self { counts, fixed: self.fixed, numbers: Iterate::<T>::memory(qp.dims, &counts) }
+    }
+}
+
+/// How the constraints of a problem are read.
+fn reading<T: Real>(qp: QpView<'_, T>) -> Reading<T> {
+    let no_bound = T::from_f64(InteriorPointOptions::new::<T>().no_bound);
+    Reading { fixed: is_first_fixed(qp), penalties: Penalties::Given, no_bound }
 }
 
 /// The iterate of Newton's method in its memory. What is in the memory stays as it was; bounds are
@@ -39,8 +53,8 @@ pub(super) fn attach<'a, T: Real>(
     let mut numbers = numbers.at_least(lengths.numbers, Field::Numbers)?;
     let mut indices = indices.at_least(lengths.counts.indices(), Field::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
-    let sides =
-        Sides::list(qp, lengths.fixed, Penalties::Given, lengths.counts, &mut numbers, &mut indices);
+    let mut sides = Sides::list(qp, &reading(qp), lengths.counts, &mut numbers, &mut indices);
+    sides.compliance = T::from_f64(T::EPSILON).sqrt();
     Ok(Iterate::new(qp, first, sides, &mut numbers))
 }
 
@@ -136,7 +150,7 @@ struct After<'r, 'a, 's, 'c, T> {
 impl<T: Real> Registers<T> for After<'_, '_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        self.iterate.go_to_multipliers();
+        self.iterate.go_without_slacks();
         self.iterate.controlled_costates::<E>(self.pi, self.coupling);
     }
 }

@@ -64,9 +64,9 @@ impl IpmOptions {
             ("warm_push", self.warm_push),
             ("elastic_penalty", self.elastic_penalty),
         ];
-        for (option, value) in positive {
+        for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(OcpError::InvalidValue { part: crate::ocp::error::Part::Penalty, stage: 0, index: 0, value });
+                return Err(OcpError::InvalidOption { name, value, allowed: "positive and finite" });
             }
         }
         Ok(())

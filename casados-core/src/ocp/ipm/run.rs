@@ -16,7 +16,7 @@ use crate::ocp::linearise::Exact;
 use crate::ocp::problem::Formulation;
 use crate::ocp::sqp::{Iteration, Outcome, Status, Times, Watch, elastic, failed, infeasible};
 use crate::ocp::data::split;
-use crate::qp::interior::{Coupling, Penalties, Sides};
+use crate::qp::interior::{Coupling, Sides};
 use crate::qp::{StageDims, Store, assign, end, take_mut};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
@@ -148,10 +148,10 @@ where
         self.options.check()?;
         // Bounds of constraints are in the QP once it is written.
         ocp.linearise(Exact { convexification: Convexification::None })?;
-        let all = Lengths::of(ocp.qp(), Penalties::Elastic(T::ONE));
-        let lengths = Lengths::of(ocp.qp(), Penalties::Given);
+        let lengths = Lengths::of(ocp.qp());
+        let all = lengths.all_soft(ocp.qp());
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), all.counts.pairs());
-        let numbers = all.numbers.max(lengths.numbers);
+        let numbers = all.numbers;
         self.work.at_least(length, crate::qp::Field::Numbers)?.fill(T::ZERO);
         self.numbers.at_least(numbers, crate::qp::Field::Numbers)?.fill(T::ZERO);
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
@@ -467,7 +467,7 @@ fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsM
     penalty: f64,
 ) {
     ocp.set_penalties(given, Some(T::from_f64(penalty)));
-    state.lengths = Lengths::of(ocp.qp(), Penalties::Given);
+    state.lengths = Lengths::of(ocp.qp());
     state.elastic = Some(penalty);
     state.begun = false;
     state.mu = state.mu.max(1e-2);

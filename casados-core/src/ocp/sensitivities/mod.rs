@@ -9,7 +9,7 @@ use super::error::{OcpError, Part};
 use super::instance::{Initial, Ocp};
 use super::linearise::Curvature;
 use super::problem::Formulation;
-use crate::qp::{StageDims, part};
+use crate::qp::StageDims;
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -58,28 +58,35 @@ impl<T: Real> Sensitivities<T> {
     /// `K_k`, `NU × NX`, column after column; empty where there is none.
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
-        part(&self.gains, stage * self.nu * self.nx, self.nu * self.nx)
+        block(&self.gains, stage, self.nu * self.nx)
     }
     /// `dx_k/dx₀`, `NX × NX`, column after column.
     #[must_use]
     pub fn dx(&self, stage: usize) -> &[T] {
-        part(&self.x, stage * self.nx * self.nx, self.nx * self.nx)
+        block(&self.x, stage, self.nx * self.nx)
     }
     /// `du_k/dx₀`, `NU × NX`, column after column.
     #[must_use]
     pub fn du(&self, stage: usize) -> &[T] {
-        part(&self.u, stage * self.nu * self.nx, self.nu * self.nx)
+        block(&self.u, stage, self.nu * self.nx)
     }
     /// `dx_k/dp`, `NX × NP`, column after column.
     #[must_use]
     pub fn dx_dp(&self, stage: usize) -> &[T] {
-        part(&self.x_p, stage * self.nx * self.np, self.nx * self.np)
+        block(&self.x_p, stage, self.nx * self.np)
     }
     /// `du_k/dp`, `NU × NP`, column after column.
     #[must_use]
     pub fn du_dp(&self, stage: usize) -> &[T] {
-        part(&self.u_p, stage * self.nu * self.np, self.nu * self.np)
+        block(&self.u_p, stage, self.nu * self.np)
     }
+}
+
+/// The matrix of a stage; empty where there is none.
+fn block<T>(matrices: &[T], stage: usize, length: usize) -> &[T] {
+    let begin = stage.checked_mul(length);
+    let end = begin.and_then(|begin| begin.checked_add(length));
+    begin.zip(end).and_then(|(begin, end)| matrices.get(begin..end)).unwrap_or_default()
 }
 
 fn zeros<T: Real>(length: usize) -> Result<Vec<T>, OcpError> {

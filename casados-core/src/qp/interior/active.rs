@@ -14,10 +14,9 @@
 //! violated   λ = l − q d     until d > 0
 //! ```
 
-use super::newton::{Iterate, Terms, at};
+use super::iterate::{Iterate, Terms, at};
 use super::run::Limits;
 use super::sides::{Sides, set};
-use super::vector::{largest_negative_product, largest_product};
 use crate::qp::layout::{assign, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::statistics::Statistics;
@@ -51,6 +50,7 @@ impl<T: Real> Iterate<'_, T> {
         self.sides.take_multipliers(solution);
         self.sides.guess();
         self.evaluate_gradient::<E>(solution.dynamics);
+        self.regularise(false);
         let (mut factor, mut changes) = (true, usize::MAX);
         loop {
             if factor {
@@ -78,11 +78,7 @@ impl<T: Real> Iterate<'_, T> {
             }
             self.sides.settle();
             let objective = self.evaluate::<E>(solution.dynamics);
-            let mut residuals = self.residuals::<E>();
-            // Slacks of active sides are zero: what is left of their distances counts here too.
-            let (residual, multiplier) = (&*self.sides.residual, &*self.sides.multiplier);
-            let products = largest_product::<T, E>(T::ZERO, residual, multiplier);
-            residuals.complementarity = largest_negative_product::<T, E>(products, residual, multiplier);
+            let residuals = self.judged::<E>();
             if limits.hold(residuals, self.terms) {
                 (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                 return Ok(statistics);
@@ -98,7 +94,7 @@ impl<T: Real> Iterate<'_, T> {
     /// Newton's step, with the sides as they are; whether there is one.
     #[inline(always)]
     fn active_step<E: Packed<T>>(&mut self, factor: bool) -> bool {
-        let weight = Self::equation_weight();
+        let weight = T::ONE / self.sides.compliance;
         self.sides.force(weight);
         if self.solve::<E>(factor).is_err() || self.riccati.regularised > 0 {
             return false;

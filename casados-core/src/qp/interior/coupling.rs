@@ -11,7 +11,7 @@
 //! (Haynsworth): the step is one of a minimum where pivots of controls and of the border together have
 //! as many negative signs as there are conditions.
 
-use super::newton::Iterate;
+use super::iterate::Iterate;
 use super::kernels::{Columns, subtract};
 use super::riccati::{Equations, First, Riccati, eliminate};
 use super::symmetric::Symmetric;
@@ -152,9 +152,9 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
         let Self { iterate, coupling, result, .. } = self;
-        let Iterate { qp, riccati, weights, gradient, dynamics, step, .. } = iterate;
-        let equations = Equations { qp: *qp, first: First::Tied, weights, gradient, dynamics };
-        *result = riccati.backward::<E>(&equations, true);
+        let Iterate { qp, riccati, weights, gradient, dynamics, step, objective, .. } = iterate;
+        let equations = Equations { qp: *qp, first: First::Tied, objective: *objective, weights, gradient, dynamics };
+        *result = riccati.backward::<E>(&equations, true, step);
         if result.is_ok() {
             assign(coupling.first, riccati.g);
             coupling.columns::<E>(*qp, riccati, dynamics);

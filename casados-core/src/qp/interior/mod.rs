@@ -3,15 +3,18 @@
 
 mod active;
 mod coupling;
+mod iterate;
 mod kernels;
 mod newton;
 mod options;
+mod pairs;
 mod riccati;
 mod run;
 mod sides;
 mod store;
 mod symmetric;
 mod vector;
+mod verdict;
 
 pub(crate) use kernels::{
     Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
@@ -20,10 +23,10 @@ pub(crate) use kernels::{
 pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
 pub use store::Store;
-pub(crate) use coupling::{Coupling, last_state};
-pub(crate) use newton::{Iterate, Largest};
+pub(crate) use coupling::Coupling;
+pub(crate) use iterate::Iterate;
 pub(crate) use riccati::First;
-pub(crate) use sides::{Counts, Penalties, Sides, count, is_first_fixed, set};
+pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
 pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
@@ -37,7 +40,7 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 use core::marker::PhantomData;
-use run::{Limits, Run};
+use run::{Attempt, Limits, Run};
 
 /// An interior point that exploits the structure of optimal control.
 ///
@@ -106,45 +109,96 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         }
     }
 
-    /// One run of the method.
+    /// One run of the method, and whether it has proved that no point satisfies all constraints.
     fn run(
         &mut self,
         qp: QpView<'_, T>,
-        penalties: Penalties<T>,
-        start: Start,
+        attempt: Attempt,
         solution: &mut SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError> {
-        let fixed = is_first_fixed(qp);
-        let counts = count(qp, fixed, penalties);
+    ) -> (Result<Statistics, QpError>, bool) {
+        let (mut result, mut infeasible) = (Ok(Statistics::default()), false);
+        let ran = self.prepared(qp, attempt, solution, (&mut result, &mut infeasible));
+        (ran.and(result), infeasible)
+    }
+
+    fn prepared(
+        &mut self,
+        qp: QpView<'_, T>,
+        attempt: Attempt,
+        solution: &mut SolutionView<'_, T>,
+        (result, infeasible): (&mut Result<Statistics, QpError>, &mut bool),
+    ) -> Result<(), QpError> {
+        let no_bound = T::from_f64(self.options.no_bound);
+        let reading = Reading { fixed: is_first_fixed(qp), penalties: attempt.penalties, no_bound };
+        let counts = count(qp, &reading);
         let length = Iterate::<T>::memory(qp.dims, &counts);
         let mut numbers = self.numbers.at_least(length, Field::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), Field::Indices)?;
         numbers.fill(T::ZERO);
-        let sides = Sides::list(qp, fixed, penalties, counts, &mut numbers, &mut indices);
-        let first = if fixed { First::Fixed } else { First::Free };
+        let sides = Sides::list(qp, &reading, counts, &mut numbers, &mut indices);
+        let first = if reading.fixed { First::Fixed } else { First::Free };
         let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
-        let mut result = Ok(Statistics::default());
-        let scale = if let Penalties::Elastic(weight) = penalties { weight } else { T::ONE };
+        iterate.objective = attempt.penalties == Penalties::Given;
+        let limits = Limits::new(&self.options, self.relaxed, attempt.penalties);
         T::registers(Run {
             iterate: &mut iterate,
             options: &self.options,
-            limits: Limits::new(&self.options, self.relaxed, scale),
-            start,
-            scale,
+            limits,
+            attempt,
             solution,
-            result: &mut result,
+            result,
+            infeasible,
         });
-        result
+        Ok(())
     }
 
-    /// The bound that is violated most where all together are violated least.
-    fn locate(&mut self, qp: QpView<'_, T>, solution: &mut SolutionView<'_, T>) -> Option<QpError> {
-        // Violations have to cost more than anything else could gain.
-        let largest = |all: &[T]| all.iter().fold(0.0, |m: f64, x| m.max(x.to_f64().abs()));
-        let gradients = qp.stages().map(|s| largest(s.gradient_x()).max(largest(s.gradient_u())));
-        let weight = 1e4 * (1.0 + gradients.fold(0.0, f64::max));
-        let _ = self.run(qp, Penalties::Elastic(T::from_f64(weight)), Start::Cold, solution);
-        run::worst(qp, solution, 1e2 * self.options.tolerance)
+    /// Other attempts at a problem that the first did not solve, and the reason if there is no solution.
+    fn again(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: Start,
+        mut error: QpError,
+        solution: &mut SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
+        let (locate, most) = (self.options.locate, self.options.max_iterations);
+        let mut attempt = Attempt {
+            penalties: Penalties::Given,
+            start: Start::Cold,
+            proximal: start == Start::Cold,
+            statistics: Statistics::default(),
+            iterations: most,
+        };
+        let mut located = false;
+        loop {
+            let (QpError::MaxIterations { iterations, residuals } | QpError::Stalled { iterations, residuals }) =
+                error
+            else {
+                return Err(error);
+            };
+            attempt.statistics.iterations = iterations;
+            attempt.iterations = if locate { iterations.saturating_add(most) } else { most };
+            let violates = !(residuals.inequalities <= 1e2 * self.options.tolerance);
+            if locate && !located && violates {
+                located = true;
+                let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };
+                if let (_, true) = self.run(qp, soft, solution)
+                    && let Some(infeasible) = verdict::worst(qp, solution, self.options.tolerance)
+                {
+                    return Err(infeasible);
+                }
+            }
+            if iterations >= attempt.iterations {
+                return Err(error);
+            }
+            error = match self.run(qp, attempt, solution).0 {
+                Err(error) => error,
+                solved => return solved,
+            };
+            if attempt.proximal {
+                return Err(error);
+            }
+            attempt.proximal = true;
+        }
     }
 }
 
@@ -155,26 +209,24 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         start: Start,
         mut solution: SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
+        self.options.check::<T>()?;
         check_all_bounds(qp)?;
         solution.fits(qp)?;
-        let result = self.run(qp, Penalties::Given, start, &mut solution);
-        match result {
+        let attempt = Attempt {
+            penalties: Penalties::Given,
+            start,
+            proximal: false,
+            statistics: Statistics::default(),
+            iterations: self.options.max_iterations,
+        };
+        match self.run(qp, attempt, &mut solution).0 {
             // A number that is not finite is found here, not in every call.
-            Err(_) if super::check::check(qp).is_err() => super::check::check(qp).and(result),
-            Err(QpError::MaxIterations { .. } | QpError::Stalled { .. }) if self.options.locate => {
-                match self.locate(qp, &mut solution) {
-                    Some(infeasible) => Err(infeasible),
-                    None => {
-                        let _ = self.run(qp, Penalties::Given, start, &mut solution);
-                        result
-                    }
-                }
-            }
-            result => result,
+            Err(error) => super::check::check(qp).and_then(|()| self.again(qp, start, error, &mut solution)),
+            solved => solved,
         }
     }
 
     fn relax(&mut self, tolerance: f64) {
-        self.relaxed = T::from_f64(tolerance);
+        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }

@@ -1,5 +1,8 @@
 //! What a user can choose.
 
+use crate::qp::error::QpError;
+use crate::scalar::Real;
+
 /// Options of the interior point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InteriorPointOptions {
@@ -20,15 +23,19 @@ pub struct InteriorPointOptions {
     pub active_sets: usize,
     /// Slacks and multipliers of a warm start are at least this. Default 1e-3.
     pub warm_distance: f64,
-    /// Whether a QP that was not solved is solved again with all bounds soft, to see which of them cannot be satisfied.
-    /// Default true.
+    /// Whether a QP that was not solved is tried again, with as many iterations each time: from a cold start, with proximal terms,
+    /// and with all bounds soft, to see which of them cannot be satisfied. Otherwise it is tried again with the iterations that
+    /// are left. Default true.
     pub locate: bool,
+    /// Lower bounds of minus this or less, and upper ones of this or more, mean that there is none. Default 1e15; of single
+    /// precision 1e7, where seven digits leave no unit.
+    pub no_bound: f64,
 }
 
 impl InteriorPointOptions {
     /// For numbers of some precision.
     #[must_use]
-    pub fn new<T: crate::scalar::Real>() -> Self {
+    pub fn new<T: Real>() -> Self {
         let (tolerance, relative_tolerance) = if T::EPSILON < 1e-10 { (1e-8, 0.0) } else { (1e-4, 1e-5) };
         Self {
             tolerance,
@@ -38,6 +45,30 @@ impl InteriorPointOptions {
             active_sets: 4,
             warm_distance: 1e-3,
             locate: true,
+            no_bound: if T::EPSILON < 1e-10 { 1e15 } else { 1e7 },
         }
+    }
+
+    /// # Errors
+    /// [`QpError::InvalidOption`]
+    pub(super) fn check<T: Real>(&self) -> Result<(), QpError> {
+        let infinity = T::from_f64(f64::INFINITY);
+        let positive = |value: T| value > T::ZERO && value < infinity;
+        let (absolute, relative) = (T::from_f64(self.tolerance), T::from_f64(self.relative_tolerance));
+        let tolerance = absolute >= T::ZERO && absolute < infinity;
+        let none = !(absolute > T::ZERO || relative > T::ZERO);
+        let all = [
+            ("tolerance", self.tolerance, tolerance && !none, "from 0, and above if relative_tolerance is 0"),
+            ("relative_tolerance", self.relative_tolerance, relative >= T::ZERO && relative < T::ONE, "from 0 to 1"),
+            ("start_mu", self.start_mu, positive(T::from_f64(self.start_mu)), "above 0, finite"),
+            ("warm_distance", self.warm_distance, positive(T::from_f64(self.warm_distance)), "above 0, finite"),
+            ("no_bound", self.no_bound, T::from_f64(self.no_bound) > T::ZERO, "above 0, infinite if all bounds count"),
+        ];
+        for (name, value, is_valid, allowed) in all {
+            if !is_valid {
+                return Err(QpError::InvalidOption { name, value, allowed });
+            }
+        }
+        Ok(())
     }
 }

@@ -10,8 +10,9 @@
 //! this classical form needs less than the one with the square root of `P`.
 
 use super::kernels::{
-    Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column,
+    Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column, symmetric,
 };
+use super::vector::larger;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
@@ -128,6 +129,8 @@ impl<'a, T: Real> Riccati<'a, T> {
 pub struct Equations<'a, T> {
     pub qp: QpView<'a, T>,
     pub first: First,
+    /// Whether the Hessian counts.
+    pub objective: bool,
     /// Weights of bounds and general constraints.
     pub weights: &'a [T],
     /// Gradient, over variables and general constraints.
@@ -150,7 +153,7 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
     #[inline(always)]
     fn run(self) {
         let Self { riccati, equations, factor, step, result, .. } = self;
-        *result = riccati.backward::<E>(&equations, factor);
+        *result = riccati.backward::<E>(&equations, factor, step);
         if result.is_ok() {
             riccati.forward::<E>(&equations, step);
         }
@@ -181,8 +184,13 @@ impl<T: Real> Riccati<'_, T> {
     }
 
     #[inline(always)]
-    pub fn backward<E: Packed<T>>(&mut self, equations: &Equations<'_, T>, factor: bool) -> Result<(), QpError> {
-        let Equations { qp, first, weights, gradient, dynamics } = *equations;
+    pub fn backward<E: Packed<T>>(
+        &mut self,
+        equations: &Equations<'_, T>,
+        factor: bool,
+        scratch: &mut [T],
+    ) -> Result<(), QpError> {
+        let Equations { qp, first, gradient, dynamics, .. } = *equations;
         if factor {
             self.regularised = 0;
             self.negative = 0;
@@ -207,7 +215,7 @@ impl<T: Real> Riccati<'_, T> {
                 *minus = -general;
             }
             if factor {
-                self.factor_stage::<E>(&place, first, data, part(weights, place.row, place.rows))?;
+                self.factor_stage::<E>(&place, equations, data, scratch)?;
             }
             let g = part_mut(self.g, 0, ld);
             assign(g, part(gradient, place.row, ld));
@@ -235,13 +243,16 @@ impl<T: Real> Riccati<'_, T> {
     fn factor_stage<E: Packed<T>>(
         &mut self,
         place: &Place,
-        first: First,
+        equations: &Equations<'_, T>,
         data: &[T],
-        weights: &[T],
+        scratch: &mut [T],
     ) -> Result<(), QpError> {
         let Place { nx, nu, n, ng, ld, next, ld_next, stage, .. } = *place;
+        let Equations { qp, first, objective, .. } = *equations;
+        let weights = part(equations.weights, place.row, place.rows);
         let matrix = Columns { data: part(data, 0, place.matrix()), ld };
-        let hessian = Source::Matrix(Columns { data: part(data, place.matrix(), place.hessian()), ld });
+        let hessian = if objective { part(data, place.matrix(), place.hessian()) } else { &[] };
+        let source = Source::Matrix(Columns { data: hessian, ld });
         let p = Columns { data: &*self.p, ld: ld_next };
         product::<T, E>(self.w, ld, Source::Zero, matrix, p, (n, 0..next, next), Part::Full);
         for (i, &weight) in part(weights, ld, ng).iter().enumerate() {
@@ -254,13 +265,13 @@ impl<T: Real> Riccati<'_, T> {
         // Columns are computed four at a time. The first with a control among them are needed whole.
         let whole = nx / 4 * 4;
         if stage > 0 || first != First::Fixed {
-            product::<T, E>(self.m, ld, hessian, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
+            product::<T, E>(self.m, ld, source, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
         }
-        product::<T, E>(self.m, ld, hessian, matrix, w, (n, whole..n, next + ng), Part::Full);
+        product::<T, E>(self.m, ld, source, matrix, w, (n, whole..n, next + ng), Part::Full);
         // Of the Hessian only the lower triangle is there: above are controls times states.
         let mixed = part_mut(self.m, nx * ld, nu * ld).chunks_exact_mut(ld.max(1));
         for (j, column) in mixed.enumerate() {
-            let row = data.get(place.matrix() + nx + j..).unwrap_or_default();
+            let row = hessian.get(nx + j..).unwrap_or_default();
             for (m, &s) in column.iter_mut().zip(row.iter().step_by(ld.max(1))).take(nx) {
                 *m = *m + s;
             }
@@ -274,15 +285,23 @@ impl<T: Real> Riccati<'_, T> {
 
         let inverse = part_mut(self.inverse, place.v, ld);
         let added = part_mut(self.added, place.v, ld);
-        let (before, panel) = self.m.split_at_mut_checked(nx * ld).unwrap_or_default();
-        let panel = part_mut(panel, 0, nu * ld);
+        let panel = part_mut(self.m, nx * ld, nu * ld);
         let indefinite = first == First::Tied;
-        let (of_controls, added_u) = (part_mut(inverse, nx, nu), part_mut(added, nx, nu));
-        let pivots = Pivots { inverse: of_controls, added: added_u, largest, indefinite };
-        let not_convex = |index: usize, pivot: T| QpError::NotConvex { stage, index, pivot: pivot.to_f64() };
-        self.regularised += cholesky::<T, E>(panel, ld, nx, n, pivots).map_err(|(i, p)| not_convex(i, p))?;
+        let (inverse, added) = (part_mut(inverse, nx, nu), part_mut(added, nx, nu));
+        let pivots = Pivots { inverse, added, largest, indefinite };
+        let (regularised, negative) = cholesky::<T, E>(panel, ld, nx, n, pivots);
+        self.regularised += regularised;
         let kept = part_mut(self.panels, place.factor, ld * place.pivots);
         assign(part_mut(kept, 0, nu * ld), panel);
+        match negative {
+            Some((index, pivot)) if indefinite => {
+                return Err(QpError::NotConvex { stage, index, pivot: pivot.to_f64() });
+            }
+            Some(found) => self.verify(qp, place, found, scratch)?,
+            None => {}
+        }
+        let kept = part_mut(self.panels, place.factor, ld * place.pivots);
+        let (before, _) = self.m.split_at_checked(nx * ld).unwrap_or_default();
         if stage == 0 && first == First::Fixed {
             return Ok(());
         }
@@ -292,13 +311,14 @@ impl<T: Real> Riccati<'_, T> {
         product::<T, E>(self.p, ld_x, source, panel, panel, (nx, 0..nx, nu), Part::Lower);
         if indefinite {
             // What has a negative pivot was subtracted, and is to be added.
-            let columns = panel.data.chunks_exact(ld.max(1)).zip(part(inverse, nx, nu));
+            let inverse = part(self.inverse, place.v + nx, nu);
+            let columns = panel.data.chunks_exact(ld.max(1)).zip(inverse);
             for (column, _) in columns.filter(|(_, inverse)| **inverse < T::ZERO) {
                 self.negative += 1;
                 for (p, &factor) in self.p.chunks_exact_mut(ld_x.max(1)).zip(column).take(nx) {
-                    let twice = -(factor + factor);
+                    let twice = factor + factor;
                     for (p, &c) in p.iter_mut().zip(column).take(nx) {
-                        *p = *p - twice * c;
+                        *p = *p + twice * c;
                     }
                 }
             }
@@ -313,10 +333,68 @@ impl<T: Real> Riccati<'_, T> {
                 *start = p;
             }
         }
-        let (inverse, added) = (part_mut(inverse, 0, nx), part_mut(added, 0, nx));
-        let pivots = Pivots { inverse, added, largest, indefinite: false };
-        self.regularised +=
-            cholesky::<T, E>(start, ld, 0, nx, pivots).map_err(|(i, p)| not_convex(nu + i, p))?;
+        let (inverse, added) = (part_mut(self.inverse, place.v, nx), part_mut(self.added, place.v, nx));
+        let (regularised, negative) =
+            cholesky::<T, E>(start, ld, 0, nx, Pivots { inverse, added, largest, indefinite: false });
+        self.regularised += regularised;
+        match negative {
+            Some((index, pivot)) => self.verify(qp, place, (nu + index, pivot), scratch),
+            None => Ok(()),
+        }
+    }
+
+    /// An error if the Hessian curves downwards along the direction in which a pivot is negative: that of one control (behind
+    /// the controls, of a state at the start), with which the ones before it and all that come later move such that the rest of
+    /// `dᵀ M d` vanishes. Otherwise the pivot is rounding.
+    fn verify(
+        &mut self,
+        qp: QpView<'_, T>,
+        from: &Place,
+        (index, pivot): (usize, T),
+        direction: &mut [T],
+    ) -> Result<(), QpError> {
+        let (mut curvature, mut size) = (T::ZERO, T::ZERO);
+        let mut rest = direction.get_mut(from.row..).unwrap_or_default();
+        for place in Places::<T>::new(qp.dims).skip(from.stage) {
+            let Place { nx, nu, n, ld, next, .. } = place;
+            let data = part(qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let (panel, inverse) =
+                (part(self.panels, place.factor, ld * place.pivots), part(self.inverse, place.v, ld));
+            let v = part_mut(take_mut(&mut rest, place.rows), 0, ld);
+            let state = index.checked_sub(nu);
+            let (begin, from_here) = (if state.is_some() { 0 } else { nx }, place.stage == from.stage);
+            // The state comes from the stage before.
+            let given = if from_here { 0 } else { nx };
+            v.iter_mut().skip(given).for_each(|v| *v = T::ZERO);
+            if from_here {
+                let columns = panel.get(if state.is_some() { nu * ld } else { 0 }..).unwrap_or_default();
+                unit(part_mut(v, begin, ld - begin), columns, ld, begin, part(inverse, begin, ld - begin), state.unwrap_or(index));
+            }
+            if !from_here || state.is_some() {
+                let u = part_mut(self.g, 0, nu);
+                u.fill(T::ZERO);
+                add_transposed::<T, T>(u, Columns { data: panel, ld }, v, nx, nu);
+                substitute(u, panel, ld, nx, part(inverse, nx, nu));
+                assign(part_mut(v, nx, nu), u);
+            }
+            let coming = part_mut(rest, 0, next);
+            coming.fill(T::ZERO);
+            add_transposed::<T, T>(coming, matrix, v, n, next);
+            let product = part_mut(self.g, 0, ld);
+            product.fill(T::ZERO);
+            let hessian = part(data, place.matrix(), place.hessian());
+            symmetric::<T, T>(product, hessian, ld, v, n);
+            let largest = larger::<T, T>(T::ZERO, hessian);
+            for (&v, &product) in v.iter().zip(&*product) {
+                curvature = curvature + v * product;
+                size = size + largest * v * v;
+            }
+        }
+        let rounding = T::from_f64(64.0 * T::EPSILON) * size;
+        if pivot.is_finite() && curvature.is_finite() && curvature < -rounding {
+            return Err(QpError::NotConvex { stage: from.stage, index, pivot: pivot.to_f64() });
+        }
         Ok(())
     }
 
@@ -389,6 +467,20 @@ fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse:
     }
 }
 
+/// `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables before `index`.
+fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T], index: usize) {
+    if let Some(d) = d.get_mut(index) {
+        *d = T::ONE;
+    }
+    for i in (0..index).rev() {
+        let column = part(panel, i * ld + row, index + 1);
+        let sum = column.iter().zip(&*d).skip(i + 1).fold(T::ZERO, |sum, (&l, &d)| sum - l * d);
+        if let (Some(d), Some(&inverse)) = (d.get_mut(i), inverse.get(i)) {
+            *d = sum * inverse;
+        }
+    }
+}
+
 /// What is kept of pivots.
 struct Pivots<'a, T> {
     inverse: &'a mut [T],
@@ -401,10 +493,7 @@ struct Pivots<'a, T> {
 
 /// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the other rows of the panel are
 /// multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were replaced by something large: the solution then does
-/// not move in their direction.
-///
-/// # Errors
-/// A pivot that is negative by more than rounding, and its index.
+/// not move in their direction. And the first of them that is negative, which may be rounding, and its index.
 #[inline(always)]
 fn cholesky<T: Real, E: Packed<T>>(
     panel: &mut [T],
@@ -412,11 +501,10 @@ fn cholesky<T: Real, E: Packed<T>>(
     row: usize,
     rows: usize,
     pivots: Pivots<'_, T>,
-) -> Result<usize, (usize, T)> {
+) -> (usize, Option<(usize, T)>) {
     let Pivots { inverse, added, largest, indefinite } = pivots;
-    let mut negative = false;
-    let mut regularised = 0;
-    let epsilon = T::from_f64(T::EPSILON);
+    let mut signed = false;
+    let (mut regularised, mut negative) = (0, None);
     let noise = T::from_f64(T::EPSILON * 4.0) * T::from_whole(rows);
     for (diagonal, inverse) in
         panel.get(row..).unwrap_or_default().iter().step_by((ld + 1).max(1)).zip(&mut *inverse)
@@ -429,7 +517,7 @@ fn cholesky<T: Real, E: Packed<T>>(
         // Rows of a product begin at a multiple of its width.
         let width = (count - begin).min(4 - (row + begin) % 4);
         let (done, group) = panel.split_at_mut_checked(begin * ld).unwrap_or_default();
-        if negative {
+        if signed {
             for (done, &inverse) in done.chunks_exact(ld.max(1)).zip(&*inverse) {
                 for (i, column) in group.chunks_exact_mut(ld.max(1)).enumerate().take(width) {
                     let factor = done.get(row + begin + i).copied().unwrap_or(T::ZERO);
@@ -455,31 +543,26 @@ fn cholesky<T: Real, E: Packed<T>>(
             *added = T::ZERO;
             // `inverse` is still what the diagonal was before elimination.
             let is_positive = pivot > noise * *inverse;
-            if indefinite && pivot < -epsilon.sqrt() * inverse.abs() {
-                negative = true;
-                *inverse = -T::ONE / (-pivot).sqrt();
-            } else if indefinite && pivot <= epsilon.sqrt() * inverse.abs() {
-                return Err((index, pivot));
-            } else if !is_positive {
-                let is_noise = pivot >= -epsilon.sqrt() * largest;
-                if !is_noise {
-                    return Err((index, pivot));
+            let small = T::from_f64(T::EPSILON).sqrt() * inverse.abs();
+            let is_negative = indefinite && pivot < -small;
+            if !is_positive && !is_negative {
+                if (pivot < T::ZERO || indefinite) && negative.is_none() {
+                    negative = Some((index, pivot));
                 }
                 pivot = if largest > T::ZERO { largest } else { T::ONE };
                 *added = pivot - found;
                 regularised += 1;
-                *inverse = T::ONE / pivot.sqrt();
-            } else {
-                *inverse = T::ONE / pivot.sqrt();
             }
-            let (size, sign) = (inverse.abs(), *inverse < T::ZERO);
+            let size = T::ONE / pivot.abs().sqrt();
+            *inverse = if is_negative { -size } else { size };
+            signed |= is_negative;
             scale::<T, E>(column, size);
             for (j, other) in rest.chunks_exact_mut(ld.max(1)).take(width - 1 - i).enumerate() {
                 let factor = column.get(row + index + 1 + j).copied().unwrap_or(T::ZERO);
-                subtract_column::<T, E>(other, if sign { -factor } else { factor }, column);
+                subtract_column::<T, E>(other, if is_negative { -factor } else { factor }, column);
             }
         }
         begin += width;
     }
-    Ok(regularised)
+    (regularised, negative)
 }

@@ -1,42 +1,65 @@
 //! The iterations.
 
-use super::newton::{Iterate, Largest, Terms};
+use super::iterate::{Iterate, Largest, Terms};
 use super::options::InteriorPointOptions;
 use super::riccati::First;
-use super::vector::largest_size;
-use crate::qp::error::{QpError, Side};
+use super::sides::Penalties;
+use super::vector::{dot, largest_size};
+use crate::qp::error::QpError;
 use crate::qp::layout::{Places, assign, part, part_mut};
-use crate::qp::problem::{QpView, Row};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
-use crate::qp::statistics::Statistics;
+use crate::qp::statistics::{Statistics, larger};
 use crate::scalar::{Packed, Real, Registers};
+
+/// How a problem is to be solved.
+#[derive(Clone, Copy)]
+pub struct Attempt {
+    pub penalties: Penalties,
+    pub start: Start,
+    /// Whether steps are kept short by proximal terms, for Hessians that are singular.
+    pub proximal: bool,
+    /// What attempts before have taken.
+    pub statistics: Statistics,
+    /// The iterations at which it ends.
+    pub iterations: usize,
+}
 
 /// One run of the method.
 pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
     pub options: &'r InteriorPointOptions,
     pub limits: Limits<T>,
-    pub start: Start,
-    /// The size of penalties.
-    pub scale: T,
+    pub attempt: Attempt,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<Statistics, QpError>,
+    /// Whether the multipliers prove that no point satisfies all constraints.
+    pub infeasible: &'r mut bool,
 }
 
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, options, limits, start, scale, solution, result } = self;
-        let tries = if start == Start::Warm { options.active_sets.min(options.max_iterations) } else { 0 };
+        let Self { iterate, options, limits, mut attempt, solution, result, infeasible } = self;
+        let warm = [&*solution.v, solution.lower, solution.upper];
+        if attempt.start == Start::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
+            attempt.start = Start::Cold;
+        }
+        let tries = if attempt.start == Start::Warm { options.active_sets.min(attempt.iterations) } else { 0 };
         // No closure: it would be compiled for another machine.
         *result = match iterate.by_active_sets::<E>(tries, &limits, solution) {
             Ok(statistics) => Ok(statistics),
             Err(statistics) => {
-                iterate.begin::<E>(options, start, scale, solution);
-                iterate.iterations::<E>(statistics, options, &limits, solution)
+                if tries > 0 {
+                    attempt.statistics = statistics;
+                }
+                iterate.begin::<E>(options, &attempt, solution);
+                iterate.iterations::<E>(&attempt, &limits, solution)
             }
         };
+        if attempt.penalties == Penalties::Hard {
+            *infeasible = iterate.is_infeasible::<E>(solution.dynamics);
+        }
         iterate.store(solution);
     }
 }
@@ -47,6 +70,10 @@ const SHORT: f64 = 0.3;
 /// The terms of the residuals are computed again where `μ` is this part of what it was.
 const OLD: f64 = 0.01;
 
+/// An iteration that leaves less than this part makes progress; so many may make none.
+const PROGRESS: f64 = 0.9;
+const IDLE: usize = 50;
+
 /// What residuals are to be below.
 pub struct Limits<T> {
     absolute: Terms<T>,
@@ -54,10 +81,12 @@ pub struct Limits<T> {
 }
 
 impl<T: Real> Limits<T> {
-    /// At least a tolerance that is asked for; with large penalties, forces are measured in their units.
-    pub fn new(options: &InteriorPointOptions, relaxed: T, scale: T) -> Self {
+    /// At least a tolerance that is asked for.
+    pub fn new(options: &InteriorPointOptions, relaxed: T, penalties: Penalties) -> Self {
         let values = T::from_f64(options.tolerance).max(relaxed);
-        let absolute = Terms { forces: values * scale, values };
+        // What multipliers are to prove depends on how well gradients vanish.
+        let share = if penalties == Penalties::Hard { 0.01 } else { 1.0 };
+        let absolute = Terms { forces: values * T::from_f64(share), values };
         Self { absolute, relative: T::from_f64(options.relative_tolerance) }
     }
 
@@ -100,41 +129,44 @@ impl<T: Real> Iterate<'_, T> {
     fn begin<E: Packed<T>>(
         &mut self,
         options: &InteriorPointOptions,
-        start: Start,
-        scale: T,
+        attempt: &Attempt,
         solution: &mut SolutionView<'_, T>,
     ) {
+        let start = attempt.start;
         if start == Start::Warm {
             self.take_point(solution);
         }
         self.give_initial_state();
         self.evaluate_values::<E>();
-        let cold = (T::from_f64(options.start_mu) * scale).sqrt();
+        let cold = T::from_f64(options.start_mu).sqrt();
+        let gap = largest_size::<T, E>(self.dynamics).max(self.sides.violation());
+        let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
             // The farther it is from being feasible, the less its slacks and multipliers mean.
-            Start::Warm => {
-                let gap = largest_size::<T, E>(self.dynamics).max(self.sides.violation());
-                let distance = T::from_f64(options.warm_distance).max(gap);
-                if distance < cold { distance } else { cold }
-            }
-            Start::Cold => cold,
+            Start::Warm if warm < cold => warm,
+            // Slacks that are small beside violations make steps short.
+            Start::Cold if attempt.proximal => gap.max(cold),
+            _ => cold,
         };
         self.sides.begin(start, distance, solution);
         // Only now are slacks what they are.
         let _ = self.evaluate::<E>(solution.dynamics);
+        self.regularise(attempt.proximal);
     }
 
     #[inline(always)]
     fn iterations<E: Packed<T>>(
         &mut self,
-        mut statistics: Statistics,
-        options: &InteriorPointOptions,
+        attempt: &Attempt,
         limits: &Limits<T>,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
-        let (mut short, mut refine) = (0, false);
+        let Attempt { mut statistics, iterations: most, .. } = *attempt;
+        let known_refinements = statistics.refinements;
+        let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
         let mut known = self.mu;
-        let failure = loop {
+        let (mut best, mut idle) = (T::from_f64(f64::INFINITY), 0);
+        let stalled = loop {
             let mut residuals = self.residuals::<E>();
             let small = limits.hold(residuals, self.terms);
             // Terms change on the way.
@@ -142,62 +174,79 @@ impl<T: Real> Iterate<'_, T> {
             if small || old {
                 // What is known of the residuals is what steps should have left of them: now they are computed.
                 let objective = self.evaluate::<E>(solution.dynamics);
-                (residuals, known) = (self.residuals::<E>(), self.mu);
+                (residuals, known) = (self.judged::<E>(), self.mu);
                 if limits.hold(residuals, self.terms) {
                     (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                     return Ok(statistics);
                 }
-                if small && statistics.refinements > 3 {
-                    let iterations = statistics.iterations;
-                    break QpError::Stalled { iterations, residuals: residuals.into() };
+                let Terms { forces, values } = limits.of(self.terms);
+                let apart = residuals.inequalities > values || residuals.complementarity > forces;
+                if small && apart {
+                    // Between two pieces of a penalty multipliers are off by the root of their products.
+                    share = share * T::from_f64(0.01);
+                } else if small && statistics.refinements > known_refinements + 3 {
+                    break true;
+                } else {
+                    // Multipliers and slacks are good: the next step is to correct the others only.
+                    refine = small;
+                    statistics.refinements += usize::from(small);
                 }
-                // Multipliers and slacks are good: the next step is to correct the others only.
-                refine = small;
-                statistics.refinements += usize::from(small);
             }
             // Products far below the tolerance gain nothing, and make weights that swallow the digits of everything else.
-            let floor = T::from_f64(0.01) * limits.of(self.terms).forces;
-            let iterations = statistics.iterations;
-            if iterations >= options.max_iterations {
-                break QpError::MaxIterations { iterations, residuals: residuals.into() };
+            let floor = share * limits.of(self.terms).forces;
+            if statistics.iterations >= most {
+                break false;
             }
+            // NaN makes no progress.
+            let left = larger(residuals.stationarity, larger(residuals.dynamics, residuals.inequalities)) + self.mu;
+            if left < T::from_f64(PROGRESS) * best {
+                (best, idle) = (left, 0);
+            } else if idle > IDLE {
+                break true;
+            }
+            idle += 1;
             self.sides.aim(if refine { self.mu.max(floor) } else { T::ZERO });
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
-            let mut alpha = self.sides.longest::<E>();
+            let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
+            let distance = self.mu.max(least);
+            let keep = if distance < boundary { distance } else { boundary };
+            let mut alpha = self.sides.longest::<E>(keep);
             if !refine && self.mu > T::ZERO {
                 let after = self.sides.mu_after::<E>(alpha, self.mu);
                 let ratio = after / self.mu;
                 self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
                 self.newton::<E>(false)?;
-                alpha = self.sides.longest::<E>();
+                alpha = self.sides.longest::<E>(keep);
                 if alpha < T::from_f64(SHORT) {
                     // Products are too different for the corrector to be right: first they are made equal.
                     self.sides.aim(self.mu * T::from_f64(SHORT));
                     self.newton::<E>(false)?;
-                    alpha = self.sides.longest::<E>();
+                    alpha = self.sides.longest::<E>(keep);
                 }
             }
-            if alpha < T::ONE {
-                let (least, most) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
-                let distance = self.mu.max(least);
-                alpha = alpha * (T::ONE - if distance < most { distance } else { most });
-            }
             statistics.iterations += 1;
-            if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) {
-                break QpError::Stalled { iterations, residuals: residuals.into() };
+            #[cfg(feature = "std")]
+            if std::env::var("DBG").is_ok() {
+                let r: crate::qp::Residuals = residuals.into();
+                std::eprintln!("{} mu {:e} alpha {:e} reg {} {r} step {:e}", statistics.iterations, self.mu.to_f64(), alpha.to_f64(), self.riccati.regularised, largest_size::<T, E>(self.step).to_f64());
             }
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
-            if short > 4 {
-                break QpError::Stalled { iterations, residuals: residuals.into() };
+            if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) || short > 4 {
+                break true;
             }
             self.advance::<E>(alpha);
             refine = false;
         };
-        // The multipliers of the dynamics belong to the point that is left.
+        // The multipliers of the dynamics, and what is said of it, belong to the point that is left.
         let _ = self.evaluate::<E>(solution.dynamics);
-        Err(failure)
+        let (residuals, iterations) = (self.judged::<E>().into(), statistics.iterations);
+        Err(if stalled {
+            QpError::Stalled { iterations, residuals }
+        } else {
+            QpError::MaxIterations { iterations, residuals }
+        })
     }
 
     /// The point and its multipliers.
@@ -225,37 +274,4 @@ impl<T: Real> Iterate<'_, T> {
             }
         }
     }
-}
-
-/// The largest violation of a hard bound, if it is larger than a tolerance relative to the bound.
-pub fn worst<T: Real>(qp: QpView<'_, T>, solution: &SolutionView<'_, T>, tolerance: f64) -> Option<QpError> {
-    let mut worst = (0.0, None);
-    for place in Places::<T>::new(qp.dims) {
-        let data = part(qp.data, place.data, place.data_len());
-        let v = part(solution.v, place.v, place.ld);
-        let vector = |row| part(data, place.row_data(row), place.rows);
-        for index in (0..place.n).chain(place.ld..place.ld + place.ng) {
-            let value = if index < place.n {
-                v.get(index).map_or(0.0, |v| v.to_f64())
-            } else {
-                let column = part(data, (place.next + index - place.ld) * place.ld, place.n);
-                column.iter().zip(v).map(|(c, v)| c.to_f64() * v.to_f64()).sum()
-            };
-            let at = |row| vector(row).get(index).map_or(0.0, |b| b.to_f64());
-            let sides = [
-                (Side::Lower, at(Row::Lower), at(Row::LowerLinear), 1.0),
-                (Side::Upper, at(Row::Upper), at(Row::UpperLinear), -1.0),
-            ];
-            for (side, bound, penalty, sign) in sides {
-                let violation = sign * (bound - value);
-                if penalty.is_infinite() && violation > tolerance * (1.0 + bound.abs()) && violation > worst.0
-                {
-                    let (field, index) = place.name(index);
-                    let stage = place.stage;
-                    worst = (violation, Some(QpError::Infeasible { field, stage, index, side, violation }));
-                }
-            }
-        }
-    }
-    worst.1
 }

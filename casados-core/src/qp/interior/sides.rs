@@ -10,13 +10,23 @@ use crate::qp::problem::{QpView, Row};
 use crate::scalar::Real;
 
 /// What violations of bounds cost.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Penalties<T> {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Penalties {
     /// What the problem says.
     Given,
-    /// This, linearly, where the problem says that there are none. Bounds of controls, which are more often what nature
-    /// gives than what somebody wants, cost ten times as much.
-    Elastic(T),
+    /// Nothing where the problem says what; one for each unit, linearly, where the bound is hard. Bounds of controls, which are more
+    /// often what nature gives than what somebody wants, cost ten times as much.
+    Hard,
+}
+
+/// How constraints are read.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<T> {
+    /// Whether the state at the start is given, and is no constraint.
+    pub fixed: bool,
+    pub penalties: Penalties,
+    /// Bounds from here on mean that there is none.
+    pub no_bound: T,
 }
 
 /// How many there are.
@@ -69,17 +79,17 @@ enum Kind<T> {
     Soft(T, T),
 }
 
-fn kind<T: Real>(bound: T, (linear, quadratic): (T, T), penalties: Penalties<T>) -> Kind<T> {
-    if !bound.is_finite() {
+fn kind<T: Real>(penalty: Option<T>, (linear, quadratic): (T, T), absent: bool) -> Kind<T> {
+    if absent {
         return Kind::Absent;
     }
-    match penalties {
-        _ if linear.is_finite() => {
-            // A violation that costs nothing is allowed.
-            if linear > T::ZERO || quadratic > T::ZERO { Kind::Soft(linear, quadratic) } else { Kind::Absent }
-        }
-        Penalties::Given => Kind::Hard,
-        Penalties::Elastic(weight) => Kind::Soft(weight, T::ZERO),
+    match penalty {
+        // A violation that costs nothing is allowed.
+        None if linear.is_finite() && linear == T::ZERO && quadratic == T::ZERO => Kind::Absent,
+        None if linear.is_finite() => Kind::Soft(linear, quadratic),
+        None => Kind::Hard,
+        Some(_) if linear.is_finite() => Kind::Absent,
+        Some(weight) => Kind::Soft(weight, T::ZERO),
     }
 }
 
@@ -115,23 +125,26 @@ fn constraints<T: Real>(qp: QpView<'_, T>, fixed: bool, mut f: impl FnMut(Constr
 
 impl<T: Real> Constraint<T> {
     /// Whether it is an equation, and otherwise its sides.
-    fn kinds(&self, penalties: Penalties<T>) -> (bool, Kind<T>, Kind<T>) {
-        let penalties = match penalties {
-            Penalties::Elastic(weight) if self.control => Penalties::Elastic(T::from_f64(10.0) * weight),
-            others => others,
+    fn kinds(&self, reading: &Reading<T>) -> (bool, Kind<T>, Kind<T>) {
+        let ten = T::from_f64(10.0);
+        let penalty = match reading.penalties {
+            Penalties::Given => None,
+            Penalties::Hard => Some(if self.control { ten } else { T::ONE }),
         };
-        let lower = kind(self.lower, self.lower_penalty, penalties);
-        let upper = kind(self.upper, self.upper_penalty, penalties);
+        // What is NaN is no bound either; the data is checked before.
+        let (is_lower, is_upper) = (self.lower > -reading.no_bound, self.upper < reading.no_bound);
+        let lower = kind(penalty, self.lower_penalty, !is_lower);
+        let upper = kind(penalty, self.upper_penalty, !is_upper);
         let equation = matches!((&lower, &upper), (Kind::Hard, Kind::Hard)) && self.lower == self.upper;
         (equation, lower, upper)
     }
 }
 
 /// How many sides there are.
-pub fn count<T: Real>(qp: QpView<'_, T>, fixed: bool, penalties: Penalties<T>) -> Counts {
+pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
     let mut counts = Counts::default();
-    constraints(qp, fixed, |constraint| {
-        let (equation, lower, upper) = constraint.kinds(penalties);
+    constraints(qp, reading.fixed, |constraint| {
+        let (equation, lower, upper) = constraint.kinds(reading);
         if equation {
             counts.equations += 1;
             return;
@@ -147,6 +160,8 @@ pub fn count<T: Real>(qp: QpView<'_, T>, fixed: bool, penalties: Penalties<T>) -
 /// All sides, and what an interior point keeps of each.
 pub struct Sides<'a, T> {
     pub counts: Counts,
+    /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the regularisation of the dual.
+    pub compliance: T,
     /// Rows of sides.
     pub rows: &'a mut [u32],
     /// Rows of equations.
@@ -191,8 +206,7 @@ impl<'a, T: Real> Sides<'a, T> {
     /// Lists the sides.
     pub fn list(
         qp: QpView<'_, T>,
-        fixed: bool,
-        penalties: Penalties<T>,
+        reading: &Reading<T>,
         counts: Counts,
         numbers: &mut &'a mut [T],
         indices: &mut &'a mut [u32],
@@ -200,6 +214,7 @@ impl<'a, T: Real> Sides<'a, T> {
         let (pairs, sides) = (counts.pairs(), counts.sides());
         let list = Self {
             counts,
+            compliance: T::ZERO,
             rows: take_mut(indices, sides),
             equations: take_mut(indices, counts.equations),
             soft: take_mut(indices, counts.soft),
@@ -221,9 +236,9 @@ impl<'a, T: Real> Sides<'a, T> {
             equation_bound: take_mut(numbers, counts.equations),
         };
         let (mut lower, mut upper, mut soft, mut equations) = (0, counts.lower, 0, 0);
-        constraints(qp, fixed, |constraint| {
+        constraints(qp, reading.fixed, |constraint| {
             let row = constraint.row as u32;
-            let (equation, lower_kind, upper_kind) = constraint.kinds(penalties);
+            let (equation, lower_kind, upper_kind) = constraint.kinds(reading);
             if equation {
                 set(list.equations, equations, row);
                 set(list.equation_bound, equations, constraint.lower);

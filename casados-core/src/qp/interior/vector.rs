@@ -34,18 +34,6 @@ pub fn largest_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
     a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (a * b).max(largest))
 }
 
-/// The largest `−a b`, at least `least`.
-#[inline(always)]
-pub fn largest_negative_product<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {
-    let ((a, a_rest), (b, b_rest)) = (split!(a), split!(b));
-    let mut largest = super::kernels::splat::<T, E>(least);
-    for (a, b) in a.iter().zip(b) {
-        largest = (-(E::load(a) * E::load(b))).max(largest);
-    }
-    let whole = largest.largest();
-    a_rest.iter().zip(b_rest).fold(whole, |largest, (&a, &b)| (-(a * b)).max(largest))
-}
-
 /// The largest `−a / b`, at least `least`.
 #[inline(always)]
 pub fn largest_negative_ratio<T: Real, E: Packed<T>>(least: T, a: &[T], b: &[T]) -> T {

@@ -216,7 +216,6 @@ mod logistic {
             symmetric: &const {
                 symmetric::<3, 8>(&Pattern { rows: &[1, 2, 3, 3, 3], columns: &[1, 1, 1, 2, 3] }, &[1, 2, 3])
             },
-            folded: &[],
             lone: &[],
             operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
             elimination: Elimination::NONE,

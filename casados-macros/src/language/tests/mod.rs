@@ -69,7 +69,7 @@ pub fn like_a_compiler(test: fn()) {
 /// Executes `fn f(x: [f64; 6])` symbolically.
 pub fn evaluate(source: &str) -> syn::Result<(Evaluator, Vec<Node>)> {
     let tokens = syn::parse_str(source)?;
-    super::nesting::check(&tokens)?;
+    super::tokens::check(&tokens)?;
     let item = Rc::new(syn::parse2::<syn::ItemFn>(tokens)?);
     let mut evaluator = Evaluator::default();
     let x = (0..6).map(|index| Value::Real(evaluator.graph.variable(index))).collect();

@@ -53,3 +53,31 @@ fn nest() {
         assert!(error.is_some_and(|error| error.contains("nested too deeply")), "{before}");
     }
 }
+
+/// Sums as other programs write them, without a bracket; on the stack that an expansion has.
+#[test]
+fn sums_of_thousands_of_terms() {
+    let terms: Vec<String> = (0..3000).map(|i| format!("{i}.5 * x[{}]", i % 6)).collect();
+    let source = format!("fn f(x: [f64; 6]) -> f64 {{ {} }}", terms.join(" + "));
+    let value = stacker::grow(crate::STACK, || {
+        let (evaluator, list) = super::evaluate(&source).unwrap();
+        evaluator.graph.evaluate(&list, crate::graph::Point { variables: &[1.0; 6], ..Default::default() })
+    });
+    // Half-integers: `Σ (i + ½)`, exact.
+    assert_eq!(value, [4_500_000.0]);
+}
+
+/// What nests without brackets ends in an error at the user's tokens.
+#[test]
+fn long_chains_are_errors() {
+    let condition = |i: usize| format!("if x[0] < {i}.0 {{ {i}.0 }} else ");
+    for source in [
+        format!("fn f(x: [f64; 6]) -> f64 {{ x[0]{} }}", ".sin()".repeat(5000)),
+        format!("fn f(x: [f64; 6]) -> f64 {{ {}{{ 0.0 }} }}", (0..1500).map(condition).collect::<String>()),
+        format!("fn f(x: [f64; 6]) -> f64 {{ {}x[0] }}", "-".repeat(5000)),
+    ] {
+        let error =
+            stacker::grow(crate::STACK, || super::evaluate(&source).map(|_| ()).map_err(|e| e.to_string()));
+        assert!(error.is_err_and(|message| message.contains("nested too deeply")));
+    }
+}

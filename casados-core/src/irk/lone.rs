@@ -1,4 +1,4 @@
-//! Second derivatives on the diagonal that need no row of `D`: of a multiple of another variable, and of a direction itself.
+//! Second derivatives on the diagonal that need no row of `D`: of a direction itself.
 
 use super::directions::Identity;
 use crate::linalg::{Arithmetic, Kernel};
@@ -6,26 +6,6 @@ use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::Array;
 use core::marker::PhantomData;
-
-/// Second derivatives in `ẋ_j = c v` become those in `v`.
-pub(super) struct Fold<'a, M, E, const S: usize> {
-    pub entries: &'a mut [[E; S]],
-    pub model: PhantomData<M>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Fold<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for fold in M::STRUCTURE.folded {
-            let Some(&from) = self.entries.get(fold.entry as usize) else { continue };
-            if let Some(to) = self.entries.get_mut(fold.into as usize) {
-                A::subtract_row(to, E::from_f64(-fold.factor), &from);
-            }
-        }
-    }
-}
 
 /// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit matrix.
 pub(super) struct Lone<'a, M, E, R, const S: usize> {

@@ -1,0 +1,109 @@
+//! The second estimate of the error of a step: what the linear part of the equations makes of the defect.
+//!
+//! The polynomial `u` of a collocation step leaves the defect `u̇ − f(u) ≈ d ℓ(τ)` with `ℓ` zero at the nodes and one where
+//! `d` is looked at. By the formula of variation of constants the end of the step is wrong by
+//!
+//! ```text
+//! h φ(hJ) d        φ(z) = ∫₀¹ exp(z (1 − τ)) ℓ(τ) dτ
+//! ```
+//!
+//! At small `z` that is of order `z^(s−1)`, which is why a tolerance may be taken for granted there that the estimate of
+//! order `s` does not reach; on the imaginary axis beyond it is `1/|z|` and no smaller than that estimate. So oscillations
+//! whose periods are not much longer than the steps, and components that are stiff, lose the order that other ones have: order
+//! reduction (A. Prothero, A. Robinson, Math. Comp. 28 (1974); E. Hairer, G. Wanner, Solving Ordinary Differential
+//! Equations II, section IV.15). In place of `φ` stands
+//!
+//! ```text
+//! r(z) = q z^(s−1) / Q(z)        Q(z) = Π_i (1 − μ_i z) = 1 + … + q z^s
+//! ```
+//!
+//! with the eigenvalues `μ_i` of `A`: `1/z` at infinity; of Radau IIA methods twice `φ` at zero, and along
+//! the imaginary axis between 0.6 and 2 times. As `r(z) = Σ_i c_i / (1 − μ_i z)`, one solve with the factors that Newton's method has
+//! gives it. The same solve gives `r(z)/z²`: of an oscillation it points against the error, of a decay along it.
+
+use super::control::power;
+use crate::linalg::{Complex, PARTS};
+use crate::scalar::{Real, Scalar};
+
+/// What is left of the error of components that decay: steps that follow damp it, and no more than one stays.
+const DAMPED: f64 = 0.1;
+/// The errors of oscillations add up, and more of them the more accurate and therefore the more steps there are.
+const KEPT: f64 = 4.0;
+/// A complex number.
+type Number = Complex<f64, 2>;
+
+/// The filter of a method, and how what it lets pass is judged.
+#[derive(Clone, Copy, Debug)]
+pub struct Transport {
+    /// `c`, as factors of the parts of a solution; and those of `r(z)/z²`.
+    weights: [[f64; PARTS]; 2],
+    /// The estimate of lower order behaves like this power of what is estimated here.
+    exponent: f64,
+}
+
+impl Transport {
+    /// From the eigenvalues of a method with `S` stages; of complex conjugate ones there is one, and a real one is the first.
+    pub fn new<T: Real, const S: usize>(values: &Complex<T, PARTS>) -> Self {
+        let value = |l: usize| {
+            let (re, im) = values.get(l);
+            Number { parts: [re.to_f64(), im.to_f64()] }
+        };
+        let conjugate = |z: Number| Number { parts: [z.parts[0], -z.parts[1]] };
+        let one = Number::real(1.0);
+        let (count, real) = (S.div_ceil(2), S % 2);
+        let mut weights = [[0.0; PARTS]; 2];
+        for lane in 0..count {
+            let own = value(lane);
+            let mut coefficient = own.scaled(-1.0);
+            for other in 0..count {
+                for (copy, value) in [value(other), conjugate(value(other))].into_iter().enumerate() {
+                    if (other, copy) != (lane, 0) && (copy == 0 || other >= real) {
+                        // −μ_j / (1 − μ_j/μ_i)
+                        coefficient = coefficient * value.scaled(-1.0) / (one - value / own);
+                    }
+                }
+            }
+            // z = 1/μ_i
+            let z = one / own;
+            let highest = (1..S).fold(coefficient, |product, _| product * z);
+            let twice = if lane < real { 1.0 } else { 2.0 };
+            // Of two stages there is no such: then everything is kept.
+            let bent = if S < 3 { highest.scaled(-1.0) } else { highest * own * own };
+            for (weights, number) in weights.iter_mut().zip([highest, bent]) {
+                // The real part of a product.
+                (weights[lane], weights[PARTS / 2 + lane]) =
+                    (twice * number.parts[0], -twice * number.parts[1]);
+            }
+        }
+        let s = S as f64;
+        Self { weights, exponent: (s + 1.0) / (2.0 * s) }
+    }
+
+    /// Factors of the parts of a solution.
+    pub fn weights(&self) -> &[[f64; PARTS]; 2] {
+        &self.weights
+    }
+
+    /// The estimate of lower order or, if that is larger, the power of this one that behaves like it: of errors relative to the
+    /// tolerance that was asked for, and `(hJ)⁻²` times them.
+    pub fn larger<T: Real>(&self, first: f64, relative: impl Iterator<Item = (T, T)>) -> f64 {
+        let (mut square, mut product, mut bent_square, mut count) = (0.0f64, 0.0f64, 0.0f64, 0usize);
+        for (error, bent) in relative {
+            let (error, bent) = (error.to_f64(), bent.to_f64());
+            square += error * error;
+            product += error * bent;
+            bent_square += bent * bent;
+            count += 1;
+        }
+        // The square of the cosine between them, where they point against each other.
+        let against = if product < 0.0 { product / square * (product / bent_square) } else { 0.0 };
+        let share = DAMPED + (KEPT - DAMPED) * against;
+        let second = share * Scalar::sqrt(square / count.max(1) as f64);
+        // Written so that NaN stays.
+        if first.is_nan() || second <= first && second <= 1.0 {
+            return first;
+        }
+        let second = power(second, self.exponent);
+        if second <= first { first } else { second }
+    }
+}

@@ -1,0 +1,577 @@
+//! Kinematic states `q`, with equations `q̇ − c v = 0`: no unknowns of iterations, of the elimination or of derivatives.
+//!
+//! ```text
+//! stages         k_q = c (x_v + hA k_v)                             or c v of a control or a parameter
+//! J X = B        B_r ← B_r − (f_q̇ + f_q hA) B_q                     X_q = B_q + c hA X_v
+//! forward        B_q = c V_v at all stages, so that hA B_q = h c_i c V_v
+//! Jᵀ M = B       B_v ← B_v + c (hA)ᵀ B_q                            M_q = B_q − Σ_r (f_q̇ + (hA)ᵀ f_q) M_r
+//! ```
+//!
+//! Everything else finds them in their places, with all other unknowns and equations: the end of a step, results, `D`, checks.
+
+use super::directions::Directions;
+use super::evaluate::{entry, stages};
+use super::record::{Coefficients, Linearization, Work};
+use crate::linalg::{
+    Arithmetic, AtRow, Block, Kernel, Packet, Viewer, coupling, dispatch, each_row, kinematic, slot,
+    subtract, subtract_diagonal, subtract_transposed,
+};
+use crate::memory::Fallback;
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Felt, Kinematic};
+use crate::scalar::Lanes;
+use crate::shape::{Plain, Shape};
+
+/// How many rows the table of kinematic states has.
+pub(super) const fn count<M: Dae>() -> usize {
+    M::STRUCTURE.elimination.kinematic.len()
+}
+
+/// Whether any state is kinematic.
+pub(super) const fn is_any<M: Dae>() -> bool {
+    count::<M>() > 0
+}
+
+/// The state that is the velocity of a kinematic one, if it is a state.
+#[inline(always)]
+pub(super) fn velocity<M: Dae>(of: &Kinematic) -> Option<usize> {
+    let nx = M::Shape::NX;
+    let velocity = of.velocity as usize;
+    if velocity < 2 * nx { velocity.checked_sub(nx) } else { None }
+}
+
+/// `−c`
+#[inline(always)]
+pub(super) fn minus_c<M: Dae, E: Plain, const S: usize>(
+    of: &Kinematic,
+    jacobian: &M::Jacobian<[E; S]>,
+) -> Option<E> {
+    jacobian.as_ref().get(of.entry as usize)?.first().copied()
+}
+
+/// An entry by which an equation feels a kinematic state: its slot, its values, whether it multiplies the derivative.
+#[inline(always)]
+pub(super) fn felt<'a, M: Dae, E: Plain, const S: usize>(
+    of: &Felt,
+    jacobian: &'a M::Jacobian<[E; S]>,
+) -> Option<(usize, &'a [E; S], bool)> {
+    let index = of.entry as usize;
+    let (row, _, values) = entry::<M, _>(jacobian, index)?;
+    Some((slot::<M>(row), values, index < M::STRUCTURE.blocks[1]))
+}
+
+/// The unknowns before the first that is not kinematic, and behind the last: `(first, end)`.
+pub(super) const fn unknowns<M: Dae>() -> (usize, usize) {
+    let (mut first, mut end) = (0, M::Shape::NK);
+    while first < end && kinematic::<M>(first).is_some() {
+        first += 1;
+    }
+    while end > first && kinematic::<M>(end - 1).is_some() {
+        end -= 1;
+    }
+    (first, end)
+}
+
+/// Whether none of [these](unknowns) is kinematic.
+pub(super) const fn are_together<M: Dae>() -> bool {
+    let (mut index, end) = unknowns::<M>();
+    while index < end {
+        if kinematic::<M>(index).is_some() {
+            return false;
+        }
+        index += 1;
+    }
+    true
+}
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
+    /// Solves `J X = B` for all unknowns in place; equations are in their slots.
+    pub(super) fn solve<const W: usize>(
+        &self,
+        (coefficients, h): (&Coefficients<E, S>, E),
+        b: &mut ArrayK<M, Packet<E, S, W>>,
+    ) {
+        if const { !is_any::<M>() } {
+            return self.factors.solve(b);
+        }
+        let (jacobian, a) = (&self.jacobian, &coefficients.a);
+        dispatch(Around::<M, E, S, W, ELIMINATE> { jacobian, a, h, rows: b.as_mut() });
+        self.factors.solve(b);
+        dispatch(Around::<M, E, S, W, RECONSTRUCT> { jacobian, a, h, rows: b.as_mut() });
+    }
+
+    /// Solves `Jᵀ X = B` for all equations in place; the solution has them in their slots.
+    pub(super) fn solve_transposed<const W: usize>(
+        &self,
+        (coefficients, h): (&Coefficients<E, S>, E),
+        b: &mut ArrayK<M, Packet<E, S, W>>,
+    ) {
+        if const { !is_any::<M>() } {
+            return self.factors.solve_transposed(b);
+        }
+        let (jacobian, a) = (&self.jacobian, &coefficients.a);
+        dispatch(Around::<M, E, S, W, CONDENSE_TRANSPOSED> { jacobian, a, h, rows: b.as_mut() });
+        self.factors.solve_transposed(b);
+        dispatch(Around::<M, E, S, W, RECONSTRUCT_TRANSPOSED> { jacobian, a, h, rows: b.as_mut() });
+    }
+}
+
+/// What is done to rows of all unknowns before and after systems without kinematic states are solved.
+pub(super) const ELIMINATE: u8 = 0;
+const RECONSTRUCT: u8 = 1;
+pub(super) const CONDENSE_TRANSPOSED: u8 = 2;
+pub(super) const RECONSTRUCT_TRANSPOSED: u8 = 3;
+
+struct Around<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    a: &'a [[E; S]; S],
+    h: E,
+    rows: &'a mut [Packet<E, S, W>],
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> Kernel
+    for Around<'_, M, E, S, W, WHAT>
+{
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, a, h, rows } = self;
+        around::<A, M, E, S, W, WHAT>(jacobian, &coupling(a, h), rows);
+    }
+}
+
+/// The same inside of a kernel.
+#[inline(always)]
+pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8>(
+    jacobian: &M::Jacobian<[E; S]>,
+    minus_ha: &Block<E, S>,
+    rows: &mut [Packet<E, S, W>],
+) {
+    if rows.len() != M::Shape::NK {
+        return;
+    }
+    let mut rows =
+        Rows::<M, E, S, W, WHAT> { jacobian, minus_ha: *minus_ha, rows, sum: [[E::from_f64(0.0); W]; S] };
+    if const { WHAT == ELIMINATE || WHAT == RECONSTRUCT_TRANSPOSED } {
+        each_row::<A, _>(&mut AtFelt(rows));
+    } else {
+        each_row::<A, _>(&mut rows);
+    }
+}
+
+struct Rows<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    minus_ha: Block<E, S>,
+    rows: &'a mut [Packet<E, S, W>],
+    /// What is known of a state between the first and the last entry by which it is felt.
+    sum: Packet<E, S, W>,
+}
+
+/// About how many instructions a product with `hA` takes.
+const fn product<E>(stages: usize, width: usize) -> usize {
+    if size_of::<E>() > 8 { stages * stages * width } else { stages * stages * width.div_ceil(4) }
+}
+
+/// Between a kinematic state and its velocity.
+impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for Rows<'_, M, E, S, W, WHAT> {
+    const ROWS: usize = count::<M>();
+    const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Self { jacobian, minus_ha, rows, .. } = self;
+        let Some(of) = kinematic::<M>(state) else { return };
+        let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
+            return;
+        };
+        let (from, to) = if WHAT == RECONSTRUCT { (velocity, state) } else { (state, velocity) };
+        let Some(from) = rows.get(from) else { return };
+        let mut moved = [[E::from_f64(0.0); W]; S];
+        if WHAT == RECONSTRUCT {
+            subtract::<A, E, S, W>(&mut moved, minus_ha, from);
+        } else {
+            subtract_transposed::<A, E, S, W>(&mut moved, minus_ha, from);
+        }
+        if let Some(to) = rows.get_mut(to) {
+            subtract_diagonal::<A, E, S, W>(to, &[minus_c; S], &moved);
+        }
+    }
+}
+
+/// Between a kinematic state and the equations that feel it.
+struct AtFelt<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8>(
+    Rows<'a, M, E, S, W, WHAT>,
+);
+
+impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
+    for AtFelt<'_, M, E, S, W, WHAT>
+{
+    const ROWS: usize = M::STRUCTURE.elimination.felt.len();
+    const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, index: usize) {
+        let Rows { jacobian, minus_ha, rows, sum } = &mut self.0;
+        let Some(of) = M::STRUCTURE.elimination.felt.get(index) else { return };
+        let Some((slot, values, derivative)) = felt::<M, E, S>(of, jacobian) else { return };
+        let (Some(&own), Some(&row)) = (rows.get(of.state as usize), rows.get(slot)) else { return };
+        let (mut own, mut row) = (own, row);
+        if of.first {
+            *sum = [[E::from_f64(0.0); W]; S];
+        }
+        if WHAT == ELIMINATE {
+            if of.first {
+                subtract::<A, E, S, W>(sum, minus_ha, &own);
+            }
+            subtract_diagonal::<A, E, S, W>(&mut row, values, if derivative { &own } else { sum });
+            if let Some(to) = rows.get_mut(slot) {
+                *to = row;
+            }
+            return;
+        }
+        if derivative {
+            subtract_diagonal::<A, E, S, W>(&mut own, values, &row);
+        } else {
+            subtract_diagonal::<A, E, S, W>(sum, values, &row);
+        }
+        if of.last {
+            // `own + (hA)ᵀ sum`
+            subtract_transposed::<A, E, S, W>(&mut own, minus_ha, sum);
+        }
+        if let (true, Some(to)) = (derivative || of.last, rows.get_mut(of.state as usize)) {
+            *to = own;
+        }
+    }
+}
+
+/// A panel of forward sensitivities.
+pub(super) struct Forward<'a, M: Dae, E: Plain, D, const S: usize, const W: usize> {
+    pub jacobian: &'a M::Jacobian<[E; S]>,
+    /// `V` at the start of the step.
+    pub v: &'a [[E; W]],
+    pub directions: &'a D,
+    /// The first column.
+    pub column: usize,
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward<'_, M, E, D, S, W> {
+    /// `c V_v`
+    #[inline(always)]
+    pub fn own<A: Arithmetic>(&self, of: &Kinematic) -> [E; W] {
+        let mut row = [E::from_f64(0.0); W];
+        let Some(minus_c) = minus_c::<M, E, S>(of, self.jacobian) else { return row };
+        match velocity::<M>(of) {
+            Some(velocity) => {
+                if let Some(v) = self.v.get(velocity) {
+                    A::subtract_row(&mut row, minus_c, v);
+                }
+            }
+            None => {
+                let input = of.velocity as usize - M::Shape::NX - M::Shape::NZ;
+                self.directions.add(input, -minus_c, self.column, &mut row);
+            }
+        }
+        row
+    }
+
+    /// Writes `V_q + h c_i c V_v`, what entries of `f_q` multiply, to the rows of the states.
+    #[inline(always)]
+    pub fn place<A: Arithmetic>(&self, nodes: &[E; S], rows: &mut [Packet<E, S, W>]) {
+        for state in 0..count::<M>() {
+            let Some(of) = kinematic::<M>(state) else { continue };
+            let (own, Some(v), Some(to)) = (self.own::<A>(of), self.v.get(state), rows.get_mut(state)) else {
+                continue;
+            };
+            for (to, &node) in to.iter_mut().zip(nodes) {
+                let mut row = *v;
+                A::subtract_row(&mut row, -node, &own);
+                *to = row;
+            }
+        }
+    }
+
+    /// Subtracts `f_q̇ c V_v` from the equations that feel derivatives.
+    #[inline(always)]
+    pub fn subtract_derivatives<A: Arithmetic>(&self, rows: &mut [Packet<E, S, W>]) {
+        if const { !feels_derivatives::<M>() } {
+            return;
+        }
+        for felt_by in M::STRUCTURE.elimination.felt {
+            let of = kinematic::<M>(felt_by.state as usize);
+            if let (Some(of), Some((slot, values, true))) = (of, felt::<M, E, S>(felt_by, self.jacobian))
+                && let Some(row) = rows.get_mut(slot)
+            {
+                let own = self.own::<A>(of);
+                subtract_diagonal::<A, E, S, W>(row, values, &[own; S]);
+            }
+        }
+    }
+
+    /// `dk_q = c (V_v + hA dk_v)`, and shows it.
+    #[inline(always)]
+    pub fn reconstruct<A: Arithmetic>(
+        &self,
+        minus_ha: &Block<E, S>,
+        rows: &mut [Packet<E, S, W>],
+        viewer: &mut impl Viewer<E, S, W>,
+    ) {
+        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha: *minus_ha, rows, viewer });
+    }
+}
+
+/// See [`Forward::reconstruct`].
+struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
+    of: &'b Forward<'a, M, E, D, S, W>,
+    minus_ha: Block<E, S>,
+    rows: &'b mut [Packet<E, S, W>],
+    viewer: &'b mut V,
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, const W: usize> AtRow
+    for Reconstruct<'_, '_, M, E, D, V, S, W>
+{
+    const ROWS: usize = count::<M>();
+    const INSTRUCTIONS: usize = 4 + product::<E>(S, W);
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Self { of: forward, minus_ha, rows, viewer } = self;
+        let Some(of) = kinematic::<M>(state) else { return };
+        let mut packet = [forward.own::<A>(of); S];
+        if let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian))
+            && let Some(dk) = rows.get(velocity)
+        {
+            let mut moved = [[E::from_f64(0.0); W]; S];
+            subtract::<A, E, S, W>(&mut moved, minus_ha, dk);
+            subtract_diagonal::<A, E, S, W>(&mut packet, &[minus_c; S], &moved);
+        }
+        if let Some(row) = rows.get_mut(state) {
+            *row = packet;
+        }
+        viewer.see::<A>(state, &packet);
+    }
+}
+
+/// Whether an equation feels the derivative of a kinematic state that is not its own.
+const fn feels_derivatives<M: Dae>() -> bool {
+    let (felt, mut index) = (M::STRUCTURE.elimination.felt, 0);
+    while index < felt.len() {
+        if (felt[index].entry as usize) < M::STRUCTURE.blocks[1] {
+            return true;
+        }
+        index += 1;
+    }
+    false
+}
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Writes `k_q`.
+    pub(super) fn reconstruct(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        x: &ArrayX<M, E>,
+        y: &mut ArrayK<M, [E; S]>,
+    ) {
+        if const { !is_any::<M>() } {
+            return;
+        }
+        dispatch(Follow::<M, E, S> {
+            jacobian: &self.linear.jacobian,
+            points: &mut self.points,
+            x,
+            rest: &self.rest,
+            y,
+            a: &coefficients.a,
+            h: self.inputs.time.step,
+        });
+    }
+
+    /// Whether stages are all alike while `k_q = 0`, so that the model, with its Jacobian, is evaluated there once; what is missing is
+    /// [eliminated](Self::eliminate_missing) then. Where stages are evaluated side by side that spares nothing, and of two stages little.
+    pub(super) fn is_missing(&mut self, jacobian: bool) -> bool {
+        if const { !is_any::<M>() } {
+            return false;
+        }
+        self.alike &= jacobian && E::LANES > 1 && S > 2;
+        self.alike
+    }
+
+    /// The residual as it would be with `k_q`, by a Jacobian that all stages share as they share the point where it is: what `k_q` adds to `x`
+    /// differs between them only by the nodes.
+    pub(super) fn eliminate_missing(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { !is_any::<M>() } {
+            return;
+        }
+        let Self { f, points, linear, inputs, .. } = self;
+        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
+        dispatch(Missing::<M, E, S> { jacobian, points, f, a, h });
+    }
+
+    /// Writes what follows from sums that have been [compensated](super::compensated), to its last digit.
+    pub(super) fn reconstruct_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
+        if const { !is_any::<M>() } {
+            return;
+        }
+        dispatch(Round::<M, E, S> { jacobian: &self.linear.jacobian, points: &mut self.points, y });
+    }
+
+    /// Takes from the residual of the others what is missing in `k_q` beyond its digits.
+    pub(super) fn eliminate_rounded(&mut self, coefficients: &Coefficients<E, S>) {
+        if const { !is_any::<M>() } {
+            return;
+        }
+        let Self { f, linear, inputs, .. } = self;
+        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
+        dispatch(Rounded::<M, E, S> { jacobian, f, a, h });
+    }
+}
+
+/// `k_q` at the stages, from `v` at these points.
+#[inline(always)]
+pub(super) fn derivative<M: Dae, E: Lanes, const S: usize>(
+    state: usize,
+    jacobian: &M::Jacobian<[E; S]>,
+    points: &[[E; S]],
+) -> Option<[E; S]> {
+    let of = kinematic::<M>(state)?;
+    let (mut k, minus_c) = (*points.get(of.velocity as usize)?, minus_c::<M, E, S>(of, jacobian)?);
+    for k in &mut k {
+        *k = -(minus_c * *k);
+    }
+    Some(k)
+}
+
+/// See [`Work::reconstruct`].
+struct Follow<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    points: &'a mut ArrayV<M, [E; S]>,
+    x: &'a ArrayX<M, E>,
+    /// What `x` has beyond its digits.
+    rest: &'a ArrayX<M, E>,
+    y: &'a mut ArrayK<M, [E; S]>,
+    a: &'a [[E; S]; S],
+    h: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Follow<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, points, x, rest, y, a, h } = self;
+        let (points, y) = (points.as_mut(), y.as_mut());
+        let minus_ha = coupling(a, h);
+        for state in 0..count::<M>() {
+            let Some(of) = kinematic::<M>(state) else { continue };
+            if let Some(v) = velocity::<M>(of)
+                && let (Some(&x), Some(&rest), Some(k)) = (x.as_ref().get(v), rest.as_ref().get(v), y.get(v))
+                && let Some(xi) = points.get_mut(M::Shape::NX + v)
+            {
+                *xi = stages::<A, E, S>(rest, &minus_ha, k);
+                for xi in xi {
+                    *xi = *xi + x;
+                }
+            }
+            if let (Some(y), Some(k)) = (y.get_mut(state), derivative::<M, E, S>(state, jacobian, points)) {
+                *y = k;
+            }
+        }
+    }
+}
+
+/// See [`Work::eliminate_missing`].
+struct Missing<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// Where `k_q` will be.
+    points: &'a mut ArrayV<M, [E; S]>,
+    f: &'a mut ArrayK<M, [E; S]>,
+    a: &'a [[E; S]; S],
+    h: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Missing<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, points, f, a, h } = self;
+        let nodes = super::right_side::nodes(a, h);
+        for felt in M::STRUCTURE.elimination.felt {
+            let of = kinematic::<M>(felt.state as usize);
+            let missing = of.and_then(|of| f.as_ref().get(of.equation as usize)).map(|own| own[0]);
+            let (Some(missing), Some((row, _, values))) =
+                (missing, entry::<M, _>(jacobian, felt.entry as usize))
+            else {
+                continue;
+            };
+            let Some(f) = f.as_mut().get_mut(row) else { continue };
+            let share = values[0] * missing;
+            for (f, &node) in f.iter_mut().zip(&nodes) {
+                let derivative = (felt.entry as usize) < M::STRUCTURE.blocks[1];
+                *f = A::subtract(*f, share, if derivative { E::from_f64(1.0) } else { node });
+            }
+        }
+        for state in 0..count::<M>() {
+            let Some(of) = kinematic::<M>(state) else { continue };
+            let Some(own) = f.as_mut().get_mut(of.equation as usize) else { continue };
+            let missing = core::mem::replace(own, [E::from_f64(0.0); S])[0];
+            for k in points.as_mut().get_mut(state).into_iter().flatten() {
+                *k = *k - missing;
+            }
+        }
+    }
+}
+
+/// See [`Work::reconstruct_compensated`].
+struct Round<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    points: &'a mut ArrayV<M, [E; S]>,
+    y: &'a mut ArrayK<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Round<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, points, y } = self;
+        for state in 0..count::<M>() {
+            let k = derivative::<M, E, S>(state, jacobian, points.as_ref());
+            if let (Some(k), Some(point), Some(y)) =
+                (k, points.as_mut().get_mut(state), y.as_mut().get_mut(state))
+            {
+                (*point, *y) = (k, k);
+            }
+        }
+    }
+}
+
+/// See [`Work::eliminate_rounded`].
+struct Rounded<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    f: &'a mut ArrayK<M, [E; S]>,
+    a: &'a [[E; S]; S],
+    h: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Rounded<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, f, a, h } = self;
+        let minus_ha = coupling(a, h);
+        for felt in M::STRUCTURE.elimination.felt {
+            let of = kinematic::<M>(felt.state as usize);
+            let residual = of.and_then(|of| f.as_ref().get(of.equation as usize)).copied();
+            let (Some(mut residual), Some((row, _, values))) =
+                (residual, entry::<M, _>(jacobian, felt.entry as usize))
+            else {
+                continue;
+            };
+            if felt.entry as usize >= M::STRUCTURE.blocks[1] {
+                residual = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
+            }
+            if let Some(f) = f.as_mut().get_mut(row) {
+                A::subtract_products(f, values, &residual);
+            }
+        }
+    }
+}

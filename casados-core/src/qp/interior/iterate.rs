@@ -1,0 +1,382 @@
+//! One iterate of the interior point, and its residuals.
+
+use super::coupling::Coupling;
+use super::kernels::{Columns, add_transposed, subtract, symmetric};
+use super::riccati::{First, Riccati, eliminate};
+use super::sides::{Counts, Sides};
+use super::vector::{larger, largest_product, largest_size};
+use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
+use crate::qp::problem::QpView;
+use crate::qp::statistics::{Residuals, larger as larger_or_nan};
+use crate::scalar::{Packed, Piece, Real};
+use core::marker::PhantomData;
+
+/// A point, its multipliers and residuals. Vectors over rows are `v` and the values of general constraints of each stage.
+///
+/// The residuals of linear conditions are not computed again in every iteration: a step of length `α` leaves `1 − α` of
+/// them. The multipliers of the dynamics are not needed for that, and come from a recursion at the end.
+pub struct Iterate<'a, T> {
+    pub qp: QpView<'a, T>,
+    pub first: First,
+    /// Whether there is one: without it a point is sought that violates least.
+    pub objective: bool,
+    /// What keeps variables near where they are: `½ ρ |Δ|²` of every step.
+    pub proximal: T,
+    pub riccati: Riccati<'a, T>,
+    pub sides: Sides<'a, T>,
+    /// `v` and `C x + D u`
+    pub v: &'a mut [T],
+    /// `Δ`
+    pub step: &'a mut [T],
+    /// Gradient of the Lagrangian.
+    pub stationarity: &'a mut [T],
+    /// Right-hand side of Newton's equations.
+    pub gradient: &'a mut [T],
+    /// Weights of rows.
+    pub weights: &'a mut [T],
+    /// `A x + B u + b − x₊`
+    pub dynamics: &'a mut [T],
+    /// The multiplier of a given state at the start.
+    pub initial: &'a mut [T],
+    /// `Σ s λ` over the number of pairs.
+    pub mu: T,
+    /// The largest terms of the residuals when they were computed last.
+    pub terms: Terms<T>,
+}
+
+/// What residuals are sums of.
+#[derive(Clone, Copy)]
+pub struct Terms<T> {
+    /// In gradients: `H v`, `h`, forces of constraints, `π`.
+    pub forces: T,
+    /// In conditions: `v`, `C x + D u`, `b`.
+    pub values: T,
+}
+
+/// The residuals of the conditions of optimality, the largest element of each: see [`Residuals`].
+#[derive(Clone, Copy)]
+pub struct Largest<T> {
+    pub stationarity: T,
+    pub dynamics: T,
+    pub inequalities: T,
+    pub complementarity: T,
+}
+
+impl<T: Real> From<Largest<T>> for Residuals {
+    fn from(largest: Largest<T>) -> Self {
+        let Largest { stationarity, dynamics, inequalities, complementarity } = largest;
+        Self {
+            stationarity: stationarity.to_f64(),
+            dynamics: dynamics.to_f64(),
+            inequalities: inequalities.to_f64(),
+            complementarity: complementarity.to_f64(),
+        }
+    }
+}
+
+/// Where the multipliers `π` of the dynamics come from when a gradient is computed.
+#[derive(Clone, Copy)]
+pub enum Costates<'c, 'm, T> {
+    /// The adjoint recursion: the gradient in the states vanishes.
+    Adjoint,
+    /// The adjoint recursion of the controlled system, with the last factors: where the gradient in the
+    /// controls vanishes both are the same, and errors decay where the adjoint recursion lets them grow.
+    /// With the changes of the multipliers of a coupling.
+    Controlled(Option<&'c Coupling<'m, T>>),
+    /// They are given.
+    Given,
+}
+
+/// The residuals as a function of its own; the gradient only where there is room for multipliers and the objective.
+struct Evaluate<'s, 'a, T, E> {
+    iterate: &'s mut Iterate<'a, T>,
+    values: bool,
+    multipliers: Option<(&'s mut [T], &'s mut T)>,
+    costates: Costates<'s, 's, T>,
+    register: PhantomData<E>,
+}
+
+impl<T: Real, E: Packed<T>> Piece for Evaluate<'_, '_, T, E> {
+    #[inline(always)]
+    fn run(self) {
+        if self.values {
+            self.iterate.values::<E>();
+        }
+        if let Some((multipliers, objective)) = self.multipliers {
+            *objective = self.iterate.gradient::<E>(multipliers, self.costates);
+        }
+    }
+}
+
+const fn first_nx(dims: &[StageDims]) -> usize {
+    match dims.first() {
+        Some(first) => first.nx,
+        None => 0,
+    }
+}
+
+impl<'a, T: Real> Iterate<'a, T> {
+    /// How many numbers it takes.
+    pub const fn memory(dims: &[StageDims], counts: &Counts) -> usize {
+        let end = end::<T>(dims);
+        Riccati::<T>::memory(dims) + counts.numbers() + 5 * end.row + end.dynamics + first_nx(dims)
+    }
+
+    /// In memory that is zero.
+    pub fn new(qp: QpView<'a, T>, first: First, sides: Sides<'a, T>, numbers: &mut &'a mut [T]) -> Self {
+        let (riccati, initial) = (Riccati::new(qp.dims, numbers), first_nx(qp.dims));
+        let end = riccati.end;
+        Self {
+            qp,
+            first,
+            objective: true,
+            proximal: T::ZERO,
+            riccati,
+            sides,
+            v: take_mut(numbers, end.row),
+            step: take_mut(numbers, end.row),
+            stationarity: take_mut(numbers, end.row),
+            gradient: take_mut(numbers, end.row),
+            weights: take_mut(numbers, end.row),
+            dynamics: take_mut(numbers, end.dynamics),
+            initial: take_mut(numbers, if first == First::Fixed { initial } else { 0 }),
+            mu: T::ZERO,
+            terms: Terms { forces: T::ZERO, values: T::ZERO },
+        }
+    }
+
+    /// What sides and equations give way to forces, and variables if they are to, in the units of the problem.
+    pub fn regularise(&mut self, proximal: bool) {
+        let Terms { forces, values } = self.terms;
+        let (small, stiffness) = (T::from_f64(T::EPSILON).sqrt(), forces / values.max(T::ONE));
+        self.sides.compliance = small / (T::from_f64(0.01) * stiffness).max(T::ONE);
+        self.proximal = if proximal { small * stiffness.max(T::from_f64(1e-4)) } else { T::ZERO };
+    }
+
+    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
+    /// Lagrangian in `x` zero, and the gradient in `u`. Returns the objective.
+    pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
+        self.evaluate_parts::<E>(true, Some(multipliers), Costates::Adjoint)
+    }
+
+    /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is what they leave.
+    pub fn evaluate_at<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_parts::<E>(true, Some(multipliers), Costates::Given);
+    }
+
+    /// The multipliers `π` at the point, by the recursion of the controlled system.
+    pub fn controlled_costates<E: Packed<T>>(
+        &mut self,
+        multipliers: &mut [T],
+        coupling: Option<&Coupling<'_, T>>,
+    ) {
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled(coupling));
+    }
+
+    /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are in `scratch` afterwards.
+    pub fn evaluate_values<E: Packed<T>>(&mut self) {
+        let _ = self.evaluate_parts::<E>(true, None, Costates::Adjoint);
+    }
+
+    /// What is left of [`evaluate`](Self::evaluate) after [`evaluate_values`](Self::evaluate_values).
+    pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Adjoint);
+    }
+
+    #[inline(always)]
+    fn evaluate_parts<E: Packed<T>>(
+        &mut self,
+        values: bool,
+        multipliers: Option<&mut [T]>,
+        costates: Costates<'_, '_, T>,
+    ) -> T {
+        let (mut objective, register) = (T::ZERO, PhantomData);
+        let multipliers = multipliers.map(|multipliers| (multipliers, &mut objective));
+        E::vectorize(Evaluate::<T, E> { iterate: self, values, multipliers, costates, register });
+        objective
+    }
+
+    /// The multipliers `π`, the gradient in `u`, and the objective.
+    #[inline(always)]
+    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates<'_, '_, T>) -> T {
+        let sides = &mut self.sides;
+        // Forces of the constraints, by rows.
+        let forces = &mut *self.gradient;
+        forces.fill(T::ZERO);
+        let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
+        let (of_lower, of_upper) = sides.multiplier.split_at_checked(lower.len()).unwrap_or_default();
+        scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
+        scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
+        scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
+        if let Costates::Controlled(coupling) = costates {
+            // What keeps variables near where they are belongs to the step, not to the problem.
+            for place in Places::<T>::new(self.qp.dims) {
+                let step = part(self.step, place.row, place.n);
+                for (force, &step) in part_mut(forces, place.row, place.n).iter_mut().zip(step) {
+                    *force = *force + self.proximal * step;
+                }
+            }
+            if let Some(coupling) = coupling {
+                coupling.push(self.qp, forces);
+            }
+        }
+        let mut objective = T::ZERO;
+        let mut largest = T::ZERO;
+        largest = larger::<T, E>(largest, forces);
+        for place in Places::<T>::ending(self.qp.dims, self.riccati.end).rev() {
+            let Place { nx, n, ng, ld, next, .. } = place;
+            let data = part(self.qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let hessian = part(data, place.matrix(), place.hessian());
+            let linear = part(data, place.gradient(), ld);
+            let g = part_mut(self.stationarity, place.row, ld);
+            let v = part(self.v, place.row, ld);
+            g.fill(T::ZERO);
+            if self.objective {
+                symmetric::<T, E>(g, hessian, ld, v, n);
+                largest = larger::<T, E>(largest, g);
+                largest = larger::<T, E>(largest, linear);
+                for ((g, &linear), &v) in g.iter_mut().zip(linear).zip(v) {
+                    objective = objective + v * (T::from_f64(0.5) * *g + linear);
+                    *g = *g + linear;
+                }
+            }
+            let force = part(self.gradient, place.row, place.rows);
+            for (g, &force) in g.iter_mut().zip(force) {
+                *g = *g + force;
+            }
+            let minus = &mut *self.riccati.minus;
+            for (minus, &pi) in minus.iter_mut().zip(part(multipliers, place.dynamics, next)) {
+                *minus = -pi;
+            }
+            for (minus, &force) in part_mut(minus, next, ng).iter_mut().zip(part(force, ld, ng)) {
+                *minus = -force;
+            }
+            subtract::<T, E>(g, matrix, minus, n, next + ng);
+            if matches!(costates, Costates::Controlled(_)) {
+                let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
+                let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
+                let y = part_mut(self.riccati.y, place.v + nx, place.nu);
+                eliminate::<T, E>(g, panel, ld, inverse, y, nx);
+            }
+            if place.stage > 0 && matches!(costates, Costates::Given) {
+                let before = place.dynamics.saturating_sub(pad::<T>(nx));
+                let pi = part(multipliers, before, nx);
+                for (g, &pi) in g.iter_mut().zip(pi) {
+                    *g = *g - pi;
+                }
+                largest = larger::<T, E>(largest, pi);
+            } else if place.stage > 0 {
+                // π is what makes this part zero.
+                let before = place.dynamics.saturating_sub(pad::<T>(nx));
+                let pi = part_mut(multipliers, before, nx);
+                for (pi, g) in pi.iter_mut().zip(part_mut(g, 0, nx)) {
+                    *pi = *g;
+                    *g = T::ZERO;
+                }
+                largest = larger::<T, E>(largest, pi);
+            } else if self.first == First::Fixed {
+                // What is left is the multiplier of the given state.
+                let given = part_mut(g, 0, nx);
+                assign(part_mut(self.initial, 0, nx), given);
+                given.fill(T::ZERO);
+            }
+        }
+        self.terms.forces = largest;
+        objective + self.penalties()
+    }
+
+    #[inline(always)]
+    fn values<E: Packed<T>>(&mut self) {
+        let mut largest = T::ZERO;
+        let mut rest = &mut *self.v;
+        for place in Places::<T>::new(self.qp.dims) {
+            let Place { n, ng, ld, next, .. } = place;
+            let data = part(self.qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let (v, general) = take_mut(&mut rest, place.rows).split_at_mut_checked(ld).unwrap_or_default();
+            let general = part_mut(general, 0, ng);
+            general.fill(T::ZERO);
+            add_transposed::<T, E>(general, matrix.skip(next), v, n, ng);
+            largest = larger::<T, E>(largest, v);
+            largest = larger::<T, E>(largest, general);
+            let dynamics = part_mut(self.dynamics, place.dynamics, next);
+            let offset = part(data, place.offset(), next);
+            largest = larger::<T, E>(largest, offset);
+            for ((dynamics, &offset), &coming) in dynamics.iter_mut().zip(offset).zip(&*rest) {
+                *dynamics = offset - coming;
+            }
+            add_transposed::<T, E>(dynamics, matrix, v, n, next);
+        }
+        self.terms.values = largest;
+        let sides = &mut self.sides;
+        sides.gather(self.v, |value, bound| value - bound, |value, bound| bound - value);
+        for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
+        {
+            *residual = value - slack;
+        }
+        let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
+        for (&side, &violation) in sides.soft.iter().zip(violations) {
+            if let Some(residual) = sides.residual.get_mut(side as usize) {
+                *residual = *residual + violation;
+            }
+        }
+        part_mut(sides.residual, sides.counts.sides(), sides.counts.soft).fill(T::ZERO);
+        let equations = sides.equations.iter().zip(&*sides.equation_bound).zip(&mut *sides.equation_residual);
+        for ((&row, &bound), residual) in equations {
+            *residual = at(self.v, row) - bound;
+        }
+        self.mu = sides.mu::<E>();
+    }
+
+    fn penalties(&self) -> T {
+        let sides = &self.sides;
+        let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
+        let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
+        costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))
+    }
+
+    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, after [`evaluate`](Self::evaluate).
+    #[inline(always)]
+    pub fn judged<E: Packed<T>>(&mut self) -> Largest<T> {
+        let Largest { stationarity, dynamics, .. } = self.residuals::<E>();
+        let (inequalities, complementarity) = self.sides.judge();
+        // The multipliers of the dynamics make gradients zero but for rounding, which is a part of the terms.
+        let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
+        Largest { stationarity: larger_or_nan(stationarity, rounding), dynamics, inequalities, complementarity }
+    }
+
+    /// The residuals as they are known.
+    #[inline(always)]
+    pub fn residuals<E: Packed<T>>(&self) -> Largest<T> {
+        let sides = &self.sides;
+        let inequalities = larger_or_nan(
+            largest_size::<T, E>(sides.residual),
+            largest_size::<T, E>(sides.equation_residual),
+        );
+        // Products may lose NaN, their sum does not.
+        let products = largest_product::<T, E>(T::ZERO, sides.slack, sides.multiplier);
+        Largest {
+            stationarity: largest_size::<T, E>(self.stationarity),
+            dynamics: largest_size::<T, E>(self.dynamics),
+            inequalities,
+            complementarity: if self.mu.is_finite() { products } else { self.mu },
+        }
+    }
+}
+
+/// An element; zero if there is none.
+#[inline(always)]
+pub fn at<T: Real>(slice: &[T], index: u32) -> T {
+    slice.get(index as usize).copied().unwrap_or(T::ZERO)
+}
+
+/// Changes rows by values that belong to them.
+#[inline(always)]
+pub fn scatter<T: Real>(target: &mut [T], rows: &[u32], values: &[T], change: impl Fn(T, &T) -> T) {
+    for (&row, value) in rows.iter().zip(values) {
+        if let Some(target) = target.get_mut(row as usize) {
+            *target = change(*target, value);
+        }
+    }
+}

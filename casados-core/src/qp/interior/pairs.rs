@@ -1,0 +1,258 @@
+//! Slacks and multipliers of all sides: their steps, products and distances.
+//!
+//! A side gives way to its multiplier: `σ (c v − bound) + e + δ (λ − λ₊) = s`, as the proximal method of multipliers has it
+//! (R. T. Rockafellar, "Augmented Lagrangians and applications of the proximal point algorithm", Math. Oper. Res. 1, 1976; S. Pougkakiotis,
+//! J. Gondzio, "An interior point-proximal method of multipliers for convex quadratic programming", Comput. Optim. Appl. 78, 2021). Its weight
+//! `λ / (s + δ λ)` stays below `1 / δ` then, however small its slack is, and leaves the digits of the Hessian beside it.
+
+use super::iterate::at;
+use super::sides::{Sides, set};
+use super::vector::{dot, largest_negative_ratio};
+use crate::qp::layout::part;
+use crate::qp::solution::SolutionView;
+use crate::qp::solver::Start;
+use crate::qp::statistics::{larger, positive};
+use crate::scalar::{Packed, Real};
+
+impl<T: Real> Sides<'_, T> {
+    /// `Σ s λ` over the number of pairs.
+    #[inline(always)]
+    pub fn mu<E: Packed<T>>(&self) -> T {
+        let pairs = self.counts.pairs().max(1);
+        dot::<T, E>(self.slack, self.multiplier) / T::from_whole(pairs)
+    }
+
+    /// A function of the value of the row and the bound, for every side, into `scratch`.
+    #[inline(always)]
+    pub fn gather(&mut self, values: &[T], lower: impl Fn(T, T) -> T, upper: impl Fn(T, T) -> T) {
+        let count = self.counts.lower;
+        let (lower_rows, upper_rows) = self.rows.split_at_checked(count).unwrap_or_default();
+        let (lower_bounds, upper_bounds) = self.bound.split_at_checked(count).unwrap_or_default();
+        let (lower_values, upper_values) = self.scratch.split_at_mut_checked(count).unwrap_or_default();
+        for ((target, &row), &bound) in lower_values.iter_mut().zip(lower_rows).zip(lower_bounds) {
+            *target = lower(at(values, row), bound);
+        }
+        for ((target, &row), &bound) in upper_values.iter_mut().zip(upper_rows).zip(upper_bounds) {
+            *target = upper(at(values, row), bound);
+        }
+    }
+
+    /// Multipliers of a solution.
+    pub fn take_multipliers(&mut self, solution: &SolutionView<'_, T>) {
+        let (lower, upper) = self.rows.split_at_checked(self.counts.lower).unwrap_or_default();
+        let sides = lower.iter().map(|&row| at(solution.lower, row));
+        let sides = sides.chain(upper.iter().map(|&row| at(solution.upper, row)));
+        for (multiplier, given) in self.multiplier.iter_mut().zip(sides) {
+            *multiplier = given;
+        }
+        for (free, &row) in self.free.iter_mut().zip(&*self.equations) {
+            *free = at(solution.lower, row) - at(solution.upper, row);
+        }
+    }
+
+    /// Slacks at least this far from zero, with multipliers from a solution or such that all products are equal.
+    /// `scratch` has the distances from the bounds.
+    pub fn begin(&mut self, start: Start, distance: T, solution: &SolutionView<'_, T>) {
+        let sides = self.counts.sides();
+        for (slack, &value) in self.slack.iter_mut().zip(&*self.scratch).take(sides) {
+            *slack = value.max(distance);
+        }
+        if start == Start::Warm {
+            self.take_multipliers(solution);
+        }
+        for (multiplier, &slack) in self.multiplier.iter_mut().zip(&*self.slack).take(sides) {
+            *multiplier = multiplier.max(distance * distance / slack);
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let side = side as usize;
+            let (Some(&linear), Some(&quadratic)) = (self.linear.get(j), self.quadratic.get(j)) else {
+                break;
+            };
+            let (Some(&value), Some(slack), Some(multiplier)) =
+                (self.scratch.get(side), self.slack.get(side).copied(), self.multiplier.get(side).copied())
+            else {
+                break;
+            };
+            // The gradient with respect to the violation vanishes from the start: λ + ν = linear + quadratic e.
+            let violation = (slack - value).max(distance);
+            let force = linear + quadratic * violation;
+            // Both products are as large as those of the others, or as equal as the force allows.
+            let least = T::from_f64(0.01) * force;
+            let share = distance * distance / slack;
+            let least = if share < least { share } else { least };
+            let most = force - least;
+            let multiplier = if multiplier < most { multiplier.max(least) } else { most };
+            set(self.multiplier, side, multiplier);
+            set(self.slack, sides + j, violation);
+            set(self.multiplier, sides + j, force - multiplier);
+        }
+    }
+
+    /// `Σ s λ` over the number of pairs after a part of the predictor.
+    #[inline(always)]
+    pub fn mu_after<E: Packed<T>>(&self, alpha: T, mu: T) -> T {
+        let pairs = self.counts.pairs().max(1);
+        let products = dot::<T, E>(self.slack_step, self.multiplier_step) / T::from_whole(pairs);
+        (T::ONE - alpha) * mu + alpha * alpha * products
+    }
+
+    /// The largest violation of a side, before anything else is in `scratch`.
+    #[inline(always)]
+    pub fn violation(&self) -> T {
+        part(self.scratch, 0, self.counts.sides())
+            .iter()
+            .fold(T::ZERO, |largest, &distance| (-distance).max(largest))
+    }
+
+    /// `s Δλ + λ Δs = μ − s λ`
+    #[inline(always)]
+    pub fn aim(&mut self, mu: T) {
+        let (sides, soft) = (self.counts.sides(), T::ZERO);
+        let own = self.compliance;
+        let pairs = self.slack.iter().zip(&*self.multiplier);
+        for (i, ((inverse, target), (&slack, &multiplier))) in
+            self.inverse.iter_mut().zip(&mut *self.target).zip(pairs).enumerate()
+        {
+            let compliance = if i < sides { own } else { soft };
+            *inverse = T::ONE / (slack + compliance * multiplier);
+            *target = (mu - slack * multiplier) * *inverse;
+        }
+    }
+
+    /// The corrector: `s Δλ + λ Δs = σμ − s λ − Δs Δλ` of the predictor.
+    #[inline(always)]
+    pub fn correct(&mut self, sigma_mu: T) {
+        let steps = self.slack_step.iter().zip(&*self.multiplier_step);
+        let pairs = self.multiplier.iter().zip(&*self.slack).zip(&*self.inverse);
+        for ((target, (&ds, &dl)), ((&multiplier, &slack), &inverse)) in
+            self.target.iter_mut().zip(steps).zip(pairs)
+        {
+            *target = (sigma_mu - ds * dl - slack * multiplier) * inverse;
+        }
+    }
+
+    /// What the sides add to the gradient of Newton's equations, into `scratch`, and their weights.
+    #[inline(always)]
+    pub fn push(&mut self, weights: bool) {
+        if weights {
+            for ((weight, &multiplier), &inverse) in
+                self.weight.iter_mut().zip(&*self.multiplier).zip(&*self.inverse)
+            {
+                *weight = multiplier * inverse;
+            }
+        }
+        let pairs = self.target.iter().zip(&*self.residual);
+        for ((push, &weight), (&target, &residual)) in self.scratch.iter_mut().zip(&*self.weight).zip(pairs) {
+            *push = weight * residual - target;
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let Some(soft) = self.soft_side(j, side as usize) else { break };
+            if weights {
+                set(self.weight, side as usize, soft.weight);
+            }
+            let residual = at(self.residual, side);
+            set(self.scratch, side as usize, soft.weight * residual - soft.target);
+        }
+    }
+
+    /// Changes of slacks from the changes of rows in `scratch`, and of multipliers.
+    #[inline(always)]
+    pub fn steps(&mut self) {
+        let (sides, compliance) = (self.counts.sides(), self.compliance);
+        let pairs = self.slack.iter().zip(&*self.multiplier).zip(&*self.inverse).zip(&*self.target);
+        let steps = self.slack_step.iter_mut().zip(&mut *self.multiplier_step);
+        let changes = self.scratch.iter().zip(&*self.residual).take(sides);
+        for (((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)), (&change, &residual)) in
+            steps.zip(pairs).zip(changes)
+        {
+            let change = change + residual;
+            *slack_step = change * (slack * inverse) + compliance * target;
+            *multiplier_step = target - multiplier * inverse * change;
+        }
+        for (j, &side) in self.soft.iter().enumerate() {
+            let Some(soft) = self.soft_side(j, side as usize) else { break };
+            let change = at(self.scratch, side) + at(self.residual, side);
+            // The change of `s − e`, and their sum written such that it keeps its digits where the slack is small and its
+            // weight large.
+            let change = change * soft.share + compliance * soft.target;
+            let violation = (soft.sum - soft.stiffness * change) * soft.inverse;
+            let step = (soft.sum + soft.compliance * change) * soft.inverse;
+            set(self.slack_step, side as usize, step);
+            set(self.multiplier_step, side as usize, soft.own - soft.stiffness * step);
+            set(self.slack_step, sides + j, violation);
+            set(self.multiplier_step, sides + j, soft.others - soft.other * violation);
+        }
+    }
+
+    /// A soft side with its violation eliminated.
+    #[inline(always)]
+    fn soft_side(&self, j: usize, side: usize) -> Option<Soft<T>> {
+        let violation = self.counts.sides() + j;
+        let (slack, multiplier) = (*self.slack.get(side)?, *self.multiplier.get(side)?);
+        let stiffness = multiplier / slack;
+        let other = *self.multiplier.get(violation)? * *self.inverse.get(violation)?;
+        let quadratic = *self.quadratic.get(j)?;
+        let own = *self.target.get(side)? * (T::ONE + self.compliance * stiffness);
+        let others = *self.target.get(violation)?;
+        let inverse = T::ONE / (quadratic + stiffness + other);
+        let sum = own + others;
+        let weight = stiffness * (quadratic + other) * inverse;
+        let share = T::ONE / (T::ONE + self.compliance * weight);
+        Some(Soft {
+            weight: weight * share,
+            target: (own - stiffness * sum * inverse) * share,
+            compliance: quadratic + other,
+            share,
+            own,
+            others,
+            other,
+            sum,
+            stiffness,
+            inverse,
+        })
+    }
+
+    /// How far the step can go, at most 1, such that slacks and multipliers keep some part of what they have.
+    #[inline(always)]
+    pub fn longest<E: Packed<T>>(&self, keep: T) -> T {
+        let most = T::ONE - keep;
+        let ratio = largest_negative_ratio::<T, E>(most, self.slack_step, self.slack);
+        most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
+    }
+
+    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, of distances from them in `scratch`, whatever
+    /// slacks and violations are.
+    pub fn judge(&mut self) -> (T, T) {
+        let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
+        for (j, &side) in self.soft.iter().enumerate() {
+            let (violation, multiplier) = (positive(-at(self.scratch, side)), at(self.multiplier, side));
+            let lacks = at(self.linear, j as u32) + at(self.quadratic, j as u32) * violation - multiplier;
+            inequalities = larger(inequalities, -lacks);
+            products = larger(products, violation * positive(lacks));
+            let distance = at(self.scratch, side);
+            set(self.scratch, side as usize, positive(distance));
+        }
+        for (&distance, &multiplier) in self.scratch.iter().zip(&*self.multiplier).take(self.counts.sides()) {
+            inequalities = larger(inequalities, -distance);
+            products = larger(products, positive(distance) * multiplier);
+        }
+        for &residual in &*self.equation_residual {
+            inequalities = larger(inequalities, residual.abs());
+        }
+        (inequalities, products)
+    }
+}
+
+/// What a soft side is to the others.
+struct Soft<T> {
+    weight: T,
+    target: T,
+    share: T,
+    own: T,
+    others: T,
+    other: T,
+    sum: T,
+    stiffness: T,
+    compliance: T,
+    inverse: T,
+}

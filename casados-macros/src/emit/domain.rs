@@ -1,0 +1,47 @@
+//! Where a model lives, for the engine: start values of Newton's method, and ranges.
+
+use crate::language::{Sampling, Variables};
+use proc_macro2::TokenStream;
+use quote::quote;
+
+/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute says anything. `is_curved` tells whether
+/// equations may be nonlinear in an unknown `(ẋ, z)`.
+pub fn write(
+    krate: &syn::Path,
+    variables: &Variables,
+    samplings: &[Sampling],
+    is_curved: impl Fn(usize) -> bool,
+) -> TokenStream {
+    let (nx, nz) = (variables.x.len(), variables.z.len());
+    let sampling = |variable: usize| samplings.get(variable).copied().unwrap_or_default();
+    // Of a derivative zero is as good as any value, unless it chooses between roots: states are then `x₀` at all stages.
+    let starts: Vec<f64> = (0..nx + nz)
+        .map(|unknown| match unknown {
+            derivative if derivative < nx && !is_curved(derivative) => 0.0,
+            derivative if derivative < nx => start(sampling(derivative)),
+            algebraic => start(sampling(nx + algebraic)),
+        })
+        .collect();
+    let starts = starts
+        .iter()
+        .any(|start| *start != 0.0)
+        .then(|| quote!(const START: &'static [f64] = &[#(#starts),*];));
+    let ranges = samplings.iter().any(|sampling| sampling.range.is_some()).then(|| {
+        let ranges = samplings.iter().map(|sampling| match sampling.range {
+            Some((low, high)) => quote!(#krate::model::Range { low: #low, high: #high }),
+            None => quote!(#krate::model::Range::ANY),
+        });
+        quote!(const RANGES: &'static [#krate::model::Range] = &[#(#ranges),*];)
+    });
+    quote!(#starts #ranges)
+}
+
+/// The nominal value; without one zero, or, where a range does not contain it, the range's geometric mean.
+fn start(Sampling { nominal, range }: Sampling) -> f64 {
+    match (nominal, range) {
+        (Some(nominal), _) => nominal,
+        (None, Some((low, high))) if low > 0.0 => low.sqrt() * high.sqrt(),
+        (None, Some((low, high))) if high < 0.0 => -((-low).sqrt() * (-high).sqrt()),
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,299 @@
+//! Items as tokens: what is refused before a parser sees them, and what is changed without one.
+//!
+//! The user's own tokens are emitted. In groups without delimiters, as `macro_rules!` puts them around
+//! what it was given, the compiler looks no more once a macro has had them in its hands: `x * $e` would
+//! be `x * 1.0 + 2.0`. So those that hold an operation get parentheses.
+
+use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
+
+/// Deeper than any model.
+const DEPTH: usize = 256;
+
+/// More tokens side by side than any model has in one pair of brackets; each may be a level of the syntax
+/// tree (prefix signs, `else if`, calls of methods).
+const LENGTH: usize = 20_000;
+
+/// Refuses what must not be parsed: tokens that are nested too deeply or too many side by side, and
+/// conditions of the compiler. Does not recurse itself.
+pub fn check(tokens: &TokenStream) -> syn::Result<()> {
+    let mut open = vec![Level::new(tokens)];
+    loop {
+        let depth = open.len();
+        let Some(innermost) = open.last_mut() else { return Ok(()) };
+        let Some(token) = innermost.tokens.get(innermost.next) else {
+            open.pop();
+            continue;
+        };
+        innermost.next += 1;
+        let TokenTree::Group(group) = token else { continue };
+        let is_attribute = group.delimiter() == Delimiter::Bracket && innermost.follows_hash();
+        let tests = is_attribute && is_test(group) && innermost.is_before_module();
+        if is_attribute && !tests {
+            no_condition(group)?;
+        }
+        if depth == DEPTH {
+            let message = format!(
+                "this is nested too deeply: more than {DEPTH} brackets around it; use functions or loops"
+            );
+            return Err(syn::Error::new(group.span_open(), message));
+        }
+        let level = Level::new(&group.stream());
+        if let Some(token) = level.tokens.get(LENGTH) {
+            let message = format!(
+                "these brackets hold more than {LENGTH} tokens as far as here: split what is in them into statements, \
+                 functions or loops"
+            );
+            return Err(syn::Error::new(token.span(), message));
+        }
+        open.push(level);
+    }
+}
+
+/// The tokens between two brackets, and how many were looked at.
+struct Level {
+    tokens: Vec<TokenTree>,
+    next: usize,
+}
+
+impl Level {
+    fn new(tokens: &TokenStream) -> Self {
+        Self { tokens: tokens.clone().into_iter().collect(), next: 0 }
+    }
+
+    /// Whether `#` or `#!` stands before the token that was taken last.
+    fn follows_hash(&self) -> bool {
+        let before = |back: usize| self.next.checked_sub(back).and_then(|index| self.tokens.get(index));
+        match before(2) {
+            Some(TokenTree::Punct(punct)) if punct.as_char() == '!' => is_punct(before(3), '#'),
+            token => is_punct(token, '#'),
+        }
+    }
+
+    /// Whether the attribute that was taken last belongs to a module.
+    fn is_before_module(&self) -> bool {
+        let rest = self.tokens.get(self.next..).unwrap_or_default();
+        module_end(rest).is_some()
+    }
+}
+
+fn is_punct(token: Option<&TokenTree>, character: char) -> bool {
+    matches!(token, Some(TokenTree::Punct(punct)) if punct.as_char() == character)
+}
+
+fn is_ident(token: Option<&TokenTree>, name: &str) -> bool {
+    matches!(token, Some(TokenTree::Ident(ident)) if ident == name)
+}
+
+/// `#[cfg(test)]`
+fn is_test(attribute: &Group) -> bool {
+    let tokens: Vec<TokenTree> = attribute.stream().into_iter().collect();
+    let [first, TokenTree::Group(condition)] = tokens.as_slice() else { return false };
+    is_ident(Some(first), "cfg") && condition.stream().to_string() == "test"
+}
+
+fn no_condition(attribute: &Group) -> syn::Result<()> {
+    match attribute.stream().into_iter().next() {
+        Some(TokenTree::Ident(ident)) if ident == "cfg" || ident == "cfg_attr" => Err(syn::Error::new(
+            ident.span(),
+            "a condition of the compiler inside of a model, which does not know what it will decide: write the whole \
+             model once for each case, with the condition above its attribute, or give the choice as a constant or a \
+             parameter",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// How many of the tokens make a module, with further attributes and visibility, if they begin with one.
+fn module_end(tokens: &[TokenTree]) -> Option<usize> {
+    let mut index = 0;
+    loop {
+        match tokens.get(index)? {
+            TokenTree::Punct(punct) if punct.as_char() == '#' => index += 2,
+            TokenTree::Ident(ident) if ident == "pub" => {
+                index += 1;
+                if matches!(tokens.get(index), Some(TokenTree::Group(_))) {
+                    index += 1;
+                }
+            }
+            TokenTree::Ident(ident) if ident == "mod" => {
+                let end = tokens
+                    .iter()
+                    .skip(index)
+                    .position(|token| matches!(token, TokenTree::Group(_)) || is_punct(Some(token), ';'))?;
+                return Some(index + end + 1);
+            }
+            _ => return None,
+        }
+    }
+}
+
+/// The item without the modules of its tests, which a model cannot use.
+pub fn without_tests(item: TokenStream) -> TokenStream {
+    in_body(item, |tokens| {
+        let mut kept = Vec::new();
+        let mut index = 0;
+        while let Some(token) = tokens.get(index) {
+            if is_punct(Some(token), '#')
+                && let Some(TokenTree::Group(group)) = tokens.get(index + 1)
+                && is_test(group)
+                && let Some(end) = module_end(tokens.get(index + 2..).unwrap_or_default())
+            {
+                index += 2 + end;
+                continue;
+            }
+            kept.push(token.clone());
+            index += 1;
+        }
+        kept.into_iter().collect()
+    })
+}
+
+/// A module without the marks `#[model]` on its functions.
+pub fn without_marks(item: TokenStream) -> TokenStream {
+    in_body(item, |tokens| {
+        let mut kept = Vec::new();
+        let mut index = 0;
+        while let Some(token) = tokens.get(index) {
+            if is_punct(Some(token), '#')
+                && let Some(TokenTree::Group(group)) = tokens.get(index + 1)
+                && group.stream().to_string() == "model"
+            {
+                index += 2;
+                continue;
+            }
+            kept.push(token.clone());
+            index += 1;
+        }
+        kept.into_iter().collect()
+    })
+}
+
+/// The item with something at the beginning of its body, behind inner attributes, and at its end.
+pub fn with(item: TokenStream, first: &TokenStream, last: &TokenStream) -> TokenStream {
+    in_body(item, |tokens| {
+        let mut inner = 0;
+        while is_punct(tokens.get(inner), '#') && is_punct(tokens.get(inner + 1), '!') {
+            inner += 3;
+        }
+        let (attributes, rest) = tokens.split_at(inner.min(tokens.len()));
+        let mut body: TokenStream = attributes.iter().cloned().collect();
+        body.extend(first.clone());
+        body.extend(rest.iter().cloned());
+        body.extend(last.clone());
+        body
+    })
+}
+
+/// Changes what is between the braces at the end of a function or module.
+fn in_body(item: TokenStream, change: impl FnOnce(&[TokenTree]) -> TokenStream) -> TokenStream {
+    let mut tokens: Vec<TokenTree> = item.into_iter().collect();
+    if let Some(TokenTree::Group(body)) = tokens.last_mut()
+        && body.delimiter() == Delimiter::Brace
+    {
+        let inside: Vec<TokenTree> = parenthesised(body.stream()).into_iter().collect();
+        let mut changed = Group::new(Delimiter::Brace, change(&inside));
+        changed.set_span(body.span());
+        *body = changed;
+    }
+    tokens.into_iter().collect()
+}
+
+/// Operations in groups without delimiters get parentheses, at every level.
+fn parenthesised(tokens: TokenStream) -> TokenStream {
+    let changed = tokens.into_iter().map(|token| {
+        let TokenTree::Group(group) = token else { return token };
+        let stream = parenthesised(group.stream());
+        let delimiter = match group.delimiter() {
+            Delimiter::None if is_operation(stream.clone()) => Delimiter::Parenthesis,
+            delimiter => delimiter,
+        };
+        let mut changed = Group::new(delimiter, stream);
+        changed.set_span(group.span());
+        TokenTree::Group(changed)
+    });
+    changed.collect()
+}
+
+/// Whether tokens are an expression whose parts another operator could take.
+fn is_operation(tokens: TokenStream) -> bool {
+    use syn::Expr::{Assign, Binary, Break, Cast, Closure, Range, Reference, Return, Unary};
+    matches!(
+        syn::parse2(tokens),
+        Ok(Assign(_)
+            | Binary(_)
+            | Break(_)
+            | Cast(_)
+            | Closure(_)
+            | Range(_)
+            | Reference(_)
+            | Return(_)
+            | Unary(_))
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nested(levels: usize) -> TokenStream {
+        (0..levels).fold(TokenStream::new(), |inner, _| {
+            TokenTree::Group(Group::new(Delimiter::Parenthesis, inner)).into()
+        })
+    }
+
+    #[test]
+    fn nesting_is_bounded() {
+        assert!(check(&nested(DEPTH - 1)).is_ok());
+        let error = check(&nested(DEPTH)).map_err(|error| error.to_string());
+        assert!(error.is_err_and(|message| message.contains("more than 256 brackets")));
+    }
+
+    #[test]
+    fn conditions_are_found_wherever_they_are() {
+        for source in [
+            "fn m(x: f64) -> f64 { let mut s = x; #[cfg(feature = \"drag\")] { s -= x; } s }",
+            "fn m(x: f64) -> f64 { #[cfg(all())] let s = x; s }",
+            "mod m { #[cfg(all())] const K: f64 = 1.0; fn m(x: f64) -> f64 { x } }",
+            "mod m { struct A { #[cfg(unix)] a: f64 } fn m(x: f64) -> f64 { x } }",
+            "fn m(x: f64) -> f64 { match 1 { #[cfg(unix)] 1 => x, _ => 2.0 * x } }",
+            "fn m(x: [f64; 1]) -> [f64; 1] { [#[cfg(unix)] x[0]] }",
+            "fn m(#[cfg(unix)] x: f64, #[cfg(not(unix))] x: f64) -> f64 { x }",
+            "mod m { #[cfg_attr(unix, inline)] fn m(x: f64) -> f64 { x } }",
+            "mod m { #![cfg(unix)] fn m(x: f64) -> f64 { x } }",
+            "mod m { #[cfg(test)] const K: f64 = 1.0; fn m(x: f64) -> f64 { x } }",
+            "#[cfg(unix)] fn m(x: f64) -> f64 { x }",
+        ] {
+            let tokens: TokenStream = source.parse().unwrap();
+            let message = check(&tokens).map_err(|error| error.to_string());
+            assert!(message.is_err_and(|message| message.contains("condition of the compiler")), "{source}");
+        }
+        let tests = "mod m { fn m(x: f64) -> f64 { x } #[cfg(test)] mod tests { fn t() {} } }";
+        let tokens: TokenStream = tests.parse().unwrap();
+        assert!(check(&tokens).is_ok());
+        assert_eq!(without_tests(tokens).to_string(), "mod m { fn m (x : f64) -> f64 { x } }");
+    }
+
+    #[test]
+    fn operations_without_delimiters_get_parentheses() {
+        let group = |source: &str| -> TokenStream {
+            TokenTree::Group(Group::new(Delimiter::None, source.parse().unwrap())).into()
+        };
+        let sum = group("1.0 + 2.0");
+        let (ty, negative) = (group("f64"), group("- y"));
+        let item = quote::quote! { fn m(x: #ty) -> #ty { [x * #sum, (#negative).abs()] } };
+        assert_eq!(
+            with(item, &TokenStream::new(), &TokenStream::new()).to_string(),
+            "fn m (x : f64) -> f64 { [x * (1.0 + 2.0) , ((- y)) . abs ()] }"
+        );
+    }
+
+    #[test]
+    fn bodies_begin_behind_inner_attributes() {
+        let item: TokenStream = "mod m { #![allow(dead_code)] #[model] fn m() {} }".parse().unwrap();
+        let (first, last) = ("use a;".parse().unwrap(), "struct B;".parse().unwrap());
+        assert_eq!(
+            with(without_marks(item), &first, &last).to_string(),
+            "mod m { #! [allow (dead_code)] use a ; fn m () { } struct B ; }"
+        );
+    }
+}

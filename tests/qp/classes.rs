@@ -1,0 +1,382 @@
+//! Random problems by classes: what is solvable is solved, what is said of the others is true.
+//!
+//! A run has some hundred problems of each class; `CASADOS_QP_RANDOM=100` multiplies that.
+
+use crate::Test;
+use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, problem};
+use casados::qp::{
+    Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver,
+    SolutionStage, Stage, StageDims, StageMut, Start, residuals,
+};
+
+const TOLERANCE: f64 = 1e-8;
+
+/// How many problems of a class.
+fn cases(few: u64) -> u64 {
+    let factor = std::env::var("CASADOS_QP_RANDOM").ok().and_then(|factor| factor.parse().ok());
+    few * factor.unwrap_or(1)
+}
+
+/// What became of the problems of a class.
+#[derive(Debug, Default)]
+struct Counts {
+    all: u64,
+    solved: u64,
+    wrong: u64,
+    infeasible: u64,
+    not_convex: u64,
+    iterations_used_up: u64,
+    stalled: u64,
+    others: u64,
+    iterations: u64,
+}
+
+impl Counts {
+    /// Every verdict but `Ok` is false: the problem has a solution.
+    fn count(&mut self, seed: u64, found: &Result<(usize, Option<String>), QpError>) {
+        self.all += 1;
+        match found {
+            Ok((iterations, None)) => {
+                self.solved += 1;
+                self.iterations += *iterations as u64;
+            }
+            Ok((_, Some(_))) => self.wrong += 1,
+            Err(QpError::Infeasible { .. }) => self.infeasible += 1,
+            Err(QpError::NotConvex { .. }) => self.not_convex += 1,
+            Err(QpError::MaxIterations { .. }) => self.iterations_used_up += 1,
+            Err(QpError::Stalled { .. }) => self.stalled += 1,
+            Err(_) => self.others += 1,
+        }
+        if std::env::var("CASADOS_QP_SHOW").is_ok() && !matches!(found, Ok((_, None))) {
+            println!("{seed}: {found:?}");
+        }
+    }
+    fn false_verdicts(&self) -> u64 {
+        self.wrong + self.infeasible + self.not_convex + self.others
+    }
+}
+
+fn multipliers<'a>(stage: &SolutionStage<'a, f64>) -> impl Iterator<Item = &'a f64> + use<'a> {
+    let sides = [stage.x_lower, stage.x_upper, stage.u_lower, stage.u_upper, stage.g_lower, stage.g_upper];
+    sides.into_iter().flatten()
+}
+
+/// What is wrong with a point that is said to be the solution.
+///
+/// With residuals of at most `r`, convexity says `f(v) − f* ≤ ∇f(v)ᵀ (v − v*) ≤ r (|v − v*|₁ + |λ|₁ + |π|₁ + sides)`, and weak duality
+/// `f* − f(v) ≤ r (|λ*|₁ + |π*|₁)`.
+fn wrong(known: &Known, found: &HeapSolution<f64>, tolerance: f64) -> Option<String> {
+    let (r, objective) = residuals(known.qp.view(), found);
+    let numbers = [r.stationarity, r.dynamics, r.inequalities, r.complementarity, objective];
+    let largest = numbers[..4].iter().fold(0.0, |largest: f64, &r| largest.max(r));
+    if numbers.iter().any(|r| !r.is_finite()) || largest > tolerance {
+        return Some(format!("{r}"));
+    }
+    let (_, expected) = residuals(known.qp.view(), &known.solution);
+    let (mut distance, mut terms) = (0.0, 1.0);
+    let (mut forces, mut known_forces, mut sides) = (0.0, 0.0, 0.0);
+    let sum = |stage: &SolutionStage<'_, f64>| {
+        stage.dynamics.iter().chain(multipliers(stage)).map(|force| force.abs()).sum::<f64>()
+    };
+    for ((a, b), data) in found.stages().zip(known.solution.stages()).zip(known.qp.view().stages()) {
+        let pairs = a.x.iter().zip(b.x).chain(a.u.iter().zip(b.u));
+        distance += pairs.map(|(a, b)| (a - b).abs()).sum::<f64>();
+        forces += sum(&a);
+        known_forces += sum(&b);
+        sides += 2.0 * multipliers(&b).count() as f64;
+        terms += objective_terms(&data, &a) + objective_terms(&data, &b);
+    }
+    let rounding = 1e2 * f64::EPSILON * terms;
+    let (above, below) = (largest * (sides + distance + forces) + rounding, largest * known_forces + rounding);
+    let difference = objective - expected;
+    (difference > above || -difference > below)
+        .then(|| format!("objective {objective} instead of {expected}: {difference:e}, {above:e}, {below:e}"))
+}
+
+/// The sizes of the terms whose sum the objective is, without penalties.
+fn objective_terms(data: &Stage<'_, f64>, point: &SolutionStage<'_, f64>) -> f64 {
+    let entry = |block: Block<'_, f64>, i, j| block.get(i, j).map_or(0.0, f64::abs);
+    let mut sum = 0.0;
+    for (i, x) in point.x.iter().enumerate() {
+        sum += x.abs() * data.gradient_x()[i].abs();
+        sum += point.x.iter().enumerate().map(|(j, y)| (x * y).abs() * entry(data.q(), i, j)).sum::<f64>();
+        sum += point.u.iter().enumerate().map(|(j, u)| (x * u).abs() * entry(data.s(), j, i)).sum::<f64>();
+    }
+    for (i, u) in point.u.iter().enumerate() {
+        sum += u.abs() * data.gradient_u()[i].abs();
+        sum += point.u.iter().enumerate().map(|(j, w)| (u * w).abs() * entry(data.r(), i, j)).sum::<f64>();
+    }
+    sum
+}
+
+/// Solves problems of a kind; `start` may write something senseless into the solution first.
+fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Counts, QpError> {
+    let mut counts = Counts::default();
+    let only: Option<u64> = std::env::var("ONLY").ok().and_then(|s| s.parse().ok());
+    for seed in only.map_or(0..cases(few), |s| s..s + 1) {
+        let mut random = Numbers::new(seed.wrapping_mul(2).wrapping_add(1));
+        let known = problem(&mut random, kind)?;
+        let (own, _) = residuals(known.qp.view(), &known.solution);
+        assert!(own.largest() < 1e-11 * 10_f64.powf(2.0 * kind.units), "{seed}: {own}");
+        let mut solver = HeapInteriorPoint::new();
+        if kind.units > 0.0 {
+            // Terms of other sizes: a part of them is what can be asked for.
+            solver.options.relative_tolerance = 1e-9;
+        }
+        let mut solution = HeapSolution::new(known.qp.dims())?;
+        if start == Start::Warm {
+            senseless(&mut random, &mut solution);
+        }
+        let found = solver.solve(known.qp.view(), start, solution.view_mut());
+        let tolerance = if kind.units > 0.0 { f64::INFINITY } else { TOLERANCE };
+        let found = found.map(|statistics| (statistics.iterations, wrong(&known, &solution, tolerance)));
+        counts.count(seed, &found);
+    }
+    println!("{name}: {counts:?}");
+    Ok(counts)
+}
+
+/// Numbers of all sizes and signs, and now and then none.
+fn senseless(random: &mut Numbers, solution: &mut HeapSolution<f64>) {
+    let size = [0.0, 1.0, 8.0, 100.0][random.below(4)];
+    for k in 0..solution.dims().len() {
+        let Some(stage) = solution.stage_mut(k) else { return };
+        let parts = [
+            stage.x, stage.u, stage.dynamics, stage.x_lower, stage.x_upper, stage.u_lower, stage.u_upper,
+            stage.g_lower, stage.g_upper,
+        ];
+        for value in parts.into_iter().flatten() {
+            let number = random.next() * random.power(size);
+            *value = if random.chance(0.001) { f64::NAN } else { number };
+        }
+    }
+}
+
+#[test]
+fn strictly_convex() -> Test {
+    let counts = run("strictly convex", &PLAIN, 300, Start::Cold)?;
+    assert_eq!(counts.solved, counts.all);
+    let kind = Kind { empty: true, ..PLAIN };
+    let counts = run("strictly convex with empty stages", &kind, 300, Start::Cold)?;
+    assert_eq!(counts.solved, counts.all);
+    Ok(())
+}
+
+#[test]
+fn convex() -> Test {
+    for hessian in [Hessian::LowRank, Hessian::Zero] {
+        let kind = Kind { hessian, empty: true, ..PLAIN };
+        let counts = run(&format!("{hessian:?}"), &kind, 300, Start::Cold)?;
+        assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn degenerate() -> Test {
+    for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
+        let kind = Kind { hessian, degenerate: true, empty: true, ..PLAIN };
+        let counts = run(&format!("degenerate, {hessian:?}"), &kind, 300, Start::Cold)?;
+        assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn soft() -> Test {
+    for hessian in [Hessian::Definite, Hessian::LowRank] {
+        for huge in [1e3, 1e8, 1e10, 1e12, 1e14, 1e20, f64::INFINITY] {
+            let kind = Kind { hessian, soft: Some(huge), empty: true, ..PLAIN };
+            let counts = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, Start::Cold)?;
+            assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn senseless_starts() -> Test {
+    for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
+        let kind = Kind { hessian, soft: Some(1e12), degenerate: true, empty: true, ..PLAIN };
+        let counts = run(&format!("senseless start, {hessian:?}"), &kind, 200, Start::Warm)?;
+        assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn other_units() -> Test {
+    for hessian in [Hessian::Definite, Hessian::Zero] {
+        for units in [1.0, 3.0] {
+            let kind = Kind { hessian, units, ..PLAIN };
+            let counts = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, Start::Cold)?;
+            assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+        }
+    }
+    Ok(())
+}
+
+/// A problem made infeasible: the rows `c` and `−c/2`, both of a stage with a solution, are bounded such that no value is between. What is
+/// said must be true of the point that is left, and the distance no more than what the rows lack.
+#[test]
+fn infeasible() -> Test {
+    for (hessian, distance) in [(Hessian::Definite, 1.0), (Hessian::Zero, 1e-3), (Hessian::LowRank, 1e4)] {
+        let (mut counts, mut found_some) = (Counts::default(), 0);
+        for seed in std::env::var("ONLY").ok().map_or(0..cases(100), |s| s.parse().map_or(0..0, |s: u64| s..s + 1)) {
+            let mut random = Numbers::new(!seed);
+            let kind = Kind { hessian, empty: seed % 2 == 0, soft: (seed % 3 == 0).then_some(1e9), ..PLAIN };
+            let known = problem(&mut random, &kind)?;
+            let Some((qp, stage)) = contradict(&known, &mut random, distance)? else { continue };
+            found_some += 1;
+            let mut solution = HeapSolution::new(qp.dims())?;
+            let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+            counts.count(seed, &found.map(|s| (s.iterations, Some("solved".into()))));
+            let Err(QpError::Infeasible { violation, .. }) = found else { continue };
+            // The named violation is the largest of the point, and at least half of what is missing is at one of the rows.
+            let (r, _) = residuals(qp.view(), &solution);
+            assert!((r.inequalities - violation).abs() <= 1e-9 * (1.0 + violation), "{seed}: {r} {violation:e}");
+            assert!(r.dynamics <= 1e-8 * (1.0 + violation), "{seed}: {r}");
+            assert!(violation >= distance / (1e2 * qp.dims()[stage].ng as f64), "{seed}: {violation:e}");
+        }
+        println!("infeasible by {distance:e}, {hessian:?}: {counts:?}");
+        assert!(found_some > 0 && counts.wrong + counts.not_convex + counts.others == 0);
+        assert!(1000 * counts.infeasible >= 999 * counts.all, "{counts:?}");
+    }
+    Ok(())
+}
+
+/// The problem with two more rows in a stage that has variables.
+fn contradict(
+    known: &Known,
+    random: &mut Numbers,
+    distance: f64,
+) -> Result<Option<(HeapQp<f64>, usize)>, QpError> {
+    let mut dims = known.qp.dims().to_vec();
+    let Some(stage) = (0..dims.len()).rev().find(|&k| dims[k].nx + dims[k].nu > 0) else { return Ok(None) };
+    let old = dims[stage].ng;
+    dims[stage].ng += 2;
+    let mut qp = HeapQp::new(&dims)?;
+    for (from, mut to) in known.qp.view().stages().zip(qp.stages_mut()) {
+        copy(&from, &mut to);
+    }
+    let Some(mut to) = qp.stage_mut(stage) else { return Ok(None) };
+    for j in 0..dims[stage].nx {
+        let c = random.next();
+        to.c_mut().set(old, j, c);
+        to.c_mut().set(old + 1, j, -0.5 * c);
+    }
+    for j in 0..dims[stage].nu {
+        let d = random.next();
+        to.d_mut().set(old, j, d);
+        to.d_mut().set(old + 1, j, -0.5 * d);
+    }
+    let at = random.next();
+    to.g_bounds_mut().set(old, at + distance, f64::INFINITY);
+    to.g_bounds_mut().set(old + 1, -0.5 * at, f64::INFINITY);
+    Ok(Some((qp, stage)))
+}
+
+/// All data of a stage, into one that has at least as many rows.
+fn copy(from: &Stage<'_, f64>, to: &mut StageMut<'_, f64>) {
+    fn block(from: Block<'_, f64>, mut to: BlockMut<'_, f64>) {
+        let (rows, columns) = from.shape();
+        for (i, j) in (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j))) {
+            to.set(i, j, from.get(i, j).unwrap_or(f64::NAN));
+        }
+    }
+    fn bounds(from: Bounds<'_, f64>, to: BoundsMut<'_, f64>) {
+        let pairs = [
+            (from.lower, to.lower),
+            (from.upper, to.upper),
+            (from.lower_linear, to.lower_linear),
+            (from.lower_quadratic, to.lower_quadratic),
+            (from.upper_linear, to.upper_linear),
+            (from.upper_quadratic, to.upper_quadratic),
+        ];
+        for (from, to) in pairs {
+            to[..from.len()].copy_from_slice(from);
+        }
+    }
+    block(from.a(), to.a_mut());
+    block(from.b(), to.b_mut());
+    block(from.c(), to.c_mut());
+    block(from.d(), to.d_mut());
+    block(from.q(), to.q_mut());
+    block(from.r(), to.r_mut());
+    block(from.s(), to.s_mut());
+    to.offset_mut().copy_from_slice(from.offset());
+    to.gradient_x_mut().copy_from_slice(from.gradient_x());
+    to.gradient_u_mut().copy_from_slice(from.gradient_u());
+    bounds(from.x_bounds(), to.x_bounds_mut());
+    bounds(from.u_bounds(), to.u_bounds_mut());
+    bounds(from.g_bounds(), to.g_bounds_mut());
+}
+
+/// Problems with a control without bounds whose square costs less than nothing, or, where later stages cost enough, something:
+/// no verdict but `NotConvex` or a point that satisfies the conditions of optimality, and `NotConvex` only where the Hessian that is
+/// left when states are eliminated has a negative eigenvalue.
+#[test]
+fn not_convex() -> Test {
+    let mut counts = Counts::default();
+    let (mut said, mut convex) = (0, 0);
+    for seed in 0..cases(300) {
+        let mut random = Numbers::new(seed.wrapping_mul(7));
+        let dims: Vec<_> =
+            (0..2 + random.below(4)).map(|_| StageDims::new(1 + random.below(3), 1 + random.below(2), 0)).collect();
+        let mut qp = HeapQp::<f64>::new(&dims)?;
+        for mut stage in qp.stages_mut() {
+            stage.a_mut().fill_with(|_, _| 0.7 * random.next());
+            stage.b_mut().fill_with(|_, _| random.next());
+            stage.q_mut().fill_with(|i, j| if i == j { 1.0 + random.next() } else { 0.0 });
+            stage.r_mut().fill_with(|i, j| if i == j { random.next() } else { 0.0 });
+            stage.s_mut().fill_with(|_, _| 0.3 * random.next());
+            stage.gradient_u_mut().iter_mut().for_each(|r| *r = random.next());
+            if random.chance(0.3) {
+                stage.u_bounds_mut().set(0, -1.0, 1.0);
+            }
+        }
+        let x0: Vec<f64> = (0..dims[0].nx).map(|_| random.next()).collect();
+        qp.fix_initial_state(&x0)?;
+        let mut solution = HeapSolution::new(&dims)?;
+        let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+        let least = least_curvature(&qp);
+        convex += u64::from(least > 1e-6);
+        match found {
+            Ok(_) => assert!(residuals(qp.view(), &solution).0.largest() <= TOLERANCE),
+            Err(QpError::NotConvex { pivot, .. }) => {
+                said += 1;
+                assert!(pivot < 0.0 && least < 0.0, "{seed}: {pivot:e} {least:e}");
+            }
+            Err(_) => assert!(least < 1e-6, "{seed}: {found:?} {least:e}"),
+        }
+        counts.count(seed, &found.map(|s| (s.iterations, None)));
+    }
+    println!("not convex: {counts:?}, {convex} are convex");
+    assert!(said > 0 && convex > 0 && counts.others == 0, "{counts:?}");
+    Ok(())
+}
+
+/// The least eigenvalue of the Hessian over all controls, states eliminated.
+fn least_curvature(qp: &HeapQp<f64>) -> f64 {
+    let dims = qp.dims();
+    let controls: usize = dims.iter().map(|d| d.nu).sum();
+    // What a control does to all variables, column after column.
+    let mut hessian = nalgebra::DMatrix::<f64>::zeros(controls, controls);
+    let mut states = nalgebra::DMatrix::<f64>::zeros(dims[0].nx, controls);
+    let mut first = 0;
+    for stage in qp.view().stages() {
+        let matrix = |block: Block<'_, f64>| {
+            let (rows, columns) = block.shape();
+            nalgebra::DMatrix::from_fn(rows, columns, |i, j| block.get(i, j).unwrap_or(0.0))
+        };
+        let nu = stage.dims().nu;
+        let own = nalgebra::DMatrix::from_fn(nu, controls, |i, j| f64::from(u8::from(j == first + i)));
+        let mixed = own.transpose() * matrix(stage.s()) * &states;
+        hessian += states.transpose() * matrix(stage.q()) * &states;
+        hessian += own.transpose() * matrix(stage.r()) * &own;
+        hessian += &mixed + mixed.transpose();
+        states = matrix(stage.a()) * &states + matrix(stage.b()) * own;
+        first += nu;
+    }
+    hessian.symmetric_eigenvalues().min()
+}
