@@ -15,6 +15,7 @@ mod closed_form;
 mod curvature;
 mod errors;
 mod infeasible;
+mod ipm;
 mod lifted;
 mod real_time;
 mod sensitivities;

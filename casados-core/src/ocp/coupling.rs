@@ -36,9 +36,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         (data.tied, data.theta)
     }
 
-    /// Whether any state is.
-    pub(super) fn is_coupled(&mut self) -> bool {
-        self.coupling().0.iter().any(|&tied| tied != T::ZERO)
+    /// Finds states that are periodic where nobody can solve that.
+    ///
+    /// # Errors
+    /// [`OcpError::Periodic`]
+    pub(super) fn is_uncoupled(&mut self) -> Result<(), OcpError> {
+        let is_free = self.coupling().0.iter().all(|&tied| tied == T::ZERO);
+        if is_free { Ok(()) } else { Err(OcpError::Periodic) }
     }
 
     /// Adds the terms of the conditions to the gradients of the QP.

@@ -187,6 +187,8 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
+    /// States are periodic, and this solver has no such conditions: [`Ipm`](super::Ipm) has.
+    Periodic,
     /// An option of the solver is out of its range.
     InvalidOption {
         /// Its name.
@@ -289,6 +291,9 @@ impl fmt::Display for OcpError {
                 write!(f, "stage {stage}: output {output} of `{function}` is {value}")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::Periodic => {
+                f.write_str("states are periodic: `Ipm` solves such problems, this solver does not")
+            }
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it has to be {allowed}")
             }

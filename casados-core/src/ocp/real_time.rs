@@ -157,6 +157,7 @@ where
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub fn prepare(&mut self) -> Result<Prepared<'_, P, S, T, D, M>, OcpError> {
+        self.ocp.is_uncoupled()?;
         self.ocp.linearise(self.curvature)?;
         let Self { qp_solver, ocp, solution, warm, .. } = self;
         Ok(Prepared { qp_solver, ocp, solution, warm })

@@ -8,6 +8,8 @@ use crate::scalar::Real;
 
 /// The first `δ_w`.
 const FIRST: f64 = 1e-4;
+/// With this on the diagonal, directions without curvature may be left alone.
+const FLAT: f64 = 1e-6;
 /// `δ_w` is never less.
 const LEAST: f64 = 1e-20;
 /// Where this is not enough nothing is.
@@ -59,6 +61,10 @@ impl Regularisation {
         match step(iterate, coupling.as_mut(), mu, T::from_f64(delta)) {
             Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
+            }
+            // Directions in which pivots vanished would not move at all.
+            Ok(()) if iterate.riccati.regularised > 0 && delta < FLAT => {
+                Err(QpError::NotConvex { stage: 0, index: 0, pivot: 0.0 })
             }
             result => result,
         }

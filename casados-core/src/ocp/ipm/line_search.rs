@@ -3,7 +3,7 @@
 use super::filter::{Filter, Pair, is_better, noise};
 use super::measure;
 use super::newton::{Lengths, attach, evaluate_values};
-use super::run::Work;
+use super::work::Work;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
@@ -33,6 +33,8 @@ pub(super) struct Expected {
     /// Below this violation the barrier function may decide.
     pub theta_min: f64,
     pub mu: f64,
+    /// `δ_w`
+    pub delta: f64,
 }
 
 impl Expected {
@@ -121,7 +123,7 @@ where
             }
             let bends = there.is_some_and(|there| there.theta >= expected.here.theta);
             if alpha == longest && bends {
-                if let Some(alpha) = self.correct(ocp, filter, expected, alpha, tau)? {
+                if let Some(alpha) = self.correct(ocp, filter, expected, tau)? {
                     return Ok(Some(Accepted { alpha, corrected: true }));
                 }
             }
@@ -134,12 +136,13 @@ where
     fn pair<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, mu: f64, alpha: f64) -> Option<Pair> {
         let part_of_step = T::from_f64(alpha);
         {
-            let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
+            let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
             self.trial.copy_from(&ocp.iterate);
             let to = self.trial.view_mut();
             for place in Places::<T>::new(iterate.qp.dims) {
                 let v = part_mut(to.v, place.v, place.n);
-                let from = part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
+                let from =
+                    part(iterate.v, place.row, place.n).iter().zip(part(iterate.step, place.row, place.n));
                 for (v, (&from, &step)) in v.iter_mut().zip(from) {
                     *v = from + part_of_step * step;
                 }
@@ -169,7 +172,6 @@ where
         ocp: &mut Ocp<P, T, D, M>,
         filter: &mut Filter,
         expected: &Expected,
-        tried: f64,
         tau: f64,
     ) -> Result<Option<f64>, OcpError> {
         {
@@ -180,21 +182,19 @@ where
         }
         let mut violation = expected.here.theta;
         let mut accepted = None;
-        let mut alpha = tried;
         for _ in 0..CORRECTIONS {
             ocp.correct(self.trial, self.work.ends);
-            let solved = {
+            let (solved, alpha) = {
                 let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
-                let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(self.work.delta));
+                let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));
                 if let Some(coupling) = &mut self.work.coupling {
                     // The conditions are linear: no correction of theirs.
                     coupling.evaluate(iterate.qp, iterate.v);
                 }
                 let solved = super::newton::step(&mut iterate, self.work.coupling.as_mut(), mu, delta);
-                alpha = longest(iterate.sides.slack, iterate.sides.slack_step, tau).min(1.0);
-                solved
+                (solved, longest(iterate.sides.slack, iterate.sides.slack_step, tau))
             };
             if solved.is_err() {
                 break;

@@ -6,8 +6,8 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `run` | the iterations |
-//! | `start` | the first point |
+//! | `run`, `iteration` | the iterations, and one of them |
+//! | `start`, `multipliers` | the first point and its multipliers |
 //! | `newton`, `direction` | Newton's equations by the Riccati recursion, and what makes them convex |
 //! | `measure`, `filter`, `line_search` | how far a step goes |
 //! | `barrier` | how `μ` shrinks |
@@ -19,13 +19,17 @@
 
 mod barrier;
 mod direction;
+mod elastic;
 mod filter;
+mod iteration;
 mod line_search;
 mod measure;
+mod multipliers;
 mod newton;
 mod options;
 mod run;
 mod start;
+mod work;
 
 pub use options::IpmOptions;
 
@@ -51,7 +55,7 @@ pub struct Ipm<T, D, M, I> {
     /// Of Newton's equations.
     numbers: M,
     indices: I,
-    /// See [`Work`](run::Work).
+    /// See [`Work`](work::Work).
     work: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,

@@ -3,8 +3,10 @@
 //! With the QP written at the iterate, one step of the interior point of QPs from there is a step of
 //! that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
 
-use crate::qp::interior::{Counts, Coupling, First, Iterate, Penalties, Reading, Sides, count, is_first_fixed};
-use super::run::Work;
+use super::work::Work;
+use crate::qp::interior::{
+    Counts, Coupling, First, Iterate, Penalties, Reading, Sides, count, is_first_fixed,
+};
 use crate::qp::{Field, InteriorPointOptions, Places, QpError, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers};
 
@@ -130,11 +132,11 @@ impl<T: Real> Registers<T> for Step<'_, '_, '_, T> {
 
 /// The multipliers `π` after the full step, into `work.pi`. The point and its multipliers are put
 /// back bit by bit.
-pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Work<'_, T>) {
+pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Work<'_, T>, delta: T) {
     assign(work.rows, iterate.v);
     assign(work.slacks, iterate.sides.multiplier);
     assign(work.ends, iterate.sides.free);
-    iterate.proximal = T::from_f64(work.delta);
+    iterate.proximal = delta;
     T::registers(After { iterate, coupling: work.coupling.as_ref(), pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
@@ -165,7 +167,10 @@ const IDENTITY: f64 = 1e8;
 ///
 /// # Errors
 /// Those of the recursion.
-pub(super) fn least_squares<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut Work<'_, T>) -> Result<(), QpError> {
+pub(super) fn least_squares<T: Real>(
+    iterate: &mut Iterate<'_, T>,
+    work: &mut Work<'_, T>,
+) -> Result<(), QpError> {
     let identity = T::from_f64(IDENTITY);
     assign(work.slacks, iterate.sides.multiplier);
     general_multipliers(iterate, |_| T::ZERO);
@@ -234,7 +239,9 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, '_, T> {
         sides.target.fill(T::ZERO);
         sides.inverse.fill(T::ZERO);
         let general = is_general::<T>(iterate.qp, sides.rows);
-        for ((inverse, multiplier), general) in sides.inverse.iter_mut().zip(&mut *sides.multiplier).zip(general) {
+        for ((inverse, multiplier), general) in
+            sides.inverse.iter_mut().zip(&mut *sides.multiplier).zip(general)
+        {
             if general {
                 (*inverse, *multiplier) = (T::ONE, identity);
             }

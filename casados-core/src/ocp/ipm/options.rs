@@ -31,7 +31,7 @@ pub struct IpmOptions {
     /// true.
     pub elastic: bool,
     /// The first of these penalties, linear; they grow by factors of ten up to ten thousand times
-    /// that. Default 1e3.
+    /// that. Default 1e2.
     pub elastic_penalty: f64,
 }
 
@@ -50,7 +50,7 @@ impl IpmOptions {
             warm_start: false,
             warm_push: 1e-6,
             elastic: true,
-            elastic_penalty: 1e3,
+            elastic_penalty: 1e2,
         }
     }
 

@@ -7,7 +7,12 @@ use crate::scalar::Real;
 
 /// Moves states and controls that have hard bounds away from these by `κ max(1, |bound|)`, and by no
 /// more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
-pub(super) fn push_inside<T: Real>(qp: QpView<'_, T>, fixed: bool, push: f64, solution: &mut SolutionView<'_, T>) {
+pub(super) fn push_inside<T: Real>(
+    qp: QpView<'_, T>,
+    fixed: bool,
+    push: f64,
+    solution: &mut SolutionView<'_, T>,
+) {
     let push = T::from_f64(push);
     for (place, stage) in Places::<T>::new(qp.dims).zip(qp.stages()) {
         let v = part_mut(solution.v, place.v, place.n);
@@ -42,7 +47,8 @@ fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
 }
 
 /// The smaller one of two numbers.
-trait MinOf {
+pub(super) trait MinOf {
+    /// The smaller one.
     fn min_of(self, other: Self) -> Self;
 }
 

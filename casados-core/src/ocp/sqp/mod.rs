@@ -10,10 +10,11 @@ mod options;
 mod run;
 mod search;
 
-pub use log::{Iteration, Log, Outcome, Status, Times};
+pub(super) use elastic::Worst;
 pub(super) use log::Watch;
-pub(super) use run::{failed, infeasible};
+pub use log::{Iteration, Log, Outcome, Status, Times};
 pub use options::{Globalisation, SqpOptions};
+pub(super) use run::{failed, infeasible};
 
 use super::error::{OcpError, Part};
 use super::instance::Ocp;

@@ -65,6 +65,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         fits(ocp, self.solution.dims())?;
+        ocp.is_uncoupled()?;
         let mut state = State {
             search: Search::new(),
             elastic: None,
@@ -345,7 +346,12 @@ fn between<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     target.combine(a, b, |a, b| if length == T::ONE { b } else { a + length * (b - a) });
 }
 
-pub(in crate::ocp) fn infeasible<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn infeasible<
+    P: Formulation<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+>(
     ocp: &Ocp<P, T, D, M>,
     worst: &Worst,
 ) -> Status {
@@ -353,7 +359,12 @@ pub(in crate::ocp) fn infeasible<P: Formulation<T>, T: Real, D: AsRef<[StageDims
     Status::Infeasible { constraint: ocp.name(field, stage, index, side), violation }
 }
 
-pub(in crate::ocp) fn failed<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn failed<
+    P: Formulation<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+>(
     ocp: &Ocp<P, T, D, M>,
     error: QpError,
 ) -> Status {

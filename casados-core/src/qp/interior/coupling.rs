@@ -53,11 +53,7 @@ impl<'a, T: Real> Coupling<'a, T> {
     }
 
     /// In memory of that length.
-    pub fn new(
-        dims: &[StageDims],
-        tied: &'a [T],
-        memory: &mut &'a mut [T],
-    ) -> Self {
+    pub fn new(dims: &[StageDims], tied: &'a [T], memory: &mut &'a mut [T]) -> Self {
         let (end, nx) = (end::<T>(dims), tied.len());
         Self {
             tied,
@@ -153,7 +149,8 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
     fn run(self) {
         let Self { iterate, coupling, result, .. } = self;
         let Iterate { qp, riccati, weights, gradient, dynamics, step, objective, .. } = iterate;
-        let equations = Equations { qp: *qp, first: First::Tied, objective: *objective, weights, gradient, dynamics };
+        let equations =
+            Equations { qp: *qp, first: First::Tied, objective: *objective, weights, gradient, dynamics };
         *result = riccati.backward::<E>(&equations, true, step);
         if result.is_ok() {
             assign(coupling.first, riccati.g);
@@ -198,13 +195,17 @@ impl<T: Real> Coupling<'_, T> {
                 let all = part(riccati.y, place.v + place.nx, nu);
                 let signed = |a: &[T], b: &[T]| {
                     let products = a.iter().zip(b).zip(inverse);
-                    products.fold(T::ZERO, |sum, ((&a, &b), &inverse)| {
-                        if inverse < T::ZERO { sum - a * b } else { sum + a * b }
-                    })
+                    products.fold(
+                        T::ZERO,
+                        |sum, ((&a, &b), &inverse)| {
+                            if inverse < T::ZERO { sum - a * b } else { sum + a * b }
+                        },
+                    )
                 };
                 linear = linear - signed(y, all);
                 own = own - signed(y, y);
-                for j in self.tied.iter().enumerate().take(i).filter(|(_, t)| **t != T::ZERO).map(|(j, _)| j) {
+                for j in self.tied.iter().enumerate().take(i).filter(|(_, t)| **t != T::ZERO).map(|(j, _)| j)
+                {
                     let other = part(before, j * end.v + place.v + place.nx, nu);
                     if let Some(element) = self.schur.get_mut(j * nx + i) {
                         *element = *element - signed(y, other);
@@ -247,11 +248,7 @@ impl<T: Real> Coupling<'_, T> {
         self.solve_border(riccati, [nx, count])
     }
 
-    fn solve_border(
-        &mut self,
-        riccati: &mut Riccati<'_, T>,
-        [nx, count]: [usize; 2],
-    ) -> Result<(), QpError> {
+    fn solve_border(&mut self, riccati: &mut Riccati<'_, T>, [nx, count]: [usize; 2]) -> Result<(), QpError> {
         let n = nx + count;
         // The first stage has left the gradient of the cost to go.
         for j in 0..nx {
@@ -270,7 +267,9 @@ impl<T: Real> Coupling<'_, T> {
         }
         factors.solve(part_mut(self.right, 0, n));
         self.step.fill(T::ZERO);
-        for (row, i) in self.tied.iter().enumerate().filter(|(_, t)| **t != T::ZERO).map(|(i, _)| i).enumerate() {
+        for (row, i) in
+            self.tied.iter().enumerate().filter(|(_, t)| **t != T::ZERO).map(|(i, _)| i).enumerate()
+        {
             let theta = self.right.get(nx + row).copied().unwrap_or(T::ZERO);
             super::set(self.step, i, theta);
             let end = riccati.end.v;

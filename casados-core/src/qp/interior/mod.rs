@@ -16,17 +16,17 @@ mod symmetric;
 mod vector;
 mod verdict;
 
+pub(crate) use coupling::Coupling;
+pub(crate) use iterate::Iterate;
 pub(crate) use kernels::{
     Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
 };
 #[cfg(feature = "alloc")]
 pub(super) use kernels::{MORE, Part, Source, product};
 pub use options::InteriorPointOptions;
-pub use store::Store;
-pub(crate) use coupling::Coupling;
-pub(crate) use iterate::Iterate;
 pub(crate) use riccati::First;
 pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
+pub use store::Store;
 pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
@@ -170,8 +170,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         };
         let mut located = false;
         loop {
-            let (QpError::MaxIterations { iterations, residuals } | QpError::Stalled { iterations, residuals }) =
-                error
+            let (QpError::MaxIterations { iterations, residuals }
+            | QpError::Stalled { iterations, residuals }) = error
             else {
                 return Err(error);
             };

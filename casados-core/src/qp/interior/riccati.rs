@@ -369,7 +369,14 @@ impl<T: Real> Riccati<'_, T> {
             v.iter_mut().skip(given).for_each(|v| *v = T::ZERO);
             if from_here {
                 let columns = panel.get(if state.is_some() { nu * ld } else { 0 }..).unwrap_or_default();
-                unit(part_mut(v, begin, ld - begin), columns, ld, begin, part(inverse, begin, ld - begin), state.unwrap_or(index));
+                unit(
+                    part_mut(v, begin, ld - begin),
+                    columns,
+                    ld,
+                    begin,
+                    part(inverse, begin, ld - begin),
+                    state.unwrap_or(index),
+                );
             }
             if !from_here || state.is_some() {
                 let u = part_mut(self.g, 0, nu);

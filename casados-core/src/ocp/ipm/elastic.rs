@@ -1,0 +1,61 @@
+//! Penalties where no step makes progress, and what they tell of a problem without a solution.
+
+use super::IpmOptions;
+use super::direction::Regularisation;
+use super::newton::Lengths;
+use super::run::State;
+use crate::ocp::instance::Ocp;
+use crate::ocp::problem::Formulation;
+use crate::ocp::sqp::{Status, Worst, infeasible};
+use crate::qp::StageDims;
+use crate::scalar::Real;
+
+/// Penalties grow to this multiple of the first.
+const LARGEST: f64 = 1e4;
+/// A violation that larger penalties do not make smaller than this part of it is there to stay.
+const STAYS: f64 = 0.9;
+/// The barrier parameter of new penalties.
+const BARRIER: f64 = 0.1;
+
+/// The hard bound that is violated most while penalties stand for it.
+pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &Ocp<P, T, D, M>,
+    state: &State,
+    given: &[T],
+) -> Option<Worst> {
+    state.elastic.and_then(|_| ocp.worst(given))
+}
+
+/// What a stationary point is: the solution, or one of penalties, which grow as long as that helps.
+pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<P, T, D, M>,
+    state: &mut State,
+    given: &[T],
+    options: &IpmOptions,
+) -> Option<Status> {
+    let worst = worst(ocp, state, given).filter(|worst| worst.violation > options.tolerance);
+    let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
+    let stays = worst.violation > STAYS * state.stationary;
+    if stays || penalty >= LARGEST * options.elastic_penalty {
+        return Some(infeasible(ocp, &worst));
+    }
+    state.stationary = worst.violation;
+    soften(ocp, state, given, 10.0 * penalty);
+    None
+}
+
+/// Penalties in place of hard bounds; slacks begin anew.
+pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    ocp: &mut Ocp<P, T, D, M>,
+    state: &mut State,
+    given: &[T],
+    penalty: f64,
+) {
+    ocp.set_penalties(given, Some(T::from_f64(penalty)));
+    state.lengths = Lengths::of(ocp.qp());
+    state.elastic = Some(penalty);
+    state.begun = false;
+    state.mu = BARRIER;
+    state.regularisation = Regularisation::default();
+    state.measured = false;
+}

@@ -1,0 +1,295 @@
+//! One iteration: residuals and barrier parameter, search direction, line search, step.
+
+use super::barrier;
+use super::filter::{Filter, Pair};
+use super::line_search::{Accepted, Expected, Room, longest};
+use super::measure;
+use super::newton::{Lengths, attach, dynamics_after, evaluate};
+use super::run::State;
+use super::start::MinOf;
+use super::work::Work;
+use super::{Ipm, elastic};
+use crate::ocp::convexify::Convexification;
+use crate::ocp::data::split;
+use crate::ocp::dynamics::SecondOrder;
+use crate::ocp::error::OcpError;
+use crate::ocp::instance::Ocp;
+use crate::ocp::linearise::Exact;
+use crate::ocp::problem::Formulation;
+use crate::ocp::sqp::{Iteration, Status, Watch, failed};
+use crate::qp::interior::{Iterate, Sides, set};
+use crate::qp::{Residuals, StageDims, Store};
+use crate::scalar::Real;
+
+/// `κ_Σ`: multipliers stay within this factor of `μ / s`.
+const MULTIPLIERS: f64 = 1e10;
+/// The Hessian of the Lagrangian as it is.
+const EXACT: Exact = Exact { convexification: Convexification::None };
+
+/// A search direction, and how far it may be gone.
+struct Direction {
+    expected: Expected,
+    tau: f64,
+    primal: f64,
+    dual: f64,
+    /// It moves nothing but rounding errors.
+    tiny: bool,
+}
+
+impl<T, D, M, I> Ipm<T, D, M, I>
+where
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
+    I: Store<u32>,
+{
+    /// One iteration; a status if it is the last one.
+    pub(super) fn iterate<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &mut State,
+        row: &mut Iteration,
+    ) -> Result<Option<Status>, OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        let mut watch = Watch::start();
+        self.linearise(ocp, all, state)?;
+        let here = self.assess(ocp, all, state, row)?;
+        row.times.linearise = watch.lap();
+        if let Some(status) = self.is_over(ocp, all, state, row) {
+            return Ok(status);
+        }
+        let direction = match self.direction(ocp, all, state, here, row)? {
+            Ok(direction) => direction,
+            Err(status) => return Ok(Some(status)),
+        };
+        row.times.qp = watch.lap();
+        let Self { options, trial, best, numbers, indices, work, .. } = self;
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, work.as_mut());
+        let accepted = if direction.tiny {
+            Some(Accepted { alpha: direction.primal, corrected: false })
+        } else {
+            let mut room = Room { lengths: &state.lengths, numbers, indices, trial, work: &mut work };
+            let Direction { expected, primal, tau, .. } = &direction;
+            room.search(ocp, &mut state.filter, expected, *primal, *tau)?
+        };
+        row.times.search = watch.lap();
+        let Some(accepted) = accepted else {
+            if state.elastic.is_some() || !options.elastic {
+                return Ok(Some(Status::NoProgress));
+            }
+            // Where no step made progress is no place to begin.
+            ocp.iterate.copy_from(best);
+            elastic::soften(ocp, state, work.penalties, options.elastic_penalty);
+            return Ok(None);
+        };
+        (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
+        self.accept(ocp, all, state, &direction, accepted)?;
+        let ends = direction.tiny && state.mu <= self.options.tolerance;
+        Ok(ends.then_some(Status::NoProgress))
+    }
+
+    /// The QP at the iterate. Where slacks are new, multipliers are too, and the Hessian has these.
+    fn linearise<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &mut State,
+    ) -> Result<(), OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        if !state.begun {
+            ocp.linearise(EXACT)?;
+            self.begin(ocp, all, state)?;
+        }
+        self.curve(ocp, all, state)?;
+        ocp.linearise(EXACT)?;
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        iterate.take_point(&solution.view_mut());
+        iterate.store(&mut solution.view_mut());
+        Ok(())
+    }
+
+    /// Residuals and barrier parameter at the iterate, the pair of the filter, and the best iterate.
+    fn assess<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &mut State,
+        row: &mut Iteration,
+    ) -> Result<Pair, OcpError> {
+        let (residuals, objective) = ocp.residuals();
+        let plain = ocp.objective.to_f64();
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        evaluate(&mut iterate, &mut solution.view_mut());
+        shrink_barrier(state, &iterate, &residuals, self.options.tolerance);
+        let mut here = measure::here(&iterate, plain, state.mu);
+        if let Some(coupling) = &mut work.coupling {
+            coupling.evaluate(iterate.qp, iterate.v);
+            here.theta += coupling.violation();
+        }
+        if !state.measured {
+            state.theta_min = 1e-4 * here.theta.max(1.0);
+            state.filter = Filter::new(1e4 * here.theta.max(1.0));
+            state.measured = true;
+        }
+        (row.residuals, row.objective) = (residuals, objective);
+        (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
+        let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
+        let size = residuals.largest().max(violation);
+        if size < state.best || row.iteration == 0 {
+            (state.best, state.kept) = (size, *row);
+            self.best.copy_from(&ocp.iterate);
+        }
+        let acceptable = size <= self.options.acceptable_tolerance;
+        state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
+        Ok(here)
+    }
+
+    /// The status of a run that ends here; nothing for a run that goes on after other penalties.
+    fn is_over<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &mut State,
+        row: &Iteration,
+    ) -> Option<Option<Status>> {
+        let work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+        if row.residuals.largest() <= self.options.tolerance {
+            return Some(elastic::verdict(ocp, state, work.penalties, &self.options));
+        }
+        if state.acceptable >= self.options.acceptable_iterations.max(1) {
+            return Some(Some(Status::Acceptable));
+        }
+        (row.iteration >= self.options.max_iterations).then_some(Some(Status::MaxIterations))
+    }
+
+    /// The search direction; a status where there is none.
+    fn direction<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &mut State,
+        here: Pair,
+        row: &mut Iteration,
+    ) -> Result<Result<Direction, Status>, OcpError> {
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+        let intervals = ocp.intervals();
+        let theta = &*split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mu = T::from_f64(state.mu);
+        match state.regularisation.direction(&mut iterate, &mut work.coupling, mu) {
+            Ok(delta) => (state.delta, row.regularisation) = (delta, delta),
+            Err(error) => return Ok(Err(failed(ocp, error))),
+        }
+        let mut slope = measure::slope(&iterate, state.mu, work.scratch);
+        if let Some(coupling) = &work.coupling {
+            // The gradients of the QP have these terms of the Lagrangian.
+            slope -= coupling.slope(iterate.qp, theta, iterate.step).to_f64();
+        }
+        let expected = Expected { here, slope, theta_min: state.theta_min, mu: state.mu, delta: state.delta };
+        let tau = barrier::fraction_to_boundary(state.mu);
+        let sides = &iterate.sides;
+        let mut primal = longest(sides.slack, sides.slack_step, tau);
+        let mut dual = longest(sides.multiplier, sides.multiplier_step, tau);
+        if is_tied(sides) {
+            (primal, dual) = (primal.min(dual), primal.min(dual));
+        }
+        let is_tiny = |(&d, &v): (&T, &T)| d.abs().to_f64() <= 10.0 * T::EPSILON * (1.0 + v.abs().to_f64());
+        let tiny = here.theta <= 1e-4 && iterate.step.iter().zip(&*iterate.v).all(is_tiny);
+        Ok(Ok(Direction { expected, tau, primal, dual, tiny }))
+    }
+
+    /// Goes the step that was accepted.
+    fn accept<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &State,
+        direction: &Direction,
+        accepted: Accepted,
+    ) -> Result<(), OcpError> {
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+        let intervals = ocp.intervals();
+        let theta = split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let Accepted { alpha, corrected } = accepted;
+        let mut dual = direction.dual;
+        if corrected {
+            dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
+        }
+        if is_tied(&iterate.sides) {
+            dual = dual.min(alpha);
+        }
+        dynamics_after(&mut iterate, &mut work, T::from_f64(state.delta));
+        let part = T::from_f64(alpha);
+        if let Some(coupling) = &work.coupling {
+            for (theta, &step) in theta.iter_mut().zip(&*coupling.step) {
+                *theta = *theta + part * step;
+            }
+        }
+        for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
+            *pi = *pi + part * (after - *pi);
+        }
+        let full = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
+        for (curving, (&multiplier, &step)) in work.curving.iter_mut().zip(full) {
+            *curving = *curving + part * (multiplier + step - *curving);
+        }
+        iterate.go(part, T::from_f64(dual));
+        centre(&mut iterate.sides, state.mu);
+        iterate.store(&mut view);
+        Ok(())
+    }
+}
+
+/// The next barrier parameter; another one has another filter.
+fn shrink_barrier<T: Real>(
+    state: &mut State,
+    iterate: &Iterate<'_, T>,
+    residuals: &Residuals,
+    tolerance: f64,
+) {
+    let Sides { slack, multiplier, .. } = &iterate.sides;
+    let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu));
+    let before = state.mu;
+    state.mu = barrier::shrink(before, error, tolerance);
+    if state.mu != before {
+        state.filter.clear();
+    }
+}
+
+/// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side what its
+/// violation costs.
+fn centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
+    let count = sides.counts.sides();
+    for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
+        let centre = mu / slack.to_f64();
+        let clamped = multiplier.to_f64().clamp(centre / MULTIPLIERS, centre * MULTIPLIERS);
+        *multiplier = T::from_f64(clamped);
+    }
+    let costs = sides.linear.iter().zip(&*sides.quadratic);
+    for (j, (&side, (&linear, &quadratic))) in sides.soft.iter().zip(costs).enumerate() {
+        let (side, other) = (side as usize, count + j);
+        let (Some(&violation), Some(&multiplier)) = (sides.slack.get(other), sides.multiplier.get(side))
+        else {
+            return;
+        };
+        let force = linear + quadratic * violation;
+        let most = force - T::from_f64(1e-3) * force.min_of(T::from_f64(mu) / violation);
+        let multiplier = multiplier.min_of(most);
+        set(sides.multiplier, side, multiplier);
+        set(sides.multiplier, other, force - multiplier);
+    }
+}
+
+/// Violations with a quadratic cost tie the lengths of both steps: `λ + ν = linear + quadratic e`.
+fn is_tied<T: Real>(sides: &Sides<'_, T>) -> bool {
+    sides.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
+}

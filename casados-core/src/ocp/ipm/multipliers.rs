@@ -1,0 +1,87 @@
+//! Multipliers: the first ones, and those that the Hessian has.
+
+use super::Ipm;
+use super::newton::{Lengths, attach, evaluate_values, least_squares};
+use super::run::State;
+use super::start::begin_sides;
+use super::work::Work;
+use crate::ocp::data::split;
+use crate::ocp::error::OcpError;
+use crate::ocp::instance::Ocp;
+use crate::ocp::problem::Formulation;
+use crate::qp::{StageDims, Store, assign};
+use crate::scalar::Real;
+
+/// First multipliers that are larger are discarded.
+const LARGEST: f64 = 1e3;
+
+impl<T, D, M, I> Ipm<T, D, M, I>
+where
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]> + Store<T>,
+    I: Store<u32>,
+{
+    /// Slacks and multipliers of the first iteration, or of new penalties.
+    pub(super) fn begin<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &mut State,
+    ) -> Result<(), OcpError> {
+        // Multipliers of hard bounds say nothing about penalties.
+        let warm = self.options.warm_start && state.elastic.is_none();
+        // Other penalties have their numbers at other places.
+        self.numbers.as_mut().fill(T::ZERO);
+        let ends = ocp.ends();
+        let intervals = ocp.intervals();
+        let theta = split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let (qp, solution) = (ocp.qp.view(), &mut ocp.iterate);
+        let mut view = solution.view_mut();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut work = Work::new(qp.dims, ends, all, self.work.as_mut());
+        iterate.take_point(&view);
+        iterate.give_initial_state();
+        evaluate_values(&mut iterate);
+        begin_sides(&mut iterate, &self.options, warm, T::from_f64(state.mu), &view);
+        iterate.store(&mut view);
+        if warm {
+            assign(work.curving, iterate.sides.multiplier);
+        } else if least_squares(&mut iterate, &mut work).is_ok() {
+            let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST);
+            if work.pi.iter().chain(&*work.curving).all(is_small) {
+                assign(view.dynamics, work.pi);
+                if let Some(coupling) = &work.coupling {
+                    for (theta, &step) in theta.iter_mut().zip(&*coupling.step) {
+                        *theta = *theta + step;
+                    }
+                }
+            } else {
+                view.dynamics.fill(T::ZERO);
+                work.curving.fill(T::ZERO);
+            }
+        }
+        state.begun = true;
+        Ok(())
+    }
+
+    /// Writes the multipliers that the Hessian has.
+    pub(super) fn curve<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        all: &Lengths,
+        state: &State,
+    ) -> Result<(), OcpError> {
+        let ends = ocp.ends();
+        let (qp, solution) = ocp.qp_and_iterate();
+        let mut view = solution.view_mut();
+        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let work = Work::new(qp.dims, ends, all, self.work.as_mut());
+        assign(work.slacks, iterate.sides.multiplier);
+        assign(iterate.sides.multiplier, work.curving);
+        iterate.take_point(&view);
+        iterate.store(&mut view);
+        assign(iterate.sides.multiplier, work.slacks);
+        Ok(())
+    }
+}

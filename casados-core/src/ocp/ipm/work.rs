@@ -1,0 +1,77 @@
+//! Memory of a run beside that of Newton's equations.
+
+use super::newton::Lengths;
+use super::start::scratch;
+use crate::ocp::sqp::elastic;
+use crate::qp::interior::Coupling;
+use crate::qp::{StageDims, end, take_mut};
+use crate::scalar::Real;
+
+/// Memory beside that of Newton's equations.
+pub(super) struct Work<'a, T> {
+    /// Ends of intervals and constraints at a point that is tried.
+    pub ends: &'a mut [T],
+    /// Values of rows there.
+    pub rows: &'a mut [T],
+    /// Slacks there.
+    pub slacks: &'a mut [T],
+    /// The step before corrections.
+    pub step: &'a mut [T],
+    pub slack_step: &'a mut [T],
+    pub multiplier_step: &'a mut [T],
+    /// Multipliers `π` after the full step.
+    pub pi: &'a mut [T],
+    /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those of
+    /// the barrier go as far as they stay positive.
+    pub curving: &'a mut [T],
+    /// Over the variables of a stage.
+    pub scratch: &'a mut [T],
+    /// Linear penalties as they were given.
+    pub penalties: &'a mut [T],
+    /// Conditions between the first and the last state.
+    pub coupling: Option<Coupling<'a, T>>,
+}
+
+impl<'a, T: Real> Work<'a, T> {
+    /// How many numbers it takes.
+    pub fn length(dims: &[StageDims], ends: usize, all: &Lengths) -> usize {
+        let pairs = all.counts.pairs();
+        Self::before_coupling(dims, ends, pairs)
+            + first_nx(dims)
+            + Coupling::<T>::memory(dims, first_nx(dims))
+    }
+
+    /// Where the list of tied states begins.
+    pub fn before_coupling(dims: &[StageDims], ends: usize, pairs: usize) -> usize {
+        let end = end::<T>(dims);
+        ends + 2 * end.row + 4 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
+    }
+
+    /// In memory of that length, whose contents stay.
+    pub fn new(dims: &[StageDims], ends: usize, all: &Lengths, mut memory: &'a mut [T]) -> Self {
+        let pairs = all.counts.pairs();
+        let end = end::<T>(dims);
+        let rest = &mut memory;
+        Self {
+            ends: take_mut(rest, ends),
+            rows: take_mut(rest, end.row),
+            slacks: take_mut(rest, pairs),
+            step: take_mut(rest, end.row),
+            slack_step: take_mut(rest, pairs),
+            multiplier_step: take_mut(rest, pairs),
+            pi: take_mut(rest, end.dynamics),
+            curving: take_mut(rest, pairs),
+            scratch: take_mut(rest, scratch::<T>(dims)),
+            penalties: take_mut(rest, elastic::memory(dims)),
+            coupling: {
+                let tied = &*take_mut(rest, first_nx(dims));
+                let coupled = tied.iter().any(|&tied| tied != T::ZERO);
+                coupled.then(|| Coupling::new(dims, tied, rest))
+            },
+        }
+    }
+}
+
+fn first_nx(dims: &[StageDims]) -> usize {
+    dims.first().map_or(0, |dims| dims.nx)
+}
