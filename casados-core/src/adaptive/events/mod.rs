@@ -256,6 +256,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
 
     /// Derivatives of all steps and over all events, and what is known about the moments of these; for `second` derivatives, what
     /// these need.
+    #[allow(clippy::type_complexity)]
     fn sweep(
         &mut self,
         x0: &VectorX<M, T>,

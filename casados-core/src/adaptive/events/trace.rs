@@ -190,7 +190,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             }
             let y = match slope {
                 Some(y) => y,
-                None => *slope.insert(self.slope(x, u, start)?),
+                None => *slope.insert(self.slope_from(self.integrator.base.given, x, u, start)?),
             };
             let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
             let total = products.fold(rate, |sum, (g, f)| sum + *g * *f);
@@ -266,14 +266,24 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         u: &VectorU<M, T>,
         t: T,
     ) -> Result<ArrayK<M, T>, Error> {
-        let base = &mut self.integrator.base;
-        let (nx, point) = (M::Shape::NX, base.point.as_ref());
+        let (nx, point) = (M::Shape::NX, self.integrator.base.point.as_ref());
         // From where the last step ended.
         let mut y = ArrayK::<M, T>::zeroed();
         for (y, from) in y.as_mut().iter_mut().zip(point[..nx].iter().chain(&point[2 * nx..])) {
             *y = *from;
         }
-        let parameters: VectorP<M, T> = base.parameters;
+        self.slope_from(y, x, u, t)
+    }
+
+    /// The same from start values `y`.
+    fn slope_from(
+        &mut self,
+        mut y: ArrayK<M, T>,
+        x: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t: T,
+    ) -> Result<ArrayK<M, T>, Error> {
+        let parameters: VectorP<M, T> = self.integrator.base.parameters;
         let at = At { x, u, p: &parameters, t };
         self.integrator.consistent.solve(&at, &mut y)?;
         Ok(y)
