@@ -1,5 +1,7 @@
 //! The start of an adaptive integration: consistent `ẋ` and `z`, or an error that names what is not.
 
+#[path = "consistent/allocations.rs"]
+mod allocations;
 #[path = "consistent/calls.rs"]
 mod calls;
 #[path = "consistent/roots.rs"]

@@ -13,7 +13,7 @@ use super::integrals::{Blocks, Spanning, Sums};
 use super::integrator::{Integrator, inside};
 use super::run::Span;
 use super::sealed::Engine;
-use super::segment::{Segment, add, dense, filled};
+use super::segment::{Segment, add, dense, filled, refill};
 use super::sensitivities::{Memory, chain, dynamic, fill, place};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
@@ -41,6 +41,8 @@ use bytemuck::Zeroable;
 /// before. Steps end where intervals end. `ends` are times as the model sees them, not lengths, and so is that of
 /// [`dense`](Self::dense).
 ///
+/// Later calls of a kind do not allocate, but for the lists that results of derivatives own and the sums of an integrand.
+///
 /// # Errors
 /// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for each interval;
 /// [`Error::OutsideInterval`] if the ends are not in order, or not those of the steps that are kept.
@@ -53,6 +55,10 @@ pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     frozen: bool,
     statistics: AdaptiveStatistics,
     nominal: Nominal<M, T>,
+    /// `V_k` and `V_{k+1}`.
+    v: [Vec<T>; 2],
+    /// Second derivatives of all columns, and a product on the way there.
+    second: [Vec<T>; 2],
 }
 
 /// The solution at the end and its derivatives with respect to `x₀`, all controls, and `p`.
@@ -115,7 +121,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
     pub fn new(integrator: Integrator<M, B, T>) -> Self {
         let nominal = Nominal::zeroed();
         let statistics = AdaptiveStatistics::default();
-        Self { integrator, segments: Vec::new(), count: 0, solved: false, frozen: false, statistics, nominal }
+        Self {
+            integrator,
+            segments: Vec::new(),
+            count: 0,
+            solved: false,
+            frozen: false,
+            statistics,
+            nominal,
+            v: Default::default(),
+            second: Default::default(),
+        }
     }
 
     /// The integrator, to set its parameters or its start time.
@@ -221,7 +237,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let mut sums = Sums::new(self.count, integrand, true)?;
         let forward = self.sweep(x0, true, Some(&mut *integrand), Some(&mut sums))?;
         let derivatives = Q::derivatives(&sums)?;
-        Ok((self.backwards(forward, lambda, sums.second, Some(integrand))?, derivatives))
+        Ok((self.backwards(forward, lambda, &mut sums.second, Some(integrand))?, derivatives))
     }
 
     /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and `p`.
@@ -285,7 +301,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         self.steps(x0, controls, ends)?;
         let forward = self.sweep(x0, true, None, None)?;
         let at = Columns::<M> { intervals: self.count, model: core::marker::PhantomData };
-        self.backwards(forward, lambda, filled(at.all() * at.all(), T::ZERO)?, None)
+        let mut sum = core::mem::take(&mut self.second[0]);
+        refill(&mut sum, at.all() * at.all(), T::ZERO)?;
+        let result = self.backwards(forward, lambda, &mut sum, None);
+        self.second[0] = sum;
+        result
     }
 
     /// The gradient and the Hessian after [`Piecewise::sweep`], with what an integrand has added to `sum`.
@@ -293,10 +313,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         &mut self,
         forward: PiecewiseForward<M, T>,
         lambda: &VectorX<M, T>,
-        mut sum: Vec<T>,
+        sum: &mut [T],
         mut along: Along<'_, '_, M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
-        let Self { integrator, segments, count, nominal, .. } = self;
+        let Self { integrator, segments, count, nominal, second: [_, product], .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let mut adjoint = PiecewiseAdjoint {
             nominal: *nominal,
@@ -304,7 +324,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             grad_u: filled(*count, VectorU::<M, T>::zeroed())?,
             grad_p: VectorP::<M, T>::zeroed(),
         };
-        let mut product = filled(M::Shape::NW * at.all(), T::ZERO)?;
+        refill(product, M::Shape::NW * at.all(), T::ZERO)?;
         for (k, segment) in segments.iter_mut().enumerate().take(*count).rev() {
             let history = core::mem::take(&mut segment.history);
             let (mut frozen, state, memory, v) = segment.open(integrator)?;
@@ -317,10 +337,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             }
             axpy(T::ONE, hessian.first.grad_p.as_slice(), adjoint.grad_p.as_mut_slice());
             place(hessian, step);
-            at.project(k, step.as_ref(), v, &mut product, &mut sum);
+            at.project(k, step.as_ref(), v, product, sum);
             segment.history = history;
         }
-        let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(&sum)?;
+        let Blocks { h_xx, h_xu, h_uu, h_xp, h_up, h_pp } = at.blocks(sum)?;
         let result = PiecewiseHessian { forward, adjoint, h_xx, h_xu, h_uu, h_xp, h_up, h_pp };
         match sum.iter().position(|value| !value.is_finite()) {
             Some(index) => Err(Error::Overflow { step: 0, index }),
@@ -396,10 +416,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let span = Span { start: integrator.start, end: *end };
             (segment.x, segment.u, segment.span, segment.given) = (x, *u, span, integrator.base.given);
             segment.chosen = true;
+            // Each interval has a tape of its own, which in later calls is long enough.
+            core::mem::swap(&mut integrator.tape, &mut segment.tape);
             let result = integrator.run(&x, u, *end, true, |_, _| Ok(()));
+            core::mem::swap(&mut integrator.tape, &mut segment.tape);
             statistics.add(&integrator.statistics);
             result?;
-            core::mem::swap(&mut integrator.tape, &mut segment.tape);
             x = integrator.base.result.x;
             if k == 0 {
                 *nominal = integrator.base.result;
@@ -462,11 +484,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         mut sums: Option<&mut Sums<M, T>>,
     ) -> Result<PiecewiseForward<M, T>, Error> {
         begin(&mut along);
-        let Self { integrator, segments, count, nominal, .. } = self;
+        let Self { integrator, segments, count, nominal, v: [v, next], .. } = self;
         let at = Columns::<M> { intervals: *count, model: core::marker::PhantomData };
         let (nx, width) = (M::Shape::NX, at.all());
-        let mut v = filled(nx * width, T::ZERO)?;
-        let mut next = filled(nx.max(M::Shape::NZ) * width, T::ZERO)?;
+        refill(v, nx * width, T::ZERO)?;
+        refill(next, nx.max(M::Shape::NZ) * width, T::ZERO)?;
         for x in 0..nx {
             v[x * width + x] = T::ONE;
         }
@@ -483,7 +505,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         for (k, segment) in segments.iter_mut().enumerate().take(*count) {
             segment.x = x;
             if second {
-                segment.v.clone_from(&v);
+                segment.v.clone_from(v);
             }
             let mut history = core::mem::take(&mut segment.history);
             history.clear();
@@ -491,20 +513,20 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
             let mut part = chain(&mut along, None, second);
             frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
             if let (Some(sums), Some(integrand)) = (&mut sums, &mut along) {
-                sums.add(k, &mut **integrand, &v, &mut memory.step);
+                sums.add(k, &mut **integrand, v, &mut memory.step);
             }
             let local = &memory.hessian.first.forward;
             x = local.nominal.x;
             collect(nominal, &local.nominal, k);
             if k + 1 == *count {
-                at.chain(k, &local.dz_dx0, &local.dz_du, &local.dz_dp, &v, &mut next);
+                at.chain(k, &local.dz_dx0, &local.dz_du, &local.dz_dp, v, next);
                 fill(&mut result.dz_dx0, |r, c| next[r * width + c]);
                 fill(&mut result.dz_dp, |r, c| next[r * width + at.p() + c]);
                 for (k, du) in result.dz_du.iter_mut().enumerate() {
                     fill(du, |r, c| next[r * width + at.u(k) + c]);
                 }
             }
-            at.chain(k, &local.dx_dx0, &local.dx_du, &local.dx_dp, &v, &mut next);
+            at.chain(k, &local.dx_dx0, &local.dx_du, &local.dx_dp, v, next);
             v.copy_from_slice(&next[..nx * width]);
             segment.history = history;
         }

@@ -112,8 +112,18 @@ pub(super) fn dense<'a, M: Dae, B: Engine<M, T>, T: Real>(
 /// [`Error::OutOfMemory`]
 pub(super) fn filled<V: Copy>(length: usize, value: V) -> Result<Vec<V>, Error> {
     let mut list = Vec::new();
+    refill(&mut list, length, value)?;
+    Ok(list)
+}
+
+/// A list that is there becomes one of this length: it does not allocate if it was ever as long.
+///
+/// # Errors
+/// [`Error::OutOfMemory`]
+pub(super) fn refill<V: Copy>(list: &mut Vec<V>, length: usize, value: V) -> Result<(), Error> {
     let bytes = length.saturating_mul(size_of::<V>());
+    list.clear();
     list.try_reserve_exact(length).map_err(|_| Error::OutOfMemory { bytes })?;
     list.resize(length, value);
-    Ok(list)
+    Ok(())
 }

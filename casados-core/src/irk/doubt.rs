@@ -41,8 +41,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             ) else {
                 continue;
             };
-            let own = size(y, x.as_ref().get(slot).copied(), h);
-            small = E::or(small, E::lt(bound * own, inverse[0][0].abs() * terms[0]));
+            let amplified = inverse[0][0].abs() * terms[0];
+            // Mostly that is all there is to be asked.
+            if E::any(E::lt(bound * y[0].abs(), amplified)) {
+                let own = size(y, x.as_ref().get(slot).copied(), h);
+                small = E::or(small, E::lt(bound * own, amplified));
+            }
         }
         E::any(small)
     }

@@ -23,7 +23,7 @@ pub use second::HybridHessian;
 use super::integrator::Integrator;
 use super::run::Span;
 use super::sealed::Engine;
-use super::segment::{Segment, dense, filled};
+use super::segment::{Segment, dense, refill};
 use super::sensitivities::{chain, dynamic, fill};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error, Place};
@@ -52,6 +52,8 @@ use bytemuck::allocation::try_zeroed_box;
 /// All calls take the length `h` of the interval, as those of the integrator. Times of events are times as the model sees them, and so
 /// is that of [`dense`](Self::dense).
 ///
+/// Later calls of a kind do not allocate, but for the lists that results of derivatives own.
+///
 /// # Errors
 /// Of every call: those of [`Integrator`]; [`Error::InconsistentStart`] after a jump too; [`Error::TooManyEvents`];
 /// [`Error::NonFiniteFunction`] of an event or a jump. Of calls with derivatives [`Error::Grazing`]: the time of the
@@ -71,7 +73,20 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     solution: Solution<M, T>,
     /// Where a function is evaluated.
     v: Box<ArrayV<M, T>>,
+    /// On which side of zero each function was.
+    signs: Vec<f64>,
+    /// What is known about the moments of the events of a call.
+    moments: Moments<M, T>,
+    /// Derivatives over the parts up to now, and memory for the next ones.
+    sensitivities: Option<[Box<Rows<M, T>>; 2]>,
+    /// Memory of second derivatives.
+    second: Option<Box<second::Second<M, T>>>,
 }
+
+/// A row for each state, with a column for each direction.
+type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
+/// The events of a call that happened, in order.
+type Moments<M, T> = Vec<(Event<M, T>, Moment<M, T>)>;
 
 /// An event that happened.
 pub struct Occurrence<M: Dae, T: Real = f64> {
@@ -170,6 +185,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             statistics: AdaptiveStatistics::default(),
             solution,
             v: try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
+            signs: Vec::new(),
+            moments: Vec::new(),
+            sensitivities: None,
+            second: None,
         })
     }
 
@@ -230,8 +249,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         along: Along<'_, '_, M, T>,
     ) -> Result<HybridForward<M, T>, Error> {
         let span = self.trace(x0, u, h)?;
-        let (result, _) = self.sweep(x0, false, along)?;
-        self.asked = Some(span);
+        let (result, moments) = self.sweep(x0, false, along)?;
+        (self.moments, self.asked) = (moments, Some(span));
         Ok(result)
     }
 
@@ -243,23 +262,28 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         x0: &VectorX<M, T>,
         second: bool,
         mut along: Along<'_, '_, M, T>,
-    ) -> Result<(HybridForward<M, T>, Vec<(Event<M, T>, Moment<M, T>)>), Error> {
+    ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
         begin(&mut along);
         let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
         let bytes = size_of::<ArrayX<M, ArrayW<M, T>>>();
         let zeroed = || try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes });
-        let mut v: Box<ArrayX<M, ArrayW<M, T>>> = zeroed()?;
-        let mut next: Box<ArrayX<M, ArrayW<M, T>>> = zeroed()?;
+        let [mut v, mut next] = match self.sensitivities.take() {
+            Some(there) => there,
+            None => [zeroed()?, zeroed()?],
+        };
         for (x, row) in v.as_mut().as_mut().iter_mut().enumerate() {
+            row.as_mut().fill(T::ZERO);
             row[x] = T::ONE;
         }
-        let (mut times, mut moments) = (Vec::new(), Vec::new());
+        let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
+        moments.clear();
         let mut x = *x0;
         for k in 0..self.count {
             let Self { integrator, segments, solution, .. } = self;
             let Some(segment) = segments.get_mut(k) else { break };
             segment.x = x;
             let mut history = core::mem::take(&mut segment.history);
+            let mut own = core::mem::take(&mut segment.v);
             history.clear();
             let (mut frozen, state, memory, _) = segment.open(integrator)?;
             // Its derivatives by where a segment begins are multiplied by those of that.
@@ -283,7 +307,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             core::mem::swap(&mut v, &mut next);
             if second {
                 // Over this segment alone.
-                let mut own = filled(nx * nw, T::ZERO)?;
+                refill(&mut own, nx * nw, T::ZERO)?;
                 for (index, element) in own.iter_mut().enumerate() {
                     let (r, w) = (index / nw, index % nw);
                     *element = if w < nx {
@@ -294,9 +318,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                         local.dx_dp[(r, w - nx - nu)]
                     };
                 }
-                segment.v = own;
             }
-            segment.history = history;
+            (segment.history, segment.v) = (history, own);
             let Some((event, moment)) = self.moment(k)? else { break };
             let [v, next] = [&mut v, &mut next].map(|v| ArrayW::<M, T>::flat_mut(v.as_mut().as_mut()));
             let time = self.forward_jump(event, &moment, v, next)?;
@@ -319,6 +342,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         }
         self.collect();
         finish(&mut along)?;
+        let [v, _] = self.sensitivities.insert([v, next]);
         let v = ArrayW::<M, T>::flat(v.as_ref().as_ref());
         if let Some((index, _)) = not_finite(v) {
             return Err(Error::Overflow { step: 0, index });
@@ -359,20 +383,16 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         along: Along<'_, '_, M, T>,
     ) -> Result<&Solution<M, T>, Error> {
         let span = self.trace(x0, u, h)?;
-        self.replay(x0, along)?;
+        self.moments = self.replay(x0, along)?;
         self.asked = Some(span);
         Ok(&self.solution)
     }
 
     /// All steps again, to rounding, and what is known about the moments of the events.
-    #[allow(clippy::type_complexity)]
-    fn replay(
-        &mut self,
-        x0: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<Vec<(Event<M, T>, Moment<M, T>)>, Error> {
+    fn replay(&mut self, x0: &VectorX<M, T>, mut along: Along<'_, '_, M, T>) -> Result<Moments<M, T>, Error> {
         begin(&mut along);
-        let mut moments = Vec::new();
+        let mut moments = core::mem::take(&mut self.moments);
+        moments.clear();
         let mut x = *x0;
         for k in 0..self.count {
             let Self { integrator, segments, solution, .. } = self;
@@ -433,7 +453,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             axpy(T::ONE, gradient.grad_u.as_slice(), result.grad_u.as_mut_slice());
             axpy(T::ONE, gradient.grad_p.as_slice(), result.grad_p.as_mut_slice());
         }
-        self.asked = Some(span);
+        (self.moments, self.asked) = (moments, Some(span));
         Ok(result)
     }
 

@@ -55,7 +55,7 @@ listed!([M: Dae, T: Real] HybridHessian<M, T> { forward, adjoint, h_xx, h_xu, h_
 /// Memory, symmetric matrices in full.
 #[derive(Zeroable)]
 #[zeroable(bound = "T: Zeroable")]
-struct Second<M: Dae, T: Plain> {
+pub(super) struct Second<M: Dae, T: Plain> {
     /// The Hessian over the state that was reached, `u` and `p`, and one in the making.
     h: ArrayW<M, ArrayW<M, T>>,
     sum: ArrayW<M, ArrayW<M, T>>,
@@ -91,7 +91,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let span = self.trace(x0, u, h)?;
         let (forward, moments) = self.sweep(x0, true, None)?;
         let bytes = size_of::<Second<M, T>>();
-        let mut second: Box<Second<M, T>> = try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?;
+        let mut second: Box<Second<M, T>> = match self.second.take() {
+            Some(there) => there,
+            None => try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes })?,
+        };
+        for row in second.h.as_mut() {
+            row.as_mut().fill(T::ZERO);
+        }
         let mut adjoint = HybridAdjoint {
             solution: self.solution.clone(),
             grad_x0: *lambda,
@@ -147,7 +153,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         fill(&mut result.h_xp, |r, c| at(r, nx + nu + c));
         fill(&mut result.h_up, |r, c| at(nx + r, nx + nu + c));
         fill(&mut result.h_pp, |r, c| at(nx + nu + r, nx + nu + c));
-        self.asked = Some(span);
+        (self.second, self.moments, self.asked) = (Some(second), moments, Some(span));
         Ok(result)
     }
 

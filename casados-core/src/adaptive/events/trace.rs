@@ -12,7 +12,6 @@ use crate::irk::{check, not_finite};
 use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
-use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
 /// Each step is looked at in so many pieces: a function that crosses zero twice in one of them is not seen.
@@ -109,14 +108,16 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         t_end: T,
     ) -> Result<Found<T>, Error> {
         let start = self.integrator.start;
-        let mut signs = self.signs(k, x, u, t_end)?;
-        let Self { integrator, segments, events, statistics, v, .. } = self;
+        self.find_signs(k, x, u, t_end)?;
+        let Self { integrator, segments, events, statistics, v, signs, .. } = self;
         let Some(segment) = segments.get_mut(k) else { return Ok(None) };
         segment.span = Span { start, end: t_end };
         (segment.x, segment.u, segment.given) = (*x, *u, integrator.base.given);
         segment.chosen = true;
         let (parameters, mut found, mut begin) = (integrator.base.parameters, None, start);
         place_inputs::<M, T>(v.as_mut().as_mut(), u, &parameters);
+        // Each part has a tape of its own, which in later calls is long enough.
+        core::mem::swap(&mut integrator.tape, &mut segment.tape);
         let run = integrator.run(x, u, t_end, true, |step, dense| {
             let length = step.end - begin;
             let mut low = begin;
@@ -124,7 +125,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 let part = T::from_f64(piece as f64 / PIECES as f64);
                 let high = if piece == PIECES { step.end } else { begin + part * length };
                 (step.evaluate)(high, dense)?;
-                for (index, (event, sign)) in events.iter().zip(&mut signs).enumerate() {
+                for (index, (event, sign)) in events.iter().zip(signs.iter_mut()).enumerate() {
                     let value = evaluate(event, v, &dense.x, high, k)?;
                     if !event.crossing.matches(*sign, value) {
                         // Zero is on the way from one side to the other.
@@ -159,21 +160,21 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             begin = step.end;
             Ok(())
         });
+        core::mem::swap(&mut integrator.tape, &mut segment.tape);
         statistics.add(&integrator.statistics);
         run?;
-        core::mem::swap(&mut integrator.tape, &mut segment.tape);
         Ok(found)
     }
 
     /// On which side of zero each function begins. Where it is zero to rounding, it is on the side that it goes to.
-    fn signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Vec<f64>, Error> {
+    fn find_signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
         let (nx, start) = (M::Shape::NX, self.integrator.start);
         let forward = if t_end < start { -1.0 } else { 1.0 };
         let parameters = self.integrator.base.parameters;
         place_inputs::<M, T>(self.v.as_mut().as_mut(), u, &parameters);
-        let mut signs = Vec::new();
         let count = self.events.len();
-        signs.try_reserve(count).map_err(|_| Error::OutOfMemory { bytes: count * size_of::<f64>() })?;
+        self.signs.clear();
+        self.signs.try_reserve(count).map_err(|_| Error::OutOfMemory { bytes: count * size_of::<f64>() })?;
         let mut slope = None;
         for index in 0..count {
             let Some(event) = self.events.get(index).copied() else { break };
@@ -184,18 +185,18 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                 size += (*g * *v).to_f64().abs();
             }
             if value.abs() > ROUNDING * T::EPSILON.to_f64() * size {
-                signs.push(value);
+                self.signs.push(value);
                 continue;
             }
             let y = match slope {
                 Some(y) => y,
-                None => *slope.insert(self.slope(x, u, start)?),
+                None => *slope.insert(self.slope_from(self.integrator.base.given, x, u, start)?),
             };
             let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
             let total = products.fold(rate, |sum, (g, f)| sum + *g * *f);
-            signs.push(forward * total.to_f64());
+            self.signs.push(forward * total.to_f64());
         }
-        Ok(signs)
+        Ok(())
     }
 
     /// The last step of a segment is made to end where the event is: its time.
@@ -265,14 +266,24 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         u: &VectorU<M, T>,
         t: T,
     ) -> Result<ArrayK<M, T>, Error> {
-        let base = &mut self.integrator.base;
-        let (nx, point) = (M::Shape::NX, base.point.as_ref());
+        let (nx, point) = (M::Shape::NX, self.integrator.base.point.as_ref());
         // From where the last step ended.
         let mut y = ArrayK::<M, T>::zeroed();
         for (y, from) in y.as_mut().iter_mut().zip(point[..nx].iter().chain(&point[2 * nx..])) {
             *y = *from;
         }
-        let parameters: VectorP<M, T> = base.parameters;
+        self.slope_from(y, x, u, t)
+    }
+
+    /// The same from start values `y`.
+    fn slope_from(
+        &mut self,
+        mut y: ArrayK<M, T>,
+        x: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        t: T,
+    ) -> Result<ArrayK<M, T>, Error> {
+        let parameters: VectorP<M, T> = self.integrator.base.parameters;
         let at = At { x, u, p: &parameters, t };
         self.integrator.consistent.solve(&at, &mut y)?;
         Ok(y)
