@@ -8,6 +8,7 @@ use super::sealed::Family;
 use super::stages::{Convergence, FAST, Failure, Start};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
+use super::transport::LENIENT;
 use super::variational::{Tolerances, Variational};
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;
@@ -27,8 +28,6 @@ const STEADY: (f64, f64) = (0.8, 1.2);
 const SETTLED: usize = 5;
 /// A step is not made longer by less than this: the factors of its matrix are worth more.
 const WORTHWHILE: f64 = 1.2;
-/// So much more is asked of the estimate before the iteration is asked for more than usual.
-const SPREAD: f64 = 4.0;
 /// After so many singular matrices in a row the problem is.
 const SINGULAR: usize = 5;
 
@@ -414,8 +413,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         // adds up over as many as there are, like the tolerance to the power of −1/(2s): of Gauss methods, which damp nothing, it is smaller
         // by that, and of Radau methods by a power of what superconvergence takes for granted. It stays above rounding.
         let wanted = if B::ENDS_ON_STAGE {
-            let spread = (SPREAD / *finer).min(1.0);
-            Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03) * Scalar::sqrt(Scalar::sqrt(spread))
+            let spread = (LENIENT / *finer).min(1.0);
+            Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03) * Scalar::sqrt(spread)
         } else {
             Scalar::powf(finest, s / (s + 1.0)).min(0.03)
         };

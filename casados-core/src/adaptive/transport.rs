@@ -28,9 +28,11 @@ use crate::scalar::{Real, Scalar};
 /// Errors of components that decay are damped by the steps that follow: no more than one of them is there at a time, and it may
 /// be some tolerances.
 const DAMPED: f64 = 0.2;
-/// The errors of oscillations add up: over more steps the more accurate these are. At tolerances that are so coarse that the first
-/// estimate is asked for no less than they are, nothing of it is missed.
+/// The errors of oscillations add up: over more steps the more accurate these are.
 const KEPT: f64 = 4.0;
+/// Where the first estimate is asked for this much less than the solution, or even less, its tolerance says nothing of components that lose
+/// their order; where it is asked for about as much, it says all, and the second one fades out.
+pub(super) const LENIENT: f64 = 4.0;
 
 /// A complex number.
 type Number = Complex<f64, 2>;
@@ -100,7 +102,8 @@ impl Transport {
         }
         // The square of the cosine between them, where they point against each other.
         let against = if product < 0.0 { product / square * (product / bent_square) } else { 0.0 };
-        let share = (DAMPED + (KEPT - DAMPED) * against) * (finer / KEPT).min(1.0);
+        let needed = Scalar::powi((finer / LENIENT).min(1.0), 4);
+        let share = needed * (DAMPED + (KEPT - DAMPED) * against);
         let second = share * Scalar::sqrt(square / count.max(1) as f64);
         // Written so that NaN stays.
         if first.is_nan() || second <= first && second <= 1.0 {
