@@ -16,6 +16,8 @@ use nalgebra::SVector;
 mod data;
 #[path = "../examples/models/ivp/mod.rs"]
 mod models;
+#[path = "ivp/vibrations.rs"]
+mod vibrations;
 
 use data::Record;
 use models::chemistry::{AkzoNobel, E5, E5Conserved, Hires, Oregonator, Robertson, RobertsonConserved};

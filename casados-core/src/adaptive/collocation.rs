@@ -219,7 +219,11 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         let asked =
             start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
         let relative = error.as_ref().iter().zip(bent.as_ref()).zip(asked);
-        self.transport.larger(first, relative.map(|((error, bent), asked)| (*error * asked, *bent * asked)))
+        self.transport.larger(
+            first,
+            start.finer,
+            relative.map(|((error, bent), asked)| (*error * asked, *bent * asked)),
+        )
     }
 
     /// The residual at the point that is there.

@@ -9,7 +9,7 @@
 //! through the matrix of one eigenvalue. Explicit pairs of orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that
 //! are not stiff.
 //!
-//! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels` its loops, `levels` the
+//! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels` its loops, `transport` the second estimate of its error, `levels` the
 //! methods of a family, `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run` the
 //! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the explicit methods,
 //! `replay` and `sensitivities` derivatives of runs, `variational` derivatives that take part in the choice of the steps,

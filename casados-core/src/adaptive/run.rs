@@ -8,6 +8,7 @@ use super::sealed::Family;
 use super::stages::{Convergence, FAST, Failure, Start};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
+use super::transport::LENIENT;
 use super::variational::{Tolerances, Variational};
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;
@@ -56,6 +57,8 @@ pub struct Base<M: Dae, T: Plain> {
     pub(super) scale: ArrayK<M, T>,
     /// and how many times as large those of the tolerances are that were asked for.
     asked: ArrayK<M, T>,
+    /// The largest of these.
+    finer: f64,
     pub result: Nominal<M, T>,
     pub dense: Dense<M, T>,
     pub parameters: VectorP<M, T>,
@@ -185,6 +188,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     point: &self.base.point,
                     scale: &self.base.scale,
                     asked: &self.base.asked,
+                    finer: self.base.finer,
                     known: accepted_h.is_some(),
                     h,
                 };
@@ -242,6 +246,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 point: &self.base.point,
                 scale: &self.base.scale,
                 asked: &self.base.asked,
+                finer: self.base.finer,
                 known: accepted_h.is_some(),
                 h,
             };
@@ -387,8 +392,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     fn tighten<B: Family>(&mut self, stages: usize) {
         let s = stages as f64;
         let exponent = (s + 1.0) / (2.0 * s);
-        let Base { tight, asked, rtol, atol, newton_tolerance, .. } = &mut *self.base;
+        let Base { tight, asked, finer, rtol, atol, newton_tolerance, .. } = &mut *self.base;
         let mut finest: f64 = 1.0;
+        *finer = 0.0;
         let mut before = (T::ZERO, T::ZERO);
         let asked = asked.as_mut().iter_mut();
         for (((tight, asked), rtol), atol) in
@@ -399,14 +405,19 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 before = (*rtol, T::from_f64(0.1 * Scalar::powf(rtol.to_f64(), exponent)));
             }
             *asked = before.1 / *rtol;
+            *finer = finer.max(asked.to_f64());
             *tight = (before.1, *asked * *atol);
             finest = finest.min(before.1.to_f64());
         }
-        // The error of the iteration is the same in step after step, and where nothing is damped it adds up over as many as
-        // there are, like 1/(2s) of a power of the tolerance. To be small beside the tolerance then, it may be the tolerance to the power
-        // of 1 + 1/(2s); of Radau methods, which damp, to two fifths of that. It stays above rounding.
-        let steps = if B::ENDS_ON_STAGE { 0.4 } else { 1.0 };
-        let wanted = Scalar::powf(finest, (s - 1.0 + steps) / (s + 1.0)).min(0.03);
+        // Where the error of the iteration is small beside that of the step. It is the same in step after step, and what is not damped
+        // adds up over as many as there are, like the tolerance to the power of −1/(2s): of Gauss methods, which damp nothing, it is smaller
+        // by that, and of Radau methods by a power of what superconvergence takes for granted. It stays above rounding.
+        let wanted = if B::ENDS_ON_STAGE {
+            let spread = (LENIENT / *finer).min(1.0);
+            Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03) * Scalar::sqrt(spread)
+        } else {
+            Scalar::powf(finest, s / (s + 1.0)).min(0.03)
+        };
         *newton_tolerance = wanted.max(10.0 * T::EPSILON.to_f64() / finest);
         self.measure();
     }

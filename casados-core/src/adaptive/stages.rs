@@ -24,6 +24,8 @@ pub struct Start<'a, M: Dae, T: Real> {
     pub scale: &'a ArrayK<M, T>,
     /// and how many times as large those of the tolerances are that were asked for.
     pub asked: &'a ArrayK<M, T>,
+    /// The largest of these factors.
+    pub finer: f64,
     /// Whether `ẋ` and `z` there are those of a stage of the step before.
     pub known: bool,
     /// Its length.

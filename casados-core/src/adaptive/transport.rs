@@ -25,10 +25,15 @@ use super::control::power;
 use crate::linalg::{Complex, PARTS};
 use crate::scalar::{Real, Scalar};
 
-/// What is left of the error of components that decay: steps that follow damp it, and no more than one stays.
-const DAMPED: f64 = 0.1;
-/// The errors of oscillations add up, and more of them the more accurate and therefore the more steps there are.
+/// Errors of components that decay are damped by the steps that follow: no more than one of them is there at a time, and it may
+/// be some tolerances.
+const DAMPED: f64 = 0.2;
+/// The errors of oscillations add up: over more steps the more accurate these are.
 const KEPT: f64 = 4.0;
+/// Where the first estimate is asked for this much less than the solution, or even less, its tolerance says nothing of components that lose
+/// their order; where it is asked for about as much, it says all, and the second one fades out.
+pub(super) const LENIENT: f64 = 4.0;
+
 /// A complex number.
 type Number = Complex<f64, 2>;
 
@@ -85,8 +90,8 @@ impl Transport {
     }
 
     /// The estimate of lower order or, if that is larger, the power of this one that behaves like it: of errors relative to the
-    /// tolerance that was asked for, and `(hJ)⁻²` times them.
-    pub fn larger<T: Real>(&self, first: f64, relative: impl Iterator<Item = (T, T)>) -> f64 {
+    /// tolerance that was asked for, which is `finer` than that of the first as a factor, and `(hJ)⁻²` times them.
+    pub fn larger<T: Real>(&self, first: f64, finer: f64, relative: impl Iterator<Item = (T, T)>) -> f64 {
         let (mut square, mut product, mut bent_square, mut count) = (0.0f64, 0.0f64, 0.0f64, 0usize);
         for (error, bent) in relative {
             let (error, bent) = (error.to_f64(), bent.to_f64());
@@ -97,7 +102,8 @@ impl Transport {
         }
         // The square of the cosine between them, where they point against each other.
         let against = if product < 0.0 { product / square * (product / bent_square) } else { 0.0 };
-        let share = DAMPED + (KEPT - DAMPED) * against;
+        let needed = Scalar::powi((finer / LENIENT).min(1.0), 4);
+        let share = needed * (DAMPED + (KEPT - DAMPED) * against);
         let second = share * Scalar::sqrt(square / count.max(1) as f64);
         // Written so that NaN stays.
         if first.is_nan() || second <= first && second <= 1.0 {

@@ -249,7 +249,7 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 let [transported, bent]: Transported<M, T> = stages.transported(start.h);
                 let pairs = transported.as_ref().iter().zip(bent.as_ref()).zip(scales);
                 let pairs = pairs.map(|((error, bent), scale)| (*error / scale, *bent / scale));
-                relative = stages.transport().larger(first, pairs);
+                relative = stages.transport().larger(first, start.finer, pairs);
                 if at_end || look > 0 || !(again && relative >= 1.0) {
                     break;
                 }
