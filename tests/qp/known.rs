@@ -79,13 +79,8 @@ struct Row {
     upper_multiplier: f64,
 }
 
-const FREE: Row = Row {
-    lower: -INFINITY,
-    upper: INFINITY,
-    penalty: None,
-    lower_multiplier: 0.0,
-    upper_multiplier: 0.0,
-};
+const FREE: Row =
+    Row { lower: -INFINITY, upper: INFINITY, penalty: None, lower_multiplier: 0.0, upper_multiplier: 0.0 };
 
 /// A row whose value at the solution is known.
 fn row(random: &mut Numbers, kind: &Kind, value: f64) -> Row {
@@ -103,9 +98,7 @@ fn row(random: &mut Numbers, kind: &Kind, value: f64) -> Row {
         3..5 => Row { lower: value, upper: far(random, 1.0), lower_multiplier: force, ..FREE },
         5..7 => Row { upper: value, lower: far(random, -1.0), upper_multiplier: force, ..FREE },
         7 => FREE,
-        _ if random.chance(0.5) => {
-            Row { lower: value, upper: value, lower_multiplier: force, ..FREE }
-        }
+        _ if random.chance(0.5) => Row { lower: value, upper: value, lower_multiplier: force, ..FREE },
         _ => Row { lower: value, upper: value, upper_multiplier: force, ..FREE },
     }
 }
@@ -203,7 +196,14 @@ pub fn problem(random: &mut Numbers, kind: &Kind) -> Result<Known, QpError> {
             .collect();
         let next_units: Vec<f64> = units.get(k + 1).map_or(Vec::new(), |u| u[..next].to_vec());
         let row_units: Vec<f64> = (0..ng).map(|_| random.power(kind.units)).collect();
-        write_stage(&mut known, k, (nx, nu), &data, (&gradient, &offset), (&units[k], &next_units, &row_units));
+        write_stage(
+            &mut known,
+            k,
+            (nx, nu),
+            &data,
+            (&gradient, &offset),
+            (&units[k], &next_units, &row_units),
+        );
         if let Some(mut point) = known.solution.stage_mut(k) {
             write_point(&mut point, &v, &pi, &data.rows, (&units[k], &next_units, &row_units));
         }
@@ -328,7 +328,8 @@ fn write_point(
     }
     let lower = point.x_lower.iter_mut().chain(point.u_lower.iter_mut()).chain(point.g_lower.iter_mut());
     let upper = point.x_upper.iter_mut().chain(point.u_upper.iter_mut()).chain(point.g_upper.iter_mut());
-    for ((lower, upper), (row, unit)) in lower.zip(upper).zip(rows.iter().zip(units.iter().chain(row_units))) {
+    for ((lower, upper), (row, unit)) in lower.zip(upper).zip(rows.iter().zip(units.iter().chain(row_units)))
+    {
         (*lower, *upper) = (row.lower_multiplier / unit, row.upper_multiplier / unit);
     }
 }

@@ -284,7 +284,12 @@ impl<'a, T: Real> Iterate<'a, T> {
         let (inequalities, complementarity) = self.sides.judge();
         // The multipliers of the dynamics make gradients zero but for rounding, which is a part of the terms.
         let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
-        Largest { stationarity: larger_or_nan(stationarity, rounding), dynamics, inequalities, complementarity }
+        Largest {
+            stationarity: larger_or_nan(stationarity, rounding),
+            dynamics,
+            inequalities,
+            complementarity,
+        }
     }
 
     /// The residuals as they are known.

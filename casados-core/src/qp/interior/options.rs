@@ -59,10 +59,25 @@ impl InteriorPointOptions {
         let none = !(absolute > T::ZERO || relative > T::ZERO);
         let all = [
             ("tolerance", self.tolerance, tolerance && !none, "from 0, and above if relative_tolerance is 0"),
-            ("relative_tolerance", self.relative_tolerance, relative >= T::ZERO && relative < T::ONE, "from 0 to 1"),
+            (
+                "relative_tolerance",
+                self.relative_tolerance,
+                relative >= T::ZERO && relative < T::ONE,
+                "from 0 to 1",
+            ),
             ("start_mu", self.start_mu, positive(T::from_f64(self.start_mu)), "above 0, finite"),
-            ("warm_distance", self.warm_distance, positive(T::from_f64(self.warm_distance)), "above 0, finite"),
-            ("no_bound", self.no_bound, T::from_f64(self.no_bound) > T::ZERO, "above 0, infinite if all bounds count"),
+            (
+                "warm_distance",
+                self.warm_distance,
+                positive(T::from_f64(self.warm_distance)),
+                "above 0, finite",
+            ),
+            (
+                "no_bound",
+                self.no_bound,
+                T::from_f64(self.no_bound) > T::ZERO,
+                "above 0, infinite if all bounds count",
+            ),
         ];
         for (name, value, is_valid, allowed) in all {
             if !is_valid {

@@ -162,8 +162,10 @@ impl<T: Real> Sides<'_, T> {
         let pairs = self.slack.iter().zip(&*self.multiplier).zip(&*self.inverse).zip(&*self.target);
         let steps = self.slack_step.iter_mut().zip(&mut *self.multiplier_step);
         let changes = self.scratch.iter().zip(&*self.residual).take(sides);
-        for (((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)), (&change, &residual)) in
-            steps.zip(pairs).zip(changes)
+        for (
+            ((slack_step, multiplier_step), (((&slack, &multiplier), &inverse), &target)),
+            (&change, &residual),
+        ) in steps.zip(pairs).zip(changes)
         {
             let change = change + residual;
             *slack_step = change * (slack * inverse) + compliance * target;

@@ -307,8 +307,7 @@ impl<T: Real> Riccati<'_, T> {
             }
         }
         let (inverse, added) = (part_mut(self.inverse, place.v, nx), part_mut(self.added, place.v, nx));
-        let (regularised, negative) =
-            cholesky::<T, E>(start, ld, 0, nx, Pivots { inverse, added, largest });
+        let (regularised, negative) = cholesky::<T, E>(start, ld, 0, nx, Pivots { inverse, added, largest });
         self.regularised += regularised;
         match negative {
             Some((index, pivot)) => self.verify(qp, place, (nu + index, pivot), scratch),
@@ -342,7 +341,14 @@ impl<T: Real> Riccati<'_, T> {
             v.iter_mut().skip(given).for_each(|v| *v = T::ZERO);
             if from_here {
                 let columns = panel.get(if state.is_some() { nu * ld } else { 0 }..).unwrap_or_default();
-                unit(part_mut(v, begin, ld - begin), columns, ld, begin, part(inverse, begin, ld - begin), state.unwrap_or(index));
+                unit(
+                    part_mut(v, begin, ld - begin),
+                    columns,
+                    ld,
+                    begin,
+                    part(inverse, begin, ld - begin),
+                    state.unwrap_or(index),
+                );
             }
             if !from_here || state.is_some() {
                 let u = part_mut(self.g, 0, nu);
