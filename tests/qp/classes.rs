@@ -51,6 +51,10 @@ impl Counts {
             println!("{seed}: {found:?}");
         }
     }
+    /// Whether no more than so many of a thousand, or one of a few, were given up with the residuals that were reached.
+    fn unsolved(&self, most: u64) -> bool {
+        1000 * (self.iterations_used_up + self.stalled) <= most * self.all.max(1000)
+    }
     fn false_verdicts(&self) -> u64 {
         self.wrong + self.infeasible + self.not_convex + self.others
     }
@@ -174,7 +178,7 @@ fn convex() -> Test {
     for hessian in [Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, empty: true, ..PLAIN };
         let counts = run(&format!("{hessian:?}"), &kind, 300, Start::Cold)?;
-        assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+        assert!(counts.false_verdicts() == 0 && counts.unsolved(1), "{counts:?}");
     }
     Ok(())
 }
@@ -184,7 +188,7 @@ fn degenerate() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, degenerate: true, empty: true, ..PLAIN };
         let counts = run(&format!("degenerate, {hessian:?}"), &kind, 300, Start::Cold)?;
-        assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+        assert!(counts.false_verdicts() == 0 && counts.unsolved(1), "{counts:?}");
     }
     Ok(())
 }
@@ -195,7 +199,7 @@ fn soft() -> Test {
         for huge in [1e3, 1e8, 1e10, 1e12, 1e14, 1e20, f64::INFINITY] {
             let kind = Kind { hessian, soft: Some(huge), empty: true, ..PLAIN };
             let counts = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, Start::Cold)?;
-            assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 999 * counts.all, "{counts:?}");
+            assert!(counts.false_verdicts() == 0 && counts.unsolved(1), "{counts:?}");
         }
     }
     Ok(())
@@ -206,7 +210,7 @@ fn senseless_starts() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, soft: Some(1e12), degenerate: true, empty: true, ..PLAIN };
         let counts = run(&format!("senseless start, {hessian:?}"), &kind, 200, Start::Warm)?;
-        assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 995 * counts.all, "{counts:?}");
+        assert!(counts.false_verdicts() == 0 && counts.unsolved(5), "{counts:?}");
     }
     Ok(())
 }
@@ -217,7 +221,7 @@ fn other_units() -> Test {
         for units in [1.0, 3.0] {
             let kind = Kind { hessian, units, ..PLAIN };
             let counts = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, Start::Cold)?;
-            assert!(counts.false_verdicts() == 0 && 1000 * counts.solved >= 995 * counts.all, "{counts:?}");
+            assert!(counts.false_verdicts() == 0 && counts.unsolved(5), "{counts:?}");
         }
     }
     Ok(())
@@ -250,7 +254,7 @@ fn infeasible() -> Test {
         }
         println!("infeasible by {distance:e}, {hessian:?}: {counts:?}");
         assert!(found_some > 0 && counts.wrong + counts.not_convex + counts.others == 0);
-        assert!(1000 * counts.infeasible >= 995 * counts.all, "{counts:?}");
+        assert!(counts.unsolved(5), "{counts:?}");
     }
     Ok(())
 }

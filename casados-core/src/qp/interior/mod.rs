@@ -177,7 +177,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             };
             attempt.statistics.iterations = iterations;
             attempt.iterations = if locate { iterations.saturating_add(most) } else { most };
-            let violates = !(residuals.inequalities <= 1e2 * self.options.tolerance);
+            let violates =
+                residuals.inequalities.is_nan() || residuals.inequalities > 1e2 * self.options.tolerance;
             if locate && !located && violates {
                 located = true;
                 let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };
