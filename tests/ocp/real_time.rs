@@ -139,3 +139,23 @@ fn errors_leave_the_plan() -> Test {
     controller.prepare()?.feedback(&X0)?;
     Ok(())
 }
+
+/// A QP that fails leaves the plan with its multipliers: the next one starts as warm as if it had not been.
+#[test]
+fn warm_after_an_error() -> Test {
+    let iterations = |fails: bool| -> Result<usize, Box<dyn std::error::Error>> {
+        let mut controller = HeapRealTime::new(problem()?)?;
+        for _ in 0..5 {
+            controller.prepare()?.feedback(&X0)?;
+        }
+        if fails {
+            controller.qp_solver.options.max_iterations = 1;
+            controller.qp_solver.options.locate = false;
+            assert!(matches!(controller.prepare()?.feedback(&[2.0, -3.0]), Err(OcpError::Qp(_))));
+            controller.qp_solver.options.max_iterations = 50;
+        }
+        Ok(controller.prepare()?.feedback(&X0)?.statistics.iterations)
+    };
+    assert_eq!(iterations(true)?, iterations(false)?);
+    Ok(())
+}

@@ -139,3 +139,56 @@ fn memory_of_the_owner() -> Test {
     );
     Ok(())
 }
+
+/// Options that make no sense are named, with their values; the largest number of iterations does not overflow and ends.
+#[test]
+fn options() -> Test {
+    type Spoil = fn(&mut casados::qp::InteriorPointOptions);
+    let cases: [(Spoil, &str); 8] = [
+        (|o| o.tolerance = f64::NAN, "tolerance"),
+        (|o| o.tolerance = -1.0, "tolerance"),
+        (|o| o.tolerance = 0.0, "tolerance"),
+        (|o| o.relative_tolerance = 1.0, "relative_tolerance"),
+        (|o| o.start_mu = 0.0, "start_mu"),
+        (|o| o.start_mu = f64::INFINITY, "start_mu"),
+        (|o| o.warm_distance = -1.0, "warm_distance"),
+        (|o| o.no_bound = f64::NAN, "no_bound"),
+    ];
+    let qp = problem()?;
+    let mut solution = HeapSolution::new(qp.dims())?;
+    for (spoil, expected) in cases {
+        let mut solver = HeapInteriorPoint::new();
+        spoil(&mut solver.options);
+        let found = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+        assert!(matches!(found, Err(QpError::InvalidOption { name, .. }) if name == expected), "{found:?}");
+    }
+    let mut solver = HeapInteriorPoint::new();
+    (solver.options.max_iterations, solver.options.active_sets) = (usize::MAX, usize::MAX);
+    solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
+    let mut unbounded = HeapQp::<f64>::new(&[StageDims::new(0, 1, 0)])?;
+    let mut stage = unbounded.stage_mut(0).ok_or("no stage")?;
+    stage.gradient_u_mut()[0] = -1.0;
+    stage.u_bounds_mut().set(0, 0.0, f64::INFINITY);
+    let mut solution = HeapSolution::new(unbounded.dims())?;
+    let found = solver.solve(unbounded.view(), Start::Cold, solution.view_mut());
+    assert!(matches!(found, Err(QpError::Stalled { .. })), "{found:?}");
+    Ok(())
+}
+
+/// Sizes that no memory has are errors, elements that a matrix does not have are none.
+#[test]
+fn absurd_sizes() -> Test {
+    for dims in
+        [[usize::MAX, 0, 0], [0, usize::MAX, 1], [usize::MAX / 2, 3, usize::MAX], [1 << 31, 1 << 31, 0]]
+    {
+        let dims = [StageDims::new(dims[0], dims[1], dims[2])];
+        assert!(matches!(HeapQp::<f64>::new(&dims), Err(QpError::OutOfMemory { .. })));
+        assert!(matches!(HeapSolution::<f64>::new(&dims), Err(QpError::OutOfMemory { .. })));
+    }
+    let mut qp = problem()?;
+    let mut stage = qp.stage_mut(0).ok_or("no stage")?;
+    stage.a_mut().set(usize::MAX, usize::MAX, 1.0);
+    assert_eq!(stage.a_mut().as_block().get(usize::MAX, 0), None);
+    assert_eq!(stage.a_mut().as_block().get(0, usize::MAX), None);
+    Ok(())
+}

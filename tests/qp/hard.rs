@@ -300,3 +300,49 @@ fn badly_scaled() -> Test {
     close(solution.stage(0).ok_or("no stage")?.u[0], -1e3, 1e-6);
     Ok(())
 }
+
+/// `min ½ u² − u` with `0.6 ≤ u ≤ 1.7` and a soft upper bound that means none: `u = 1`.
+#[test]
+fn soft_bounds_that_mean_none() -> Test {
+    for none in [1e8, 1e9, 1e10, 1e12, 1e14, 1e15, 1e20, 1e300, INFINITY] {
+        let mut qp = HeapQp::<f64>::new(&[StageDims::new(0, 1, 1)])?;
+        let mut stage = qp.stage_mut(0).ok_or("no stage")?;
+        stage.r_mut().set(0, 0, 1.0);
+        stage.gradient_u_mut()[0] = -1.0;
+        stage.u_bounds_mut().set(0, 0.6, 1.7);
+        stage.d_mut().set(0, 0, 1.0);
+        stage.g_bounds_mut().set(0, -0.9, none);
+        stage.g_bounds_mut().soften(0, 100.0, 0.0);
+        let (solution, ..) = solve(&qp)?;
+        close(solution.stage(0).ok_or("no stage")?.u[0], 1.0, 1e-9);
+    }
+    Ok(())
+}
+
+/// A row `0 ≤ 0`, beside variables and in a stage without any: every multiplier of it satisfies the conditions, NaN does not.
+#[test]
+fn rows_without_variables() -> Test {
+    let mut qp = HeapQp::<f64>::new(&[StageDims::new(1, 1, 0), StageDims::new(0, 0, 1)])?;
+    let mut stage = qp.stage_mut(0).ok_or("no stage")?;
+    stage.q_mut().set(0, 0, 1.0);
+    stage.r_mut().set(0, 0, 1.0);
+    qp.stage_mut(1).ok_or("no stage")?.g_bounds_mut().set(0, -INFINITY, 0.0);
+    let (solution, ..) = solve(&qp)?;
+    assert!(solution.stage(1).ok_or("no stage")?.g_upper[0].is_finite());
+    let mut qp = integrator(3, 1.0)?;
+    let mut dims = qp.dims().to_vec();
+    dims[1].ng = 1;
+    qp = HeapQp::new(&dims)?;
+    for mut stage in qp.stages_mut() {
+        stage.a_mut().set(0, 0, 1.0);
+        stage.b_mut().set(0, 0, 1.0);
+        stage.q_mut().set(0, 0, 1.0);
+        stage.r_mut().set(0, 0, 1.0);
+        stage.u_bounds_mut().set(0, -0.1, 0.1);
+        stage.g_bounds_mut().set(0, -INFINITY, 0.0);
+    }
+    qp.fix_initial_state(&[1.0])?;
+    let (solution, ..) = solve(&qp)?;
+    close(solution.stage(0).ok_or("no stage")?.u[0], -0.1, 1e-8);
+    Ok(())
+}

@@ -197,7 +197,6 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: A
         ocp.fix_initial_state(x0)?;
         solution.copy_from(&ocp.iterate);
         let start = if *warm { Start::Warm } else { Start::Cold };
-        *warm = false;
         let statistics = qp_solver.solve(ocp.qp(), start, solution.view_mut())?;
         *warm = true;
         core::mem::swap(&mut ocp.iterate, solution);

@@ -17,7 +17,7 @@ pub(super) struct Shape {
 
 impl Shape {
     fn index(&self, row: usize, column: usize) -> Option<usize> {
-        (row < self.rows && column < self.columns).then_some(row * self.row + column * self.column)
+        (row < self.rows && column < self.columns).then(|| row * self.row + column * self.column)
     }
 }
 

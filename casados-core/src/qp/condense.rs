@@ -12,7 +12,9 @@
 //! memory passes by in each iteration.
 
 use super::error::{Field, QpError};
-use super::interior::{Columns, MORE, Part, Source, add_transposed, product, subtract, symmetric};
+use super::interior::{
+    Columns, MORE, Part, Source, add_symmetric, add_transposed, product, subtract, symmetric,
+};
 use super::layout::{Place, Places, StageDims, assign, pad, part, part_mut};
 use super::memory::reserve;
 use super::problem::{HeapQp, QpView, Row};
@@ -500,7 +502,9 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
             rows: Places::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
         };
         let most = places.map(|p| pad::<T>(p.next + p.ng)).max().unwrap_or(0);
-        let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + most + pad::<T>(largest.n);
+        let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);
+        let room = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
+        let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + room;
         reserve(work, length)?;
         origins.clear();
         origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes: largest.rows })?;
@@ -513,9 +517,30 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         let result = solver.solve(condensed.view(), start, start_and_solution.view_mut());
         copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), true);
         let (minus, g) = work.split_at_mut_checked(most).unwrap_or_default();
-        T::registers(Expand { qp, block: *block, solution, minus, g });
-        result.map_err(|error| translate(error, qp, *block, dims, rows))
+        T::registers(Expand { qp, block: *block, solution: solution.reborrow(), minus, g });
+        result.map_err(|error| translate(error, qp, *block, dims, rows)).map(|statistics| {
+            // Penalties are the same; what is constant in eliminated states is in none of the condensed costs.
+            let g = work.get_mut(..pad::<T>(largest.n.max(condensed_n))).unwrap_or_default();
+            let difference = quadratic(qp, solution.v, g)
+                - quadratic(condensed.view(), start_and_solution.view_mut().v, g);
+            Statistics { objective: statistics.objective + difference, ..statistics }
+        })
     }
+}
+
+/// `Σ ½ vᵀ H v + hᵀ v`, with room for a vector over the variables of a stage.
+fn quadratic<T: Real>(qp: QpView<'_, T>, v: &[T], product: &mut [T]) -> f64 {
+    let mut sum = 0.0;
+    for place in Places::<T>::new(qp.dims) {
+        let data = part(qp.data, place.data, place.data_len());
+        let (v, product) = (part(v, place.v, place.ld), part_mut(product, 0, place.ld));
+        product.fill(T::ZERO);
+        add_symmetric(product, part(data, place.matrix(), place.hessian()), place.ld, v, place.n);
+        for ((&v, &product), &linear) in v.iter().zip(&*product).zip(part(data, place.gradient(), place.n)) {
+            sum += v.to_f64() * (0.5 * product.to_f64() + linear.to_f64());
+        }
+    }
+    sum
 }
 
 /// An error in terms of the problem that was not condensed.

@@ -214,6 +214,26 @@ pub(crate) const fn end<T>(dims: &[StageDims]) -> Place {
     behind::<T>(Place::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
 }
 
+/// Whether lengths of such a horizon are more than there is memory, and may be more than a `usize` holds.
+pub(crate) const fn is_absurd(dims: &[StageDims]) -> bool {
+    let (mut total, mut rest): (u128, _) = (0, dims);
+    while let Some((&first, after)) = rest.split_first() {
+        let next = match after.first() {
+            Some(dims) => dims.nx as u128,
+            None => 0,
+        };
+        let (n, ng) = (first.nx as u128 + first.nu as u128 + 16, first.ng as u128 + 16);
+        // Two of these are below 2¹³⁰ at most: what is larger than 2⁶³ each is too large by itself.
+        let (most, columns) = (1 << 62, n + next + ng);
+        if n > most || columns > most {
+            return true;
+        }
+        total = total.saturating_add(16 * n * columns);
+        rest = after;
+    }
+    total > (usize::MAX / 64) as u128
+}
+
 /// The place behind stages that follow a place, from that one on whose number is given.
 const fn behind<T>(mut place: Place, mut stage: usize, dims: &[StageDims]) -> Place {
     let mut rest = dims;

@@ -2,7 +2,7 @@
 
 use super::block::{Block, BlockMut, Shape};
 use super::error::{Field, QpError};
-use super::layout::{Place, Places, StageDims, assign, end, part, part_mut};
+use super::layout::{Place, Places, StageDims, assign, end, is_absurd, part, part_mut};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -409,10 +409,10 @@ impl<T: Real> HeapQp<T> {
 }
 
 impl<T: Real, D, M> Qp<T, D, M> {
-    /// How many numbers the data takes.
+    /// How many numbers the data takes; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
-        end::<T>(dims).data
+        if is_absurd(dims) { usize::MAX } else { end::<T>(dims).data }
     }
 }
 

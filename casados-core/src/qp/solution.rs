@@ -1,7 +1,7 @@
 //! Solutions: variables and multipliers.
 
 use super::error::{Field, QpError};
-use super::layout::{Place, Places, StageDims, end, move_forward, part, part_mut, take_mut};
+use super::layout::{Place, Places, StageDims, end, is_absurd, move_forward, part, part_mut, take_mut};
 use super::problem::QpView;
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -97,9 +97,12 @@ impl<T: Real> HeapSolution<T> {
 }
 
 impl<T: Real, D, M> Solution<T, D, M> {
-    /// How many numbers a solution takes.
+    /// How many numbers a solution takes; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
+        if is_absurd(dims) {
+            return usize::MAX;
+        }
         let end = end::<T>(dims);
         end.v + end.dynamics + 2 * end.row
     }

@@ -31,7 +31,7 @@ pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
 use super::error::{Field, QpError};
-use super::layout::StageDims;
+use super::layout::{StageDims, is_absurd};
 use super::problem::QpView;
 use super::solution::SolutionView;
 use super::solver::{QpSolver, Start};
@@ -92,6 +92,9 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
     /// To locate what makes a problem infeasible it takes as much as if all were soft.
     #[must_use]
     pub const fn memory(dims: &[StageDims], bounds: usize, soft: usize, equations: usize) -> (usize, usize) {
+        if is_absurd(dims) {
+            return (usize::MAX, usize::MAX);
+        }
         let counts = Counts { lower: bounds, upper: 0, soft, equations };
         (Iterate::<T>::memory(dims, &counts), counts.indices())
     }
@@ -177,7 +180,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             };
             attempt.statistics.iterations = iterations;
             attempt.iterations = if locate { iterations.saturating_add(most) } else { most };
-            let violates = !(residuals.inequalities <= 1e2 * self.options.tolerance);
+            let violates =
+                residuals.inequalities.is_nan() || residuals.inequalities > 1e2 * self.options.tolerance;
             if locate && !located && violates {
                 located = true;
                 let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };

@@ -74,6 +74,8 @@ const OLD: f64 = 0.01;
 /// An iteration that leaves less than this part makes progress; so many may make none.
 const PROGRESS: f64 = 0.9;
 const IDLE: usize = 50;
+/// After so many correctors may go in a circle.
+const CYCLE: usize = 8;
 
 /// What residuals are to be below.
 pub struct Limits<T> {
@@ -221,7 +223,7 @@ impl<T: Real> Iterate<'_, T> {
                 self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
                 self.newton::<E>(false)?;
                 alpha = self.sides.longest::<E>(keep);
-                if alpha < T::from_f64(SHORT) {
+                if alpha < T::from_f64(SHORT) || idle > CYCLE {
                     // Products are too different for the corrector to be right: first they are made equal.
                     self.sides.aim(self.mu * T::from_f64(SHORT));
                     self.newton::<E>(false)?;
@@ -229,18 +231,6 @@ impl<T: Real> Iterate<'_, T> {
                 }
             }
             statistics.iterations += 1;
-            #[cfg(feature = "std")]
-            if std::env::var("DBG").is_ok() {
-                let r: crate::qp::Residuals = residuals.into();
-                std::eprintln!(
-                    "{} mu {:e} alpha {:e} reg {} {r} step {:e}",
-                    statistics.iterations,
-                    self.mu.to_f64(),
-                    alpha.to_f64(),
-                    self.riccati.regularised,
-                    largest_size::<T, E>(self.step).to_f64()
-                );
-            }
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) || short > 4 {
                 break true;
