@@ -133,7 +133,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
 
     /// Start values `ẋ` and `z` for Newton's method, at all stages: read with
     /// [`Start::Given`](crate::options::Start), and with `Start::Warm` where there is no warm start. Of states that
-    /// [follow](crate::model::Follower) another `ẋ` is known, and is not read.
+    /// are [kinematic](crate::model::Kinematic) `ẋ` is known, and is not read.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
