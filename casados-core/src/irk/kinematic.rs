@@ -313,14 +313,14 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
         rows: &mut [Packet<E, S, W>],
         viewer: &mut impl Viewer<E, S, W>,
     ) {
-        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha: *minus_ha, rows, viewer });
+        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha, rows, viewer });
     }
 }
 
 /// See [`Forward::reconstruct`].
 struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
     of: &'b Forward<'a, M, E, D, S, W>,
-    minus_ha: Block<E, S>,
+    minus_ha: &'b Block<E, S>,
     rows: &'b mut [Packet<E, S, W>],
     viewer: &'b mut V,
 }
