@@ -140,7 +140,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
 
     /// Start values `ẋ` and `z` for Newton's method, at all stages, instead of the nominal values of the model: with
     /// [`Start::Zero`](crate::options::Start) they are not read, and with `Start::Warm` only where there is no warm start. Of states
-    /// that [follow](crate::model::Follower) another `ẋ` is known, and is not read. They stay until they are set again.
+    /// that are [kinematic](crate::model::Kinematic) `ẋ` is known, and is not read. They stay until they are set again.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.

@@ -313,14 +313,14 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
         rows: &mut [Packet<E, S, W>],
         viewer: &mut impl Viewer<E, S, W>,
     ) {
-        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha: *minus_ha, rows, viewer });
+        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha, rows, viewer });
     }
 }
 
 /// See [`Forward::reconstruct`].
 struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usize> {
     of: &'b Forward<'a, M, E, D, S, W>,
-    minus_ha: Block<E, S>,
+    minus_ha: &'b Block<E, S>,
     rows: &'b mut [Packet<E, S, W>],
     viewer: &'b mut V,
 }
@@ -334,13 +334,18 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, con
     fn at<A: Arithmetic>(&mut self, state: usize) {
         let Self { of: forward, minus_ha, rows, viewer } = self;
         let Some(of) = kinematic::<M>(state) else { return };
-        let mut packet = [forward.own::<A>(of); S];
-        if let (Some(velocity), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian))
-            && let Some(dk) = rows.get(velocity)
-        {
-            let mut moved = [[E::from_f64(0.0); W]; S];
-            subtract::<A, E, S, W>(&mut moved, minus_ha, dk);
-            subtract_diagonal::<A, E, S, W>(&mut packet, &[minus_c; S], &moved);
+        let mut packet = [[E::from_f64(0.0); W]; S];
+        match (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian)) {
+            (Some(velocity), Some(minus_c)) => {
+                if let (Some(v), Some(dk)) = (forward.v.get(velocity), rows.get(velocity)) {
+                    packet = [*v; S];
+                    subtract::<A, E, S, W>(&mut packet, minus_ha, dk);
+                }
+                for element in packet.as_flattened_mut() {
+                    *element = -(minus_c * *element);
+                }
+            }
+            _ => packet = [forward.own::<A>(of); S],
         }
         if let Some(row) = rows.get_mut(state) {
             *row = packet;

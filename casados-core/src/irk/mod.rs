@@ -15,7 +15,7 @@
 //! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its `progress`, and, where that does
 //! not arrive, `pivoted`, what errors say about where it `started`, and the `doubt` about linear equations, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`
 //! by products of panels (`curvature`) or by a `curved_adjoint` of large models,
-//! `along` an integrand, `verify` what was solved, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
+//! `along` an integrand, `verify` what was solved, states that are `kinematic`, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
 //! `sensitivities` what users see.
 
 mod adjoint;

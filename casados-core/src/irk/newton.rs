@@ -84,9 +84,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let jacobian = operations.residual_jacobian as f64;
         // One for all stages, where they are not evaluated side by side.
         let middle = if E::LANES > 1 { jacobian / s } else { jacobian };
-        let products = plan.products() + inverses;
-        let of_blocks = (jacobian + products * s * s) / Self::ITERATION;
-        [of_blocks, (middle + products * 4.0) / Self::ITERATION]
+        let (products, terms) = (plan.products() + inverses, plan.assembly.len() as f64);
+        let of_blocks = (jacobian + (products + terms / s) * s * s) / Self::ITERATION;
+        [of_blocks, (middle + (products + terms) * 4.0) / Self::ITERATION]
     };
 
     /// The cost of a residual, in iterations.

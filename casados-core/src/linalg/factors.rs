@@ -121,7 +121,9 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
         let Self { jacobian, a, h, blocks } = self;
         let coupling = coupling(a, h);
         let mut square = [[E::from_f64(0.0); S]; S];
-        A::subtract_blocks(&mut square, &coupling, &coupling);
+        if const { !M::STRUCTURE.elimination.felt.is_empty() } {
+            A::subtract_blocks(&mut square, &coupling, &coupling);
+        }
         each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, coupling, square, blocks });
     }
 }
@@ -149,23 +151,31 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
             return;
         }
         let Some(to) = blocks.get_mut(of.block as usize) else { return };
-        let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
         // An index that marks what is not there lies outside of the Jacobian.
-        if let Some(&(mut values)) = jacobian.get(of.entry as usize) {
-            if let Some(minus_c) = jacobian.get(of.by as usize) {
-                for value in &mut values {
-                    *value = -(*value * minus_c[0]);
-                }
+        let Some(&(mut values)) = jacobian.get(of.entry as usize) else {
+            *to = [[E::from_f64(0.0); S]; S];
+            return;
+        };
+        if let Some(minus_c) = jacobian.get(of.by as usize) {
+            for value in &mut values {
+                *value = -(*value * minus_c[0]);
             }
-            if of.order == 0 {
-                for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
-                    column[stage] = column[stage] + value;
-                }
-            } else {
-                let power = if of.order == 1 { &self.coupling } else { &self.square };
-                for (column, power) in block.iter_mut().zip(power) {
-                    A::subtract_products(column, &values, power);
-                }
+        }
+        if of.order == 0 && !of.first {
+            for (stage, (column, &value)) in to.iter_mut().zip(&values).enumerate() {
+                column[stage] = column[stage] + value;
+            }
+            return;
+        }
+        let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
+        if of.order == 0 {
+            for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
+                column[stage] = value;
+            }
+        } else {
+            let power = if of.order == 1 { &self.coupling } else { &self.square };
+            for (column, power) in block.iter_mut().zip(power) {
+                A::subtract_products(column, &values, power);
             }
         }
         *to = block;
