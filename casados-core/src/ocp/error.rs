@@ -187,6 +187,15 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
+    /// An option of the solver is out of its range.
+    InvalidOption {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
     /// The QP has no solution.
     Qp(QpError),
     /// Memory could not be allocated.
@@ -280,6 +289,9 @@ impl fmt::Display for OcpError {
                 write!(f, "stage {stage}: output {output} of `{function}` is {value}")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
+            Self::InvalidOption { name, value, allowed } => {
+                write!(f, "the option `{name}` is {value}: it has to be {allowed}")
+            }
             Self::Qp(error) => error.fmt(f),
             Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }
