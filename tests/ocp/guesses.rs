@@ -112,14 +112,39 @@ fn car_without_time() -> Test {
     Ok(())
 }
 
-/// Walls on opposite sides three stages apart, which the speed limit and the longest time cannot connect.
+/// A car that turns and accelerates, over a given time: position, heading, speed.
+#[ode]
+fn unicycle(x: [f64; 4], u: [f64; 2]) -> [f64; 4] {
+    [x[3] * x[2].cos(), x[3] * x[2].sin(), u[0], u[1]]
+}
+
+#[function]
+fn unicycle_effort(_x: [f64; 4], u: [f64; 2]) -> f64 {
+    0.5 * (u[0] * u[0] + u[1] * u[1])
+}
+
+/// Walls on opposite sides, three stages or 0.75 s apart: 3 m at a speed of 2 m/s at most.
 #[test]
-fn car_between_walls() -> Test {
-    let mut ocp = car!(12.0);
-    ocp.bound("x[1]", 20..=20, 30.0, 1e3)?.bound("x[1]", 23..=23, -1e3, -30.0)?;
+fn walls_on_opposite_sides() -> Test {
+    let n = 40;
+    let mut ocp = Problem::new(Erk::<Unicycle, Rk4>::new(Options::default())?)
+        .running_cost(GeneralCost::<UnicycleEffort>::new())
+        .on(Horizon::uniform(n, 0.25))?;
+    ocp.fix_initial_state(&[0.0, 0.0, 0.0, 1.0])?;
+    ocp.bound("x[3]", .., 0.0, 2.0)?.bound("u[0]", .., -2.0, 2.0)?.bound("u[1]", .., -1.0, 1.0)?;
+    ocp.bound("x[1]", 20..=20, 1.5, 1e2)?.bound("x[1]", 23..=23, -1e2, -1.5)?;
+    ocp.bound("x[0]", n..=n, 10.0, 10.0)?.bound("x[1]", n..=n, 0.0, 0.0)?;
+    for k in 0..=n {
+        let stage = ocp.iterate_mut().stage_mut(k).ok_or("no stage")?;
+        stage.x.copy_from_slice(&[10.0 * k as f64 / n as f64, 0.0, 0.0, 1.0]);
+    }
     let outcome = solve(&mut ocp)?;
-    assert!(matches!(outcome.status, Status::Infeasible { .. }), "{outcome}");
+    let Status::Infeasible { violation, .. } = outcome.status else {
+        return Err(outcome.to_string().into());
+    };
     assert!(outcome.iterations < 50);
+    // Both walls together are missed by 1.5 m at least, one of them by half of that.
+    assert!(violation > 0.75 - 1e-3, "{violation}");
     Ok(())
 }
 
