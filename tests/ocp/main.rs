@@ -14,6 +14,7 @@ mod chain;
 mod closed_form;
 mod curvature;
 mod errors;
+mod guesses;
 mod infeasible;
 mod ipm;
 mod lifted;

@@ -6,6 +6,12 @@ use crate::scalar::Real;
 /// What is done with the Hessian of a stage that is not positive definite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convexification {
+    /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and bounds leave, a multiple of the
+    /// identity is added to all of them, as little as it takes (A. Wächter, L. T. Biegler, "On the
+    /// implementation of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math. Program.
+    /// 106, 2006, section 3.1). Near a solution with second-order sufficient conditions nothing is added, and convergence is
+    /// quadratic. This is what [`Sqp`](super::Sqp) does; a QP without it is that of `None`.
+    Reduced,
     /// Nothing. The reduced Hessian may be positive definite where that of a stage is not; the QP says if it is not.
     None,
     /// Eigenvalues that are too small become a small positive number.
@@ -31,7 +37,7 @@ pub(super) fn convexify<T: Real>(
     n: usize,
     scratch: &mut [T],
 ) {
-    if method == Convexification::None || n == 0 {
+    if matches!(method, Convexification::None | Convexification::Reduced) || n == 0 {
         return;
     }
     let mut largest = T::ZERO;

@@ -37,12 +37,18 @@ pub struct GaussNewton {
     pub convexification: Convexification,
 }
 
-/// The Hessian of the Lagrangian, made convex stage by stage. Where costs or constraints depend on algebraic states, all intervals are
+/// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all intervals are
 /// simulated first: what second derivatives of these states are multiplied by depends on them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exact {
-    /// What is done where a stage is not convex.
+    /// What is done where it is not convex. Default [`Convexification::Reduced`].
     pub convexification: Convexification,
+}
+
+impl Default for Exact {
+    fn default() -> Self {
+        Self { convexification: Convexification::Reduced }
+    }
 }
 
 impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
@@ -216,6 +222,21 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.objective = objective;
         self.couple();
         Ok(())
+    }
+
+    /// Adds `½ δ ‖v − v̄‖²` to the objective of the QP at the iterate `v̄`.
+    pub(super) fn regularise(&mut self, delta: T) {
+        let (v, _) = self.iterate.vectors();
+        let mut begin = 0;
+        for mut stage in self.qp.stages_mut() {
+            let Arrays { n, ld, hessian, gradient, .. } = stage.arrays();
+            let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);
+            for ((h, gradient), &v) in diagonal.zip(gradient).zip(part(v, begin, n)) {
+                *h = *h + delta;
+                *gradient = *gradient - delta * v;
+            }
+            begin += ld;
+        }
     }
 
     /// How well the iterate satisfies the conditions of optimality of the problem, and the objective with penalties of soft

@@ -154,6 +154,17 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             *target = f(a, b);
         }
     }
+    /// Everything as a function of what it was and another solution of the same dimensions.
+    pub(crate) fn update(&mut self, other: &Self, f: impl Fn(T, T) -> T) {
+        for (target, &other) in self.memory.as_mut().iter_mut().zip(other.memory.as_ref()) {
+            *target = f(*target, other);
+        }
+    }
+    /// All multipliers.
+    pub(crate) fn multipliers_mut(&mut self) -> &mut [T] {
+        let begin = self.lengths[0];
+        self.memory.as_mut().get_mut(begin..).unwrap_or_default()
+    }
     /// A stage.
     #[must_use]
     pub fn stage(&self, stage: usize) -> Option<SolutionStage<'_, T>> {

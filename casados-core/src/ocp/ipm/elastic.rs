@@ -23,7 +23,7 @@ pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<
     state: &State,
     given: &[T],
 ) -> Option<Worst> {
-    state.elastic.and_then(|_| ocp.worst(given))
+    state.elastic.and_then(|_| ocp.worst(given).0)
 }
 
 /// What a stationary point is: the solution, or one of penalties, which grow as long as that helps.

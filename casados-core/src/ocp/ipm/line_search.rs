@@ -153,7 +153,7 @@ where
             }
         }
         let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
-        let gaps = ocp.gaps(self.trial, self.work.ends);
+        let gaps = ocp.gaps_at(self.trial, self.work.ends);
         let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
         let mut theta = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);

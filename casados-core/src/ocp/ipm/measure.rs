@@ -89,7 +89,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The sum of the gaps between the ends of intervals and the states that follow.
-    pub(super) fn gaps(&self, at: &Solution<T, D, M>, ends: &[T]) -> f64 {
+    pub(super) fn gaps_at(&self, at: &Solution<T, D, M>, ends: &[T]) -> f64 {
         let nx = P::Shape::NX;
         let mut sum = 0.0;
         for (k, next) in at.stages().skip(1).enumerate() {

@@ -69,9 +69,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The largest violation of a bound that is hard, by the penalties that are remembered.
-    pub(in crate::ocp) fn worst(&self, memory: &[T]) -> Option<Worst> {
-        let mut worst: Option<Worst> = None;
+    /// The largest violation of a bound that is hard, by the penalties that are remembered, and the sum of all of them.
+    pub(in crate::ocp) fn worst(&self, memory: &[T]) -> (Option<Worst>, f64) {
+        let (mut worst, mut sum): (Option<Worst>, f64) = (None, 0.0);
         let mut begin = 0;
         let fixed = self.initial == Initial::Fixed;
         for (k, (stage, point)) in self.qp().stages().zip(self.iterate().stages()).enumerate() {
@@ -102,6 +102,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                         (Side::Upper, value - at(upper), is_hard(upper_penalties)),
                     ] {
                         let violation = violation.to_f64();
+                        if hard && violation > 0.0 {
+                            sum += violation;
+                        }
                         if hard && violation > worst.map_or(0.0, |w| w.violation) {
                             worst = Some(Worst { field, stage: k, index, side, violation });
                         }
@@ -109,7 +112,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 }
             }
         }
-        worst
+        (worst, sum)
     }
 }
 

@@ -36,14 +36,14 @@ pub struct Iteration {
     pub step: f64,
     /// Iterations of QPs.
     pub qp_iterations: usize,
+    /// What was added to the diagonal of the Hessian because the QP was not convex ([`Convexification::Reduced`](super::super::Convexification)).
+    pub regularisation: f64,
     /// Whether bounds had penalties because the QP was infeasible.
     pub elastic: bool,
     /// Whether the step has a second-order correction.
     pub corrected: bool,
     /// The barrier parameter `μ`; zero in sequential quadratic programming.
     pub barrier: f64,
-    /// What was added to the diagonal of the Hessian, `δ_w`.
-    pub regularisation: f64,
     /// How long it took.
     pub times: Times,
 }
@@ -60,8 +60,8 @@ pub enum Status {
     MaxIterations,
     /// The observer stopped it.
     Stopped,
-    /// Near the iterate no point satisfies all constraints. This is the one that is violated most where their weighted sum is
-    /// smallest.
+    /// Near the iterate no point satisfies all constraints: no direction makes the sum of its gaps and violations smaller by a
+    /// thousandth, to first order. This is the constraint that the iterate violates most.
     Infeasible {
         /// The constraint.
         constraint: ConstraintName,
@@ -111,16 +111,29 @@ impl fmt::Display for Status {
         match self {
             Self::Converged => f.write_str("converged"),
             Self::Acceptable => f.write_str("converged to the acceptable tolerance"),
-            Self::MaxIterations => f.write_str("not converged: the iterations were used up"),
+            Self::MaxIterations => f.write_str(
+                "not converged: the iterations were used up; more of them (`options.max_iterations`), exact Hessians \
+                 (`Sqp::exact`) or another guess may help",
+            ),
             Self::Stopped => f.write_str("stopped by the observer"),
             Self::Infeasible { constraint, violation } => {
-                write!(f, "infeasible: {constraint} is violated by {violation:e}")
+                write!(f, "infeasible near the iterate: {constraint} is violated by {violation:e}; another guess may help")
             }
             Self::InfeasibleQp { constraint, violation } => {
-                write!(f, "the QP is infeasible: {constraint} is violated by {violation:e} at least")
+                write!(
+                    f,
+                    "the QP is infeasible: {constraint} is violated by {violation:e} at least; `options.elastic` goes on \
+                     where only QPs are"
+                )
             }
-            Self::QpFailed(error) => write!(f, "the QP was not solved: {error}"),
-            Self::NoProgress => f.write_str("no step was short enough to make progress"),
+            Self::QpFailed(error @ QpError::NotConvex { .. }) => {
+                write!(f, "the QP was not solved: {error}; `Convexification::Reduced` adds what is missing")
+            }
+            Self::QpFailed(error) => write!(f, "the QP was not solved: {error}; another guess may help"),
+            Self::NoProgress => f.write_str(
+                "no step of at least `options.shortest_step` makes progress; exact Hessians (`Sqp::exact`), another \
+                 `options.globalisation` or another guess may help",
+            ),
         }
     }
 }
@@ -143,7 +156,7 @@ impl fmt::Display for Log<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "iter       objective   stationar.  dynamics  inequal.  complem.      step  QP it.   lin ms    QP ms  search ms"
+            "iter       objective   stationar.  dynamics  inequal.  complem.      step  regular.  QP it.   lin ms    QP ms  search ms"
         )?;
         for i in self.0 {
             let Residuals { stationarity, dynamics, inequalities, complementarity } = i.residuals;
@@ -154,7 +167,7 @@ impl fmt::Display for Log<'_> {
             };
             writeln!(
                 f,
-                "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:6} {:8.3} {:8.3} {:10.3}",
+                "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:8.1e} {:6} {:8.3} {:8.3} {:10.3}",
                 i.iteration,
                 i.objective,
                 stationarity,
@@ -162,6 +175,7 @@ impl fmt::Display for Log<'_> {
                 inequalities,
                 complementarity,
                 i.step,
+                i.regularisation,
                 i.qp_iterations,
                 1e3 * i.times.linearise,
                 1e3 * i.times.qp,

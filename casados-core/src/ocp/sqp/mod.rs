@@ -1,11 +1,19 @@
 //! Sequential quadratic programming.
 //!
 //! ```text
-//! linearise at (x̄, ū)  →  QP with the Hessian of Gauss and Newton, or the exact one made convex  →  step
+//! linearise at (x̄, ū)  →  QP with the Hessian of Gauss and Newton, or the exact one  →  step
 //! ```
+//!
+//! | | |
+//! | --- | --- |
+//! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible (`elastic`) |
+//! | `search` | how far a step goes, by what `measure` finds at trial points |
+//! | `run` | the iterations, and how they end |
 
+mod direction;
 pub(super) mod elastic;
 mod log;
+mod measure;
 mod options;
 mod run;
 mod search;
@@ -43,6 +51,8 @@ pub struct Sqp<S, C, T, D, M> {
     trial: Solution<T, D, M>,
     /// The best iterate.
     best: Solution<T, D, M>,
+    /// The weights of constraints in the merit function, in the places of their multipliers.
+    weights: Solution<T, D, M>,
     /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode exchanges.
     work: M,
     #[cfg(feature = "alloc")]
@@ -87,6 +97,7 @@ impl<S, T: Real> HeapSqp<S, GaussNewton, T> {
             solution: Solution::new(dims)?,
             trial: Solution::new(dims)?,
             best: Solution::new(dims)?,
+            weights: Solution::new(dims)?,
             work,
             log: Vec::new(),
         })
@@ -113,6 +124,7 @@ impl<S, T: Real, D, M> Sqp<S, GaussNewton, T, D, M> {
             solution: self.solution,
             trial: self.trial,
             best: self.best,
+            weights: self.weights,
             work: self.work,
             #[cfg(feature = "alloc")]
             log: self.log,
@@ -124,7 +136,7 @@ impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
     /// How many numbers it takes for a problem.
     #[must_use]
     pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
-        3 * Solution::<T, (), ()>::memory(dims) + super::linearise::ends::<P, T>(dims) + elastic::memory(dims)
+        4 * Solution::<T, (), ()>::memory(dims) + super::linearise::ends::<P, T>(dims) + elastic::memory(dims)
     }
 
     /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.
@@ -143,7 +155,8 @@ impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
         let length = Solution::<T, (), ()>::memory(dims);
         let (solution, rest) = memory.split_at_mut_checked(length).unwrap_or_default();
         let (trial, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
-        let (best, work) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (best, rest) = rest.split_at_mut_checked(length).unwrap_or_default();
+        let (weights, work) = rest.split_at_mut_checked(length).unwrap_or_default();
         Ok(Self {
             options: SqpOptions::new::<T>(),
             curvature: GaussNewton::default(),
@@ -151,6 +164,7 @@ impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
             solution: Solution::in_memory(dims, solution)?,
             trial: Solution::in_memory(dims, trial)?,
             best: Solution::in_memory(dims, best)?,
+            weights: Solution::in_memory(dims, weights)?,
             work,
             #[cfg(feature = "alloc")]
             log: Vec::new(),

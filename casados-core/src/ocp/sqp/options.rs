@@ -1,12 +1,17 @@
 //! What can be chosen.
 
+use crate::ocp::error::OcpError;
+
 /// How far a step goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Globalisation {
-    /// All the way, always: what converges fastest where it converges.
-    #[default]
+    /// All the way, always.
     FullStep,
-    /// As far as the merit function `f + ν ‖c‖₁` shrinks as it should, with second-order correction.
+    /// As far as the merit function `f + Σ ν_i |c_i|` shrinks as it should, with second-order correction. Each constraint has a
+    /// weight of its own, which follows its multiplier: `ν ← max(|λ|, ½ (ν + |λ|))` (M. J. D. Powell, "A fast algorithm for
+    /// nonlinearly constrained optimization calculations", 1978). It does not depend on the units of constraints, and near a
+    /// solution full steps are what it accepts: the linearisation there is that of the next iteration.
+    #[default]
     Merit,
     /// As far as objective or violation shrink compared to all iterates before, with second-order correction.
     Filter,
@@ -15,22 +20,22 @@ pub enum Globalisation {
 /// Options of [`Sqp`](super::Sqp).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SqpOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below. Default 1e-6; of single precision 1e-3.
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Default 1e-6; of single precision 1e-3.
     pub tolerance: f64,
-    /// Default 50.
+    /// Default 200.
     pub max_iterations: usize,
-    /// Default [`Globalisation::FullStep`].
+    /// Default [`Globalisation::Merit`].
     pub globalisation: Globalisation,
     /// Whether QPs begin at the solution of the one before. Default true.
     pub warm_start: bool,
     /// QPs are solved to this part of the largest residual, if that is more than the solver's own tolerance: what the
-    /// linearisation is off by is more. Default 1e-4.
+    /// linearisation is off by is more. From 0 to 1, default 1e-4.
     pub qp_accuracy: f64,
     /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default true.
     pub elastic: bool,
-    /// The first of these penalties, linear; they grow by factors of ten up to ten thousand times that. Default 1e3.
+    /// These penalties, linear; positive. Default 1e3.
     pub elastic_penalty: f64,
-    /// The shortest step of a line search. Default 1e-6.
+    /// The shortest step of a line search; above 0, at most 1. Default 1e-6.
     pub shortest_step: f64,
 }
 
@@ -40,7 +45,7 @@ impl SqpOptions {
     pub fn new<T: crate::scalar::Real>() -> Self {
         Self {
             tolerance: if T::EPSILON < 1e-10 { 1e-6 } else { 1e-3 },
-            max_iterations: 50,
+            max_iterations: 200,
             globalisation: Globalisation::default(),
             warm_start: true,
             qp_accuracy: 1e-4,
@@ -48,5 +53,23 @@ impl SqpOptions {
             elastic_penalty: 1e3,
             shortest_step: 1e-6,
         }
+    }
+
+    /// # Errors
+    /// [`OcpError::InvalidOption`]
+    pub(super) fn check(&self) -> Result<(), OcpError> {
+        let positive = |value: f64| value > 0.0 && value.is_finite();
+        let (accuracy, step) = (self.qp_accuracy, self.shortest_step);
+        for (name, value, is_valid, allowed) in [
+            ("tolerance", self.tolerance, positive(self.tolerance), "above 0 and finite"),
+            ("qp_accuracy", accuracy, (0.0..=1.0).contains(&accuracy), "from 0 to 1"),
+            ("elastic_penalty", self.elastic_penalty, positive(self.elastic_penalty), "above 0 and finite"),
+            ("shortest_step", step, step > 0.0 && step <= 1.0, "above 0 and at most 1"),
+        ] {
+            if !is_valid {
+                return Err(OcpError::InvalidOption { name, value, allowed });
+            }
+        }
+        Ok(())
     }
 }

@@ -1,29 +1,16 @@
 //! How far a step goes: merit function and filter.
 
+use super::Sqp;
+use super::log::{Iteration, Watch};
+use super::measure::{Measure, Model};
 use super::options::{Globalisation, SqpOptions};
-use crate::ocp::data::split;
+use super::run::{State, Taken};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
+use crate::ocp::linearise::Curvature;
 use crate::ocp::problem::Formulation;
-use crate::qp::{Bounds, Solution, StageDims, add_symmetric, assign, part, part_mut};
+use crate::qp::{QpSolver, Solution, StageDims, Start};
 use crate::scalar::{Real, Scalar};
-use crate::shape::Shape;
-
-/// Objective with penalties of soft bounds, and the sum of all violations of what is hard.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Measure {
-    pub objective: f64,
-    pub violation: f64,
-}
-
-/// What is known of a step before it is taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Model {
-    /// `∇fᵀd`, with the change of penalties.
-    pub slope: f64,
-    /// `dᵀHd`
-    pub curvature: f64,
-}
 
 /// Entries of the filter; the oldest one is forgotten when there are more.
 const ENTRIES: usize = 64;
@@ -35,47 +22,44 @@ const ARMIJO: f64 = 1e-4;
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
-    /// Penalty `ν` of the merit function.
-    pub penalty: f64,
     entries: [Measure; ENTRIES],
     count: usize,
+    /// Whether the last step was a full one: then the next full step is tried by linearising there, which is not to be done again.
+    full: bool,
+    /// Seconds of the linearisation at the iterate, if there is one.
+    pub linearised: Option<f64>,
+}
+
+/// A line search: where it begins, and what it expects.
+#[derive(Clone, Copy)]
+struct Line {
+    here: Measure,
+    model: Model,
 }
 
 impl Search {
     pub fn new() -> Self {
-        Self { penalty: 0.0, entries: [Measure { objective: 0.0, violation: 0.0 }; ENTRIES], count: 0 }
+        Self { entries: [Measure::default(); ENTRIES], count: 0, full: true, linearised: None }
     }
 
-    /// Before a line search from a point.
-    pub fn begin(&mut self, here: &Measure, model: &Model) {
-        if here.violation > 0.0 {
-            // The merit function is to shrink by a tenth of `ν c` at least (Nocedal and Wright, (18.36)).
-            let needed = (model.slope + 0.5 * model.curvature.max(0.0)) / (0.9 * here.violation);
-            if needed > self.penalty {
-                self.penalty = 2.0 * needed;
-            }
-        }
+    /// Forgets all entries: their objectives had other penalties.
+    pub fn forget(&mut self) {
+        self.count = 0;
     }
 
     /// Whether a point is good enough after a step of this length.
-    pub fn accepts(
-        &mut self,
-        options: &SqpOptions,
-        length: f64,
-        here: &Measure,
-        model: &Model,
-        there: &Measure,
-    ) -> bool {
+    fn accepts(&mut self, options: &SqpOptions, length: f64, line: &Line, there: &Measure) -> bool {
+        let Line { here, model } = line;
         if !(there.objective.is_finite() && there.violation.is_finite()) {
             return false;
         }
         // Near the solution, differences are roundings.
-        let noise = 10.0 * f64::EPSILON * (1.0 + here.objective.abs() + self.penalty * here.violation);
+        let noise = 1e4 * f64::EPSILON * (1.0 + here.objective.abs() + here.violation);
         match options.globalisation {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
-                let merit = |m: &Measure| m.objective + self.penalty * m.violation;
-                let slope = model.slope - self.penalty * here.violation;
+                let merit = |m: &Measure| m.objective + m.violation;
+                let slope = model.slope - here.violation;
                 merit(there) <= merit(here) + ARMIJO * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
@@ -108,107 +92,121 @@ fn better(a: &Measure, b: &Measure, noise: f64) -> bool {
     a.violation <= (1.0 - MARGIN) * b.violation || a.objective <= b.objective - MARGIN * b.violation + noise
 }
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Slope and curvature of the objective from the iterate to the solution of its QP.
-    pub(super) fn model(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> Model {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
-        let (from, _) = self.iterate.vectors();
-        let (to, _) = solution.vectors();
-        let (mut slope, mut curvature, mut begin) = (T::ZERO, T::ZERO, 0);
-        let mut soft = -penalties;
-        for (stage, point) in self.qp.view().stages().zip(solution.stages()) {
-            let view = stage.arrays();
-            let (v, w) = (part(from, begin, view.ld), part(to, begin, view.ld));
-            begin += view.ld;
-            let (direction, rest) = data.scratch.split_at_mut_checked(view.ld).unwrap_or_default();
-            let gradient = part_mut(rest, 0, view.ld);
-            for ((d, &w), &v) in direction.iter_mut().zip(w).zip(v) {
-                *d = w - v;
-            }
-            assign(gradient, part(view.gradient, 0, view.ld));
-            add_symmetric(gradient, view.hessian, view.ld, v, view.n);
-            slope = gradient.iter().zip(&*direction).fold(slope, |sum, (&g, &d)| sum + g * d);
-            gradient.fill(T::ZERO);
-            add_symmetric(gradient, view.hessian, view.ld, direction, view.n);
-            curvature = gradient.iter().zip(&*direction).fold(curvature, |sum, (&g, &d)| sum + g * d);
-            let x = |i: usize| point.x.get(i).copied().unwrap_or(T::ZERO);
-            let u = |i: usize| point.u.get(i).copied().unwrap_or(T::ZERO);
-            let g = |i: usize| {
-                let column = part(view.matrix, (view.next + i) * view.ld, view.ld);
-                crate::ocp::linearise::dot(column, w)
-            };
-            soft += sides(&stage.x_bounds(), x).objective
-                + sides(&stage.u_bounds(), u).objective
-                + sides(&stage.g_bounds(), g).objective;
-        }
-        Model { slope: slope.to_f64() + soft, curvature: curvature.to_f64() }
-    }
-
-    /// Objective and violations at some point.
+impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
+    /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short enough.
     ///
     /// # Errors
-    /// Those of functions and integrators.
-    pub(super) fn measure(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<Measure, OcpError> {
-        let objective = self.evaluate(at, ends)?;
-        let mut sum = Measure { objective: objective.to_f64(), violation: 0.0 };
-        let (intervals, nx, rows) = (self.intervals(), P::Shape::NX, self.rows());
-        let values = ends.get(intervals * nx..).unwrap_or_default();
-        let mut stages = at.stages().peekable();
-        for (k, stage) in self.qp.view().stages().enumerate() {
-            let Some(point) = stages.next() else { break };
-            if let Some(next) = stages.peek() {
-                for (&phi, &x) in part(ends, k * nx, nx).iter().zip(next.x) {
-                    sum.violation += (phi - x).abs().to_f64();
+    /// [`OcpError`] of the linearisation at the iterate, if that has to be repeated.
+    pub(super) fn search<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+    ) -> Result<Option<Taken>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let weighted = self.options.globalisation == Globalisation::Merit;
+        if weighted {
+            // Those of this step count at least.
+            let half = T::from_f64(0.5);
+            self.weights.update(&self.solution, |w, multiplier| {
+                let size = multiplier.abs();
+                size.max(half * (w + size))
+            });
+        }
+        let here = ocp.measure_here(weighted.then_some(&self.weights));
+        let penalties = here.objective - ocp.objective.to_f64();
+        let line = Line { here, model: ocp.model(&self.solution, penalties) };
+        let mut written = true;
+        if state.search.full {
+            if self.try_linearised(ocp, state, &line) {
+                return Ok(Some(Taken { length: 1.0, corrected: false }));
+            }
+            written = false;
+        }
+        state.search.full = false;
+        let mut length = 1.0;
+        while length >= self.options.shortest_step {
+            let Self { options, solution, trial, work, weights, .. } = self;
+            let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+            between(&ocp.iterate, solution, length, trial);
+            // A point without a value is one that is not good enough.
+            let there = ocp.measure(trial, weighted.then_some(&*weights), ends).ok();
+            if there.is_some_and(|there| state.search.accepts(options, length, &line, &there)) {
+                core::mem::swap(&mut ocp.iterate, trial);
+                state.search.full = length == 1.0;
+                return Ok(Some(Taken { length, corrected: false }));
+            }
+            if length == 1.0 && there.is_some_and(|m| (m.objective + m.violation).is_finite()) {
+                if !written {
+                    ocp.linearise(self.curvature)?;
+                    ocp.regularise(T::from_f64(row.regularisation));
+                }
+                if self.corrected(ocp, state, &line, row) {
+                    return Ok(Some(Taken { length, corrected: true }));
                 }
             }
-            let x = |i: usize| point.x.get(i).copied().unwrap_or(T::ZERO);
-            let u = |i: usize| point.u.get(i).copied().unwrap_or(T::ZERO);
-            for part in [sides(&stage.x_bounds(), x), sides(&stage.u_bounds(), u)] {
-                sum.objective += part.objective;
-                sum.violation += part.violation;
-            }
-            let bounds = stage.g_bounds();
-            for index in 0..bounds.lower.len() {
-                let [lower, upper] = self.limits(k, index);
-                let value = values.get(k * rows + index).copied().unwrap_or(T::ZERO);
-                let part = side(&bounds, index, lower, upper, value);
-                sum.objective += part.objective;
-                sum.violation += part.violation;
-            }
+            length *= 0.5;
         }
-        Ok(sum)
+        Ok(None)
+    }
+
+    /// The full step, tried by linearising there.
+    fn try_linearised<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        line: &Line,
+    ) -> bool
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let mut watch = Watch::start();
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        let weighted = self.options.globalisation == Globalisation::Merit;
+        let there =
+            ocp.linearise(self.curvature).map(|()| ocp.measure_here(weighted.then_some(&self.weights)));
+        let seconds = watch.lap();
+        if there.is_ok_and(|there| state.search.accepts(&self.options, 1.0, line, &there)) {
+            state.search.linearised = Some(seconds);
+            return true;
+        }
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        false
+    }
+
+    /// The full step, with constraints corrected by their values at its end: they bend away.
+    fn corrected<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        line: &Line,
+        row: &mut Iteration,
+    ) -> bool {
+        let Self { options, qp_solver, solution, trial, work, weights, .. } = self;
+        let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
+        ocp.correct(trial, ends);
+        trial.copy_from(solution);
+        let Ok(statistics) = qp_solver.solve(ocp.qp(), Start::Warm, trial.view_mut()) else { return false };
+        row.qp_iterations += statistics.iterations;
+        let weights = (options.globalisation == Globalisation::Merit).then_some(&*weights);
+        let there = ocp.measure(trial, weights, ends).ok();
+        let is_good = there.is_some_and(|there| state.search.accepts(options, 1.0, line, &there));
+        if is_good {
+            core::mem::swap(&mut ocp.iterate, trial);
+        }
+        is_good
     }
 }
 
-/// Penalties and violations of some bounds.
-fn sides<T: Real>(bounds: &Bounds<'_, T>, value: impl Fn(usize) -> T) -> Measure {
-    let mut sum = Measure { objective: 0.0, violation: 0.0 };
-    for (i, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
-        let part = side(bounds, i, lower, upper, value(i));
-        sum.objective += part.objective;
-        sum.violation += part.violation;
-    }
-    sum
-}
-
-/// Those of one.
-fn side<T: Real>(bounds: &Bounds<'_, T>, index: usize, lower: T, upper: T, value: T) -> Measure {
-    let mut sum = Measure { objective: 0.0, violation: 0.0 };
-    let at = |penalties: &[T]| penalties.get(index).map_or(0.0, |p| p.to_f64());
-    for (excess, linear, quadratic) in [
-        (lower - value, bounds.lower_linear, bounds.lower_quadratic),
-        (value - upper, bounds.upper_linear, bounds.upper_quadratic),
-    ] {
-        let excess = excess.to_f64();
-        if excess > 0.0 {
-            let linear = at(linear);
-            if linear.is_finite() {
-                sum.objective += excess * (linear + 0.5 * at(quadratic) * excess);
-            } else {
-                sum.violation += excess;
-            }
-        }
-    }
-    sum
+/// `a + length (b − a)` of everything.
+fn between<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    a: &Solution<T, D, M>,
+    b: &Solution<T, D, M>,
+    length: f64,
+    target: &mut Solution<T, D, M>,
+) {
+    let length = T::from_f64(length);
+    target.combine(a, b, |a, b| if length == T::ONE { b } else { a + length * (b - a) });
 }

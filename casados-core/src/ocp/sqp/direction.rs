@@ -1,0 +1,209 @@
+//! The direction of a step: the QP at the iterate, regularised where it is not convex, with penalties where it is infeasible.
+
+use super::Sqp;
+use super::elastic::Worst;
+use super::log::Iteration;
+use super::run::State;
+use crate::ocp::convexify::Convexification;
+use crate::ocp::instance::Ocp;
+use crate::ocp::linearise::Curvature;
+use crate::ocp::problem::Formulation;
+use crate::qp::{QpError, QpSolver, StageDims, Start, Statistics};
+use crate::scalar::Real;
+
+/// The first regularisation that is tried, and the smallest one.
+const FIRST: f64 = 1e-6;
+const LEAST: f64 = 1e-8;
+/// The largest one.
+const MOST: f64 = 1e10;
+/// What it grows by where it is not enough, and shrinks by from one iteration to the next.
+const FACTOR: f64 = 4.0;
+/// It grows so many times because a QP was not solved for a reason that is not known.
+const UNKNOWN: usize = 3;
+/// Penalties grow by this to see whether less violation is possible at all, and so many times.
+const GROWTH: f64 = 100.0;
+const GROWTHS: usize = 2;
+/// No direction makes violations smaller if the best one leaves this part of them.
+const STAYS: f64 = 1.0 - 1e-3;
+
+/// What came of a QP.
+pub(super) enum Direction {
+    /// A step.
+    Step,
+    /// A proof that the sum of violations is stationary.
+    Infeasible(Worst),
+}
+
+impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
+    pub(super) fn penalties<'s, P: Formulation<T>>(&'s self, ocp: &Ocp<P, T, D, M>) -> &'s [T] {
+        self.work.as_ref().get(ocp.ends()..).unwrap_or_default()
+    }
+
+    /// Penalties in place of hard bounds.
+    fn set_elastic<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        penalty: f64,
+    ) {
+        let ends = ocp.ends();
+        let memory = self.work.as_mut().get_mut(ends..).unwrap_or_default();
+        if !state.elastic {
+            ocp.remember_penalties(memory);
+        }
+        ocp.set_penalties(memory, Some(T::from_f64(penalty)));
+        state.elastic = true;
+        // Objectives with other penalties are not to be compared.
+        state.search.forget();
+    }
+
+    /// Bounds as they were given.
+    pub(super) fn leave_elastic<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+    ) {
+        if state.elastic {
+            ocp.set_penalties(self.penalties(ocp), None);
+            state.elastic = false;
+            state.search.forget();
+        }
+    }
+
+    /// The QP at the iterate; in elastic mode if it has no solution otherwise.
+    pub(super) fn direction<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+    ) -> Result<Direction, QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let reduced = self.curvature.convexification() == Convexification::Reduced;
+        let warm = self.options.warm_start && (row.iteration > 0 || reduced);
+        self.qp_solver.relax(self.options.qp_accuracy * row.residuals.largest());
+        let start = if warm { Start::Warm } else { Start::Cold };
+        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
+        let may_help = matches!(
+            error,
+            QpError::Infeasible { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. }
+        );
+        if !(may_help && self.options.elastic) {
+            return Err(error);
+        }
+        // What is violated and what is possible are compared: by exact solutions.
+        self.qp_solver.relax(0.0);
+        let mut penalty = self.options.elastic_penalty;
+        self.set_elastic(ocp, state, penalty);
+        row.elastic = true;
+        // What made it infeasible says more than what happened afterwards.
+        self.regularised(ocp, state, Start::Cold, row).map_err(|_| error)?;
+        let (worst, bounds) = ocp.worst(self.penalties(ocp));
+        let before = bounds + ocp.gaps();
+        let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
+            return Ok(Direction::Step);
+        };
+        if self.violation_of_solution(ocp) < STAYS * before {
+            return Ok(Direction::Step);
+        }
+        // The objective may be what holds it back: with larger penalties it counts less.
+        self.trial.copy_from(&self.solution);
+        let mut stays = true;
+        for _ in 0..GROWTHS {
+            penalty *= GROWTH;
+            self.set_elastic(ocp, state, penalty);
+            stays = self.regularised(ocp, state, Start::Cold, row).is_ok()
+                && self.violation_of_solution(ocp) >= STAYS * before;
+            if !stays {
+                break;
+            }
+        }
+        if stays {
+            return Ok(Direction::Infeasible(worst));
+        }
+        self.set_elastic(ocp, state, self.options.elastic_penalty);
+        core::mem::swap(&mut self.solution, &mut self.trial);
+        Ok(Direction::Step)
+    }
+
+    /// The sum of violations that the solution of the QP leaves, by its linearisation.
+    fn violation_of_solution<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> f64 {
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        let (_, sum) = ocp.worst(self.penalties(ocp));
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        sum
+    }
+
+    /// The QP with as much regularisation as it takes.
+    fn regularised<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        start: Start,
+        row: &mut Iteration,
+    ) -> Result<(), QpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let reduced = self.curvature.convexification() == Convexification::Reduced;
+        let mut unknown = 0;
+        loop {
+            let error = match self.solve_qp(ocp, start, row) {
+                Ok(()) => break,
+                Err(error) => error,
+            };
+            let is_curvature = match error {
+                QpError::NotConvex { .. } => true,
+                QpError::MaxIterations { .. } | QpError::Stalled { .. } => {
+                    unknown += 1;
+                    unknown <= UNKNOWN
+                }
+                _ => false,
+            };
+            if !(reduced && is_curvature && row.regularisation < MOST) {
+                return Err(error);
+            }
+            let more = if row.regularisation > 0.0 {
+                FACTOR * row.regularisation
+            } else if state.regularisation > 0.0 {
+                (state.regularisation / FACTOR).max(LEAST)
+            } else {
+                FIRST
+            };
+            ocp.regularise(T::from_f64(more - row.regularisation));
+            row.regularisation = more;
+            state.regularisation = more;
+        }
+        if row.regularisation == 0.0 {
+            state.regularisation /= FACTOR;
+        }
+        Ok(())
+    }
+
+    /// The QP from the iterate; from a cold start if a warm one was to blame.
+    fn solve_qp<P: Formulation<T>>(
+        &mut self,
+        ocp: &Ocp<P, T, D, M>,
+        start: Start,
+        row: &mut Iteration,
+    ) -> Result<(), QpError> {
+        let mut start = start;
+        loop {
+            self.solution.copy_from(&ocp.iterate);
+            let result = self.qp_solver.solve(ocp.qp(), start, self.solution.view_mut());
+            row.qp_iterations += match &result {
+                Ok(Statistics { iterations, .. })
+                | Err(QpError::MaxIterations { iterations, .. } | QpError::Stalled { iterations, .. }) => {
+                    *iterations
+                }
+                Err(_) => 0,
+            };
+            let Err(error) = result else { return Ok(()) };
+            if start == Start::Cold || matches!(error, QpError::NotConvex { .. }) {
+                return Err(error);
+            }
+            start = Start::Cold;
+        }
+    }
+}
