@@ -416,8 +416,25 @@ pub trait Widest<T> {
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
 }
 
-/// One real number: `f32` or `f64`.
-pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default {
+/// What nobody else can name.
+mod sealed {
+    /// Numbers whose alignment tells kernels which registers hold them.
+    pub trait Sealed {}
+    impl Sealed for f32 {}
+    impl Sealed for f64 {}
+}
+
+/// One real number: `f32` or `f64`. No other type can be one: kernels are entered by the alignment of
+/// their numbers, with instructions that a machine has for these.
+///
+/// ```compile_fail,E0277
+/// // A number of its own that is a `Scalar` and has `Lanes` is still no `Real`.
+/// fn real<T: casados_core::scalar::Real>() {}
+/// #[repr(align(64))]
+/// struct Wide(f64);
+/// real::<Wide>();
+/// ```
+pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default + sealed::Sealed {
     /// Zero.
     const ZERO: Self;
     /// One.
