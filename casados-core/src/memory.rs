@@ -177,7 +177,7 @@ impl<V: Zeroable> Default for Inside<V> {
 ///
 /// | integrator | [`mode::Nominal`] | [`mode::Forward`] | [`mode::Adjoint`] | [`mode::Hessian`] |
 /// |---|---|---|---|---|
-/// | `Irk`, `Gauss<2>` | 2952 | 4416 | 3272 | 8648 |
+/// | `Irk`, `Gauss<2>` | 2632 | 4104 | 2952 | 8112 |
 /// | `Erk`, `Rk4` | 1344 | 2912 | 1344 | 3872 |
 ///
 /// For a model of one's own `cargo doc` prints the number beside a public constant that is `SIZE`, for the target that it is
