@@ -16,11 +16,11 @@
 //! (`ocp.bound("u", .., -1.0, 1.0)?`), references and parameters of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves it:
 //!
 //! ```text
-//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        GaussNewton: JᵀWJ of least squares alone; Exact: all of it, made convex stage by stage
+//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        GaussNewton: JᵀWJ of least squares alone; Exact: all of it, regularised where a QP is not convex
 //! QP at (x̄, ū): variables (x, u), data φ − A x̄ − B ū, …, solution the next iterate
 //! ```
 //!
-//! with full steps or line searches (merit function, filter, second-order correction), penalties where a QP is infeasible
+//! with line searches (merit function, filter, second-order correction) or full steps, penalties where a QP is infeasible
 //! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. [`RealTime`] takes one step in
 //! each sample, in two phases. `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback gains.
 //!
