@@ -1,5 +1,5 @@
-//! Right-hand sides of forward sensitivities, `−(f_x,i V_n + f_w,i)` in the slots of the equations, from which
-//! [kinematic](super::kinematic) states have been eliminated:
+//! Right-hand sides of forward sensitivities, `−(f_x,i V_n + f_w,i)` in the slots of the equations,
+//! from which [kinematic](super::kinematic) states have been eliminated:
 //!
 //! ```text
 //! −(f_x,i V_n + f_q,i h c_i c V_v + f_q̇,i c V_v + f_w,i)
@@ -26,7 +26,8 @@ pub(super) fn nodes<E: Lanes, const S: usize>(a: &[[E; S]; S], h: E) -> [E; S] {
     nodes
 }
 
-/// The same where every direction is an element of `w` and `V_n` the unit matrix: entries of the Jacobian go to their places in all panels.
+/// The same where every direction is an element of `w` and `V_n` the unit matrix: entries of the
+/// Jacobian go to their places in all panels.
 pub(super) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     pub nodes: &'a [E; S],
@@ -71,7 +72,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
     }
 }
 
-/// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`, with its slot and the variable.
+/// What an equation has of a velocity through a kinematic state: `c f_q̇,i` or `h c_i c f_q,i`,
+/// with its slot and the variable.
 #[inline(always)]
 fn through<M: Dae, E: Lanes, const S: usize>(
     jacobian: &M::Jacobian<[E; S]>,
@@ -94,7 +96,8 @@ fn by_column<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Optio
     entry::<M, V>(jacobian, *M::STRUCTURE.by_column.get(index)? as usize)
 }
 
-/// The same of a panel that begins with a column: entries column by column, from one of them on. Where the next panel begins.
+/// The same of a panel that begins with a column: entries column by column, from one of them on.
+/// Where the next panel begins.
 #[inline(always)]
 pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize>(
     jacobian: &M::Jacobian<[E; S]>,
@@ -167,7 +170,8 @@ pub(super) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W: usize>
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
     /// The first entry of `f_x`.
     const FIRST: usize = M::STRUCTURE.blocks[1];
-    /// Whether a straight line begins with zeros everywhere: of plain numbers that is less than a row that begins with its first entry.
+    /// Whether a straight line begins with zeros everywhere: of plain numbers that is less than a
+    /// row that begins with its first entry.
     const AT_ONCE: bool = size_of::<E>() <= 8;
 
     #[inline(always)]

@@ -1,18 +1,22 @@
 //! The plan by which the Newton matrix is eliminated.
 
-/// The order in which the Newton matrix is eliminated, with everything that follows from it and the pattern.
+/// The order in which the Newton matrix is eliminated, with everything that follows from it and the
+/// pattern.
 ///
-/// Made by the macro from the pattern of `f_ẋ ∪ f_x ∪ f_z` and from the values of the model at sample points; the entries
-/// are s×s blocks, so that it serves every tableau. A *slot* is an unknown `(k, z)` and the equation that is its pivot.
+/// Made by the macro from the pattern of `f_ẋ ∪ f_x ∪ f_z` and from the values of the model at
+/// sample points; the entries are s×s blocks, so that it serves every tableau. A *slot* is an
+/// unknown `(k, z)` and the equation that is its pivot.
 #[derive(Clone, Copy, Debug)]
 pub struct Elimination {
     /// The pivots in order.
     pub pivots: &'static [Pivot],
-    /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its unknown.
+    /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its
+    /// unknown.
     pub slots: &'static [u32],
     /// For each pivot the blocks of `L` in its row.
     pub left: &'static [Left],
-    /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is updated.
+    /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is
+    /// updated.
     pub updates: &'static [Update],
     /// What blocks are made of before elimination, those of a kind one after the other, fill first.
     pub assembly: &'static [Assembly],
@@ -22,7 +26,8 @@ pub struct Elimination {
     pub supernodes: &'static [Supernode],
     /// For each state whether it is kinematic, and what it follows from; empty if none is.
     pub kinematic: &'static [Kinematic],
-    /// The entries of `f_ẋ` and `f_x` by which other equations feel kinematic states, state by state.
+    /// The entries of `f_ẋ` and `f_x` by which other equations feel kinematic states, state by
+    /// state.
     pub felt: &'static [Felt],
 }
 
@@ -81,18 +86,21 @@ pub struct Pivot {
     pub left: [u32; 2],
     /// The pivot is the identity, whatever the step size and the point.
     pub identity: bool,
-    /// How many pivots from this one on are a [`Supernode`]; zero if one before this one has counted it.
+    /// How many pivots from this one on are a [`Supernode`]; zero if one before this one has
+    /// counted it.
     pub supernode: u32,
 }
 
-/// A kinematic state `q`, with an equation `q̇ − c v = 0` where `v` is a state that is not kinematic itself, a control or a parameter. It is no
-/// unknown of any elimination: its derivatives at the stages are
+/// A kinematic state `q`, with an equation `q̇ − c v = 0` where `v` is a state that is not
+/// kinematic itself, a control or a parameter. It is no unknown of any elimination: its derivatives
+/// at the stages are
 ///
 /// ```text
 /// k_q = c (x_v + hA k_v)        or        k_q = c v
 /// ```
 ///
-/// and its column of the Newton matrix, multiplied by `c hA`, is a part of that of `v`: see [`Assembly`].
+/// and its column of the Newton matrix, multiplied by `c hA`, is a part of that of `v`: see
+/// [`Assembly`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kinematic {
     /// Its equation, or [`Kinematic::NONE`].
@@ -108,7 +116,8 @@ impl Kinematic {
     pub const NONE: u32 = u32::MAX;
 }
 
-/// An entry of `f_ẋ` or `f_x` by which an equation feels a kinematic state that is not determined by it.
+/// An entry of `f_ẋ` or `f_x` by which an equation feels a kinematic state that is not determined
+/// by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Felt {
     /// The entry.
@@ -142,8 +151,8 @@ impl Pivot {
     }
 }
 
-/// Pivots one after the other, four at most, that have the same rows below them and the same columns beside them but for themselves, and whose rows
-/// have the same blocks of `L`.
+/// Pivots one after the other, four at most, that have the same rows below them and the same
+/// columns beside them but for themselves, and whose rows have the same blocks of `L`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Supernode {
     /// The first of them.
@@ -170,16 +179,19 @@ pub struct Update {
     pub first: bool,
 }
 
-/// A term `c diag(f) (hA)^order` of a block of the Newton matrix before elimination, with an entry `f` of the Jacobian at all stages.
+/// A term `c diag(f) (hA)^order` of a block of the Newton matrix before elimination, with an entry
+/// `f` of the Jacobian at all stages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Assembly {
     /// The block.
     pub block: u32,
     /// The entry `f`, or [`Assembly::NONE`]: the block is fill.
     pub entry: u32,
-    /// The entry that is `−c`, if `f` multiplies a [kinematic](Kinematic) state; or [`Assembly::NONE`] of one.
+    /// The entry that is `−c`, if `f` multiplies a [kinematic](Kinematic) state; or
+    /// [`Assembly::NONE`] of one.
     pub by: u32,
-    /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more for those that multiply a kinematic state.
+    /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more for those that
+    /// multiply a kinematic state.
     pub order: u32,
     /// It is the first term of its block: those of higher order come first.
     pub first: bool,

@@ -1,5 +1,6 @@
-//! Kinematic states: `q` with an equation `q̇ − c v = 0`, where `v` is a state that is not kinematic itself, a control or a parameter. Their
-//! derivatives follow from those of `v` at every stage, so that they are no unknowns of the elimination: `casados_core::model::Kinematic`.
+//! Kinematic states: `q` with an equation `q̇ − c v = 0`, where `v` is a state that is not
+//! kinematic itself, a control or a parameter. Their derivatives follow from those of `v` at every
+//! stage, so that they are no unknowns of the elimination: `casados_core::model::Kinematic`.
 
 use super::Model;
 use super::samples::{Position, Term};
@@ -45,8 +46,9 @@ pub fn find(model: &Model, (jacobian, blocks): (&[Entry], [usize; 6]), trivial: 
     independent(nx, candidates)
 }
 
-/// A largest set of candidates of which none is the velocity of another. Each has one velocity, so that they are a forest but for cycles: who
-/// is no velocity of a candidate that is left is taken, and its velocity is not.
+/// A largest set of candidates of which none is the velocity of another. Each has one velocity, so
+/// that they are a forest but for cycles: who is no velocity of a candidate that is left is taken,
+/// and its velocity is not.
 fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinematic> {
     let mut taken = BTreeMap::new();
     while let Some(&first) = candidates.keys().next() {
@@ -62,8 +64,8 @@ fn independent(nx: u32, mut candidates: BTreeMap<u32, Kinematic>) -> Vec<Kinemat
     taken.into_values().collect()
 }
 
-/// The Newton matrix without the equations and the derivatives of kinematic states: of `k_q = c (x_v + hA k_v)` the column of `q`, multiplied by
-/// `c hA`, is a part of that of `v`.
+/// The Newton matrix without the equations and the derivatives of kinematic states: of `k_q = c
+/// (x_v + hA k_v)` the column of `q`, multiplied by `c hA`, is a part of that of `v`.
 pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<Position>) -> Vec<Position> {
     let mut left: BTreeMap<(u32, u32), Position> = BTreeMap::new();
     for Position { row, column, terms } in positions {

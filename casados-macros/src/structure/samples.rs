@@ -1,14 +1,16 @@
 //! The Newton matrix of a model at sample points: what an elimination order is judged by.
 //!
-//! Where nothing is said about the values of a variable, points are of several kinds. The user may say more: a nominal
-//! value (the first point has it exactly, the others are within half of its size) and a range (no point is outside).
+//! Where nothing is said about the values of a variable, points are of several kinds. The user may
+//! say more: a nominal value (the first point has it exactly, the others are within half of its
+//! size) and a range (no point is outside).
 
 use super::elimination::{Complex, Entry};
 use crate::graph::{Graph, Node, Point};
 use crate::language::Sampling;
 use std::collections::BTreeMap;
 
-/// Sample points that are wanted, and how many may be drawn to get them: at some the model has no finite value.
+/// Sample points that are wanted, and how many may be drawn to get them: at some the model has no
+/// finite value.
 const POINTS: usize = 12;
 const DRAWS: usize = 200;
 
@@ -28,7 +30,8 @@ pub struct Term {
     pub entry: u32,
     /// That which is `−c`; one if there is none.
     pub by: Option<u32>,
-    /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more through a kinematic state.
+    /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more through a
+    /// kinematic state.
     pub order: u32,
 }
 
@@ -118,7 +121,8 @@ fn coordinate(random: &mut Random, draw: usize, sampling: Sampling) -> f64 {
     }
 }
 
-/// Points of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any magnitude.
+/// Points of several kinds in turn: anywhere, positive, on coordinate planes and axes, of any
+/// magnitude.
 fn anywhere(random: &mut Random, draw: usize) -> f64 {
     let value = random.between(-1.0, 1.0);
     match draw % 4 {

@@ -1,5 +1,6 @@
-//! Supernodes: pivots one after the other whose columns of `L` and rows of `U` are the same but for themselves, so that what these have in common
-//! is looked up once (J. W. H. Liu, E. G. Ng, B. W. Peyton, On finding supernodes for sparse matrix computations, 1993).
+//! Supernodes: pivots one after the other whose columns of `L` and rows of `U` are the same but for
+//! themselves, so that what these have in common is looked up once (J. W. H. Liu, E. G. Ng, B. W.
+//! Peyton, On finding supernodes for sparse matrix computations, 1993).
 
 use super::elimination::Plan;
 use std::collections::HashMap;
