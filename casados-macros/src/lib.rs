@@ -63,8 +63,8 @@ fn expand_within(
 ) -> proc_macro2::TokenStream {
     let checks = [language::tokens::check(&attribute), language::tokens::check(&item)];
     if let Some(error) = checks.into_iter().find_map(Result::err) {
-        let error = error.to_compile_error();
-        return quote::quote! { #item #error };
+        // The compiler itself does not bear what is nested too deeply or too long.
+        return error.to_compile_error();
     }
     match language::dual::read(form, attribute.clone(), item.clone()) {
         Ok(None) => {}

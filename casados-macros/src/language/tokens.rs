@@ -9,9 +9,12 @@ use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 /// Deeper than any model.
 const DEPTH: usize = 256;
 
-/// More tokens side by side than any model has in one pair of brackets; each may be a level of the syntax
-/// tree (prefix signs, `else if`, calls of methods).
+/// Tokens of one statement or element side by side; each may be a level of the syntax tree (prefix signs,
+/// `else if`, calls of methods).
 const LENGTH: usize = 20_000;
+
+/// Terms of one sum without brackets. The compiler bears twice as many.
+const TERMS: usize = 4096;
 
 /// Refuses what must not be parsed: tokens that are nested too deeply or too many side by side, and
 /// conditions of the compiler. Does not recurse itself.
@@ -38,13 +41,7 @@ pub fn check(tokens: &TokenStream) -> syn::Result<()> {
             return Err(syn::Error::new(group.span_open(), message));
         }
         let level = Level::new(&group.stream());
-        if let Some(token) = level.tokens.get(LENGTH) {
-            let message = format!(
-                "these brackets hold more than {LENGTH} tokens as far as here: split what is in them into statements, \
-                 functions or loops"
-            );
-            return Err(syn::Error::new(token.span(), message));
-        }
+        level.is_short()?;
         open.push(level);
     }
 }
@@ -58,6 +55,27 @@ struct Level {
 impl Level {
     fn new(tokens: &TokenStream) -> Self {
         Self { tokens: tokens.clone().into_iter().collect(), next: 0 }
+    }
+
+    /// Refuses statements and elements that are too long.
+    fn is_short(&self) -> syn::Result<()> {
+        let (mut length, mut terms) = (0, 0);
+        for token in &self.tokens {
+            length += 1;
+            match token {
+                TokenTree::Punct(punct) if matches!(punct.as_char(), ';' | ',') => (length, terms) = (0, 0),
+                TokenTree::Punct(punct) if matches!(punct.as_char(), '+' | '-') => terms += 1,
+                _ => {}
+            }
+            if length > LENGTH || terms > TERMS {
+                let message = format!(
+                    "this expression has more than {TERMS} terms or {LENGTH} tokens without brackets as far as here: \
+                     split it into statements, functions or loops"
+                );
+                return Err(syn::Error::new(token.span(), message));
+            }
+        }
+        Ok(())
     }
 
     /// Whether `#` or `#!` stands before the token that was taken last.

@@ -23,6 +23,8 @@ const UNKNOWN: usize = 3;
 /// Penalties grow by this to see whether less violation is possible at all, and so many times.
 const GROWTH: f64 = 100.0;
 const GROWTHS: usize = 2;
+/// What rounding may leave of forces as large as one.
+const DIGITS: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
 const STAYS: f64 = 1.0 - 1e-3;
 
@@ -113,6 +115,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for _ in 0..GROWTHS {
             penalty *= GROWTH;
             self.set_elastic(ocp, state, penalty);
+            // Forces are as large as penalties, and have as many digits.
+            self.qp_solver.relax(DIGITS * penalty);
             stays = self.regularised(ocp, state, Start::Cold, row).is_ok()
                 && self.violation_of_solution(ocp) >= STAYS * before;
             if !stays {
