@@ -151,31 +151,23 @@ impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
             return;
         }
         let Some(to) = blocks.get_mut(of.block as usize) else { return };
-        // An index that marks what is not there lies outside of the Jacobian.
-        let Some(&(mut values)) = jacobian.get(of.entry as usize) else {
-            *to = [[E::from_f64(0.0); S]; S];
-            return;
-        };
-        if let Some(minus_c) = jacobian.get(of.by as usize) {
-            for value in &mut values {
-                *value = -(*value * minus_c[0]);
-            }
-        }
-        if of.order == 0 && !of.first {
-            for (stage, (column, &value)) in to.iter_mut().zip(&values).enumerate() {
-                column[stage] = column[stage] + value;
-            }
-            return;
-        }
         let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
-        if of.order == 0 {
-            for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
-                column[stage] = value;
+        // An index that marks what is not there lies outside of the Jacobian.
+        if let Some(&(mut values)) = jacobian.get(of.entry as usize) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
+                for value in &mut values {
+                    *value = -(*value * minus_c[0]);
+                }
             }
-        } else {
-            let power = if of.order == 1 { &self.coupling } else { &self.square };
-            for (column, power) in block.iter_mut().zip(power) {
-                A::subtract_products(column, &values, power);
+            if of.order == 0 {
+                for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
+                    column[stage] = column[stage] + value;
+                }
+            } else {
+                let power = if of.order == 1 { &self.coupling } else { &self.square };
+                for (column, power) in block.iter_mut().zip(power) {
+                    A::subtract_products(column, &values, power);
+                }
             }
         }
         *to = block;

@@ -193,7 +193,7 @@ pub struct Assembly {
     /// Zero for entries of `f_ẋ` and `f_z`, one for those of `f_x`, and one more for those that
     /// multiply a kinematic state.
     pub order: u32,
-    /// It is the first term of its block: those of higher order come first.
+    /// It is the first term of its block: those of lower order come first.
     pub first: bool,
 }
 

@@ -8,7 +8,6 @@ use crate::structure::{
 };
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
-use std::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// The value of `Dae::STRUCTURE`.
@@ -230,7 +229,7 @@ fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Toke
         rows.extend(terms.iter().enumerate().map(|(index, &term)| (Some(term), index == 0, block)));
     }
     rows.sort_by_key(|&(term, first, block)| {
-        (term.map(|term| (Reverse(term.order), term.by.is_some())), !first, block)
+        (term.map(|term| (term.order, term.by.is_some())), !first, block)
     });
     let none = Term { entry: u32::MAX, by: None, order: 0 };
     rows.into_iter()

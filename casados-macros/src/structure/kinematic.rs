@@ -5,7 +5,6 @@
 use super::Model;
 use super::samples::{Position, Term};
 use crate::graph::{Degree, Entry, Point};
-use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 /// A kinematic state.
@@ -82,7 +81,7 @@ pub fn condense(nx: u32, kinematic: &[Kinematic], positions: Vec<Position>) -> V
         };
         let position = left.entry((row, column)).or_insert(Position { row, column, terms: Vec::new() });
         position.terms.extend(terms);
-        position.terms.sort_by_key(|term| (Reverse(term.order), term.by, term.entry));
+        position.terms.sort_by_key(|term| (term.order, term.by, term.entry));
     }
     left.into_values().collect()
 }

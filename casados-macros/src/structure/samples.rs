@@ -19,7 +19,6 @@ const DRAWS: usize = 200;
 pub struct Position {
     pub row: u32,
     pub column: u32,
-    /// Those of higher order first.
     pub terms: Vec<Term>,
 }
 

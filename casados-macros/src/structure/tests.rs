@@ -254,7 +254,7 @@ fn kinematic_states() {
     let of_velocity = positions.iter().find(|position| (position.row, position.column) == (2, 1));
     let terms = of_velocity.map(|position| position.terms.clone());
     let (own, through) = (Term { entry: 10, by: None, order: 1 }, Term { entry: 9, by: Some(4), order: 2 });
-    assert_eq!(terms, Some(vec![through, own]));
+    assert_eq!(terms, Some(vec![own, through]));
 }
 
 /// Of a row of four that follow one another, the last of them a control, every other one: as many as there can be.
