@@ -20,9 +20,9 @@ const MOST: f64 = 1e10;
 const FACTOR: f64 = 4.0;
 /// It grows so many times because a QP was not solved for a reason that is not known.
 const UNKNOWN: usize = 3;
-/// Penalties grow by this to see whether less violation is possible at all, and so many times.
+/// Penalties grow by this to see whether less violation is possible at all, up to that multiple.
 const GROWTH: f64 = 100.0;
-const GROWTHS: usize = 2;
+const MOST_ELASTIC: f64 = 1e4;
 /// What rounding may leave of forces as large as one.
 const DIGITS: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
@@ -95,9 +95,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             return Err(error);
         }
         // What is violated and what is possible are compared: by exact solutions.
-        self.qp_solver.relax(0.0);
-        let mut penalty = self.options.elastic_penalty;
+        let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
+        self.qp_solver.relax(DIGITS * penalty);
         row.elastic = true;
         // What made it infeasible says more than what happened afterwards.
         self.regularised(ocp, state, Start::Cold, row).map_err(|_| error)?;
@@ -111,21 +111,24 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
+        let most = MOST_ELASTIC * self.options.elastic_penalty;
         let mut stays = true;
-        for _ in 0..GROWTHS {
+        while stays && penalty < most {
             penalty *= GROWTH;
             self.set_elastic(ocp, state, penalty);
             // Forces are as large as penalties, and have as many digits.
             self.qp_solver.relax(DIGITS * penalty);
-            stays = self.regularised(ocp, state, Start::Cold, row).is_ok()
-                && self.violation_of_solution(ocp) >= STAYS * before;
-            if !stays {
-                break;
+            stays = self.regularised(ocp, state, Start::Cold, row).is_ok();
+            if stays && self.violation_of_solution(ocp) < STAYS * before {
+                // It is, and from now on it does.
+                state.penalty = penalty;
+                return Ok(Direction::Step);
             }
         }
         if stays {
             return Ok(Direction::Infeasible(worst));
         }
+        state.penalty = 0.0;
         self.set_elastic(ocp, state, self.options.elastic_penalty);
         core::mem::swap(&mut self.solution, &mut self.trial);
         Ok(Direction::Step)

@@ -31,6 +31,8 @@ pub(super) struct State<T> {
     pub regularisation: f64,
     /// Steps with penalties in a row.
     elastic_steps: usize,
+    /// The penalty that violations were found to need; zero at first.
+    pub(super) penalty: f64,
     /// The largest residual of the best iterate.
     best: f64,
     /// That iterate.
@@ -77,6 +79,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             elastic: false,
             regularisation: 0.0,
             elastic_steps: 0,
+            penalty: 0.0,
             best: f64::INFINITY,
             kept: Iteration::default(),
             number: PhantomData,
