@@ -56,7 +56,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     fn algebraic_of(equation: usize) -> impl Iterator<Item = usize> {
         let [begin, end] = [2, 3].map(|block| M::STRUCTURE.blocks[block]);
         let places = (begin..end).map(|entry| M::STRUCTURE.jacobian.at(entry));
-        places.filter(move |place| place.0 == equation).map(|place| place.1 - M::Shape::NX)
+        places.filter(move |place| place.0 == equation).map(|place| place.1.saturating_sub(M::Shape::NX))
     }
 
     /// The algebraic state for whose value an equation has none: with another one it has. The points of the stages are left
@@ -66,15 +66,21 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             let variable = unknown + M::Shape::NX;
             let Some(start) = self.points.as_ref().get(variable).copied() else { return false };
             let has_value = TRIED.iter().any(|value| {
-                self.points.as_mut()[variable] = [T::from_f64(*value); S];
+                self.place_point(variable, [T::from_f64(*value); S]);
                 self.evaluate_jacobian();
                 let jacobian = self.linear.jacobian.as_ref();
                 let mut row = entries(&M::STRUCTURE, jacobian, 0, jacobian.len()).filter(|e| e.0 == equation);
                 let residual = self.f.as_ref().get(equation);
                 residual.is_some_and(|f| not_finite(f).is_none()) && row.all(|e| not_finite(e.2).is_none())
             });
-            self.points.as_mut()[variable] = start;
+            self.place_point(variable, start);
             has_value
         })
+    }
+
+    fn place_point(&mut self, variable: usize, value: [T; S]) {
+        if let Some(point) = self.points.as_mut().get_mut(variable) {
+            *point = value;
+        }
     }
 }

@@ -434,7 +434,9 @@ mod sealed {
 /// struct Wide(f64);
 /// real::<Wide>();
 /// ```
-pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default + sealed::Sealed {
+pub trait Real:
+    Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default + sealed::Sealed
+{
     /// Zero.
     const ZERO: Self;
     /// One.

@@ -33,13 +33,17 @@ mod work;
 
 pub use options::IpmOptions;
 
+#[cfg(feature = "alloc")]
 use super::error::OcpError;
+#[cfg(feature = "alloc")]
 use super::problem::Formulation;
+#[cfg(feature = "alloc")]
 use super::sqp::Iteration;
 #[cfg(feature = "alloc")]
 use super::sqp::Log;
-use crate::qp::{Solution, StageDims};
-use crate::scalar::Real;
+use crate::qp::Solution;
+#[cfg(feature = "alloc")]
+use crate::{qp::StageDims, scalar::Real};
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 

@@ -212,7 +212,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 }
 
-pub(in crate::ocp) fn infeasible<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+pub(in crate::ocp) fn infeasible<
+    P: Formulation<T>,
+    T: Real,
+    D: AsRef<[StageDims]>,
+    M: AsRef<[T]> + AsMut<[T]>,
+>(
     ocp: &Ocp<P, T, D, M>,
     worst: &Worst,
 ) -> Status {
