@@ -54,8 +54,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 
     /// The algebraic states that occur in an equation, as unknowns.
     fn algebraic_of(equation: usize) -> impl Iterator<Item = usize> {
-        let [begin, end] = [2, 3].map(|block| M::STRUCTURE.blocks[block]);
-        let places = (begin..end).map(|entry| M::STRUCTURE.jacobian.at(entry));
+        let [_, _, begin, end, ..] = M::STRUCTURE.blocks;
+        let places = (begin..end).filter_map(|entry| M::STRUCTURE.jacobian.get(entry));
         places.filter(move |place| place.0 == equation).map(|place| place.1.saturating_sub(M::Shape::NX))
     }
 

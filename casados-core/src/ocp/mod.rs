@@ -31,6 +31,9 @@
 //! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call, from the stages of the last one: these converge with the
 //! iterates, to the same solution.
 //!
+//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians, and those whose states are periodic
+//! (`ocp.periodic("x")?`, `x₀ = x_N`).
+//!
 //! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
 //! stage 0 given by equal bounds. So are parameters that are to be found.
 //!

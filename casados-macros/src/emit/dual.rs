@@ -135,7 +135,6 @@ pub fn write(model: &Model) -> TokenStream {
                                 &#krate::model::all(),
                             )
                         },
-                        folded: &[],
                         lone: &[],
                         operations: #krate::model::Operations {
                             residual: 0,

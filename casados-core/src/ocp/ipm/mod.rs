@@ -48,6 +48,19 @@ use crate::{qp::StageDims, scalar::Real};
 use alloc::vec::Vec;
 
 /// A nonlinear interior point for an [`Ocp`](super::Ocp), with exact Hessians.
+///
+/// ```text
+/// min  f(v) − μ Σ log s        x_{k+1} = φ(x_k, u_k),  σ (g(v) − bound) = s,  x₀[i] = x_N[i] where asked
+/// ```
+///
+/// It needs dynamics with second derivatives ([`SecondOrder`](super::SecondOrder)). Bounds that are equal
+/// are equations; soft ones have their penalties. An iteration costs one evaluation with Hessians, one
+/// Riccati factorisation, and one simulation for each point that the line search tries. Where no step makes
+/// progress, hard bounds of states and constraints get penalties, and the bound that stays violated most is
+/// named. The iterate of the problem is the best one afterwards, whatever the status.
+///
+/// A. Wächter, L. T. Biegler, Math. Program. 106 (2006); periodic states by parametric recursion, inertia by
+/// J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977).
 #[derive(Clone, Debug)]
 pub struct Ipm<T, D, M, I> {
     /// Options, which may be changed between calls.
