@@ -149,7 +149,7 @@ fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let mut random = casados::testing::Random::new(7);
     for term in plan.assembly.iter().filter(|term| !term.is_fill()) {
         for (i, row) in blocks[term.block as usize].iter_mut().enumerate() {
-            for (j, element) in row.iter_mut().enumerate().filter(|&(j, _)| term.order > 0 || i == j) {
+            for (_, element) in row.iter_mut().enumerate().filter(|&(j, _)| term.order > 0 || i == j) {
                 *element = Counted(0.1 * random.symmetric());
             }
         }

@@ -61,7 +61,7 @@ fn later_calls_allocate_what_results_own() {
     let (x0, u, p, lambda) = (vector![1.0, 0.0], Vector1::new(0.1), vector![9.81, 0.8], vector![1.0, 0.5]);
     macro_rules! check {
         ($method:ty) => {
-            let mut adaptive = || {
+            let adaptive = || {
                 let mut adaptive = Adaptive::<Ball, $method>::new(AdaptiveOptions::default()).unwrap();
                 adaptive.set_parameters(&p).unwrap();
                 adaptive

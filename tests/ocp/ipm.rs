@@ -173,9 +173,8 @@ fn periodic_orbits_of_linear_systems_are_those_of_one_linear_system() -> Test {
         };
         for k in 0..N {
             for i in 0..2 {
-                for j in 0..2 {
-                    condition(2 * k + i, 3 * k + j, a[i][j]);
-                }
+                condition(2 * k + i, 3 * k, a[i][0]);
+                condition(2 * k + i, 3 * k + 1, a[i][1]);
                 condition(2 * k + i, 3 * k + 2, b[i]);
                 condition(2 * k + i, 3 * (k + 1) + i, -1.0);
             }

@@ -2,11 +2,9 @@ use casados::ode;
 
 #[ode]
 fn model(x: f64) -> f64 {
-    let mut rate = -x;
-    #[cfg(feature = "drag")]
-    {
-        rate -= 0.1 * x * x;
-    }
+    let rate = -x;
+    #[cfg(not(test))]
+    let rate = rate - 0.1 * x * x;
     rate
 }
 

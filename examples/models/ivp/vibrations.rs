@@ -78,24 +78,24 @@ pub fn explicit_beam<const N: usize>(x: [f64; N], t: f64) -> [f64; N] {
         };
         u[i] = x[n + i] * x[n + i];
         if i > 0 {
-            u[i] = u[i] - (x[i] - x[i - 1]).sin() * moment[i - 1];
+            u[i] -= (x[i] - x[i - 1]).sin() * moment[i - 1];
         }
         if i + 1 < n {
-            u[i] = u[i] - (x[i] - x[i + 1]).sin() * moment[i + 1];
+            u[i] -= (x[i] - x[i + 1]).sin() * moment[i + 1];
         }
         if i > 0 {
             let cos = (x[i] - x[i - 1]).cos();
             let factor = cos / pivot[i - 1];
-            pivot[i] = pivot[i] - factor * cos;
-            u[i] = u[i] + factor * u[i - 1];
+            pivot[i] -= factor * cos;
+            u[i] += factor * u[i - 1];
         }
     }
     for step in 0..n {
         let i = n - 1 - step;
         if i + 1 < n {
-            u[i] = u[i] + (x[i] - x[i + 1]).cos() * u[i + 1];
+            u[i] += (x[i] - x[i + 1]).cos() * u[i + 1];
         }
-        u[i] = u[i] / pivot[i];
+        u[i] /= pivot[i];
     }
     let mut derivative = [0.0; N];
     for i in 0..n {
@@ -128,8 +128,8 @@ pub fn modes(x: [f64; 12], p: f64, t: f64) -> [f64; 12] {
     let mut positions = 0.0;
     let mut velocities = 0.0;
     for i in 0..6 {
-        positions = positions + V[i] * (x[i] - t.sin());
-        velocities = velocities + V[i] * x[6 + i];
+        positions += V[i] * (x[i] - t.sin());
+        velocities += V[i] * x[6 + i];
     }
     let mut force = [0.0; 6];
     let mut along = 0.0;
@@ -138,7 +138,7 @@ pub fn modes(x: [f64; 12], p: f64, t: f64) -> [f64; 12] {
         let position = x[i] - t.sin() - 2.0 * V[i] * positions;
         let velocity = x[6 + i] - 2.0 * V[i] * velocities;
         force[i] = -omega * (omega * position + 2.0 * p * velocity);
-        along = along + V[i] * force[i];
+        along += V[i] * force[i];
     }
     core::array::from_fn(|i| if i < 6 { x[6 + i] } else { force[i - 6] - 2.0 * V[i - 6] * along })
 }

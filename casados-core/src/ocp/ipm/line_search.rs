@@ -122,10 +122,11 @@ where
                 return Ok(Some(Accepted { alpha, corrected: false }));
             }
             let bends = there.is_some_and(|there| there.theta >= expected.here.theta);
-            if alpha == longest && bends {
-                if let Some(alpha) = self.correct(ocp, filter, expected, tau)? {
-                    return Ok(Some(Accepted { alpha, corrected: true }));
-                }
+            if alpha == longest
+                && bends
+                && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
+            {
+                return Ok(Some(Accepted { alpha, corrected: true }));
             }
             alpha *= 0.5;
         }

@@ -31,7 +31,7 @@ fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
     {
         let below = lower.is_finite() && !soft_below.is_finite();
         let above = upper.is_finite() && !soft_above.is_finite();
-        if below && above && !(lower < upper) {
+        if below && above && lower >= upper {
             *v = lower;
             continue;
         }

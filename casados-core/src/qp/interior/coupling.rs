@@ -114,7 +114,7 @@ impl<'a, T: Real> Coupling<'a, T> {
 
 /// Where the last state begins among the rows.
 pub fn last_state<T: Real>(qp: QpView<'_, T>) -> usize {
-    Places::<T>::new(qp.dims).last().map_or(0, |place| place.row)
+    Places::<T>::new(qp.dims).next_back().map_or(0, |place| place.row)
 }
 
 impl<T: Real> Iterate<'_, T> {
