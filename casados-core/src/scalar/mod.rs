@@ -426,14 +426,6 @@ mod sealed {
 
 /// One real number: `f32` or `f64`. No other type can be one: kernels are entered by the alignment of
 /// their numbers, with instructions that a machine has for these.
-///
-/// ```compile_fail,E0277
-/// // A number of its own that is a `Scalar` and has `Lanes` is still no `Real`.
-/// fn real<T: casados_core::scalar::Real>() {}
-/// #[repr(align(64))]
-/// struct Wide(f64);
-/// real::<Wide>();
-/// ```
 pub trait Real:
     Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default + sealed::Sealed
 {
