@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Comments of Rust files and lines of Markdown files have at most 100 columns.
 
-Tables, links and generated text (between `<!-- name -->` and `<!-- end of name -->`) are left out.
+Tables, links, code and formulas (between fences) and generated text (between `<!-- name -->` and
+`<!-- end of name -->`) are left out.
 """
 
 import re
@@ -14,9 +15,11 @@ LINK = re.compile(r"https?://\S{40,}|\]\([^)]{40,}\)")
 
 
 def long_lines(path, text):
-    generated = False
+    generated = fenced = False
     for number, line in enumerate(text.split("\n"), 1):
         stripped = line.strip()
+        if stripped.lstrip("/! ").startswith("```"):
+            fenced = not fenced
         if path.endswith(".md"):
             if stripped.startswith("<!-- end of"):
                 generated = False
@@ -26,7 +29,7 @@ def long_lines(path, text):
                 continue
         elif not COMMENT.match(line) or stripped.startswith(("/// |", "//! |")):
             continue
-        if len(line) > WIDTH and not LINK.search(line):
+        if len(line) > WIDTH and not fenced and not LINK.search(line):
             yield number, len(line)
 
 

@@ -1,4 +1,5 @@
-//! The chain of the examples, for the numbers of states that are measured here: one text for the model.
+//! The chain of the examples, for the numbers of states that are measured here: one text for the
+//! model.
 
 use std::{env, error::Error, fs, path::Path};
 

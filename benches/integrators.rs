@@ -1,6 +1,8 @@
-//! Time of one call by criterion: simulation, forward, adjoint, Hessian, from start values of zero, to rounding.
+//! Time of one call by criterion: simulation, forward, adjoint, Hessian, from start values of zero,
+//! to rounding.
 //!
-//! `cargo bench --manifest-path benches/Cargo.toml -- 'chain 5'` runs a part. "s4n4" is a method of 4 stages with 4 steps.
+//! `cargo bench --manifest-path benches/Cargo.toml -- 'chain 5'` runs a part. "s4n4" is a method of
+//! 4 stages with 4 steps.
 
 use casados::prelude::Start;
 use casados_benches::calls::{open, options};

@@ -1,4 +1,5 @@
-//! A chain of masses on springs falls while its end is drawn up: time of one call as the chain grows.
+//! A chain of masses on springs falls while its end is drawn up: time of one call as the chain
+//! grows.
 //!
 //! ```text
 //! cargo run --release --example chain

@@ -2,7 +2,8 @@
 //!
 //! ## Integrals along the solution
 //!
-//! `#[function]` writes a function of a model's variables with its derivatives. An integrator takes its integral along:
+//! `#[function]` writes a function of a model's variables with its derivatives. An integrator takes
+//! its integral along:
 //!
 //! ```
 //! use casados::prelude::*;
@@ -103,8 +104,8 @@
 //!
 //! ## Second derivatives of algebraic states
 //!
-//! The Hessian of `λᵀx + νᵀz₀` has those of the algebraic states at the start of an interval, too, on which costs and constraints may
-//! depend; problems of optimal control ask for it by themselves.
+//! The Hessian of `λᵀx + νᵀz₀` has those of the algebraic states at the start of an interval, too,
+//! on which costs and constraints may depend; problems of optimal control ask for it by themselves.
 //!
 //! ```
 //! use casados::prelude::*;

@@ -1,7 +1,7 @@
 //! Second derivatives of algebraic states at the start of an interval, `∇²(λᵀx₊ + νᵀz₀)`.
 //!
-//! References are differences of order eight of exact gradients of the same discrete map, which other tests compare with
-//! independent ones, and a closed form.
+//! References are differences of order eight of exact gradients of the same discrete map, which
+//! other tests compare with independent ones, and a closed form.
 
 use casados::batch::Slice;
 use casados::error::Argument;
@@ -12,8 +12,8 @@ use nalgebra::{SMatrix, SVector, vector};
 
 type Test = Result<(), Box<dyn std::error::Error>>;
 
-/// A cart with friction: `z₀` is a force, explicit but nonlinear in everything; `z₁` is given by an equation without a solution in
-/// elementary functions.
+/// A cart with friction: `z₀` is a force, explicit but nonlinear in everything; `z₁` is given by an
+/// equation without a solution in elementary functions.
 #[dae]
 fn cart(xdot: [f64; 2], x: [f64; 2], z: [f64; 2], u: [f64; 1], p: [f64; 1], t: f64) -> [f64; 4] {
     [
@@ -106,7 +106,8 @@ fn slopes(step: &Hessian<Cart>) -> W {
 
 /// Gradients and Hessians are sums of some dozen products of order one.
 const ROUNDING: f64 = 1e-14;
-/// The weights of differences add up to `2.1 / STEP`; ninth derivatives count with `STEP⁸/630 = 2e-19`.
+/// The weights of differences add up to `2.1 / STEP`; ninth derivatives count with
+/// `STEP⁸/630 = 2e-19`.
 const DIFFERENCE: f64 = 210.0 * ROUNDING;
 
 /// One interval alone and any number of them in lanes.
@@ -188,7 +189,8 @@ fn with_an_integral() -> Test {
     Ok(())
 }
 
-/// `ẋ = u − x`, `z = sin(x u) + p x³`: the states of the stages are linear in `(x₀, u)`, `ξ = (I + hA)⁻¹ (x₀ + hA u)`.
+/// `ẋ = u − x`, `z = sin(x u) + p x³`: the states of the stages are linear in `(x₀, u)`,
+/// `ξ = (I + hA)⁻¹ (x₀ + hA u)`.
 #[dae]
 fn decay(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 2] {
     [xdot[0] + x[0] - u[0], z[0] - (x[0] * u[0]).sin() - p[0] * x[0].powi(3)]
@@ -244,13 +246,15 @@ fn closed_forms() -> Test {
     check_closed_form(trapezoidal, nalgebra::matrix![0.0, 0.0; 0.5, 0.5], vector![1.0, 0.0])
 }
 
-/// `P z = (x³, x u²)` with a state that stays as it is: of two permutations one has a pivot of zero in any static order.
+/// `P z = (x³, x u²)` with a state that stays as it is: of two permutations one has a pivot of zero
+/// in any static order.
 #[dae]
 fn permuted(xdot: [f64; 1], x: [f64; 1], z: [f64; 2], u: [f64; 1], p: [f64; 4]) -> [f64; 3] {
     [xdot[0], p[0] * z[0] + p[1] * z[1] - x[0].powi(3), p[2] * z[0] + p[3] * z[1] - x[0] * u[0] * u[0]]
 }
 
-/// Where the whole matrix is pivoted, alone and beside intervals that need no such thing: `νᵀ∂²(P⁻¹ r)` in closed form.
+/// Where the whole matrix is pivoted, alone and beside intervals that need no such thing:
+/// `νᵀ∂²(P⁻¹ r)` in closed form.
 #[test]
 fn pivoted() -> Test {
     let permutations = [vector![1.0, 0.0, 0.0, 1.0], vector![0.0, 1.0, 1.0, 0.0]];

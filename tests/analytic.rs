@@ -1,11 +1,11 @@
-//! Problems with closed-form solutions: end state, first and second derivatives by all variables, integrated until
-//! only rounding is left.
+//! Problems with closed-form solutions: end state, first and second derivatives by all variables,
+//! integrated until only rounding is left.
 //!
-//! `tests/data/analytic/analytic.json` holds the closed forms evaluated to 32 digits at 130 digits of working
-//! precision. Tolerances come from `check_exact`: the difference between two numbers of steps bounds the
-//! discretisation error, samples of the rounding error stand for condition times epsilon. `limit` in each test is what
-//! the tolerance itself may be at most, relative to the largest entry, so that no test passes by
-//! being unable to tell.
+//! `tests/data/analytic/analytic.json` holds the closed forms evaluated to 32 digits at 130 digits
+//! of working precision. Tolerances come from `check_exact`: the difference between two numbers of
+//! steps bounds the discretisation error, samples of the rounding error stand for condition times
+//! epsilon. `limit` in each test is what the tolerance itself may be at most, relative to the
+//! largest entry, so that no test passes by being unable to tell.
 
 use casados::options::Start;
 use casados::testing::{Exact, Integrator, Report, check_exact};
@@ -222,8 +222,8 @@ fn oscillators() {
     check!(Erk::<Oscillator, DormandPrince8>, "oscillator_underdamped", 256, 1e-11);
 }
 
-/// Orbits: the far end of an eccentric one amplifies errors by the norm of the state transition matrix, 100, its square
-/// in second derivatives.
+/// Orbits: the far end of an eccentric one amplifies errors by the norm of the state transition
+/// matrix, 100, its square in second derivatives.
 #[test]
 fn kepler_orbits() {
     check!(Irk::<Kepler, Gauss<6>>, "kepler_e0.0", 64, 1e-11);
@@ -278,7 +278,8 @@ fn kaps_every_stiffness() {
 
 #[test]
 fn linear_dae() {
-    // The algebraic states at the end are those of the collocation polynomial: of order s with Gauss.
+    // The algebraic states at the end are those of the collocation polynomial: of order s with
+    // Gauss.
     check!(Irk::<Linear, Gauss<8>>, "linear_dae_index1", 32, 1e-11);
     check!(Irk::<Linear, RadauIIA<5>>, "linear_dae_index1", 32, 1e-11);
 }

@@ -1,8 +1,10 @@
-//! Intervals side by side against one interval after the other, which are tested against independent references.
+//! Intervals side by side against one interval after the other, which are tested against
+//! independent references.
 //!
-//! Both solve the same stages to rounding and differentiate them exactly, each with errors of ε times the condition of
-//! the Newton matrix (as in `tests/reference.rs`, where the conditions come from): so they are apart by twice that at most.
-//! Errors are relative to the largest element of a result.
+//! Both solve the same stages to rounding and differentiate them exactly, each with errors of ε
+//! times the condition of the Newton matrix (as in `tests/reference.rs`, where the conditions come
+//! from): so they are apart by twice that at most. Errors are relative to the largest element of a
+//! result.
 
 #[path = "../examples/models/awe.rs"]
 mod awe;
@@ -181,7 +183,8 @@ fn pendulums() -> Test {
     Ok(())
 }
 
-/// Three kinematic states, that follow another one, the control and the parameter, and are felt by three more.
+/// Three kinematic states, that follow another one, the control and the parameter, and are felt by
+/// three more.
 #[ode]
 fn followers(x: [f64; 6], u: f64, p: f64) -> [f64; 6] {
     let [a, b, c, v, w, y] = x;
@@ -216,7 +219,8 @@ fn kinematic_states() -> Test {
     Ok(())
 }
 
-/// The Jacobian changes by a multiple of itself from stage to stage, by the state, what is algebraic, and the time.
+/// The Jacobian changes by a multiple of itself from stage to stage, by the state, what is
+/// algebraic, and the time.
 #[dae]
 fn driven(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, t: f64) -> [f64; 3] {
     let [a, b] = x;
@@ -227,8 +231,8 @@ fn driven(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, t: f64) -> [f64; 3] {
     ]
 }
 
-/// Of a batch one Jacobian in the middle of the stages is taken for all of them, of a single call the mean of theirs: iterations converge as
-/// fast.
+/// Of a batch one Jacobian in the middle of the stages is taken for all of them, of a single call
+/// the mean of theirs: iterations converge as fast.
 #[test]
 fn jacobian_in_the_middle() -> Test {
     fn same<B: Method<S>, const S: usize>(options: Options) -> Test {
@@ -266,7 +270,8 @@ fn immense(xdot: [f64; 2], x: [f64; 2]) -> [f64; 2] {
     [1e60 * (xdot[0] - x[1] * 1e-60), xdot[1] + 1e60 * x[0] * (1.0 + x[0] * x[0]).sqrt()]
 }
 
-/// Nine digits of the Newton matrix are those of a fast motion to `x₀ = x₁`, and the slow one is in the others.
+/// Nine digits of the Newton matrix are those of a fast motion to `x₀ = x₁`, and the slow one is in
+/// the others.
 #[dae]
 fn coupled(xdot: [f64; 2], x: [f64; 2]) -> [f64; 2] {
     [xdot[0] + 1e9 * (x[0] - x[1]) + x[0] * x[0], xdot[1] - 1e9 * (x[0] - x[1]) + x[1].sin()]
@@ -360,7 +365,8 @@ fn fragile(xdot: f64, x: f64, z: f64, u: f64, p: f64) -> [f64; 2] {
     [xdot + x.sqrt() - u, p * z - x + z * z * z * 0.01]
 }
 
-/// Intervals that fail say why, as a single call does, leave their results as they were, and change no bit of others.
+/// Intervals that fail say why, as a single call does, leave their results as they were, and change
+/// no bit of others.
 #[test]
 fn failures() -> Test {
     let count = 11;

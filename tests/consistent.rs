@@ -1,4 +1,5 @@
-//! The start of an adaptive integration: consistent `ẋ` and `z`, or an error that names what is not.
+//! The start of an adaptive integration: consistent `ẋ` and `z`, or an error that names what is
+//! not.
 
 #[path = "consistent/allocations.rs"]
 mod allocations;

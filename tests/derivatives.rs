@@ -1,5 +1,6 @@
-//! Derivative code three ways: what the attributes emit, `num-dual`, and complex step or differences of order 8; on the
-//! example models and on random models that cover every function of the language.
+//! Derivative code three ways: what the attributes emit, `num-dual`, and complex step or
+//! differences of order 8; on the example models and on random models that cover every function of
+//! the language.
 
 use casados::GraphDae;
 use casados::testing::{Points, Report, check_derivatives, check_pattern};
@@ -30,8 +31,8 @@ fn generated_file_is_up_to_date() {
     );
 }
 
-/// Every comparison passes, and at most a tenth of the entries are near a kink or a singularity, where
-/// differences say nothing.
+/// Every comparison passes, and at most a tenth of the entries are near a kink or a singularity,
+/// where differences say nothing.
 fn check<M: GraphDae>(points: &Points<M>) {
     let report: Report = check_derivatives(points);
     report.assert();

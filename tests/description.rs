@@ -1,7 +1,7 @@
 //! What models say about themselves, and whether the costs that they expect are those of the plan.
 //!
-//! The texts are in `description/`; `CASADOS_WRITE=1 cargo test --test description` writes them anew: read
-//! them before committing them, as somebody who sees the model for the first time.
+//! The texts are in `description/`; `CASADOS_WRITE=1 cargo test --test description` writes them
+//! anew: read them before committing them, as somebody who sees the model for the first time.
 
 use casados::Dae;
 use casados::model::{Cost, Structure};
@@ -23,7 +23,8 @@ use awe::Awe;
 use chain::Chain;
 use pendulum::Pendulum;
 
-/// A tank with an outflow and a meter, linear but for the multiplication with the valve: quadrature, algebraic state, parameter.
+/// A tank with an outflow and a meter, linear but for the multiplication with the valve:
+/// quadrature, algebraic state, parameter.
 #[dae]
 mod tank {
     pub struct State {
@@ -140,8 +141,8 @@ fn inverse(a: &Matrix) -> Matrix {
     a
 }
 
-/// Any matrix of the pattern of a model, eliminated by its plan: operations of the factorisation and of a solve, and
-/// the largest error of a solution of which every element is one.
+/// Any matrix of the pattern of a model, eliminated by its plan: operations of the factorisation
+/// and of a solve, and the largest error of a solution of which every element is one.
 fn eliminate(structure: &Structure, s: usize) -> (u64, u64, f64) {
     let plan = &structure.elimination;
     let n = plan.slot_of_equation.len();
@@ -230,7 +231,8 @@ fn costs_are_those_of_the_plan() {
     }
 }
 
-/// LU factors of a matrix of `n` rows and a solve with them, operation by operation: the cost without a plan.
+/// LU factors of a matrix of `n` rows and a solve with them, operation by operation: the cost
+/// without a plan.
 #[test]
 fn costs_without_a_plan() {
     let structure = Structure { elimination: casados::model::Elimination::NONE, ..*Tank::describe() };
@@ -282,7 +284,8 @@ fn costs_of_the_tank() {
         assert_eq!(cost.iteration, newton);
         assert_eq!(cost.forward, 3 * (2 * s + cost.solve + 4 * s) + 2 * s);
         assert_eq!(cost.adjoint, 2 * s + cost.solve + 2 * s * 3);
-        // Second derivatives by (x₀, u), (x₀, p) and (u, p): three curved variables, one of them a state.
+        // Second derivatives by (x₀, u), (x₀, p) and (u, p): three curved variables, one of them a
+        // state.
         assert_eq!((structure.hessian.len(), structure.curved), (3, &[2, 5, 6][..]));
         let second = s * u64::from(operations.hessian) + 3 * 2 * s * s + 3 * 2 * s * 6 + 6 * 2 * s * 3;
         assert_eq!(cost.hessian, second);

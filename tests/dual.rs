@@ -1,4 +1,5 @@
-//! Models over dual numbers: their derivatives against the graphs of the same models, and their passes.
+//! Models over dual numbers: their derivatives against the graphs of the same models, and their
+//! passes.
 
 use casados::dual::DualModel;
 use casados::model::{ArrayK, ArrayV, Pattern};
@@ -21,7 +22,8 @@ fn pendulum<T: DualNum<Primitive = f64> + Copy>(xdot: [T; 4], x: [T; 4], u: [T; 
 /// Stiffness of a spring by deflection, linear between whole numbers.
 const STIFFNESS: [f64; 4] = [1.0, 2.5, 2.0, 4.0];
 
-/// A mass on a spring whose stiffness is a table, with a stop at 2.5 and a damper that depends on time.
+/// A mass on a spring whose stiffness is a table, with a stop at 2.5 and a damper that depends on
+/// time.
 #[ode]
 fn spring<T: DualNum<Primitive = f64> + Copy>(t: T, p: [T; 2], x: [T; 2], u: T) -> [T; 2] {
     let [position, velocity] = x;
@@ -37,7 +39,8 @@ fn spring<T: DualNum<Primitive = f64> + Copy>(t: T, p: [T; 2], x: [T; 2], u: T) 
     [velocity, force]
 }
 
-/// States that are driven by their neighbours: sparse. The lengths come from the attribute and from the module.
+/// States that are driven by their neighbours: sparse. The lengths come from the attribute and from
+/// the module.
 #[dae(N = [12])]
 mod chain {
     use nalgebra::SVector;
@@ -61,11 +64,12 @@ mod chain {
     }
 }
 
-/// Compares all derivatives of a dual model and of the graph of the same model. What is not in the pattern of
-/// the graph must be exactly zero in the dense one.
+/// Compares all derivatives of a dual model and of the graph of the same model. What is not in the
+/// pattern of the graph must be exactly zero in the dense one.
 ///
-/// Both round in at most fifty operations on the way to an entry, on intermediate results of the size of the largest
-/// entry (all variables and constants are of order one to ten): they differ by 100 ε times that at most.
+/// Both round in at most fifty operations on the way to an entry, on intermediate results of the
+/// size of the largest entry (all variables and constants are of order one to ten): they differ by
+/// 100 ε times that at most.
 fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
     for point in points {
         let v = ArrayV::<M, f64>::from_fn(|i| point[i]);
@@ -85,7 +89,8 @@ fn compare<M: DualModel, G: Dae<Shape = M::Shape>>(points: &[Vec<f64>]) {
             &dense(&G::STRUCTURE.jacobian, sparse.as_ref(), M::Shape::NV),
         );
 
-        // In one direction, term by term: also the product with the Jacobian, whose terms are as large.
+        // In one direction, term by term: also the product with the Jacobian, whose terms are as
+        // large.
         let direction = |i: usize| if i + 1 < M::Shape::NV { 0.7 - 0.2 * (i % 5) as f64 } else { 0.0 };
         let along = ArrayV::<M, Tangent<f64>>::from_fn(|i| Tangent { value: v[i], derivative: direction(i) });
         let nothing = |_| Tangent { value: f64::NAN, derivative: f64::NAN };
@@ -141,7 +146,8 @@ fn close(what: &str, a: &[f64], b: &[f64]) {
     }
 }
 
-/// Points with coordinates between -2 and 2: multiples of the golden ratio, which no structure repeats.
+/// Points with coordinates between -2 and 2: multiples of the golden ratio, which no structure
+/// repeats.
 fn points(length: usize, count: usize) -> Vec<Vec<f64>> {
     let golden = |k: usize| (k as f64 * 0.618_033_988_749_894_9).fract() * 4.0 - 2.0;
     (0..count).map(|point| (0..length).map(|i| golden(point * length + i + 1)).collect()).collect()
@@ -180,8 +186,9 @@ fn values_are_those_of_the_function() {
     assert_eq!(f, [0.3 - velocity, 0.1 - force]);
 }
 
-/// No equation of the chain depends on two derivatives, nor on two states of the same parity: with the control,
-/// which is no state of the second equation, three evaluations instead of 25. Three pairs of them have second derivatives.
+/// No equation of the chain depends on two derivatives, nor on two states of the same parity: with
+/// the control, which is no state of the second equation, three evaluations instead of 25. Three
+/// pairs of them have second derivatives.
 #[test]
 fn sparse_models_take_few_passes() {
     Chain::<12>::residual_jacobian::<f64>(&[0.3; 26], &mut [0.0; 12], &mut [0.0; 300]);

@@ -1,4 +1,5 @@
-//! Emitted code computes the bits of the function that it was made from, in one piece or in several.
+//! Emitted code computes the bits of the function that it was made from, in one piece or in
+//! several.
 
 use casados::testing::{Points, check_derivatives};
 use casados::{Dae, dae};

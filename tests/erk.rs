@@ -156,7 +156,8 @@ fn derivatives<const S: usize>(tableau: &Tableau<S>) -> Derivatives {
     result
 }
 
-/// Values are of size 1 to 30, each of some 100 operations: rounding stays below 1e-13 of the largest.
+/// Values are of size 1 to 30, each of some 100 operations: rounding stays below 1e-13 of the
+/// largest.
 #[track_caller]
 fn close<const R: usize, const C: usize>(ours: &SMatrix<f64, R, C>, exact: &SMatrix<f64, R, C>) {
     let error = (ours - exact).amax();

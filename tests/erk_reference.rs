@@ -1,4 +1,5 @@
-//! Explicit integrators against reference values of an independent code: pendulum and chains, RK4, one step.
+//! Explicit integrators against reference values of an independent code: pendulum and chains, RK4,
+//! one step.
 
 mod data;
 mod systems;
@@ -54,8 +55,8 @@ explicit!(Chain3: 0 1 2 3 4 5 6 7 8);
 explicit!(Chain5: 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20);
 explicit!(Chain7: 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32);
 
-/// The reference has 17 digits; each value is a sum of some 100 terms of the size of the largest, with roundings
-/// of both codes.
+/// The reference has 17 digits; each value is a sum of some 100 terms of the size of the largest,
+/// with roundings of both codes.
 #[track_caller]
 fn close<const R: usize, const C: usize>(what: &str, ours: SMatrix<f64, R, C>, exact: SMatrix<f64, R, C>) {
     let error = (ours - exact).amax() / exact.amax();

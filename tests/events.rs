@@ -1,4 +1,5 @@
-//! Events against closed forms: times, states, and their derivatives, which are complex steps through the formulas.
+//! Events against closed forms: times, states, and their derivatives, which are complex steps
+//! through the formulas.
 
 use casados::adaptive::HybridHessian;
 use casados::prelude::*;
@@ -20,7 +21,8 @@ fn bounce(x: [f64; 2], p: [f64; 2]) -> [f64; 2] {
     [x[0], -p[1] * x[1]]
 }
 
-/// Times of the first `n` bounces, and height and velocity at `t`, which is after them and before the next.
+/// Times of the first `n` bounces, and height and velocity at `t`, which is after them and before
+/// the next.
 fn bouncing(w: [Complex<f64>; 4], n: usize, t: f64) -> (Vec<Complex<f64>>, [Complex<f64>; 2]) {
     let [height, velocity, gravity, restitution] = w;
     let speed = (velocity * velocity + gravity * height * 2.0).sqrt();
@@ -64,8 +66,8 @@ fn options(rtol: f64) -> AdaptiveOptions {
     AdaptiveOptions { rtol, atol: rtol / 10.0, ..Default::default() }
 }
 
-/// Polynomials of degree two are solved exactly by every method: rounding, which each bounce multiplies by the slopes of
-/// some units.
+/// Polynomials of degree two are solved exactly by every method: rounding, which each bounce
+/// multiplies by the slopes of some units.
 const ROUNDING: f64 = 1e-11;
 
 macro_rules! bounces {
@@ -183,7 +185,8 @@ fn a_terminal_event() {
     });
     let solution = hybrid.solve(&x0, &u, 10.0).unwrap();
     assert!(solution.terminal);
-    // Some steps with errors of 1e-11, which the slope of 0.05 at the level makes errors in time of twenty times as much.
+    // Some steps with errors of 1e-11, which the slope of 0.05 at the level makes errors in time of
+    // twenty times as much.
     let tolerance = 2e-9;
     assert_close([solution.t], [value[1]], tolerance);
     assert_close(solution.nominal.x, [value[0]], 1e-14);
@@ -205,7 +208,8 @@ fn a_terminal_event() {
     assert!(!solution.terminal && solution.occurrences.is_empty());
 }
 
-/// Two events: at `t = p/2` and where the level is reached the state jumps, in ways that depend on everything.
+/// Two events: at `t = p/2` and where the level is reached the state jumps, in ways that depend on
+/// everything.
 #[test]
 fn several_events_that_depend_on_everything() {
     let events =
@@ -298,7 +302,8 @@ fn root(x: f64) -> f64 {
 fn touching_and_undefined_functions() {
     let event = Event::terminal::<Cube>(Crossing::Rising);
     let mut hybrid = Hybrid::new(Adaptive::<Line, Radau>::new(options(1e-8)).unwrap(), &[event]).unwrap();
-    // Newton's method on a cube gains a third with each of twenty iterations, after a millionth of a step.
+    // Newton's method on a cube gains a third with each of twenty iterations, after a millionth of
+    // a step.
     let t = hybrid.solve(&Vector1::new(0.0), &vector![], 4.0).unwrap().t;
     assert_close([t], [1.0], 1e-6);
     let error = hybrid.forward(&Vector1::new(0.0), &vector![], 4.0).unwrap_err();
@@ -490,7 +495,8 @@ macro_rules! second_over_bounces {
             assert_close(hessian.adjoint.grad_x0, adjoint.grad_x0, ROUNDING);
             assert_close(hessian.adjoint.grad_p, adjoint.grad_p, ROUNDING);
             for (direction, found) in all(&hessian).iter().enumerate() {
-                // Of a gradient that is exact: h⁸ times a ninth derivative over 630, and ε/h, of numbers up to a few hundred.
+                // Of a gradient that is exact: h⁸ times a ninth derivative over 630, and ε/h, of
+                // numbers up to a few hundred.
                 let expected = difference(1e-2, |step| {
                     let mut w = w;
                     w[direction] += step;
@@ -518,8 +524,8 @@ fn second_derivatives_up_to_an_event() {
     hybrid.integrator().set_parameters(&vector![9.81, 0.8]).unwrap();
     let (h, v, g) = (1.3, 0.4, 9.81_f64);
     let hessian = hybrid.hessian(&vector![h, v], &vector![], 9.0, &vector![0.5, 1.0]).unwrap();
-    // s = √(v² + 2gh): s_hh = −g²/s³, s_hv = −gv/s³, s_vv = 2gh/s³, s_hg = 1/s − gh/s³, s_vg = −vh/s³, s_gg = −h²/s³.
-    // The height is zero whatever happens.
+    // s = √(v² + 2gh): s_hh = −g²/s³, s_hv = −gv/s³, s_vv = 2gh/s³, s_hg = 1/s − gh/s³, s_vg =
+    // −vh/s³, s_gg = −h²/s³. The height is zero whatever happens.
     let s = (v * v + 2.0 * g * h).sqrt();
     let c = s.powi(3);
     let (hh, hv, vv) = (-g * g / c, -g * v / c, 2.0 * g * h / c);
@@ -530,7 +536,8 @@ fn second_derivatives_up_to_an_event() {
     }
 }
 
-/// A pendulum with friction and an algebraic state that is pushed, between walls that depend on everything.
+/// A pendulum with friction and an algebraic state that is pushed, between walls that depend on
+/// everything.
 #[dae]
 fn pushed(xdot: [f64; 2], x: [f64; 2], z: f64, u: f64, p: [f64; 2]) -> [f64; 3] {
     [
@@ -568,8 +575,8 @@ fn gradient(hybrid: &mut Hybrid<Pushed, Radau, f64>, w: [f64; 5]) -> [f64; 6] {
     [lambda.dot(&found.solution.nominal.x), x[0], x[1], u[0], p[0], p[1]]
 }
 
-/// Against differences of the gradient of order eight. Their errors are those of gradients, 1e-11 times the condition of
-/// two events over `h = 5e-3`, and a ninth derivative times `h⁸/630`.
+/// Against differences of the gradient of order eight. Their errors are those of gradients, 1e-11
+/// times the condition of two events over `h = 5e-3`, and a ninth derivative times `h⁸/630`.
 #[test]
 fn second_derivatives_over_events_that_depend_on_everything() {
     let mut hybrid = between_walls(AdaptiveOptions { rtol: 1e-12, atol: 1e-13, ..Default::default() });
@@ -606,7 +613,8 @@ fn second_derivatives_need_autonomous_events() {
     }
 }
 
-/// Steps and events that are kept: polynomials are exact whatever the steps are, and the times of events move as they should.
+/// Steps and events that are kept: polynomials are exact whatever the steps are, and the times of
+/// events move as they should.
 #[test]
 fn frozen_bounces() {
     let event = Event::jump::<Height, Bounce>(Crossing::Falling);
@@ -646,8 +654,8 @@ fn frozen_bounces() {
     assert!(hybrid.statistics().steps > 0);
 }
 
-/// What is frozen is smooth at a coarse tolerance too: differences over different steps agree to rounding, `ε/h` and `h⁸`, and
-/// gradients are theirs up to the errors of the steps.
+/// What is frozen is smooth at a coarse tolerance too: differences over different steps agree to
+/// rounding, `ε/h` and `h⁸`, and gradients are theirs up to the errors of the steps.
 #[test]
 fn frozen_events_are_smooth() {
     let tolerance = 1e-4;

@@ -21,8 +21,8 @@ use data::Record;
 use interval::{check, options};
 use pendulum::Pendulum;
 
-/// Every comparison passes, and at most a tenth of the entries are near a kink or a singularity, where
-/// differences say nothing.
+/// Every comparison passes, and at most a tenth of the entries are near a kink or a singularity,
+/// where differences say nothing.
 fn derivatives<M: GraphDae>(points: &Points<M>) {
     let report = check_derivatives(points);
     report.assert();

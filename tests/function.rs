@@ -1,5 +1,5 @@
-//! Functions of a model's variables: values, patterns, and derivatives three ways (forward differentiation through the
-//! emitted code, the complex step, formulas by hand).
+//! Functions of a model's variables: values, patterns, and derivatives three ways (forward
+//! differentiation through the emitted code, the complex step, formulas by hand).
 
 use casados::function::FunctionStructure;
 use casados::prelude::*;
@@ -73,7 +73,8 @@ fn hessian(v: &[f64; NV], mu: &[f64; NY]) -> [[f64; NV]; NV] {
     matrix
 }
 
-/// Some thirty operations on numbers of size one to twenty: a relative error of 1e-14 of the largest is hundred units of rounding.
+/// Some thirty operations on numbers of size one to twenty: a relative error of 1e-14 of the
+/// largest is hundred units of rounding.
 fn assert_close(a: &[[f64; NV]], b: &[[f64; NV]]) {
     let largest = a.as_flattened().iter().fold(1.0, |m: f64, a| m.max(a.abs()));
     for (a, b) in a.as_flattened().iter().zip(b.as_flattened()) {

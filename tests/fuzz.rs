@@ -1,5 +1,6 @@
-//! Anything at all into every public entry of every integrator: an answer that is finite or an error, never a panic, never an
-//! endless loop. What comes is drawn from a seed, so that a failure repeats.
+//! Anything at all into every public entry of every integrator: an answer that is finite or an
+//! error, never a panic, never an endless loop. What comes is drawn from a seed, so that a failure
+//! repeats.
 
 #[path = "stress/everything.rs"]
 mod everything;
@@ -145,8 +146,9 @@ fn ignore<T>(_: T) {}
 
 /// How many integrators of each kind are made, and how many calls of each.
 const INTEGRATORS: u64 = 120;
-// Draws are the same in every run: of what they ask for, so much has an answer (the last number of each test, somewhat less than
-// what is counted, since rounding differs between machines). Less means that something has begun to fail.
+// Draws are the same in every run: of what they ask for, so much has an answer (the last number of
+// each test, somewhat less than what is counted, since rounding differs between machines). Less
+// means that something has begun to fail.
 const CALLS: usize = 8;
 
 /// Calls that all integrators with equal steps have; how many succeeded.

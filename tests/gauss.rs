@@ -1,5 +1,6 @@
-//! Gauss methods with steps of variable size: the error follows the tolerance with the order of the method, quadratic
-//! invariants stay, stiff and algebraic equations are solved, derivatives are those of the steps.
+//! Gauss methods with steps of variable size: the error follows the tolerance with the order of the
+//! method, quadratic invariants stay, stiff and algebraic equations are solved, derivatives are
+//! those of the steps.
 
 use casados::prelude::*;
 use nalgebra::{Vector1, matrix, vector};
@@ -18,7 +19,8 @@ fn assert_close(value: impl AsRef<[f64]>, expected: impl AsRef<[f64]>, tolerance
     }
 }
 
-/// `x(t) = 1 / (1 + t²)` solves `ẋ = −2 t x²` from `x(0) = 1`: all of its steps have different sizes.
+/// `x(t) = 1 / (1 + t²)` solves `ẋ = −2 t x²` from `x(0) = 1`: all of its steps have different
+/// sizes.
 #[ode]
 fn bell(x: f64, t: f64) -> f64 {
     -2.0 * t * x * x
@@ -46,7 +48,8 @@ macro_rules! follows {
             // Errors at the start grow like x², by (0.8 · 26)².
             assert!(*error <= 400.0 * rtol, "{error:e} at {rtol:e} with {} stages", $stages);
         }
-        // Over six digits of the tolerance the error falls by five to seven and a half; by less where it is at rounding.
+        // Over six digits of the tolerance the error falls by five to seven and a half; by less
+        // where it is at rounding.
         let slope = (errors[0] / errors[3]).log10() / 6.0;
         assert!($stages == 6 || (0.8..=1.25).contains(&slope), "{slope} with {} stages: {errors:?}", $stages);
     }};
@@ -78,9 +81,11 @@ macro_rules! order {
             error
         };
         let order = (error($steps) / error(2 * $steps)).log2();
-        // Before rounding is reached, steps are hardly smaller than the distance of the poles at ±i: above the order.
+        // Before rounding is reached, steps are hardly smaller than the distance of the poles at
+        // ±i: above the order.
         let excess = order - 2.0 * f64::from($stages);
-        assert!((-0.3..2.0).contains(&excess),
+        assert!(
+            (-0.3..2.0).contains(&excess),
             "order {order} with {} stages: {:e}",
             $stages,
             error(2 * $steps)
@@ -108,7 +113,8 @@ fn quadratic_invariants_stay() {
     let x = gauss.solve(&vector![0.6, 0.8], &vector![], 200.0).unwrap().x;
     let steps = gauss.statistics().steps;
     assert!(steps > 300);
-    // What Newton's method leaves of each step: at most 0.03 of what is tolerated of its estimate, 0.1 · 1e-5^(4/6).
+    // What Newton's method leaves of each step: at most 0.03 of what is tolerated of its estimate,
+    // 0.1 · 1e-5^(4/6).
     assert!((x.norm() - 1.0).abs() < 0.03 * 4.7e-5 * steps as f64, "{:e}", x.norm() - 1.0);
     // The steps solved to rounding: nothing but rounding.
     gauss.freeze().unwrap();
@@ -229,7 +235,8 @@ fn dense_output_events_and_integrals() {
     let mut gauss = Adaptive::<Circle, Gauss<4>>::new(options(1e-10)).unwrap();
     let x0 = vector![0.0, 1.0];
     gauss.solve(&x0, &vector![], 6.0).unwrap();
-    // The polynomial of four stages is of order four, as is the estimate, which is held at 0.1 · 1e-10^(5/8) = 6e-8.
+    // The polynomial of four stages is of order four, as is the estimate, which is held at 0.1 ·
+    // 1e-10^(5/8) = 6e-8.
     for t in [0.1, 1.0, 2.7, 5.9] {
         assert_close(gauss.dense(t).unwrap().x, [f64::sin(t), f64::cos(t)], 1e-6);
     }

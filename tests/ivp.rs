@@ -1,10 +1,11 @@
-//! Adaptive integration of the IVP set: errors at the end beside tolerances, and how much work that was.
+//! Adaptive integration of the IVP set: errors at the end beside tolerances, and how much work that
+//! was.
 //!
-//! The tolerance bounds the error of one step. At the end there are those of all steps, propagated by the problem: on
-//! the stiff problems they are damped, and a hundred steps leave at most some tolerances; the oscillators have neutral
-//! directions, in which errors add up and shift the phase. So each problem has its factor, `amplification`, between
-//! tolerance and the relative error of the worst component; a mistake in an estimate or in an order shows as powers of
-//! ten.
+//! The tolerance bounds the error of one step. At the end there are those of all steps, propagated
+//! by the problem: on the stiff problems they are damped, and a hundred steps leave at most some
+//! tolerances; the oscillators have neutral directions, in which errors add up and shift the phase.
+//! So each problem has its factor, `amplification`, between tolerance and the relative error of the
+//! worst component; a mistake in an estimate or in an order shows as powers of ten.
 
 use casados::shape::Shape;
 use casados::{
@@ -96,7 +97,8 @@ macro_rules! runner {
 runner!(variable, Radau, Dae);
 runner!(three, RadauIIA<3>, Dae);
 
-/// Errors at these tolerances are below `amplification · rtol`, for all end times; the work of the first end time.
+/// Errors at these tolerances are below `amplification · rtol`, for all end times; the work of the
+/// first end time.
 macro_rules! follows {
     ($runner:ident::<$model:ty, $nx:literal, $nz:literal, $np:literal>($problem:expr, $tolerances:expr, $most:expr, $values:expr)) => {{
         let problem = $problem;
@@ -111,7 +113,8 @@ macro_rules! follows {
                     *error <= bound,
                     "t = {t:e}, rtol = {rtol:e}: {error:e} instead of {bound:e}, {work:?}"
                 );
-                // A step of an implicit method takes at least one iteration, and no more Jacobians than were tried.
+                // A step of an implicit method takes at least one iteration, and no more Jacobians
+                // than were tried.
                 let tried = work.steps + work.rejected + work.failed;
                 let iterated = work.iterations >= work.steps || work.jacobians == 0;
                 assert!(iterated && work.jacobians <= tried, "{work:?}");
@@ -140,8 +143,8 @@ fn robertson() {
     follows!(variable::<RobertsonConserved, 2, 1, 3>(problem, TOLERANCES, 1e12, all));
 }
 
-/// The first end lies in the fall after the induction, where the rounding of the data alone changes digits 25 times as
-/// much as at the second.
+/// The first end lies in the fall after the induction, where the rounding of the data alone changes
+/// digits 25 times as much as at the second.
 #[test]
 fn hires() {
     let work =
@@ -170,8 +173,8 @@ fn oregonator() {
     assert!(work.iter().all(|work| work.steps < 400), "{work:?}");
 }
 
-/// Written as four rates, y4 at late times is the difference of numbers that carry rounding errors of early ones,
-/// 1e-20; with the invariant as an equation it is not.
+/// Written as four rates, y4 at late times is the difference of numbers that carry rounding errors
+/// of early ones, 1e-20; with the invariant as an equation it is not.
 #[test]
 fn e5() {
     let problem = Problem::load("e5", 1e-22, 100.0);
@@ -192,8 +195,9 @@ fn akzo_nobel() {
     follows!(three::<AkzoNobel, 5, 1, 9>(problem(), TOLERANCES, 1e9, all));
 }
 
-/// Both forms: with a matrix of `ẋ` that has not full rank, and with algebraic states. At the tightest tolerance, the rounding
-/// errors of nodes at 6 V are above what Newton's method is asked for at nodes around 0 V.
+/// Both forms: with a matrix of `ẋ` that has not full rank, and with algebraic states. At the
+/// tightest tolerance, the rounding errors of nodes at 6 V are above what Newton's method is asked
+/// for at nodes around 0 V.
 #[test]
 fn transistor_amplifier() {
     let problem = Problem::load("transistor_amplifier", 1e-2, 100.0);
@@ -227,10 +231,11 @@ fn squeezer() {
     follows!(variable::<Squeezer, 14, 13, 0>(problem, [1e-5, 1e-8], 1.0, all));
 }
 
-/// Beside the Fortran code: E. Hairer's driver for RADAU5 at Van der Pol's equation reports 242 steps accepted and 8 refused,
-/// 280 tried, 2248 evaluations, 162 Jacobians and 253 factorisations (reproduced in the tests of russell_ode by D. Pedroso).
-/// The algorithm is the same but for the norm in which Newton's method is stopped, its start in the first step, and the Jacobian,
-/// which is that of the middle of the step: the same steps with less work.
+/// Beside the Fortran code: E. Hairer's driver for RADAU5 at Van der Pol's equation reports 242
+/// steps accepted and 8 refused, 280 tried, 2248 evaluations, 162 Jacobians and 253 factorisations
+/// (reproduced in the tests of russell_ode by D. Pedroso). The algorithm is the same but for the
+/// norm in which Newton's method is stopped, its start in the first step, and the Jacobian, which
+/// is that of the middle of the step: the same steps with less work.
 #[test]
 fn as_many_steps_as_radau5() {
     let options = AdaptiveOptions { rtol: 1e-4, atol: 1e-4, initial_step: Some(1e-6), ..Default::default() };
@@ -242,7 +247,8 @@ fn as_many_steps_as_radau5() {
         assert!(found.abs_diff(published) <= published / 10, "{found} instead of {published}: {work:?}");
     };
     near(work.steps, 242);
-    // The Jacobian in the middle of a step leaves 4 failures of 30, and with them 38 attempts, their factors and their stages.
+    // The Jacobian in the middle of a step leaves 4 failures of 30, and with them 38 attempts,
+    // their factors and their stages.
     let fewer = |found: usize, published: usize, spared: usize| {
         let range = published - spared * 5 / 4..=published - spared * 3 / 4;
         assert!(range.contains(&found), "{found} instead of {published} − {spared}: {work:?}");
@@ -253,8 +259,8 @@ fn as_many_steps_as_radau5() {
     fewer(work.factorizations, 253, 47);
 }
 
-/// Dense output is as good as the method between its steps: order `s + 1`, so that it follows the tolerance too. And
-/// output while integrating is the same.
+/// Dense output is as good as the method between its steps: order `s + 1`, so that it follows the
+/// tolerance too. And output while integrating is the same.
 #[test]
 fn dense_output() {
     let problem = Problem::load("akzo_nobel", 1e-3, 20.0);
@@ -340,8 +346,8 @@ fn backwards() {
 runner!(fifth, DormandPrince5, Ode);
 runner!(eighth, DormandPrince8, Ode);
 
-/// Explicit pairs on what is not stiff: the tolerance bounds the estimate of the lower order, so that the better method is
-/// better than asked.
+/// Explicit pairs on what is not stiff: the tolerance bounds the estimate of the lower order, so
+/// that the better method is better than asked.
 #[test]
 fn explicit_pairs() {
     let work =
@@ -350,7 +356,8 @@ fn explicit_pairs() {
     let problem = Problem::load("pleiades", 1.0, 1e4);
     let work = follows!(eighth::<Pleiades, 28, 0, 0>(problem, [1e-4, 1e-7, 1e-10], 5.0, states));
     assert!(work[2].steps < 300, "{work:?}");
-    // Twelve stages for each step that was tried, the one that is the next step's first included, and few to start.
+    // Twelve stages for each step that was tried, the one that is the next step's first included,
+    // and few to start.
     let tried = work[2].steps + work[2].rejected;
     assert!(work[2].residuals <= 12 * tried + 4, "{work:?}");
 }

@@ -1,4 +1,5 @@
-//! The models of the IVP set: their derivatives three ways, and what is known of their equations without solving them.
+//! The models of the IVP set: their derivatives three ways, and what is known of their equations
+//! without solving them.
 
 use casados::testing::{Points, check_derivatives, check_pattern};
 use casados::{Dae, GraphDae};
@@ -52,8 +53,8 @@ fn derivative<M: GraphDae>(x: &[f64], p: &[f64], t: f64) -> Vec<f64> {
     residual::<M>(&v, x.len()).iter().map(|f| -f).collect()
 }
 
-/// What mass and charge say about the sums of rates: each is a sum of at most eight terms, so that rounding is
-/// below 16 ε of the largest.
+/// What mass and charge say about the sums of rates: each is a sum of at most eight terms, so that
+/// rounding is below 16 ε of the largest.
 #[test]
 fn invariants() {
     let sum = |terms: &[f64]| {
@@ -100,8 +101,8 @@ fn start_values() {
     let lambda = [98.5668703962410896057654982170, -6.12268834425566265503114393122, 0.0, 0.0, 0.0, 0.0];
     let v = [&[0.0; 7], &w[..], &x, &w, &lambda, &[0.0]].concat();
     for (row, f) in residual::<Squeezer>(&v, 27).iter().enumerate() {
-        // Terms are at most |w| · 0.04 = 600 in the constraints, and two of them cancel with an error of ε each;
-        // the data have 30 digits.
+        // Terms are at most |w| · 0.04 = 600 in the constraints, and two of them cancel with an
+        // error of ε each; the data have 30 digits.
         assert!(f.abs() <= 600.0 * 4.0 * f64::EPSILON, "equation {row}: {f:e}");
     }
     assert_eq!(Squeezer::STRUCTURE.z.len(), 13);

@@ -1,5 +1,5 @@
-//! Derivatives of adaptive runs: against the references of the IVP set, against each other, and as those of one smooth
-//! function.
+//! Derivatives of adaptive runs: against the references of the IVP set, against each other, and as
+//! those of one smooth function.
 
 use casados::shape::Shape;
 use casados::{
@@ -95,17 +95,21 @@ macro_rules! first {
     };
 }
 
-/// At a tight tolerance the discrete map is the flow, and so are their derivatives: column by column, and row by row with parameters in
-/// units of their own, since Robertson's smallest component is 1e-13 of the largest and its derivatives keep their digits. A column
-/// that decays keeps the rounding errors of each of 130 steps, of ten terms each, from when it was large: those of Robertson's rates
-/// fall by a factor of four million, while what rounding does to the mass stays. Where derivatives move otherwise than states they take part in
-/// the choice of the steps: those of the Oregonator are 8e-11 off without, 6e-14 with it.
+/// At a tight tolerance the discrete map is the flow, and so are their derivatives: column by
+/// column, and row by row with parameters in units of their own, since Robertson's smallest
+/// component is 1e-13 of the largest and its derivatives keep their digits. A column that decays
+/// keeps the rounding errors of each of 130 steps, of ten terms each, from when it was large: those
+/// of Robertson's rates fall by a factor of four million, while what rounding does to the mass
+/// stays. Where derivatives move otherwise than states they take part in the choice of the steps:
+/// those of the Oregonator are 8e-11 off without, 6e-14 with it.
 ///
-/// Those of Van der Pol grow by a million in the jump between the slow branches, with the velocity, and shrink
-/// again where it ends: rounding errors from the middle stay. What they do at the end is at most
-/// `ε Σ_n |∂x(T)/∂x(t_n)| |∂x(t_n)/∂x₀|`, summed over the steps `2.0e7 ε = 4.5e-9` of the derivative itself, and 1.4e6 ε for the
-/// worst of them; no order of the products avoids it, forwards or backwards. In binary128, where nothing but states and derivatives at the
-/// ends of these steps is rounded to doubles, they are 1.4e-10 to 8.0e-10 off (twenty draws of the rounding errors).
+/// Those of Van der Pol grow by a million in the jump between the slow branches, with the velocity,
+/// and shrink again where it ends: rounding errors from the middle stay. What they do at the end is
+/// at most `ε Σ_n |∂x(T)/∂x(t_n)| |∂x(t_n)/∂x₀|`, summed over the steps `2.0e7 ε = 4.5e-9` of the
+/// derivative itself, and 1.4e6 ε for the worst of them; no order of the products avoids it,
+/// forwards or backwards. In binary128, where nothing but states and derivatives at the ends of
+/// these steps is rounded to doubles, they are 1.4e-10 to 8.0e-10 off (twenty draws of the rounding
+/// errors).
 #[test]
 fn t14_first_order() {
     first!(Robertson, "robertson", 3, 0, 3, 1e-12, 1e-20, false, 1e-12);
@@ -151,7 +155,8 @@ fn expected(reference: &Record, n: usize) -> (DVector<f64>, DMatrix<f64>) {
     (gradient, hessian)
 }
 
-/// Elements relative to the geometric mean of the diagonal, as parameters have very different units.
+/// Elements relative to the geometric mean of the diagonal, as parameters have very different
+/// units.
 fn close(found: &DMatrix<f64>, expected: &DMatrix<f64>, bound: f64) {
     let scale = |i: usize| expected.row(i).amax();
     for i in 0..expected.nrows() {
@@ -183,8 +188,9 @@ macro_rules! second_order {
     };
 }
 
-/// Relative to the larger of row and column. Those of Van der Pol's equation, which grow in its jumps, are 7e-10 off where steps are chosen for the
-/// states alone, and 1.5e-12 where derivatives take part.
+/// Relative to the larger of row and column. Those of Van der Pol's equation, which grow in its
+/// jumps, are 7e-10 off where steps are chosen for the states alone, and 1.5e-12 where derivatives
+/// take part.
 #[test]
 fn t17_second_order() {
     second_order!(Robertson, "robertson", 3, 3, 1e-12, 1e-20, false, 1e-10);
@@ -192,7 +198,8 @@ fn t17_second_order() {
     second_order!(VanDerPol, "van_der_pol_5", 2, 1, 1e-13, 1e-13, true, 1e-10);
 }
 
-/// The reference has the algebraic state in its sum: `y6 = Ks y1 y4`, whose derivatives follow by the product rule.
+/// The reference has the algebraic state in its sum: `y6 = Ks y1 y4`, whose derivatives follow by
+/// the product rule.
 #[test]
 fn second_order_of_a_product() {
     let (x0, p) = problem("akzo_nobel");
@@ -224,8 +231,9 @@ fn second_order_of_a_product() {
     close(&hessian, &expected_hessian, 1e-10);
 }
 
-/// All derivatives at a coarse tolerance are those of one discrete map, exactly: the adjoint is the product with the
-/// forward derivatives, and both follow the frozen map by complex or real differences.
+/// All derivatives at a coarse tolerance are those of one discrete map, exactly: the adjoint is the
+/// product with the forward derivatives, and both follow the frozen map by complex or real
+/// differences.
 #[test]
 fn derivatives_of_the_frozen_map() {
     let (x0, p) = problem("akzo_nobel");
@@ -237,7 +245,8 @@ fn derivatives_of_the_frozen_map() {
     adaptive.freeze().expect("steps are remembered");
     let times: Vec<f64> = adaptive.times().collect();
     assert!(times.len() > 5);
-    // Before, each step was taken from where the run was, which had solved its equations to a part of the tolerance.
+    // Before, each step was taken from where the run was, which had solved its equations to a part
+    // of the tolerance.
     let hessian = *adaptive.hessian(&x0, &u, t, &lambda).expect("second derivatives");
     for (run, frozen) in [
         (run.grad_x0.as_slice(), &hessian.grad_x0.as_slice()),
@@ -324,8 +333,8 @@ fn derivatives_of_frozen_explicit_steps() {
     }
 }
 
-/// At any tolerance derivatives are those of the run that was made: jumps, which amplify by a million, do not lead elsewhere what is
-/// taken again.
+/// At any tolerance derivatives are those of the run that was made: jumps, which amplify by a
+/// million, do not lead elsewhere what is taken again.
 #[test]
 fn derivatives_of_coarse_runs() {
     let (x0, p) = problem("van_der_pol_1e3");
@@ -357,8 +366,9 @@ fn unchanged(x: [f64; 2], _p: f64) -> [f64; 2] {
     x
 }
 
-/// So are those over events on the slow branch, and over intervals one after the other, and both ways to a gradient give the same. Other steps
-/// have other errors, which the jumps amplify by a million: found are up to 83 tolerances.
+/// So are those over events on the slow branch, and over intervals one after the other, and both
+/// ways to a gradient give the same. Other steps have other errors, which the jumps amplify by a
+/// million: found are up to 83 tolerances.
 #[test]
 fn derivatives_of_coarse_runs_in_parts() {
     let (x0, p) = problem("van_der_pol_1e3");
@@ -418,9 +428,10 @@ fn pulled(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], p: [f64; 1]) -> [f64; 3] {
     [xdot[0] - x[1], xdot[1] + z[0], z[0] - p[0] * x[0].sin()]
 }
 
-/// At rest nothing moves, so that the states accept every step, while derivatives swing with `ω`: without control they are
-/// those of nine steps at any tolerance. With it the errors of all steps add up to no more than their number times the tolerance of
-/// `1 + |V|`, `|V| ≤ ω`, and the condition of the swing, `ω`: found are one to six tolerances.
+/// At rest nothing moves, so that the states accept every step, while derivatives swing with `ω`:
+/// without control they are those of nine steps at any tolerance. With it the errors of all steps
+/// add up to no more than their number times the tolerance of `1 + |V|`, `|V| ≤ ω`, and the
+/// condition of the swing, `ω`: found are one to six tolerances.
 macro_rules! at_rest {
     ($model:ty, $method:ty) => {{
         let (omega, t, u) = (2.0f64, 5.0, SVector::zeros());
@@ -462,8 +473,8 @@ fn controlled_derivatives_where_states_rest() {
     at_rest!(Swing, DormandPrince8);
 }
 
-/// The largest error of a column of derivatives by `(x₀, p)`, in units of what is tolerated: the root of the mean of the squares of
-/// its elements over `atol / s_c + rtol |V_rc|`.
+/// The largest error of a column of derivatives by `(x₀, p)`, in units of what is tolerated: the
+/// root of the mean of the squares of its elements over `atol / s_c + rtol |V_rc|`.
 fn oregonator(tolerance: f64, controlled: bool) -> f64 {
     let (start, p) = problem("oregonator");
     let reference = references("first", "oregonator").remove(0);
@@ -488,8 +499,9 @@ fn oregonator(tolerance: f64, controlled: bool) -> f64 {
     })
 }
 
-/// Relaxation oscillations amplify errors between their jumps. With control the errors of some hundred steps are those of a few at the
-/// tolerance, found 0.2 to 7; without it 30 to 130 at fine tolerances, since derivatives are steeper than the states.
+/// Relaxation oscillations amplify errors between their jumps. With control the errors of some
+/// hundred steps are those of a few at the tolerance, found 0.2 to 7; without it 30 to 130 at fine
+/// tolerances, since derivatives are steeper than the states.
 #[test]
 fn controlled_derivatives_of_a_relaxation_oscillation() {
     for exponent in 2..=8 {
@@ -500,7 +512,8 @@ fn controlled_derivatives_of_a_relaxation_oscillation() {
     }
 }
 
-/// Magnitudes say which changes count: an input whose changes are small beside what is tolerated is not controlled.
+/// Magnitudes say which changes count: an input whose changes are small beside what is tolerated is
+/// not controlled.
 #[test]
 fn scales_of_controlled_derivatives() {
     let options = AdaptiveOptions { rtol: 1e-6, atol: 1e-6, ..Default::default() };

@@ -1,8 +1,8 @@
-//! The language of models: each model below uses a part of it. The residual that the attribute emits must
-//! have the bits of the plain function, which the compiler understood by itself.
+//! The language of models: each model below uses a part of it. The residual that the attribute
+//! emits must have the bits of the plain function, which the compiler understood by itself.
 //!
-//! Bits, not numbers: the emitted code does the same operations in the same order. The places where it
-//! does not (`mul_add`) are compared with a tolerance, said there.
+//! Bits, not numbers: the emitted code does the same operations in the same order. The places where
+//! it does not (`mul_add`) are compared with a tolerance, said there.
 
 #![allow(
     clippy::manual_clamp,

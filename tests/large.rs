@@ -1,5 +1,6 @@
-//! Models too large to be differentiated side by side: their stages are found side by side, and each is differentiated alone. One
-//! process, one test: how large the cache is said to be is global.
+//! Models too large to be differentiated side by side: their stages are found side by side, and
+//! each is differentiated alone. One process, one test: how large the cache is said to be is
+//! global.
 //!
 //! Errors are those of `tests/batch.rs`.
 
@@ -19,10 +20,12 @@ type Test = Result<(), Box<dyn std::error::Error>>;
 /// One interval is left over in a register of four, three in one of eight.
 const COUNT: usize = 11;
 
-/// The stages of two steps of a chain of five masses fit for as many lanes as there are, its columns for none.
+/// The stages of two steps of a chain of five masses fit for as many lanes as there are, its
+/// columns for none.
 const CACHE: usize = 32 << 10;
 
-/// Both solve the same stages to rounding; the condition of the Newton matrix is of order ten, and two steps add up.
+/// Both solve the same stages to rounding; the condition of the Newton matrix is of order ten, and
+/// two steps add up.
 const TOLERANCE: f64 = 2.0 * 100.0 * f64::EPSILON;
 
 fn close(what: &str, found: &[f64], expected: &[f64]) {
@@ -33,7 +36,8 @@ fn close(what: &str, found: &[f64], expected: &[f64]) {
     }
 }
 
-/// So many were differentiated alone from stages that were found side by side, and so many computed alone after all.
+/// So many were differentiated alone from stages that were found side by side, and so many computed
+/// alone after all.
 fn check(statistics: &BatchStatistics, alone: usize, redone: usize) {
     #[cfg(target_arch = "x86_64")]
     if std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma") {

@@ -1,5 +1,5 @@
-//! Piecewise constant controls: against closed forms, one integration over a single interval, and derivatives against
-//! each other and against differences.
+//! Piecewise constant controls: against closed forms, one integration over a single interval, and
+//! derivatives against each other and against differences.
 
 use casados::prelude::*;
 use nalgebra::{Vector1, Vector2, vector};
@@ -77,7 +77,8 @@ fn decay_has_a_closed_form() {
     for t in [0.0, 0.3, 0.7, 1.0, 1.9, 2.1, 2.4] {
         let (x, ..) = closed_form(x0, &controls, p, t);
         let dense = horizon.dense(t).unwrap();
-        // The polynomial of three stages is of order three, as is the estimate, which is held at 1e-10^(2/3) = 2e-7.
+        // The polynomial of three stages is of order three, as is the estimate, which is held at
+        // 1e-10^(2/3) = 2e-7.
         assert_close(dense.x, [x], 1e-6);
         assert_close(dense.z, [x * x], 1e-6);
     }
@@ -142,7 +143,8 @@ macro_rules! derivatives {
                 _ => hessian.h_pp[(0, 0)],
             }
         };
-        // Differences of order four with steps of 1e-3, of numbers of size one: 1e-12 of truncation and as much rounding.
+        // Differences of order four with steps of 1e-3, of numbers of size one: 1e-12 of truncation
+        // and as much rounding.
         let e = 1e-3;
         for direction in 0..9 {
             let mut moved = |step: f64| {

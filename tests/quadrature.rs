@@ -1,5 +1,6 @@
-//! Integrals of functions along the solution, in every integrator: against additional states of a model, which give the
-//! same sums; against closed forms; first and second derivatives against each other and against differences.
+//! Integrals of functions along the solution, in every integrator: against additional states of a
+//! model, which give the same sums; against closed forms; first and second derivatives against each
+//! other and against differences.
 
 use casados::prelude::*;
 use nalgebra::{Matrix1, Vector1, Vector2, matrix, vector};
@@ -308,7 +309,8 @@ fn gauss_newton_is_exact_where_nothing_is_curved() {
     assert_close(hessian.h_uu, fit.h_uu, ROUNDING);
 }
 
-/// Derivatives of a run whose steps are kept, against each other and against differences of the values.
+/// Derivatives of a run whose steps are kept, against each other and against differences of the
+/// values.
 macro_rules! derivatives_of_kept_steps {
     ($integrator:ty, $outputs:ty) => {{
         let options = AdaptiveOptions { rtol: 1e-7, atol: 1e-8, ..Default::default() };
@@ -331,7 +333,8 @@ macro_rules! derivatives_of_kept_steps {
         assert_close(adjoint.grad_p, p, ROUNDING);
         assert_close(adjoint.grad_u, u, ROUNDING);
 
-        // Central differences of order four with steps of 1e-3: errors of 1e-12 of the value and of 1e-12 by rounding.
+        // Central differences of order four with steps of 1e-3: errors of 1e-12 of the value and of
+        // 1e-12 by rounding.
         let e = 1e-3;
         let difference = |f: &mut dyn FnMut(f64) -> [f64; 8]| {
             let values = [-2.0, -1.0, 1.0, 2.0].map(|k| f(k * e));
@@ -515,7 +518,8 @@ fn derivatives_of_integrals_over_piecewise_constant_controls() {
     let start = vector![X0[0], X0[1], 0.0, 0.0];
     let lambda = vector![LAMBDA[0], LAMBDA[1], NU[0], NU[1]];
     let expected = states.hessian(&start, &controls, &ends, &lambda).unwrap();
-    // Two sequences of a dozen steps, each with an error of 1e-11 of numbers around one; of second derivatives around ten.
+    // Two sequences of a dozen steps, each with an error of 1e-11 of numbers around one; of second
+    // derivatives around ten.
     let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-8 * b.abs().max(1.0), "{a} {b}");
 
     let mut integral = Quadrature::<Outputs>::new();
@@ -550,7 +554,8 @@ fn derivatives_of_integrals_over_piecewise_constant_controls() {
     }
 }
 
-/// Least squares over several intervals: gradients and exact second derivatives against differences of the same steps.
+/// Least squares over several intervals: gradients and exact second derivatives against differences
+/// of the same steps.
 #[test]
 fn least_squares_over_piecewise_constant_controls() {
     let controls = [vector![0.3], vector![-0.8], vector![0.5]];
@@ -601,8 +606,8 @@ fn deviation(x: f64, u: f64, _p: f64) -> [f64; 2] {
     [x, 0.5 * u - x]
 }
 
-/// Where nothing is curved, the matrix of Gauss and Newton is the Hessian: to rounding, of sums of a few dozen terms. The
-/// product `p x` is curved, so that only `x₀` and the controls count.
+/// Where nothing is curved, the matrix of Gauss and Newton is the Hessian: to rounding, of sums of
+/// a few dozen terms. The product `p x` is curved, so that only `x₀` and the controls count.
 #[test]
 fn gauss_newton_over_piecewise_constant_controls() {
     let mut fit = LeastSquares::<Deviation>::new(&matrix![1.0, 0.1; 0.1, 0.4]);

@@ -2,8 +2,8 @@
 //! `tests/data` says where each comes from.
 //!
 //! Errors are relative to the largest element of the reference. Both sides solve the same stages to
-//! rounding and differentiate them exactly; what is left is rounding, of the size ε times the condition of
-//! the Newton matrix (ε = 2.2e-16), in the integrator and in the reference alike.
+//! rounding and differentiate them exactly; what is left is rounding, of the size ε times the
+//! condition of the Newton matrix (ε = 2.2e-16), in the integrator and in the reference alike.
 
 #[path = "../examples/models/awe.rs"]
 mod awe;
@@ -61,8 +61,8 @@ fn blocks<const X: usize, const U: usize, const W: usize>(
     })
 }
 
-/// Every call against a reference: the largest errors must be below the bound, those of the end state,
-/// the Jacobian, the adjoint and the Hessian.
+/// Every call against a reference: the largest errors must be below the bound, those of the end
+/// state, the Jacobian, the adjoint and the Hessian.
 macro_rules! check {
     ($irk:expr, $reference:expr, $lambda:expr, $h:expr, $nx:literal, $nu:literal, $nw:literal, $bound:expr) => {{
         let (irk, reference) = (&mut $irk, &$reference);
@@ -161,8 +161,8 @@ fn awe_jacobian() -> Test {
     Ok(())
 }
 
-/// Pendulum and chain: in one step `h ∂f/∂x` is of order one, and the condition of the Newton matrix of
-/// order ten; four steps add up.
+/// Pendulum and chain: in one step `h ∂f/∂x` is of order one, and the condition of the Newton
+/// matrix of order ten; four steps add up.
 const ORDINARY: f64 = 100.0 * f64::EPSILON;
 
 /// Aircraft: the Newton matrix of the reference has the condition 6e3.

@@ -1,5 +1,6 @@
-//! The same results, but for rounding, with every kind of registers that this machine has: one interval, and many side by
-//! side, in every mode. One process, one test: the choice of registers is global.
+//! The same results, but for rounding, with every kind of registers that this machine has: one
+//! interval, and many side by side, in every mode. One process, one test: the choice of registers
+//! is global.
 
 #[allow(dead_code)]
 #[path = "../examples/models/chain.rs"]
@@ -22,7 +23,8 @@ type Test = Result<(), Box<dyn std::error::Error>>;
 /// One lane is left over in a register of four, five in one of eight.
 const COUNT: usize = 13;
 
-/// Conditions of the Newton matrices are of order ten, and four steps add up (as in `tests/batch.rs`).
+/// Conditions of the Newton matrices are of order ten, and four steps add up (as in
+/// `tests/batch.rs`).
 const TOLERANCE: f64 = 2.0 * 100.0 * f64::EPSILON;
 
 struct Horizon<M: Dae> {

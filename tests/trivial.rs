@@ -1,5 +1,6 @@
-//! Kinematic states, with equations `q̇ = c v`: they are no unknowns of iterations, of the elimination or of derivatives. Held against
-//! differences of what they are derivatives of, with the plan of elimination and without.
+//! Kinematic states, with equations `q̇ = c v`: they are no unknowns of iterations, of the
+//! elimination or of derivatives. Held against differences of what they are derivatives of, with
+//! the plan of elimination and without.
 
 use casados::irk::Integrator;
 use casados::model::Kinematic;
@@ -17,7 +18,8 @@ mod chain;
 #[path = "../examples/firmware/src/lost.rs"]
 mod lost;
 
-/// Positions that follow a state, a multiple of one, and a control; two velocities; a cost, of positions or of their derivatives.
+/// Positions that follow a state, a multiple of one, and a control; two velocities; a cost, of
+/// positions or of their derivatives.
 #[dae(COST = [0, 1])]
 fn points<const COST: usize>(xdot: [f64; 6], x: [f64; 6], z: [f64; 2], u: [f64; 2], p: [f64; 2]) -> [f64; 8] {
     let of = if COST == 1 { [xdot[0], xdot[1], xdot[2]] } else { [x[0], x[1], x[2]] };
@@ -158,7 +160,8 @@ fn without_the_plan() -> Test {
     check(steps::<Lost<Points<1>>, Gauss<2>, 2>()?, true)
 }
 
-/// Kinematic states that follow another one, a control and a parameter, each felt by three more: `a`, `b`, `c`.
+/// Kinematic states that follow another one, a control and a parameter, each felt by three more:
+/// `a`, `b`, `c`.
 #[dae(CURVED = [0, 1])]
 fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2]) -> [f64; 6] {
     let [a, b, c, v, w, y] = x;
@@ -173,7 +176,8 @@ fn led<const CURVED: usize>(xdot: [f64; 6], x: [f64; 6], u: [f64; 2], p: [f64; 2
     ]
 }
 
-/// No iteration finds kinematic states: the solution is that of the whole matrix, whose iterations go on until every equation is satisfied.
+/// No iteration finds kinematic states: the solution is that of the whole matrix, whose iterations
+/// go on until every equation is satisfied.
 fn same_as_whole<B: Method<S>, const S: usize, const CURVED: usize>(options: Options) -> Test
 where
     Led<CURVED>: Dae<Shape = <Led<0> as Dae>::Shape>,
@@ -219,8 +223,9 @@ fn kinematic_states_follow_in_every_iteration() -> Test {
     Ok(())
 }
 
-/// Positions that follow one velocity, another one, and a control, each felt by several more, as are derivatives of two of them. Where `p = 0`
-/// the equations are linear, which nobody knows before they run.
+/// Positions that follow one velocity, another one, and a control, each felt by several more, as
+/// are derivatives of two of them. Where `p = 0` the equations are linear, which nobody knows
+/// before they run.
 #[dae]
 fn gone(xdot: [f64; 7], x: [f64; 7], u: [f64; 1], p: [f64; 1]) -> [f64; 7] {
     let [a, b, c, d, v, w, y] = x;
@@ -235,7 +240,8 @@ fn gone(xdot: [f64; 7], x: [f64; 7], u: [f64; 1], p: [f64; 1]) -> [f64; 7] {
     ]
 }
 
-/// Points of four, three, two and one coordinates in a row, one of which follows another. Where `p = 0` the equations are linear.
+/// Points of four, three, two and one coordinates in a row, one of which follows another. Where
+/// `p = 0` the equations are linear.
 #[dae(NX = [11, 61])]
 fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1]) -> [f64; NX] {
     let point = |i: usize| 4 * (i / 10) + [0, 0, 0, 0, 1, 1, 1, 2, 2, 3][i % 10];
@@ -253,8 +259,8 @@ fn knots<const NX: usize>(xdot: [f64; NX], x: [f64; NX], u: [f64; 1], p: [f64; 1
     f
 }
 
-/// Newton's method finds the solution of linear equations in one iteration if columns of kinematic states are part of the right ones, and its systems
-/// are solved.
+/// Newton's method finds the solution of linear equations in one iteration if columns of kinematic
+/// states are part of the right ones, and its systems are solved.
 fn one_iteration<M, B: Method<S>, const S: usize, const NX: usize>(x: SVector<f64, NX>) -> Test
 where
     M: Dae<
@@ -278,7 +284,8 @@ where
         let error = (led.solve(&x, &u, LENGTH)?.x - expected).amax();
         assert!(error <= ROUNDING, "{error:e}");
         let Statistics { steps, iterations, dense, .. } = *led.statistics();
-        // Without their share, increments would shrink by `(hA)²`, a five-hundredth: to rounding in six iterations. The second one is none.
+        // Without their share, increments would shrink by `(hA)²`, a five-hundredth: to rounding in
+        // six iterations. The second one is none.
         assert!(iterations <= 2 * steps && dense == 0, "{iterations} iterations, {dense} pivoted");
     }
     // Registers, whose factors may have half of the digits.
@@ -327,8 +334,9 @@ fn supernodes_are_solved_together() -> Test {
     one_iteration::<Knots<61>, Gauss<5>, 5, 61>(many)
 }
 
-/// From zero, positions are where they follow to in the first evaluation, so that its Jacobian is one within the step; and the Jacobian after it is not
-/// taken anew because of an increment of the first. (With positions at the start of the step 7 masses had three factorisations.)
+/// From zero, positions are where they follow to in the first evaluation, so that its Jacobian is
+/// one within the step; and the Jacobian after it is not taken anew because of an increment of the
+/// first. (With positions at the start of the step 7 masses had three factorisations.)
 #[test]
 fn jacobians_from_zero_do_for_several_iterations() -> Test {
     let newton = Newton { tolerance: 1e-8, ..Default::default() };

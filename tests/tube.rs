@@ -1,5 +1,6 @@
-//! Second derivatives of a model with many directions, where the adjoint goes backwards in all of them: held against differences of
-//! gradients, and against a batch, whose registers take products of all directions with each other.
+//! Second derivatives of a model with many directions, where the adjoint goes backwards in all of
+//! them: held against differences of gradients, and against a batch, whose registers take products
+//! of all directions with each other.
 
 use casados::irk::Integrator;
 use casados::prelude::*;
@@ -9,9 +10,10 @@ use nalgebra::{SVector, vector};
 
 const NX: usize = 43;
 
-/// A substance in a tube: it diffuses, grows, and heat and what it is stored in depend on it; its ends are a control and a function of
-/// algebraic states, whose pivot vanishes with `p[1]`. The last state measures, and nobody
-/// depends on it. With a `MASS` of its own each equation has the derivatives of two states.
+/// A substance in a tube: it diffuses, grows, and heat and what it is stored in depend on it; its
+/// ends are a control and a function of algebraic states, whose pivot vanishes with `p[1]`. The
+/// last state measures, and nobody depends on it. With a `MASS` of its own each equation has the
+/// derivatives of two states.
 #[dae(MASS = [0, 1])]
 fn tube<const MASS: usize>(
     xdot: [f64; 44],
@@ -59,7 +61,8 @@ impl Point {
 
 const LENGTH: f64 = 0.1;
 
-/// Stages are solved to rounding, and the condition of the Newton matrix is of order ten, over a few steps.
+/// Stages are solved to rounding, and the condition of the Newton matrix is of order ten, over a
+/// few steps.
 const ROUNDING: f64 = 40.0 * f64::EPSILON;
 
 type Steps<M, B, const S: usize> = Integrator<M, B, S, f64, Heap>;
@@ -102,7 +105,8 @@ where
             p += (forth.2 - back.2) * (weight / step);
         }
         let size = hessian.grad_x0.amax().max(hessian.grad_u.amax()).max(hessian.grad_p.amax());
-        // The weights add up to 2.1; what is truncated, `step⁸/630` of the ninth derivative, is less.
+        // The weights add up to 2.1; what is truncated, `step⁸/630` of the ninth derivative, is
+        // less.
         let tolerance = 2.1 * ROUNDING * size / step;
         let error_x = hessian.h_xx * by.x + hessian.h_xu * by.u + hessian.h_xp * by.p - x;
         let error_u = hessian.h_xu.transpose() * by.x + hessian.h_uu * by.u + hessian.h_up * by.p - u;

@@ -16,7 +16,8 @@ pub trait Calls {
     /// # Errors
     /// Those of the integrator.
     fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error>;
-    /// One call with every input, whose results are kept: what a batch is compared with, which keeps them too.
+    /// One call with every input, whose results are kept: what a batch is compared with, which
+    /// keeps them too.
     ///
     /// # Errors
     /// Those of the integrator.
@@ -30,7 +31,8 @@ pub trait Calls {
     fn statistics(&self) -> Statistics;
 }
 
-/// Options as in the tables: iterations end at a tolerance for the whole interval, zero for rounding.
+/// Options as in the tables: iterations end at a tolerance for the whole interval, zero for
+/// rounding.
 #[must_use]
 pub fn options(case: &Case, tolerance: f64, start: Start) -> Options {
     let newton = Newton { tolerance: tolerance / case.steps as f64, ..Default::default() };

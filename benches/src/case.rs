@@ -44,7 +44,8 @@ pub enum Family {
     Rk4,
 }
 
-/// Results as flat lists: Jacobians by rows, of Hessians the lower triangle by rows. Empty: not known.
+/// Results as flat lists: Jacobians by rows, of Hessians the lower triangle by rows. Empty: not
+/// known.
 #[derive(Clone, Debug, Default)]
 pub struct Values {
     /// The state at the end.
@@ -81,8 +82,8 @@ impl Values {
         }
     }
 
-    /// The largest error of that part, relative to the largest element of the reference; none where one of
-    /// the two is not known.
+    /// The largest error of that part, relative to the largest element of the reference; none where
+    /// one of the two is not known.
     #[must_use]
     pub fn error(&self, reference: &Self, mode: Mode) -> Option<f64> {
         let (a, b) = (self.of(mode), reference.of(mode));
@@ -175,7 +176,8 @@ impl Case {
         }
     }
 
-    /// The aircraft on a tether: the intervals of its optimal orbit, one step of Radau IIA with 4 stages each.
+    /// The aircraft on a tether: the intervals of its optimal orbit, one step of Radau IIA with 4
+    /// stages each.
     ///
     /// # Errors
     /// If the reference data cannot be read.

@@ -1,4 +1,5 @@
-//! What the programs of this package share: cases, calls of the integrators by name, peers in other processes, and timing.
+//! What the programs of this package share: cases, calls of the integrators by name, peers in other
+//! processes, and timing.
 
 pub mod calls;
 pub mod case;

@@ -39,8 +39,9 @@ impl Peer {
         Ok(Self { child, input, output: BufReader::new(output) })
     }
 
-    /// Starts it once for each installation of acados that `ACADOS_SOURCE_DIR` lists, such as one for each target of BLASFEO. Its
-    /// argument is where code that acados generates is kept: beside this program.
+    /// Starts it once for each installation of acados that `ACADOS_SOURCE_DIR` lists, such as one
+    /// for each target of BLASFEO. Its argument is where code that acados generates is kept: beside
+    /// this program.
     ///
     /// # Errors
     /// If the variable is not set, or there is no such interpreter.

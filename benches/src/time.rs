@@ -45,7 +45,8 @@ impl Summary {
 /// A sample lasts at least this long: reading the clock is a system call.
 const SAMPLE: Duration = Duration::from_micros(200);
 
-/// Times a call: a tenth of the budget to warm up, then samples until it is spent, never fewer than nine.
+/// Times a call: a tenth of the budget to warm up, then samples until it is spent, never fewer than
+/// nine.
 ///
 /// # Errors
 /// Those of the call.

@@ -46,8 +46,8 @@ pub enum Error {
         /// Where.
         at: Place,
     },
-    /// The model has no finite value where Newton's method starts, or where it leads from there, because of the value of an
-    /// algebraic state.
+    /// The model has no finite value where Newton's method starts, or where it leads from there,
+    /// because of the value of an algebraic state.
     NonFiniteStart {
         /// What was evaluated.
         quantity: Quantity,
@@ -55,22 +55,23 @@ pub enum Error {
         equation: usize,
         /// The value.
         value: f64,
-        /// The algebraic state with another value of which the equation has one, and where it started.
+        /// The algebraic state with another value of which the equation has one, and where it
+        /// started.
         started: Started,
         /// Where.
         at: Place,
     },
-    /// The Newton matrix is singular to rounding: with this step size the equations do not determine the
-    /// unknowns.
+    /// The Newton matrix is singular to rounding: with this step size the equations do not
+    /// determine the unknowns.
     Singular {
-        /// The unknown whose column depends on those of the unknowns before it: the state whose derivative
-        /// it is, or the algebraic state.
+        /// The unknown whose column depends on those of the unknowns before it: the state whose
+        /// derivative it is, or the algebraic state.
         unknown: &'static str,
         /// Where.
         at: Place,
     },
-    /// The planned elimination was not good enough here, or Newton's method did not converge with it, and the memory of the
-    /// integrator has no place to pivot the whole matrix:
+    /// The planned elimination was not good enough here, or Newton's method did not converge with
+    /// it, and the memory of the integrator has no place to pivot the whole matrix:
     /// [`fallback::Refusing`](crate::memory::fallback::Refusing). Also of a model without a plan.
     NotPivoted {
         /// The step.
@@ -88,11 +89,12 @@ pub enum Error {
         increment: f64,
         /// Where it ended.
         at: Place,
-        /// An algebraic state of these, and its start value; if there is one, and the start was no continuation of a solution.
+        /// An algebraic state of these, and its start value; if there is one, and the start was no
+        /// continuation of a solution.
         started: Option<Started>,
     },
-    /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive integration starts, or Newton's
-    /// method does not find them from the values of `set_start`.
+    /// There are no `ẋ` and `z` that satisfy the equations for the `x` where an adaptive
+    /// integration starts, or Newton's method does not find them from the values of `set_start`.
     InconsistentStart {
         /// The time.
         t: f64,
@@ -100,8 +102,8 @@ pub enum Error {
         equation: usize,
         /// By how much: its residual where Newton's method ended.
         residual: f64,
-        /// The unknown that the equations do not determine, or else the one that moved most: the state whose derivative
-        /// it is, or the algebraic state.
+        /// The unknown that the equations do not determine, or else the one that moved most: the
+        /// state whose derivative it is, or the algebraic state.
         unknown: &'static str,
         /// Its value where Newton's method ended.
         value: f64,
@@ -177,8 +179,8 @@ pub enum Error {
         /// How many ends of intervals there are.
         ends: usize,
     },
-    /// The nodes of the tableau define no polynomial through the stages: there is no dense output, and
-    /// there are no algebraic states at the ends of the interval.
+    /// The nodes of the tableau define no polynomial through the stages: there is no dense output,
+    /// and there are no algebraic states at the ends of the interval.
     NoInterpolation,
     /// A question about the last successful call, and there was none.
     NoResult,

@@ -1,9 +1,9 @@
 //! Functions of the variables of a model: integrands, events, costs, constraints.
 //!
 //! A function `y(x, z, u, p, t)` with `y ∈ R^{ny}` takes the variables of a model, one flat array
-//! `v = (ẋ, x, z, u, p, t)` as in [`Dae`](crate::Dae), and depends on all but `ẋ`. It belongs to every model of its
-//! dimensions: `F: Function<Shape = M::Shape>`. The attribute `#[function]` writes it, with its derivatives, from a
-//! Rust function that names the arguments of the model:
+//! `v = (ẋ, x, z, u, p, t)` as in [`Dae`](crate::Dae), and depends on all but `ẋ`. It belongs to
+//! every model of its dimensions: `F: Function<Shape = M::Shape>`. The attribute `#[function]`
+//! writes it, with its derivatives, from a Rust function that names the arguments of the model:
 //!
 //! ```text
 //! #[function]
@@ -35,11 +35,12 @@ pub type MatrixYU<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYU<<F as 
 /// `SMatrix<T, NY, NP>` of a function.
 pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as Function>::Shape, T>;
 
-/// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: written by `#[function]`.
+/// A function `y(x, z, u, p, t)` of the variables of a model, with its derivatives: written by
+/// `#[function]`.
 ///
 /// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
-/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables, by `t` only the first
-/// ones ([`Function::time_derivative`]).
+/// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables, by `t` only the
+/// first ones ([`Function::time_derivative`]).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a function of a model's variables",
     note = "write it as `#[function] fn name(x: [f64; NX], ...) -> [f64; NY]` and use its type, `Name`"
@@ -51,7 +52,8 @@ pub trait Function: 'static {
     type Outputs: Outputs;
     /// Values of the structural non-zeros of `∂y/∂(ẋ, x, z, u, p)`, of which `ẋ` has none.
     type Jacobian<T: Plain>: Array<T>;
-    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ y)` over `(ẋ, x, z, u, p)`.
+    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ y)` over
+    /// `(ẋ, x, z, u, p)`.
     type Hessian<T: Plain>: Array<T>;
     /// What is known about the function before it runs.
     const STRUCTURE: FunctionStructure;
@@ -70,7 +72,8 @@ pub trait Function: 'static {
         jacobian: &mut Self::Jacobian<S::Cell>,
     );
 
-    /// The gradient `∇ᵥ(μᵀ y)` over `(ẋ, x, z, u, p)`. The elements of `ẋ` and the last, that of `t`, are set to zero.
+    /// The gradient `∇ᵥ(μᵀ y)` over `(ẋ, x, z, u, p)`. The elements of `ẋ` and the last, that of
+    /// `t`, are set to zero.
     fn adjoint<S: Lanes>(
         v: &ArrayV<Self, S::Cell>,
         mu: &ArrayY<Self, S::Cell>,
@@ -110,8 +113,8 @@ pub struct FunctionStructure {
     pub u: &'static [&'static str],
     /// Names of the parameters.
     pub p: &'static [&'static str],
-    /// Non-zeros of the Jacobian: output, variable. In order of the blocks `y_ẋ` (empty), `y_x, y_z, y_u, y_p`, within
-    /// each by row, then by column.
+    /// Non-zeros of the Jacobian: output, variable. In order of the blocks `y_ẋ` (empty),
+    /// `y_x, y_z, y_u, y_p`, within each by row, then by column.
     pub jacobian: Pattern,
     /// Where each of the five blocks begins in `jacobian`, and its end.
     pub blocks: [usize; 6],

@@ -1,8 +1,9 @@
 //! The integrators of `casados`.
 //!
 //! Implicit and explicit Runge-Kutta methods for differential-algebraic equations
-//! `f(ẋ, x, u, z, p, t) = 0`, with forward, adjoint and second-order sensitivities that are the exact
-//! derivatives of the discrete step. `no_std`; memory is static, or on the heap with the feature `alloc`.
+//! `f(ẋ, x, u, z, p, t) = 0`, with forward, adjoint and second-order sensitivities that are the
+//! exact derivatives of the discrete step. `no_std`; memory is static, or on the heap with the
+//! feature `alloc`.
 //!
 //! A model is a type that implements [`Dae`]; the attributes of `casados-macros` write that
 //! implementation from a Rust function.

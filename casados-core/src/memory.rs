@@ -1,9 +1,10 @@
 //! Where the memory of an integrator is.
 //!
-//! - [`Heap`] (feature `alloc`): the memory of a mode (forward, adjoint, ...) is allocated, zeroed, by the first
-//!   call of that mode or when it is reserved; no later call allocates. Large models never touch the stack.
-//! - [`Inline`]: everything is inside the integrator itself, for one mode that is part of the type and at
-//!   most `STEPS` steps. A call that the mode has no memory for does not compile:
+//! - [`Heap`] (feature `alloc`): the memory of a mode (forward, adjoint, ...) is allocated, zeroed,
+//!   by the first call of that mode or when it is reserved; no later call allocates. Large models
+//!   never touch the stack.
+//! - [`Inline`]: everything is inside the integrator itself, for one mode that is part of the type
+//!   and at most `STEPS` steps. A call that the mode has no memory for does not compile:
 //!
 //! ```
 //! # use casados_core::{Dae, Error, Gauss, Inline, Irk, mode, model::{VectorU, VectorX}};
@@ -169,19 +170,19 @@ impl<V: Zeroable> Default for Inside<V> {
     }
 }
 
-/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps; with what it is to fall back on
-/// ([`fallback`]), or without.
+/// Memory inside the integrator, for the calls of one [`mode`] and at most `STEPS` steps; with what
+/// it is to fall back on ([`fallback`]), or without.
 ///
-/// An integrator has the constant `SIZE`, how many bytes it takes: there are no others. For a pendulum on a cart (four states, a
-/// control) in `f64` on a 32-bit processor:
+/// An integrator has the constant `SIZE`, how many bytes it takes: there are no others. For a
+/// pendulum on a cart (four states, a control) in `f64` on a 32-bit processor:
 ///
 /// | integrator | [`mode::Nominal`] | [`mode::Forward`] | [`mode::Adjoint`] | [`mode::Hessian`] |
 /// |---|---|---|---|---|
 /// | `Irk`, `Gauss<2>` | 2632 | 4104 | 2952 | 8112 |
 /// | `Erk`, `Rk4` | 1344 | 2912 | 1344 | 3872 |
 ///
-/// For a model of one's own `cargo doc` prints the number beside a public constant that is `SIZE`, for the target that it is
-/// asked for.
+/// For a model of one's own `cargo doc` prints the number beside a public constant that is `SIZE`,
+/// for the target that it is asked for.
 #[derive(Clone, Copy, Debug)]
 pub struct Inline<Mode, const STEPS: usize = 1, F = fallback::Pivoting>(PhantomData<fn() -> (Mode, F)>);
 
@@ -189,14 +190,14 @@ impl<Mode, const STEPS: usize, F> sealed::Sealed for Inline<Mode, STEPS, F> {}
 
 /// What an implicit integrator does where the planned elimination is not good enough.
 pub mod fallback {
-    /// It pivots the whole matrix. With three stages or more it has memory for the mean Jacobian of the stages too, which
-    /// Newton's method takes where iterations are not fixed.
+    /// It pivots the whole matrix. With three stages or more it has memory for the mean Jacobian of
+    /// the stages too, which Newton's method takes where iterations are not fixed.
     #[derive(Clone, Copy, Debug)]
     pub struct Pivoting;
 
-    /// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no other worst case than the
-    /// usual one. Neither the whole matrix nor the mean Jacobian of the stages has any memory or any code: for firmware
-    /// with fixed iterations.
+    /// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no
+    /// other worst case than the usual one. Neither the whole matrix nor the mean Jacobian of the
+    /// stages has any memory or any code: for firmware with fixed iterations.
     ///
     /// ```
     /// # use casados_core::{Dae, Error, Gauss, Inline, Irk, memory::fallback, mode};
@@ -364,7 +365,8 @@ mod heap {
     #[derive(Debug)]
     pub struct AllocatedTape<V>(Option<Box<[V]>>);
 
-    /// Values on the heap, one of each type that was asked for: types differ in the number of seeds.
+    /// Values on the heap, one of each type that was asked for: types differ in the number of
+    /// seeds.
     #[derive(Debug, Default)]
     pub struct AllocatedByType(Vec<Box<dyn Any + Send + Sync>>);
 

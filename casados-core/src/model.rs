@@ -65,18 +65,21 @@ pub trait Dae: 'static {
     type Shape: Shape;
     /// Values of the structural non-zeros of `∂f/∂(ẋ, x, z, u, p)`.
     type Jacobian<T: Plain>: Array<T>;
-    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ f)` over `(ẋ, x, z, u, p)`.
+    /// Values of the structural non-zeros of the lower triangle of `∇²(μᵀ f)` over
+    /// `(ẋ, x, z, u, p)`.
     type Hessian<T: Plain>: Array<T>;
-    /// One element for each block of the factors of the Newton matrix, fill included: see [`Elimination`].
+    /// One element for each block of the factors of the Newton matrix, fill included: see
+    /// [`Elimination`].
     type Factors<B: Plain>: Array<B>;
     /// What is known about the model before it runs.
     const STRUCTURE: Structure;
-    /// Where Newton's method starts if a call gives no start values: one for each unknown `(ẋ, z)`, or none at all for
-    /// zeros. `#[dae]` takes them from `nominal(..)` and `range(..)` of its attribute. Where equations have several roots
-    /// these decide for one; see [`Start`](crate::options::Start).
+    /// Where Newton's method starts if a call gives no start values: one for each unknown `(ẋ, z)`,
+    /// or none at all for zeros. `#[dae]` takes them from `nominal(..)` and `range(..)` of its
+    /// attribute. Where equations have several roots these decide for one; see
+    /// [`Start`](crate::options::Start).
     const START: &'static [f64] = &[];
-    /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said so: one for each, or
-    /// none at all. Integrators do not read it; the checks of `testing` do.
+    /// From where to where the variables `(ẋ, x, z, u, p, t)` may be, as far as the user has said
+    /// so: one for each, or none at all. Integrators do not read it; the checks of `testing` do.
     const RANGES: &'static [Range] = &[];
 
     /// The residual `f(v)`.
@@ -93,8 +96,9 @@ pub trait Dae: 'static {
         jacobian: &mut Self::Jacobian<S::Cell>,
     );
 
-    /// The residual and its derivative in one direction, `∂f/∂v v'`, where every variable comes with its `v'`; that of `t` is
-    /// zero. Written models compute it term by term (see [`Tangent`]); without that it is the product with the Jacobian.
+    /// The residual and its derivative in one direction, `∂f/∂v v'`, where every variable comes
+    /// with its `v'`; that of `t` is zero. Written models compute it term by term (see
+    /// [`Tangent`]); without that it is the product with the Jacobian.
     fn tangent<S: Lanes>(v: &ArrayV<Self, Tangent<S>>, f: &mut ArrayK<Self, Tangent<S>>) {
         let mut point = ArrayV::<Self, S::Cell>::zeroed();
         for (cell, variable) in point.as_mut().iter_mut().zip(v.as_ref()) {
@@ -115,7 +119,8 @@ pub trait Dae: 'static {
         }
     }
 
-    /// The gradient `∇ᵥ(μᵀ f)` over `(ẋ, x, z, u, p)`. The last element, that of `t`, is set to zero.
+    /// The gradient `∇ᵥ(μᵀ f)` over `(ẋ, x, z, u, p)`. The last element, that of `t`, is set to
+    /// zero.
     fn adjoint<S: Lanes>(
         v: &ArrayV<Self, S::Cell>,
         mu: &ArrayK<Self, S::Cell>,
@@ -165,8 +170,8 @@ pub trait GraphDae: Dae {
     fn adjoint_of<S: Scalar<Cell = S>>(v: &[S], mu: &[S], gradient: &mut [S]);
 }
 
-/// A model in explicit form: row `r` of the residual is `c (ẋ_j − g_j(x, u, p, t))` with a constant `c`
-/// and every `j` occurs once; there are no algebraic states.
+/// A model in explicit form: row `r` of the residual is `c (ẋ_j − g_j(x, u, p, t))` with a constant
+/// `c` and every `j` occurs once; there are no algebraic states.
 ///
 /// Then `g_j = −f_r / c` at `ẋ = 0`, and every derivative of `g` is one of `f`.
 #[diagnostic::on_unimplemented(

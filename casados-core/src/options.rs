@@ -16,9 +16,9 @@ pub struct Options {
     pub newton: Newton,
     /// Where Newton's method starts.
     pub start: Start,
-    /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's summation), and implicit
-    /// methods compute the sums of their stages with twice the digits: for thousands of steps in one interval, where
-    /// rounding errors of `x` would add up.
+    /// Whether what the sum over the steps rounds off is carried along to the next step (Kahan's
+    /// summation), and implicit methods compute the sums of their stages with twice the digits: for
+    /// thousands of steps in one interval, where rounding errors of `x` would add up.
     pub compensated: bool,
 }
 
@@ -32,15 +32,18 @@ impl Default for Options {
 /// How the equations of the stages are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
-    /// The iteration ends when its error is expected below this, relative to the size of each unknown
-    /// (of a derivative `ẋ` also below `|x/h|`, the change that rounds to none in `x`).
-    /// Between zero and 0.1; zero, the default, means rounding: a few units in the last place of the number type.
+    /// The iteration ends when its error is expected below this, relative to the size of each
+    /// unknown (of a derivative `ẋ` also below `|x/h|`, the change that rounds to none in `x`).
+    /// Between zero and 0.1; zero, the default, means rounding: a few units in the last place of
+    /// the number type.
     pub tolerance: f64,
-    /// With a tolerance: more iterations than these are the error `NotConverged`. Between 1 and 10000; 50 by default.
+    /// With a tolerance: more iterations than these are the error `NotConverged`. Between 1 and
+    /// 10000; 50 by default.
     pub max_iterations: usize,
     /// Which Jacobian the iteration takes. Sensitivities always take the one of the solution.
     pub jacobian: Jacobian,
-    /// Exactly these iterations, between 1 and 10000, and no test for convergence: the same run time in every call.
+    /// Exactly these iterations, between 1 and 10000, and no test for convergence: the same run
+    /// time in every call.
     pub fixed_iterations: Option<usize>,
 }
 
@@ -53,14 +56,15 @@ impl Default for Newton {
 /// The Jacobian in Newton's method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Jacobian {
-    /// That of the start values in the first step, that of the last step in later ones; evaluated and factorised anew as
-    /// soon as the iterations that are still expected with it cost more (by the counts of operations in the model's
-    /// structure, and the rate at which increments shrink, or after the first one the residual). With three stages or more a new one
-    /// is `Simplified` up to three times in a step. With a fixed number of iterations as `Full`.
+    /// That of the start values in the first step, that of the last step in later ones; evaluated
+    /// and factorised anew as soon as the iterations that are still expected with it cost more (by
+    /// the counts of operations in the model's structure, and the rate at which increments shrink,
+    /// or after the first one the residual). With three stages or more a new one is `Simplified` up
+    /// to three times in a step. With a fixed number of iterations as `Full`.
     #[default]
     Auto,
-    /// The mean of the stages' Jacobians, in the eigenbasis of the tableau; renewed as with `Auto`. Tableaux of one or two
-    /// stages, or without such a basis, take `Auto`.
+    /// The mean of the stages' Jacobians, in the eigenbasis of the tableau; renewed as with `Auto`.
+    /// Tableaux of one or two stages, or without such a basis, take `Auto`.
     Simplified,
     /// Evaluated and factorised in every iteration.
     Full,
@@ -69,7 +73,8 @@ pub enum Jacobian {
 }
 
 impl Jacobian {
-    /// Whether old factors, and those of the mean of the stages, do as long as they cost less than new ones.
+    /// Whether old factors, and those of the mean of the stages, do as long as they cost less than
+    /// new ones.
     pub(crate) fn is_adaptive(self) -> bool {
         matches!(self, Self::Auto | Self::Simplified)
     }
@@ -77,34 +82,41 @@ impl Jacobian {
 
 /// Where Newton's method starts in the first step of a call.
 ///
-/// In the steps after it the start is the polynomial through the stages of the step before; with five stages or more the
-/// algebraic states start at those of its last stage. So a call stays on the branch on which its first step was.
+/// In the steps after it the start is the polynomial through the stages of the step before; with
+/// five stages or more the algebraic states start at those of its last stage. So a call stays on
+/// the branch on which its first step was.
 ///
-/// Where the equations have several roots, as `z² = x` does, the start decides for one, and a root that nobody wants
-/// looks like any other: say where the model lives, `#[dae(nominal(z = 0.1))]`, or give values with `set_start`. Where a
-/// residual has no value at `z = 0`, as that of `ln z`, or a matrix there is singular, as that of `z² = x`, there is no
-/// solution without such values.
+/// Where the equations have several roots, as `z² = x` does, the start decides for one, and a root
+/// that nobody wants looks like any other: say where the model lives, `#[dae(nominal(z = 0.1))]`,
+/// or give values with `set_start`. Where a residual has no value at `z = 0`, as that of `ln z`, or
+/// a matrix there is singular, as that of `z² = x`, there is no solution without such values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// The values of `set_start` if it was called, else the nominal values of the model, [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or, where there is none, at the
-    /// geometric mean of a `range(..)` that does not contain zero; else at zero. `ẋ` is zero, unless the equations are
-    /// nonlinear in it and it has a nominal value. The same input gives the same bits in every call.
+    /// The values of `set_start` if it was called, else the nominal values of the model,
+    /// [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or, where there is none, at the
+    /// geometric mean of a `range(..)` that does not contain zero; else at zero. `ẋ` is zero,
+    /// unless the equations are nonlinear in it and it has a nominal value. The same input gives
+    /// the same bits in every call.
     #[default]
     Nominal,
     /// `ẋ = 0` and `z = 0`, whatever the nominal values are.
     Zero,
     /// The values of `set_start`; an error if it was not called.
     Given,
-    /// The stages of the same step in the last successful call; in the first one as with `Nominal`. A branch that was found once is kept from call to call, until `reset`.
+    /// The stages of the same step in the last successful call; in the first one as with `Nominal`.
+    /// A branch that was found once is kept from call to call, until `reset`.
     Warm,
 }
 
 impl Options {
-    /// Stages lifted to the level of a problem of optimal control, which then solves their equations too: each call takes one iteration,
-    /// from the stages of the last one (in the first call from the nominal values). Stages converge with the iterates instead of in every one of them,
-    /// and at convergence agree with those of any other options (R. Quirynen, S. Gros, M. Diehl, "Lifted implicit integrators for
-    /// direct optimal control", CDC 2015). Until then ends of intervals have errors of second order in the last step; derivatives are exact
-    /// at the stages that there are. Whether that saves more than an iteration more of the problem costs is to be measured.
+    /// Stages lifted to the level of a problem of optimal control, which then solves their
+    /// equations too: each call takes one iteration, from the stages of the last one (in the first
+    /// call from the nominal values). Stages converge with the iterates instead of in every one of
+    /// them, and at convergence agree with those of any other options (R. Quirynen, S. Gros, M.
+    /// Diehl, "Lifted implicit integrators for direct optimal control", CDC 2015). Until then ends
+    /// of intervals have errors of second order in the last step; derivatives are exact at the
+    /// stages that there are. Whether that saves more than an iteration more of the problem costs
+    /// is to be measured.
     ///
     /// ```
     /// # use casados_core::options::{Options, Start};

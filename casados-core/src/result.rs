@@ -63,7 +63,8 @@ pub struct Directional<M: Dae, T: Plain, const C: usize> {
     pub dz0: MatrixZC<M, T, C>,
 }
 
-/// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`. By default all are zero.
+/// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`. By default all are
+/// zero.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Seeds<M: Dae, T: Plain, const C: usize> {
@@ -103,7 +104,8 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
     pub grad_p: VectorP<M, T>,
 }
 
-/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`; of `λᵀx + νᵀz0` where weights `ν` are given.
+/// The solution, its derivatives, and the gradient and Hessian of `λᵀx`; of `λᵀx + νᵀz0` where
+/// weights `ν` are given.
 ///
 /// The Hessian over `(x₀, u, p)` is symmetric to the last bit; of its blocks beside the diagonal
 /// the upper ones are given.

@@ -12,8 +12,8 @@ use nalgebra::{SMatrix, SVector};
 pub trait Plain: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static {}
 impl<T: Copy + Zeroable + Debug + PartialEq + Send + Sync + 'static> Plain for T {}
 
-/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put on
-/// the parameters of the struct.
+/// What makes a struct of [`Plain`] fields plain itself, without the bounds that a derive would put
+/// on the parameters of the struct.
 macro_rules! plain {
     ([$($generics:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
         impl<$($generics)*> Clone for $type {
@@ -61,8 +61,9 @@ macro_rules! compared {
 }
 pub(crate) use compared;
 
-/// What begins where a line of the cache does on machines with wide registers: they are loaded in halves where they cross into the
-/// next line. Without `std` programs have what they were compiled for, and memory is laid out by others.
+/// What begins where a line of the cache does on machines with wide registers: they are loaded in
+/// halves where they cross into the next line. Without `std` programs have what they were compiled
+/// for, and memory is laid out by others.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 #[cfg_attr(all(target_arch = "x86_64", feature = "std"), repr(C, align(64)))]
 pub struct Aligned<V>(pub V);
@@ -152,7 +153,8 @@ impl<T: Plain, const R: usize, const C: usize> Matrix<T> for SMatrix<T, R, C> {
 /// The dimensions of a model, and the arrays and matrices they give.
 ///
 /// Three index sets occur everywhere:
-/// - unknowns of a stage `(k, z)`, length `NK = NX + NZ`: the rows and columns of the Newton matrix;
+/// - unknowns of a stage `(k, z)`, length `NK = NX + NZ`: the rows and columns of the Newton
+///   matrix;
 /// - variables of the model `(ẋ, x, z, u, p, t)`, length `NV = 2 NX + NZ + NU + NP + 1`;
 /// - directions of sensitivities `w = (x₀, u, p)`, length `NW = NX + NU + NP`.
 pub trait Shape: 'static {
@@ -299,7 +301,8 @@ impl<
     type MatrixCP<T: Plain, const C: usize> = SMatrix<T, C, NP>;
 }
 
-/// The number of outputs of a function, and the arrays and matrices it gives beside the dimensions of a model.
+/// The number of outputs of a function, and the arrays and matrices it gives beside the dimensions
+/// of a model.
 pub trait Outputs: 'static {
     /// How many.
     const NY: usize;

@@ -9,11 +9,12 @@ pub struct Statistics {
     pub iterations: usize,
     /// Evaluations of the residual alone at all stages; of an explicit method, of one stage.
     pub residuals: usize,
-    /// Evaluations of the residual and the Jacobian at all stages, or of the residual there and the Jacobian in their middle; of an explicit
-    /// method, of one stage.
+    /// Evaluations of the residual and the Jacobian at all stages, or of the residual there and the
+    /// Jacobian in their middle; of an explicit method, of one stage.
     pub jacobians: usize,
     /// Factorisations of the Newton matrix.
     pub factorizations: usize,
-    /// Those of them in which the planned elimination was not good enough, so that the whole matrix was pivoted.
+    /// Those of them in which the planned elimination was not good enough, so that the whole matrix
+    /// was pivoted.
     pub dense: usize,
 }

@@ -1,5 +1,5 @@
-//! Implicit integrators on small models: derivatives against differences and against each other, identities,
-//! repeated calls.
+//! Implicit integrators on small models: derivatives against differences and against each other,
+//! identities, repeated calls.
 
 mod models;
 
@@ -33,8 +33,9 @@ macro_rules! at {
     }};
 }
 
-/// `dφ/dw` by the central difference of order 6 with step `d`: truncation error `d⁶ φ⁽⁷⁾/140`, rounding error
-/// `≈ 2 ε |φ| / d`; with `d = 2e-3` and derivatives of order one both are below 2e-13.
+/// `dφ/dw` by the central difference of order 6 with step `d`: truncation error `d⁶ φ⁽⁷⁾/140`,
+/// rounding error `≈ 2 ε |φ| / d`; with `d = 2e-3` and derivatives of order one both are below
+/// 2e-13.
 fn difference<const R: usize>(mut f: impl FnMut(V4) -> SVector<f64, R>, w: V4) -> SMatrix<f64, R, 4> {
     let d = 2e-3;
     SMatrix::from_columns(&core::array::from_fn::<_, 4, _>(|c| {
@@ -229,7 +230,8 @@ fn newton_variants_find_the_same_solution() {
         irk.set_start(&vector![0.1, 0.2], &vector![1.0]).unwrap();
         for _ in 0..3 {
             let h = irk.hessian(&x0, &u, H, &lambda).unwrap();
-            // Stages agree to the tolerance of a few ε; second derivatives amplify this by their size.
+            // Stages agree to the tolerance of a few ε; second derivatives amplify this by their
+            // size.
             assert!((h.x - expected.x).amax() < 10.0 * f64::EPSILON);
             assert!((h.dx_dx0 - expected.dx_dx0).amax() < 50.0 * f64::EPSILON);
             assert!((h.h_xx - expected.h_xx).amax() < 1e-13);

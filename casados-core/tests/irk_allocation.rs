@@ -60,8 +60,8 @@ fn memory_is_allocated_once() {
     };
     let mut irk = Irk::<Nonlinear, Gauss<2>>::new(options).unwrap();
     assert_eq!(count(|| irk.set_parameters(&vector![1.3]).unwrap()), 1);
-    // The two records of `solve`; then one for each new kind of call, and a list for those that depend on the
-    // number of seeds.
+    // The two records of `solve`; then one for each new kind of call, and a list for those that
+    // depend on the number of seeds.
     assert_eq!(run(&mut irk), [2, 1, 0, 0, 2, 1, 2, 2]);
     assert_eq!(run(&mut irk), [0; 8]);
 

@@ -23,7 +23,8 @@ fn linear_model_meets_its_closed_form() {
         let x = e * x0 + g * u;
         let near = |a: f64, b: f64| assert!((a - b).abs() < 40.0 * f64::EPSILON * (1.0 + b.abs()), "{a} {b}");
         near(r.x[0], x);
-        // z is a polynomial of degree 7 at both ends: its error is x⁽⁸⁾ Π(1 − c_i)/8! h⁸ with Π(1 − c_i) = 8!²/16!.
+        // z is a polynomial of degree 7 at both ends: its error is x⁽⁸⁾ Π(1 − c_i)/8! h⁸ with Π(1 −
+        // c_i) = 8!²/16!.
         let bound = (p * h).abs().powi(8) * 40320.0 / 20_922_789_888_000.0 * e.max(1.0) * 1.01;
         let near_z = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < bound * scale + 1e-14, "{a} {b}");
         near_z(r.z[0], x, (x0 + u / p).abs());
@@ -109,7 +110,8 @@ fn no_differential_states() {
     irk.adjoint(&none, &vector![8.0], 0.0, &none).unwrap();
 }
 
-/// A matrix of 450 unknowns (1.6 MB) and three of them in the record, on a thread with 2 MB of stack.
+/// A matrix of 450 unknowns (1.6 MB) and three of them in the record, on a thread with 2 MB of
+/// stack.
 #[test]
 fn large_models_stay_off_the_stack() {
     let run = || {

@@ -9,8 +9,8 @@ use models::pendulum::Pendulum;
 use nalgebra::{SMatrix, SVector, vector};
 use reference::{Reference, S2_N1, S4_N4};
 
-/// The reference solves a linear system for its tableau, which is off by up to 1e-13 for s = 2 and 1e-12 for
-/// s = 4 (`tests/data` has its coefficients); two builds of it agree to 1e-12.
+/// The reference solves a linear system for its tableau, which is off by up to 1e-13 for s = 2 and
+/// 1e-12 for s = 4 (`tests/data` has its coefficients); two builds of it agree to 1e-12.
 const TOLERANCE: f64 = 2e-12;
 
 fn near(actual: &[f64], expected: &[f64]) {

@@ -1,5 +1,5 @@
-//! Tokens that are no model, and models with something wrong in them: expanded to errors at tokens, without a panic and in
-//! bounded time. All is drawn from seeds, so that a failure repeats.
+//! Tokens that are no model, and models with something wrong in them: expanded to errors at tokens,
+//! without a panic and in bounded time. All is drawn from seeds, so that a failure repeats.
 
 use super::expand;
 use crate::language::Form;
@@ -163,7 +163,8 @@ fn form(seed: u64) -> Form {
     if seed.is_multiple_of(2) { Form::Dae } else { Form::Ode }
 }
 
-/// What is mutated is a model to begin with, or the mutations would be rejected for other reasons than their own.
+/// What is mutated is a model to begin with, or the mutations would be rejected for other reasons
+/// than their own.
 #[test]
 fn models_are_models() {
     for (index, model) in MODELS.iter().enumerate() {

@@ -1,8 +1,8 @@
 //! The attributes `#[dae]`, `#[ode]` and `#[function]`.
 //!
 //! The entry is these few lines; everything else is an ordinary library over `proc_macro2`:
-//! `language` executes the model function symbolically and yields a graph, `graph` differentiates it,
-//! `structure` finds out what can be known before it runs, `emit` writes Rust.
+//! `language` executes the model function symbolically and yields a graph, `graph` differentiates
+//! it, `structure` finds out what can be known before it runs, `emit` writes Rust.
 
 mod emit;
 mod graph;
@@ -20,14 +20,16 @@ const STACK: usize = 1 << 29;
 
 /// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
 ///
-/// What a model may contain is in `docs/language.md`. In `f64` the residual has the bits of the function,
-/// but structural zeros are zeros: `0.0 * y` is dropped, whatever `y` is when it runs. Conditions of the
-/// compiler (`#[cfg]`) are refused inside of a model.
+/// What a model may contain is in `docs/language.md`. In `f64` the residual has the bits of the
+/// function, but structural zeros are zeros: `0.0 * y` is dropped, whatever `y` is when it runs.
+/// Conditions of the compiler (`#[cfg]`) are refused inside of a model.
 ///
-/// `#[dae(nominal(x = [900.0, 2e6], z = 0.1), range(z = 1e-3..=10.0))]` says where it lives. Algebraic states start Newton's method at
-/// their nominal values where a call gives no others (`set_start`), without one at zero, or at the geometric mean of a range
-/// that zero is not in. Where the equations have several roots, that decides for one; where they have no value or a singular
-/// matrix at `z = 0`, as those with `z.ln()` or `z * z - x[0]`, there is no solution without it.
+/// `#[dae(nominal(x = [900.0, 2e6], z = 0.1), range(z = 1e-3..=10.0))]` says where it lives.
+/// Algebraic states start Newton's method at their nominal values where a call gives no others
+/// (`set_start`), without one at zero, or at the geometric mean of a range that zero is not in.
+/// Where the equations have several roots, that decides for one; where they have no value or a
+/// singular matrix at `z = 0`, as those with `z.ln()` or `z * z - x[0]`, there is no solution
+/// without it.
 #[proc_macro_attribute]
 pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Dae, attribute.into(), item.into()).into()
@@ -39,7 +41,8 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Ode, attribute.into(), item.into()).into()
 }
 
-/// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event, a cost, a constraint.
+/// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event, a cost, a
+/// constraint.
 #[proc_macro_attribute]
 pub fn function(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Function, attribute.into(), item.into()).into()

@@ -1,5 +1,5 @@
-//! An aircraft that harvests wind energy on a tether: the 40 intervals of its optimal orbit, integrated
-//! with all sensitivities, compared with an independent implementation, timed and drawn.
+//! An aircraft that harvests wind energy on a tether: the 40 intervals of its optimal orbit,
+//! integrated with all sensitivities, compared with an independent implementation, timed and drawn.
 //!
 //! ```text
 //! cargo run --release --example awe [PICTURE.svg]

@@ -1,15 +1,15 @@
-//! The power-optimal periodic orbit of an aircraft on a tether, by multiple shooting and a nonlinear
-//! interior point, from each of three guesses.
+//! The power-optimal periodic orbit of an aircraft on a tether, by multiple shooting and a
+//! nonlinear interior point, from each of three guesses.
 //!
 //! ```text
 //! cargo run --release --example awe_orbit
 //! ```
 //!
-//! The second experiment of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation
-//! for use in CasADi": 40 intervals, Radau IIA with four stages, all 22 physical states periodic, 21
-//! linear and 9 nonlinear path constraints. The reference solution is by CasADi 3.8.2 and IPOPT with direct
-//! collocation. Its tension at a node solves the equations there; here it is where the integrator's stages
-//! continue to, which moves the optimum by 8e-7.
+//! The second experiment of Frey, De Schutter and Diehl, "Fast integrators with sensitivity
+//! propagation for use in CasADi": 40 intervals, Radau IIA with four stages, all 22 physical states
+//! periodic, 21 linear and 9 nonlinear path constraints. The reference solution is by CasADi 3.8.2
+//! and IPOPT with direct collocation. Its tension at a node solves the equations there; here it is
+//! where the integrator's stages continue to, which moves the optimum by 8e-7.
 
 #[path = "../models/awe.rs"]
 mod awe;
@@ -31,8 +31,8 @@ const GUESSES: [&str; 3] = ["guess_dc", "guess_pow", "guess_init"];
 /// The interpolated tension moves the objective by 8e-7.
 const TOLERANCE: f64 = 2e-6;
 
-/// The nonlinear path constraints, scaled, all at least zero: tension, airspeed, angles of attack and
-/// sideslip, angle between tether and aircraft.
+/// The nonlinear path constraints, scaled, all at least zero: tension, airspeed, angles of attack
+/// and sideslip, angle between tether and aircraft.
 #[function]
 fn limits(x: [f64; 23], z: [f64; 1], _u: [f64; 4]) -> [f64; 9] {
     const TETHER_SCALE: f64 = 12.499305032751677;

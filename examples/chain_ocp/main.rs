@@ -1,5 +1,5 @@
-//! A chain of masses is brought to rest beside a wall: optimal control by multiple shooting and sequential quadratic programming,
-//! and what an iteration costs as the chain grows.
+//! A chain of masses is brought to rest beside a wall: optimal control by multiple shooting and
+//! sequential quadratic programming, and what an iteration costs as the chain grows.
 //!
 //! ```text
 //! cargo run --release --example chain_ocp [PICTURE.svg]
@@ -49,7 +49,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Solves the problem of a size, again and again; the fastest outcome, the iterations of the last one, and the states.
+/// Solves the problem of a size, again and again; the fastest outcome, the iterations of the last
+/// one, and the states.
 macro_rules! solve {
     ($nx:literal, $stages:literal, $steps:literal) => {{
         let record = Record::load(&format!("ocp/chain_{}.json", ($nx - 3) / 6 + 2))?;

@@ -1,4 +1,5 @@
-//! The picture: at the left the motion of the chain as seen from above, at the right what an iteration costs.
+//! The picture: at the left the motion of the chain as seen from above, at the right what an
+//! iteration costs.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;

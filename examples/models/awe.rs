@@ -1,12 +1,12 @@
 //! An aircraft that harvests wind energy on a tether of fixed length, with turbines on board.
 //!
-//! Six degrees of freedom in non-minimal coordinates: position, velocity, body rates and the rotation
-//! matrix itself; the tether is a constraint with a multiplier. The constraint is differentiated twice,
-//! and its drift and that of the rotation matrix are damped (Baumgarte). The last state accumulates the
-//! cost of an optimal control problem: a quadrature.
+//! Six degrees of freedom in non-minimal coordinates: position, velocity, body rates and the
+//! rotation matrix itself; the tether is a constraint with a multiplier. The constraint is
+//! differentiated twice, and its drift and that of the rotation matrix are damped (Baumgarte). The
+//! last state accumulates the cost of an optimal control problem: a quadrature.
 //!
-//! The benchmark of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation for use
-//! in CasADi": aircraft after Malz et al. (2019), turbines after Zanon et al. (2013).
+//! The benchmark of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation for
+//! use in CasADi": aircraft after Malz et al. (2019), turbines after Zanon et al. (2013).
 
 #![allow(clippy::module_inception)] // The file is named like the model.
 
@@ -28,7 +28,8 @@ pub mod awe {
         pub dq: Vector3<f64>,
         /// Angular velocity in the body frame, rad/s.
         pub omega: Vector3<f64>,
-        /// Rotation, body to earth: columns along the chord (to the trailing edge), the span, and up.
+        /// Rotation, body to earth: columns along the chord (to the trailing edge), the span, and
+        /// up.
         pub r: Matrix3<f64>,
         /// Deflections of aileron, elevator and rudder, rad.
         pub delta: Vector3<f64>,

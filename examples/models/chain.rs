@@ -1,4 +1,5 @@
-//! A chain of masses on springs: the first hangs at the wall, the velocity of the last is controlled.
+//! A chain of masses on springs: the first hangs at the wall, the velocity of the last is
+//! controlled.
 
 use casados::dae;
 use nalgebra::{SVector, Vector3};

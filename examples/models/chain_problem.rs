@@ -1,7 +1,7 @@
 //! The problem of the chain of masses: from a disturbance back to rest, with a wall beside it.
 //!
-//! The first experiment of Frey, De Schutter and Diehl, "Fast integrators with sensitivity propagation for use in CasADi", after
-//! Wirsching, Bock and Diehl (2006).
+//! The first experiment of Frey, De Schutter and Diehl, "Fast integrators with sensitivity
+//! propagation for use in CasADi", after Wirsching, Bock and Diehl (2006).
 
 use casados::function;
 
@@ -23,7 +23,8 @@ pub fn weights<const NX: usize>() -> [f64; NX] {
     core::array::from_fn(|i| if i / 3 == free { 2.0 * (free + 1) as f64 } else { 2.0 })
 }
 
-/// The problem of a size with dynamics, at the start `x_k = x_rest`, `u = 0`: 40 intervals of 0.2 s.
+/// The problem of a size with dynamics, at the start `x_k = x_rest`, `u = 0`: 40 intervals of 0.2
+/// s.
 ///
 /// ```text
 /// min  ½ Σ_k h (‖x_k − x_rest‖²_Q + ‖u_k‖²_R) + ½ ‖x_N − x_rest‖²_Q        |u| ≤ 1,  y ≥ −0.05 from the second node to the last but one

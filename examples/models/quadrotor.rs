@@ -6,7 +6,8 @@ const G: f64 = 9.81; // m/s²
 
 /// In a vertical plane.
 ///
-/// x = [horizontal and vertical position m, pitch rad, their velocities], u = [thrusts of both rotors N].
+/// x = [horizontal and vertical position m, pitch rad, their velocities], u = [thrusts of both
+/// rotors N].
 #[ode]
 pub fn planar_quadrotor(x: [f64; 6], u: [f64; 2]) -> [f64; 6] {
     const MASS: f64 = 0.5; // kg
@@ -21,7 +22,8 @@ pub fn planar_quadrotor(x: [f64; 6], u: [f64; 2]) -> [f64; 6] {
 
 /// In space; angles are roll, pitch and yaw, rates those of the body.
 ///
-/// x = [position m, angles rad, velocity m/s, rates rad/s], u = [thrusts of the rotors in front, right, behind, left N].
+/// x = [position m, angles rad, velocity m/s, rates rad/s], u = [thrusts of the rotors in front,
+/// right, behind, left N].
 #[ode]
 pub fn quadrotor(x: [f64; 12], u: [f64; 4]) -> [f64; 12] {
     const MASS: f64 = 1.0; // kg

@@ -1,5 +1,5 @@
-//! Nonlinear model predictive control by real-time iterations: a pendulum swings up and is pushed, a chain of masses is disturbed;
-//! what a sample takes, and the worst of many.
+//! Nonlinear model predictive control by real-time iterations: a pendulum swings up and is pushed,
+//! a chain of masses is disturbed; what a sample takes, and the worst of many.
 //!
 //! ```text
 //! cargo run --release --example nmpc [PICTURE.svg]

@@ -1,5 +1,5 @@
-//! What the macro finds in a model: its description in words, and spy plots of its Jacobian and of the factors
-//! of its Newton matrix.
+//! What the macro finds in a model: its description in words, and spy plots of its Jacobian and of
+//! the factors of its Newton matrix.
 //!
 //! ```text
 //! cargo run --release --example spy [FOLDER]

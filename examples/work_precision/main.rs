@@ -1,12 +1,13 @@
-//! Error over time on the initial value problems of the stiff test sets, adaptive and with equal steps, beside diffsol and, where
-//! CasADi is installed, CVODES and IDAS.
+//! Error over time on the initial value problems of the stiff test sets, adaptive and with equal
+//! steps, beside diffsol and, where CasADi is installed, CVODES and IDAS.
 //!
 //! ```text
 //! cargo run --release --example work_precision [-- --only TEXT] [--without-peers] [--seconds S] [--out FOLDER] [--write FILE]
 //! ```
 //!
-//! Times are the least CPU time of a call in `S` seconds (0.05). A table is printed, and written between the marks
-//! `<!-- work_precision -->` and `<!-- end -->` of FILE; plots are drawn in FOLDER (`plots/work_precision`).
+//! Times are the least CPU time of a call in `S` seconds (0.05). A table is printed, and written
+//! between the marks `<!-- work_precision -->` and `<!-- end -->` of FILE; plots are drawn in
+//! FOLDER (`plots/work_precision`).
 
 #[path = "../../tests/data/mod.rs"]
 mod data;

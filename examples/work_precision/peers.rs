@@ -1,5 +1,6 @@
-//! Other solvers, in processes of their own that answer line by line: diffsol by a program of `benches/`, which is built
-//! when it is first asked for, and CVODES and IDAS by Python with CasADi.
+//! Other solvers, in processes of their own that answer line by line: diffsol by a program of
+//! `benches/`, which is built when it is first asked for, and CVODES and IDAS by Python with
+//! CasADi.
 
 use super::data::Record;
 use super::problems::Problem;
@@ -94,7 +95,8 @@ impl Peer {
     /// Of the process; a solver that fails is a run with an error.
     pub fn runs(&mut self, problem: &Problem, derivatives: bool, seconds: f64) -> Result<Vec<Run>, String> {
         let tolerances: Vec<f64> = (6..=24).map(|i| 10f64.powf(-0.5 * f64::from(i))).collect();
-        // Peers take the amplifier as an equation with algebraic states, the voltages of its capacitors.
+        // Peers take the amplifier as an equation with algebraic states, the voltages of its
+        // capacitors.
         let mut x0 = problem.x0.clone();
         if problem.name == "transistor_amplifier" {
             let y = &problem.x0;

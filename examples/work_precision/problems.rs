@@ -101,7 +101,8 @@ macro_rules! adaptive {
     }};
 }
 
-/// The derivatives of all states by `(x₀, p)`, where they are known; a model is not differentiated where they are not.
+/// The derivatives of all states by `(x₀, p)`, where they are known; a model is not differentiated
+/// where they are not.
 macro_rules! derivatives {
     (unknown, $($rest:tt)*) => {};
     (known, $solver:ident, $x0:ident, $t:ident, $values:expr, $call:ident) => {

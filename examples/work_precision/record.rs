@@ -17,8 +17,8 @@ pub struct Run {
 /// A run that came to the end.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// The largest relative error of a component; of the derivatives, relative to the largest of their row, if they were asked
-    /// for and are worse.
+    /// The largest relative error of a component; of the derivatives, relative to the largest of
+    /// their row, if they were asked for and are worse.
     pub error: f64,
     /// CPU seconds.
     pub time: f64,

@@ -98,7 +98,8 @@ fn later_calls_allocate_what_results_own() {
                 }
                 assert_eq!(third(|| _ = horizon.solve(&x0, &controls, &ends).unwrap()), 0);
                 assert_eq!(third(|| _ = horizon.dense(0.3).unwrap()), 0);
-                // A list for each derivative by the controls: dx, dz (which have no size), then the gradient, h_xu, h_uu, h_up.
+                // A list for each derivative by the controls: dx, dz (which have no size), then the
+                // gradient, h_xu, h_uu, h_up.
                 assert_eq!(third(|| drop(horizon.forward(&x0, &controls, &ends).unwrap())), 1);
                 assert_eq!(third(|| drop(horizon.adjoint(&x0, &controls, &ends, &lambda).unwrap())), 1);
                 assert_eq!(third(|| drop(horizon.hessian(&x0, &controls, &ends, &lambda).unwrap())), 5);

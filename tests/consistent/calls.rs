@@ -1,4 +1,5 @@
-//! What calls of all integrators have in common: lengths and times, and what is left of a call that failed.
+//! What calls of all integrators have in common: lengths and times, and what is left of a call that
+//! failed.
 
 use casados::prelude::*;
 use casados::{Erk, Error};
@@ -27,7 +28,8 @@ fn floor(x: f64, u: f64) -> f64 {
     x - 0.25 + 0.0 * u
 }
 
-/// The last argument of a call is a length, whatever the time at the start is; `dense` takes a time.
+/// The last argument of a call is a length, whatever the time at the start is; `dense` takes a
+/// time.
 #[test]
 fn intervals_have_lengths_and_solutions_have_times() {
     let none = SVector::<f64, 0>::zeros();
@@ -98,7 +100,8 @@ fn lengths_that_the_time_does_not_resolve_are_an_error() {
     ));
 }
 
-/// What integrators of steps of variable size, with events and over several intervals have in common.
+/// What integrators of steps of variable size, with events and over several intervals have in
+/// common.
 trait Calls {
     /// One of the four modes, with a control.
     fn call(&mut self, mode: usize, u: f64) -> Result<(), Error>;
@@ -141,8 +144,9 @@ of_method!(DormandPrince5);
 const GOOD: f64 = 0.5;
 const BAD: f64 = 5.0;
 
-/// After a call that failed, whichever it was and however late it failed, there is nothing to be asked or frozen; after one that
-/// succeeds there is again, and it is that of an integrator that never failed.
+/// After a call that failed, whichever it was and however late it failed, there is nothing to be
+/// asked or frozen; after one that succeeds there is again, and it is that of an integrator that
+/// never failed.
 fn leaves_no_answers<C: Calls>(make: impl Fn() -> C) {
     let (mut object, mut calm) = (make(), make());
     for mode in 0..4 {
@@ -212,7 +216,8 @@ fn parts_that_vanish_come_back() {
     }
 }
 
-/// Each option outside of its range is refused before anything runs, with its name, its value, and the range.
+/// Each option outside of its range is refused before anything runs, with its name, its value, and
+/// the range.
 #[test]
 fn options_outside_of_their_ranges_are_refused() {
     use casados::options::Newton;
@@ -293,7 +298,8 @@ fn logarithm(x: [f64; 2], z: f64, u: f64) -> f64 {
     x[0].ln() + 0.0 * (z + u)
 }
 
-/// Derivatives of dense output are those of the last good call to the last bit, whatever a call that failed has left.
+/// Derivatives of dense output are those of the last good call to the last bit, whatever a call
+/// that failed has left.
 #[test]
 fn dense_derivatives_are_those_of_the_last_good_call() {
     let (x0, u, negative) = (vector![0.3, -0.7], vector![0.9], vector![-50.0, -0.2]);

@@ -6,7 +6,8 @@ use casados::prelude::*;
 use casados::{Inline, mode};
 use nalgebra::{SVector, Vector1, vector};
 
-/// Decay of an acid `a` whose ions obey `z² + z/2 − a = 0`: one root is positive, the other is no concentration.
+/// Decay of an acid `a` whose ions obey `z² + z/2 − a = 0`: one root is positive, the other is no
+/// concentration.
 #[dae(nominal(z = 0.1))]
 fn acid(xdot: f64, x: f64, z: f64) -> [f64; 2] {
     [xdot + 0.3 * z, z * z + 0.5 * z - x]
@@ -52,8 +53,8 @@ fn large(x: f64) -> f64 {
     0.5 * (3.0 + (9.0 - 4.0 * x).sqrt())
 }
 
-/// The root that is wanted at both ends. Roots are more than one apart, and the error of the polynomials through the stages of
-/// such short steps is below a ten-thousandth.
+/// The root that is wanted at both ends. Roots are more than one apart, and the error of the
+/// polynomials through the stages of such short steps is below a ten-thousandth.
 fn is_root(root: fn(f64) -> f64, x0: f64, x: f64, z0: f64, z: f64) {
     for (state, z) in [(x0, z0), (x, z)] {
         assert!((z - root(state)).abs() <= 1e-4, "{state}: {z} is not {}", root(state));
@@ -154,7 +155,8 @@ fn derivatives_with_several_roots_start_at_their_nominal_values() {
     let mut irk = Irk::<Slope, Gauss<4>>::new(Options::default()).unwrap();
     let x = irk.solve(&vector![X0], &vector![], 1e-6).unwrap().x[0];
     assert!(((x - X0) / 1e-6 / positive(X0) - 1.0).abs() < 1e-5, "{x}");
-    // Where equations are linear in it, zero is as good as any value, and states start where they are given.
+    // Where equations are linear in it, zero is as good as any value, and states start where they
+    // are given.
     assert!(Acid::START == [0.0, 0.1] && Slope::START == [1.0] && LargerInRange::START == [0.0, 2.5]);
     assert!(Winding::START.is_empty() && LargerDual::START == Larger::START);
 }

@@ -3,7 +3,8 @@
 use casados::prelude::*;
 use nalgebra::{SVector, Vector1, vector};
 
-/// `ẋ = −x` twice, in two equations that differ by `p`: the solution does not depend on it, its digits do.
+/// `ẋ = −x` twice, in two equations that differ by `p`: the solution does not depend on it, its
+/// digits do.
 #[dae]
 fn nearly(xdot: [f64; 2], x: [f64; 2], p: f64) -> [f64; 2] {
     [xdot[0] + xdot[1] + x[0] + x[1], xdot[0] + (1.0 + p) * xdot[1] + x[0] + (1.0 + p) * x[1]]
@@ -43,7 +44,8 @@ macro_rules! ends {
     }};
 }
 
-/// Each result is right to what the condition `4/p` leaves, or there is none. Steps of 0.6 have errors below a percent.
+/// Each result is right to what the condition `4/p` leaves, or there is none. Steps of 0.6 have
+/// errors below a percent.
 #[test]
 fn nearly_singular_equations_are_refused_or_right() {
     let exact = f64::exp(-0.6);
@@ -121,7 +123,8 @@ fn stiff_equations_are_not_refused() {
                         "{p:e} {h}: {x}"
                     );
                     if total > 0.0 && h == 0.6 && (1e5..1e13).contains(&p) && x0[2] == 0.0 {
-                        // The slow motion is e^{−t/2} of the whole; three stages are right to a thousandth.
+                        // The slow motion is e^{−t/2} of the whole; three stages are right to a
+                        // thousandth.
                         let expected = 0.5 * total * f64::exp(-0.3);
                         assert!((x[0] - expected).abs() <= 1e-3, "{p:e}: {x}");
                     }

@@ -1,6 +1,7 @@
 //! Reads the reference values beside this file: JSON objects of numbers and (nested) lists of them.
 //!
-//! The parser may be off by one unit in the last place of a double, which is far below every tolerance.
+//! The parser may be off by one unit in the last place of a double, which is far below every
+//! tolerance.
 
 #![allow(dead_code)] // Each program that includes it takes a part.
 

@@ -1,5 +1,6 @@
-//! Writes random models as Rust source: every function of the model language, shared subexpressions, every kind of
-//! variable. What the attributes make of them is checked in `derivatives.rs`.
+//! Writes random models as Rust source: every function of the model language, shared
+//! subexpressions, every kind of variable. What the attributes make of them is checked in
+//! `derivatives.rs`.
 //!
 //! The source is the same in every run. After a change here, write the file anew:
 //! `CASADOS_WRITE=1 cargo test --test derivatives generated_file`
@@ -23,8 +24,8 @@ pub fn file() -> String {
     text
 }
 
-/// Functions of one argument, written so that every real argument is in their domain and that values stay moderate.
-/// `A` is the argument.
+/// Functions of one argument, written so that every real argument is in their domain and that
+/// values stay moderate. `A` is the argument.
 const UNARY: &[&str] = &[
     "-(A)",
     "(0.5 + (A) * (A)).sqrt()",
@@ -82,7 +83,8 @@ const BINARY: &[&str] = &[
     "if (A) <= -0.3 || !((B) > 0.1) { (B) * (B) } else { (A) + 1.5 * (B) }",
 ];
 
-/// One model: bindings that use variables and earlier bindings, then equations that use the bindings.
+/// One model: bindings that use variables and earlier bindings, then equations that use the
+/// bindings.
 fn model(text: &mut String, number: usize, turn: &mut usize) {
     let mut random = Random::new(1000 + number as u64);
     let explicit = number.is_multiple_of(3);

@@ -1,10 +1,12 @@
-//! All checks of one interval of an integrator, with the share of comparisons that may be unable to tell.
+//! All checks of one interval of an integrator, with the share of comparisons that may be unable to
+//! tell.
 
 use casados::testing::{Integrator, check_sensitivities};
 use casados::{Dae, Options, Shape};
 use nalgebra::SVector;
 
-/// All checks of one interval; of the comparisons with differences at most a tenth may be unable to tell.
+/// All checks of one interval; of the comparisons with differences at most a tenth may be unable to
+/// tell.
 pub fn check<M, I, const NX: usize, const NU: usize, const NP: usize>(
     mut integrator: I,
     x0: &SVector<f64, NX>,

@@ -1,8 +1,9 @@
-//! Errors of oscillations and of stiff components follow the tolerance: there the order is reduced, and no less may be asked of the
-//! estimate than of the solution.
+//! Errors of oscillations and of stiff components follow the tolerance: there the order is reduced,
+//! and no less may be asked of the estimate than of the solution.
 //!
-//! Errors are relative to `atol + rtol |x|`, of the worst component. No more than thirty of them are allowed: the errors of
-//! hundreds of steps, which stay where nothing is damped, each a part of its tolerance.
+//! Errors are relative to `atol + rtol |x|`, of the worst component. No more than thirty of them
+//! are allowed: the errors of hundreds of steps, which stay where nothing is damped, each a part of
+//! its tolerance.
 
 use crate::data::Record;
 use crate::models::vibrations::{Beam, Modes, RodPendulum, Rope, SpringPendulum, Turning};
@@ -23,7 +24,8 @@ fn in_tolerances(found: &[f64], expected: &[f64], tolerance: f64) -> f64 {
     found.iter().zip(expected).map(relative).fold(0.0, f64::max) / tolerance
 }
 
-/// `(sin t, cos t)`, whatever the eigenvalues: at the end of each step, of which the last alone is shortened.
+/// `(sin t, cos t)`, whatever the eigenvalues: at the end of each step, of which the last alone is
+/// shortened.
 #[test]
 fn stiff_components_follow_the_tolerance() {
     let eigenvalues =
@@ -84,7 +86,8 @@ fn spring_pendulum() {
     follows!("spring_pendulum", SpringPendulum, Radau, ALLOWED);
 }
 
-/// The equations do not keep the length of the rod: errors of the first steps grow to hundreds of them within the five swings.
+/// The equations do not keep the length of the rod: errors of the first steps grow to hundreds of
+/// them within the five swings.
 #[test]
 fn rod_pendulum() {
     follows!("rod_pendulum", RodPendulum, Gauss<4>, 100.0);

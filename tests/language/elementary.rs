@@ -95,8 +95,8 @@ fn named_constants() {
     same_bits::<Constants>(|v| constants(part(v, 0), part(v, 3)).to_vec());
 }
 
-/// `mul_add` rounds once, the emitted `a * b + c` twice: each rounding is at most half an ulp of a number
-/// below 6, and the subtraction adds one.
+/// `mul_add` rounds once, the emitted `a * b + c` twice: each rounding is at most half an ulp of a
+/// number below 6, and the subtraction adds one.
 #[test]
 fn fused_multiplication() {
     for seed in 1..=20 {

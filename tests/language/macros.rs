@@ -1,4 +1,5 @@
-//! Models out of `macro_rules!`, names that emitted code could meet, and text that other programs write.
+//! Models out of `macro_rules!`, names that emitted code could meet, and text that other programs
+//! write.
 
 use crate::same_bits;
 use casados::ode;

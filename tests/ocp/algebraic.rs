@@ -8,7 +8,8 @@ use casados::ocp::{
 use casados::prelude::*;
 use casados::qp::QpView;
 
-/// `sinh z = 0.7 c + 0.4 u − 0.3 p + 0.5 c u p` with a state `c` that does not change: the polynomial of the stages is exact at the start.
+/// `sinh z = 0.7 c + 0.4 u − 0.3 p + 0.5 c u p` with a state `c` that does not change: the
+/// polynomial of the stages is exact at the start.
 mod implicit {
     use casados::prelude::*;
 
@@ -112,7 +113,8 @@ macro_rules! at_a_point {
     }};
 }
 
-/// To rounding: all derivatives of `z`, second ones in exact Hessians too, are those that are written down in the other problem.
+/// To rounding: all derivatives of `z`, second ones in exact Hessians too, are those that are
+/// written down in the other problem.
 #[test]
 fn the_same_quadratic_programs() -> Test {
     let exact = Exact { convexification: Convexification::None };
@@ -149,7 +151,8 @@ fn the_same_quadratic_programs() -> Test {
     Ok(())
 }
 
-/// The same solution, by line search too, with a constraint on `z` that is active, and the same derivatives of it.
+/// The same solution, by line search too, with a constraint on `z` that is active, and the same
+/// derivatives of it.
 #[test]
 fn the_same_solutions() -> Test {
     macro_rules! solved {
@@ -184,7 +187,8 @@ fn the_same_solutions() -> Test {
             (derivatives.du_dp(k), others.du_dp(k)),
         ];
         for (a, b) in parts.into_iter().flat_map(|(a, b)| a.iter().zip(b)) {
-            // Two solutions to 1e-10 with multipliers of at least 1e-3; active bounds are springs of 1e8.
+            // Two solutions to 1e-10 with multipliers of at least 1e-3; active bounds are springs
+            // of 1e8.
             assert!((a - b).abs() < 1e-5, "{k}: {a} {b}");
         }
     }
@@ -224,7 +228,8 @@ fn speed(x: [f64; 3], _z: [f64; 1], u: [f64; 1], _p: [f64; 1]) -> f64 {
     x[1] * x[1] + u[0] * u[0]
 }
 
-/// Nothing more is simulated where nothing depends on algebraic states, or where Hessians are not exact.
+/// Nothing more is simulated where nothing depends on algebraic states, or where Hessians are not
+/// exact.
 #[test]
 fn what_nobody_needs() -> Test {
     macro_rules! count {
@@ -274,8 +279,8 @@ fn where_there_are_none() -> Test {
     Ok(())
 }
 
-/// A motor whose torque is an algebraic state, nonlinear in everything, with friction as a parameter; at the start of an interval
-/// it is what the polynomial of the stages continues to.
+/// A motor whose torque is an algebraic state, nonlinear in everything, with friction as a
+/// parameter; at the start of an interval it is what the polynomial of the stages continues to.
 #[dae]
 fn motor(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 3] {
     [
@@ -309,8 +314,9 @@ macro_rules! motor_problem {
 const MOTOR_X0: [f64; 2] = [-0.6, 0.3];
 const MOTOR_P: f64 = 0.8;
 
-/// With second derivatives of everything, full steps are those of Newton's method: `r₊ ≤ C r²` of the largest residuals. Linear
-/// convergence has a quotient that grows without bound. What is below is rounding.
+/// With second derivatives of everything, full steps are those of Newton's method: `r₊ ≤ C r²` of
+/// the largest residuals. Linear convergence has a quotient that grows without bound. What is below
+/// is rounding.
 macro_rules! quadratic {
     ($problem:expr) => {{
         let (mut ocp, mut sqp) = $problem;

@@ -27,7 +27,8 @@ fn distance(x: [f64; 2], _u: [f64; 2]) -> f64 {
     x[0] * x[0] + x[1] * x[1]
 }
 
-/// One interval to a target at (3, 4) in a disc of radius one: the point of the disc that is nearest, (0.6, 0.8).
+/// One interval to a target at (3, 4) in a disc of radius one: the point of the disc that is
+/// nearest, (0.6, 0.8).
 #[test]
 fn a_constraint_at_the_end() -> Test {
     let mut ocp = Problem::new(Map::<Go, f64>::new())
@@ -36,7 +37,8 @@ fn a_constraint_at_the_end() -> Test {
         .on(Horizon::uniform(1, 1.0))?;
     ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[3.0, 4.0])?;
     ocp.guess(&[0.1, 0.2], &[0.0; 2])?;
-    // The constraint bends more than the cost: without its second derivatives full steps would go back and forth.
+    // The constraint bends more than the cost: without its second derivatives full steps would go
+    // back and forth.
     let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
     sqp.options.tolerance = 1e-8;
     let outcome = sqp.solve(&mut ocp)?;
@@ -54,7 +56,8 @@ fn a_constraint_at_the_end() -> Test {
     Ok(())
 }
 
-/// `½ (x − 3)²` with a soft bound `x ≤ 1`: the violation `e` satisfies `e − 2 + linear + quadratic e = 0`.
+/// `½ (x − 3)²` with a soft bound `x ≤ 1`: the violation `e` satisfies
+/// `e − 2 + linear + quadratic e = 0`.
 #[test]
 fn soft_bounds() -> Test {
     for (linear, quadratic) in [(0.0, 1.0), (0.5, 0.0), (0.5, 2.0), (5.0, 1.0)] {
@@ -76,7 +79,8 @@ fn soft_bounds() -> Test {
     Ok(())
 }
 
-/// The same as constraints of the path, two at once, of which the second is soft: `x₀² + x₁² ≤ 4` and `u ≤ 0.5`.
+/// The same as constraints of the path, two at once, of which the second is soft: `x₀² + x₁² ≤ 4`
+/// and `u ≤ 0.5`.
 #[test]
 fn constraints_of_the_path() -> Test {
     let n = 8;

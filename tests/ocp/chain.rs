@@ -1,4 +1,5 @@
-//! The chain of masses against reference objectives and trajectories of independent implementations: `tests/data/ocp`.
+//! The chain of masses against reference objectives and trajectories of independent
+//! implementations: `tests/data/ocp`.
 
 use crate::Test;
 use crate::chain_model::Chain;
@@ -67,8 +68,9 @@ macro_rules! follows {
             sqp.options.tolerance = 1e-9;
             assert!(sqp.solve(&mut ocp)?.is_converged());
             let (x, u) = (record.numbers("X", 41 * $nx)?, record.numbers("U", 120)?);
-            // The reference has a residual of 1e-6, and multiplied by the inverse of a Hessian of 0.004 (R Ts/2 twice) that may be
-            // 2.5e-4 in `u`; in states, whose Hessian is 0.4 and more, 2.5e-6.
+            // The reference has a residual of 1e-6, and multiplied by the inverse of a Hessian of
+            // 0.004 (R Ts/2 twice) that may be 2.5e-4 in `u`; in states, whose Hessian is 0.4 and
+            // more, 2.5e-6.
             for (k, stage) in ocp.iterate().stages().enumerate() {
                 for (a, b) in stage.x.iter().zip(&x[k * $nx..]) {
                     assert!((a - b).abs() < 2.5e-6, "stage {k}: {a} {b}");
@@ -85,7 +87,8 @@ follows!(trajectory_of_three_masses, "ocp/chain_3.json", 9);
 follows!(trajectory_of_five_masses, "ocp/chain_5.json", 21);
 follows!(trajectory_of_seven_masses, "ocp/chain_7.json", 33);
 
-/// The same solution with the Hessian of the Lagrangian, whichever way it is made convex, with and without line search.
+/// The same solution with the Hessian of the Lagrangian, whichever way it is made convex, with and
+/// without line search.
 #[test]
 fn exact_hessians_lead_to_the_same_solution() -> Test {
     let record = Record::load("ocp/chain_3.json")?;
@@ -144,7 +147,8 @@ fn single_intervals_give_the_same() -> Test {
     Ok(())
 }
 
-/// At rest, velocities and accelerations are differences that cancel: all intervals are integrated side by side nevertheless.
+/// At rest, velocities and accelerations are differences that cancel: all intervals are integrated
+/// side by side nevertheless.
 #[test]
 fn rest_is_not_a_special_case() -> Test {
     let record = Record::load("ocp/chain_5.json")?;
@@ -155,7 +159,8 @@ fn rest_is_not_a_special_case() -> Test {
     Ok(())
 }
 
-/// The conditions of optimality, with costs written by hand and derivatives of single integrations by differences.
+/// The conditions of optimality, with costs written by hand and derivatives of single integrations
+/// by differences.
 #[test]
 fn the_solution_satisfies_conditions_that_are_computed_independently() -> Test {
     const NX: usize = 9;
@@ -182,7 +187,8 @@ fn the_solution_satisfies_conditions_that_are_computed_independently() -> Test {
             let mut phi = |x: &SVector<f64, NX>, u: &Vector3<f64>| irk.solve(x, u, ts).map(|end| end.x);
             let miss = phi(&x, &u)? - SVector::<f64, NX>::from_column_slice(next.x);
             assert!(miss.amax() < 1e-6);
-            // Central differences: φ''' h² / 6 of 1e-10 and roundings of 1e-16 / h, times multipliers of up to 10.
+            // Central differences: φ''' h² / 6 of 1e-10 and roundings of 1e-16 / h, times
+            // multipliers of up to 10.
             for i in 0..NX {
                 let d = SVector::<f64, NX>::from_fn(|j, _| if i == j { step } else { 0.0 });
                 gradient[i] += pi.dot(&(phi(&(x + d), &u)? - phi(&(x - d), &u)?)) / (2.0 * step);

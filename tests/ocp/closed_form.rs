@@ -8,7 +8,8 @@ use casados::ocp::{
 use casados::prelude::*;
 use nalgebra::{Matrix2, Matrix2x1, RowVector2, SMatrix, Vector2};
 
-/// A mass that is pushed, in discrete time: exact for a control that is constant over an interval of 0.1.
+/// A mass that is pushed, in discrete time: exact for a control that is constant over an interval
+/// of 0.1.
 #[function]
 fn push(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
     [x[0] + 0.1 * x[1] + 0.005 * u[0], x[1] + 0.1 * u[0]]
@@ -29,7 +30,8 @@ fn mass(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
     [x[1], u[0]]
 }
 
-/// Without bounds it is the linear-quadratic regulator: its Riccati recursion, with coupled weights.
+/// Without bounds it is the linear-quadratic regulator: its Riccati recursion, with coupled
+/// weights.
 #[test]
 fn regulator() -> Test {
     let a = Matrix2::new(1.0, 0.1, 0.0, 1.0);
@@ -106,7 +108,8 @@ fn duration(x: [f64; 3], _u: [f64; 1]) -> f64 {
     x[2]
 }
 
-/// From rest to rest over a distance `d` with `|u| ≤ 1` takes `2 √d`: full speed ahead, and back (bang-bang).
+/// From rest to rest over a distance `d` with `|u| ≤ 1` takes `2 √d`: full speed ahead, and back
+/// (bang-bang).
 #[test]
 fn shortest_time() -> Test {
     for globalisation in [Globalisation::Merit, Globalisation::Filter] {
@@ -145,8 +148,8 @@ fn deviation(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
     [x[0], u[0]]
 }
 
-/// `½ ∫ x₁² + u² dt` as a square, as an integral of a general function, and with exact Hessians: one solution, whose objective is
-/// that of a fine discretisation by hand.
+/// `½ ∫ x₁² + u² dt` as a square, as an integral of a general function, and with exact Hessians:
+/// one solution, whose objective is that of a fine discretisation by hand.
 #[test]
 fn integral_costs() -> Test {
     let (n, h) = (10, 0.2);

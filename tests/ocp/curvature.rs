@@ -75,7 +75,8 @@ fn disturb<P: Formulation<f64>>(ocp: &mut HeapOcp<P>) -> Test {
     Ok(())
 }
 
-/// The gradient of the Lagrangian with respect to `(x, u)` of a stage, from the first derivatives of the QP.
+/// The gradient of the Lagrangian with respect to `(x, u)` of a stage, from the first derivatives
+/// of the QP.
 fn gradient<P: Formulation<f64>>(
     ocp: &mut HeapOcp<P>,
     k: usize,
@@ -152,8 +153,9 @@ fn check<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<P>) 
             at(0.0)?;
             for i in j..size {
                 let (difference, exact) = (differences[i], hessian[i * size + j]);
-                // Gradients are sums of some dozen products of order ten, and the weights add up to 420. What order eight leaves is
-                // 256 times smaller than with twice the step, where it was 3e-11.
+                // Gradients are sums of some dozen products of order ten, and the weights add up to
+                // 420. What order eight leaves is 256 times smaller than with twice the step, where
+                // it was 3e-11.
                 assert!((difference - exact).abs() < 420.0 * 1e-14, "{k} {i} {j}: {difference} {exact}");
             }
         }
@@ -191,7 +193,8 @@ fn hessians_of_the_lagrangian() -> Test {
     check(&mut ocp)
 }
 
-/// With algebraic states in costs and constraints, whose second derivatives come from the integrator.
+/// With algebraic states in costs and constraints, whose second derivatives come from the
+/// integrator.
 #[test]
 fn hessians_with_algebraic_states() -> Test {
     let weights = nalgebra::matrix![1.0, 0.2, 0.1; 0.2, 2.0, 0.3; 0.1, 0.3, 3.0];
@@ -217,7 +220,8 @@ fn hessians_with_algebraic_states() -> Test {
     check(&mut problem.on(Horizon::uniform(3, 0.2))?)
 }
 
-/// Swinging up from below by exact Hessians with line searches: where full steps of Gauss and Newton would be far off.
+/// Swinging up from below by exact Hessians with line searches: where full steps of Gauss and
+/// Newton would be far off.
 #[test]
 fn swing_up() -> Test {
     use casados::ocp::Globalisation;

@@ -8,8 +8,8 @@ use casados::ocp::{
 use casados::prelude::*;
 use casados::qp::Side;
 
-/// A kinematic car over `τ ∈ [0, 1]`: position, heading, speed, steering angle, acceleration, and the time that everything takes;
-/// controls are the rates of steering and acceleration.
+/// A kinematic car over `τ ∈ [0, 1]`: position, heading, speed, steering angle, acceleration, and
+/// the time that everything takes; controls are the rates of steering and acceleration.
 #[ode]
 fn car(x: [f64; 7], u: [f64; 2]) -> [f64; 7] {
     let [_, _, heading, speed, steering, acceleration, time] = x;
@@ -80,13 +80,15 @@ fn is_quadratic(log: &[casados::ocp::Iteration]) -> bool {
     last.regularisation == 0.0 && last.residuals.largest() < 1e-2 * before.residuals.largest()
 }
 
-/// The reference is IPOPT 3.14 on the same discretisation (CasADi 3.8.2, Runge-Kutta of order four, tolerance 1e-10, bounds not relaxed).
+/// The reference is IPOPT 3.14 on the same discretisation (CasADi 3.8.2, Runge-Kutta of order four,
+/// tolerance 1e-10, bounds not relaxed).
 #[test]
 fn time_optimal_car() -> Test {
     let mut ocp = car!(50.0);
     let outcome = solve(&mut ocp)?;
     assert!(outcome.is_converged() && outcome.iterations <= 40, "{outcome}");
-    // Stationary up to 1e-6, with multipliers of order one and steps of the last iteration below 1e-3.
+    // Stationary up to 1e-6, with multipliers of order one and steps of the last iteration below
+    // 1e-3.
     assert!((outcome.objective - CAR_TIME).abs() < 1e-5, "{}", outcome.objective);
     let end = ocp.stage(CAR_STAGES)?;
     assert!((end.x[0] - 50.0).abs() < 1e-6);
@@ -94,7 +96,8 @@ fn time_optimal_car() -> Test {
 }
 const CAR_TIME: f64 = 8.042163245;
 
-/// One second is not enough for 50 m from rest: the end is missed, and it is said by how much at the iterate that is handed back.
+/// One second is not enough for 50 m from rest: the end is missed, and it is said by how much at
+/// the iterate that is handed back.
 #[test]
 fn car_without_time() -> Test {
     let mut ocp = car!(1.0);
@@ -164,7 +167,8 @@ fn limits_of_iterations_are_no_infeasibility() -> Test {
     Ok(())
 }
 
-/// A quadrotor over `τ ∈ [0, 1]`: position, quaternion, velocity, rates, and the time that everything takes; four thrusts.
+/// A quadrotor over `τ ∈ [0, 1]`: position, quaternion, velocity, rates, and the time that
+/// everything takes; four thrusts.
 #[ode]
 fn quadrotor(x: [f64; 14], u: [f64; 4]) -> [f64; 14] {
     let (w, a, b, c) = (x[3], x[4], x[5], x[6]);
@@ -239,7 +243,8 @@ fn quadrotor_between_cylinders() -> Test {
     let outcome = sqp.solve(&mut ocp)?;
     println!("{}{outcome}", sqp.log());
     assert!(outcome.is_converged() && outcome.iterations <= 40, "{outcome}");
-    // There are several minima, that differ by how it turns about its axis: this is as good as another method's.
+    // There are several minima, that differ by how it turns about its axis: this is as good as
+    // another method's.
     assert!(outcome.objective < 1.01 * QUADROTOR_COST, "{}", outcome.objective);
     assert!(is_quadratic(sqp.log().0));
     Ok(())
@@ -259,7 +264,8 @@ fn barrier(x: [f64; 1], _u: [f64; 1]) -> f64 {
     x[0] - x[0].ln()
 }
 
-/// Newton's step from three goes to `3 - 3 (3 - 1) = -3`, where there is no logarithm: a line search shortens it.
+/// Newton's step from three goes to `3 - 3 (3 - 1) = -3`, where there is no logarithm: a line
+/// search shortens it.
 #[test]
 fn full_steps_to_nowhere_are_shortened() -> Test {
     for globalisation in [Globalisation::FullStep, Globalisation::Merit, Globalisation::Filter] {

@@ -57,7 +57,8 @@ fn out_of_reach() -> Test {
     Ok(())
 }
 
-/// `x² ≥ 1` at the end, linearised at `x = 0.1`, asks for `x ≥ 5.05`, which bounds forbid: the first QP is infeasible, the problem is not.
+/// `x² ≥ 1` at the end, linearised at `x = 0.1`, asks for `x ≥ 5.05`, which bounds forbid: the
+/// first QP is infeasible, the problem is not.
 #[test]
 fn infeasible_on_the_way() -> Test {
     for globalisation in [Globalisation::FullStep, Globalisation::Merit, Globalisation::Filter] {

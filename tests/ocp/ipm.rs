@@ -1,5 +1,5 @@
-//! The nonlinear interior point: against IPOPT, against closed forms, on periodic orbits and on problems
-//! without a solution.
+//! The nonlinear interior point: against IPOPT, against closed forms, on periodic orbits and on
+//! problems without a solution.
 
 use crate::Test;
 use casados::ocp::{
@@ -42,8 +42,8 @@ fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
     1e-2 * (u[0] * u[0] + x[1] * x[1]) + 1e-3 * (x[0] * x[0] + x[2] * x[2] + x[3] * x[3])
 }
 
-/// Objective of the same problem (RK4 with two steps, 40 intervals of 0.05 s) by IPOPT 3.14 through CasADi
-/// 3.8.2, tolerance 1e-12, bounds not relaxed.
+/// Objective of the same problem (RK4 with two steps, 40 intervals of 0.05 s) by IPOPT 3.14 through
+/// CasADi 3.8.2, tolerance 1e-12, bounds not relaxed.
 const SWING_UP: f64 = 21.742138737256;
 
 #[test]
@@ -142,8 +142,8 @@ fn place(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
     [x[0], 0.3 * u[0]]
 }
 
-/// A linear system that is unstable, tracking a square wave around a period: the conditions of optimality
-/// are one linear system, which LU solves.
+/// A linear system that is unstable, tracking a square wave around a period: the conditions of
+/// optimality are one linear system, which LU solves.
 #[test]
 fn periodic_orbits_of_linear_systems_are_those_of_one_linear_system() -> Test {
     const N: usize = 12;

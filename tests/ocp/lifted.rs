@@ -1,4 +1,5 @@
-//! Stages that converge with the iterates of optimal control: the same solutions, and stages that satisfy their equations there.
+//! Stages that converge with the iterates of optimal control: the same solutions, and stages that
+//! satisfy their equations there.
 
 use crate::Test;
 use crate::chain_model::Chain;
@@ -21,8 +22,8 @@ macro_rules! solve {
     }};
 }
 
-/// The problem with lifted stages takes two iterations more, at most, than with stages that converge in each; then every interval is
-/// integrated with Newton's method to rounding, alone.
+/// The problem with lifted stages takes two iterations more, at most, than with stages that
+/// converge in each; then every interval is integrated with Newton's method to rounding, alone.
 macro_rules! agrees {
     ($name:ident, $file:literal, $nx:literal, $stages:literal x $steps:literal, $key:literal, $exact:literal) => {
         #[test]
@@ -45,7 +46,8 @@ macro_rules! agrees {
                 let u = VectorU::<Chain<$nx>, f64>::from_column_slice(pair[0].u);
                 let end = irk.solve(&x0, &u, 0.2)?;
                 for (&end, &next) in end.x.iter().zip(pair[1].x) {
-                    // The residual of the dynamics as the solver sees it, and as much for what the last iteration leaves of the stages.
+                    // The residual of the dynamics as the solver sees it, and as much for what the
+                    // last iteration leaves of the stages.
                     assert!((end - next).abs() < 2e-9, "{end} {next}");
                 }
             }

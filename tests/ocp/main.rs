@@ -1,4 +1,5 @@
-//! Problems of optimal control: the chain of masses against references, small problems against closed forms, mistakes.
+//! Problems of optimal control: the chain of masses against references, small problems against
+//! closed forms, mistakes.
 
 #[path = "../../examples/models/chain.rs"]
 #[allow(dead_code)]

@@ -39,7 +39,8 @@ fn problem() -> Result<HeapOcp<Controlled>, OcpError> {
 
 const X0: [f64; 2] = [0.8, 0.4];
 
-/// With the same state in every sample the plans are the iterates of sequential quadratic programming with full steps.
+/// With the same state in every sample the plans are the iterates of sequential quadratic
+/// programming with full steps.
 #[test]
 fn converges_to_the_solution() -> Test {
     let mut ocp = problem()?;
@@ -60,10 +61,12 @@ fn converges_to_the_solution() -> Test {
     Ok(())
 }
 
-/// Gains of the QP that gave the feedback: where the same bounds are active its solution is linear in the state.
+/// Gains of the QP that gave the feedback: where the same bounds are active its solution is linear
+/// in the state.
 #[test]
 fn gains_are_those_of_the_qp() -> Test {
-    // Where the bound is met at the start the first control does not move; where it is not, it does.
+    // Where the bound is met at the start the first control does not move; where it is not, it
+    // does.
     for (near, moves) in [(X0, false), ([0.1, 0.05], true)] {
         let feedback = |x0: [f64; 2]| -> Result<_, OcpError> {
             let mut controller = HeapRealTime::new(problem()?)?;
@@ -78,7 +81,8 @@ fn gains_are_those_of_the_qp() -> Test {
             let mut other = near;
             other[i] += 1e-3;
             let difference = (feedback(other)?.1 - u) / 1e-3;
-            // Bounds of the plan are springs of 1.5e-8 relative to what they hold, and the QP is solved to 1e-12 / 0.09, twice.
+            // Bounds of the plan are springs of 1.5e-8 relative to what they hold, and the QP is
+            // solved to 1e-12 / 0.09, twice.
             assert!((difference - gain).abs() < 1e-7 * (1.0 + gain.abs()), "{difference} {gain}");
             assert_eq!(gain.abs() > 1e-3, moves, "{gain}");
         }
@@ -105,7 +109,8 @@ fn feedback_solves_the_prepared_qp() -> Test {
     Ok(())
 }
 
-/// In closed loop the pendulum comes to rest, within the bounds of the torque; warm QPs take fewer iterations.
+/// In closed loop the pendulum comes to rest, within the bounds of the torque; warm QPs take fewer
+/// iterations.
 #[test]
 fn closed_loop() -> Test {
     let mut controller = HeapRealTime::new(problem()?)?;
@@ -140,7 +145,8 @@ fn errors_leave_the_plan() -> Test {
     Ok(())
 }
 
-/// A QP that fails leaves the plan with its multipliers: the next one starts as warm as if it had not been.
+/// A QP that fails leaves the plan with its multipliers: the next one starts as warm as if it had
+/// not been.
 #[test]
 fn warm_after_an_error() -> Test {
     let iterations = |fails: bool| -> Result<usize, Box<dyn std::error::Error>> {

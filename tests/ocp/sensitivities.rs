@@ -1,4 +1,5 @@
-//! Derivatives of solutions against differences of problems that are solved again, and against the regulator.
+//! Derivatives of solutions against differences of problems that are solved again, and against the
+//! regulator.
 
 use crate::Test;
 use casados::LeastSquares;
@@ -77,7 +78,8 @@ fn differences_of_solutions() -> Test {
             let du = result.du(k.min(n - 1)).get(direction..).unwrap_or_default();
             for ((a, b), derivative) in pairs.chain(plus.1.iter().zip(&minus.1).zip(du)) {
                 let difference = (a - b) / (2.0 * step);
-                // Solutions to 1e-9 over 2e-5, and complementarity of 1e-11 over multipliers of 1e-3: 1e-4 in all.
+                // Solutions to 1e-9 over 2e-5, and complementarity of 1e-11 over multipliers of
+                // 1e-3: 1e-4 in all.
                 assert!((difference - derivative).abs() < 1e-4, "{k} {direction}: {difference} {derivative}");
             }
         }
@@ -97,7 +99,8 @@ fn both(x: [f64; 2], u: [f64; 1]) -> [f64; 3] {
     [x[0], x[1], u[0]]
 }
 
-/// A long horizon without bounds: gains of the regulator, and `x_k = dx_k/dx₀ x₀`, since everything is linear.
+/// A long horizon without bounds: gains of the regulator, and `x_k = dx_k/dx₀ x₀`, since everything
+/// is linear.
 #[test]
 fn linear_problems() -> Test {
     let mut ocp = Problem::new(Map::<Push, f64>::new())
@@ -176,7 +179,8 @@ mod states {
 
 const P: [f64; 2] = [1.3, 0.8];
 
-/// A problem with this dynamics, solved, and its derivatives; `full` is the initial state, with parameters behind it that are states.
+/// A problem with this dynamics, solved, and its derivatives; `full` is the initial state, with
+/// parameters behind it that are states.
 macro_rules! solved {
     ($module:ident, $dynamics:expr, $full:expr, $p:expr, $curvature:expr) => {{
         let mut ocp = Problem::new($dynamics)
@@ -209,8 +213,9 @@ macro_rules! integrator {
 const N: usize = 12;
 const EXACT: Exact = Exact { convexification: Convexification::None };
 
-/// Parameters are states that do not change, and need no columns of their own: dynamics of an integrator, of one with an integral, of
-/// a map; exact and of Gauss and Newton. Constraints are active somewhere.
+/// Parameters are states that do not change, and need no columns of their own: dynamics of an
+/// integrator, of one with an integral, of a map; exact and of Gauss and Newton. Constraints are
+/// active somewhere.
 #[test]
 fn parameters_as_states() -> Test {
     macro_rules! compare {
@@ -224,10 +229,15 @@ fn parameters_as_states() -> Test {
             for k in 0..=N {
                 for p in 0..2 {
                     let (dx, other) = (&with.dx_dp(k)[2 * p..][..2], &without.dx(k)[4 * (2 + p)..][..2]);
-                    let (du, others) = if k < N { (&with.du_dp(k)[p..=p], &without.du(k)[2 + p..=2 + p]) } else { (&[][..], &[][..]) };
+                    let (du, others) = if k < N {
+                        (&with.du_dp(k)[p..=p], &without.du(k)[2 + p..=2 + p])
+                    } else {
+                        (&[][..], &[][..])
+                    };
                     for (a, b) in dx.iter().chain(du).zip(other.iter().chain(others)) {
                         largest = largest.max(a.abs());
-                        // Two solutions to 1e-10, whose multipliers are at least 1e-3; bounds as springs of 1e8.
+                        // Two solutions to 1e-10, whose multipliers are at least 1e-3; bounds as
+                        // springs of 1e8.
                         assert!((a - b).abs() < 1e-6, "{k} {p}: {a} {b}");
                     }
                 }

@@ -95,9 +95,10 @@ impl Chain {
     }
 }
 
-/// The references come from products of slacks and multipliers of 1e-9, which leave slacks of 1e-9 over the multiplier at active
-/// bounds. With 3 masses one of them (of u₂ at stage 2) has a multiplier near zero: a slack of 7e-6 there satisfies the
-/// conditions as well as none. The residuals, which are asserted to rounding, say that the solution here is the better one.
+/// The references come from products of slacks and multipliers of 1e-9, which leave slacks of 1e-9
+/// over the multiplier at active bounds. With 3 masses one of them (of u₂ at stage 2) has a
+/// multiplier near zero: a slack of 7e-6 there satisfies the conditions as well as none. The
+/// residuals, which are asserted to rounding, say that the solution here is the better one.
 #[test]
 fn stored_problems_have_their_reference_solutions() -> Test {
     let mut solver = HeapInteriorPoint::new();
@@ -165,7 +166,8 @@ fn a_warm_start_takes_few_iterations() -> Test {
     Ok(())
 }
 
-/// Single precision: ε = 1.2e-7 times gradients of 1e2 and a strong convexity of 0.004 leave errors of 1e-2 at the worst.
+/// Single precision: ε = 1.2e-7 times gradients of 1e2 and a strong convexity of 0.004 leave errors
+/// of 1e-2 at the worst.
 #[test]
 fn single_precision() -> Test {
     let chain = Chain::load(3)?;
@@ -205,8 +207,8 @@ fn largest_force<T: Real>(solution: &HeapSolution<T>) -> f64 {
     all.map(|force| force.to_f64().abs()).fold(0.0, f64::max)
 }
 
-/// Costs in other units, 2²⁰ times as large: rounding errors of forces of 1e6 and more are far above the absolute tolerance,
-/// and a part of the forces is what can be asked for.
+/// Costs in other units, 2²⁰ times as large: rounding errors of forces of 1e6 and more are far
+/// above the absolute tolerance, and a part of the forces is what can be asked for.
 fn in_other_units<T: Real>(relative: f64) -> Test {
     const UNIT: f64 = (1 << 20) as f64;
     let chain = Chain::load(3)?;
@@ -224,11 +226,13 @@ fn in_other_units<T: Real>(relative: f64) -> Test {
     let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
     let (found, _) = residuals(qp.view(), &solution);
     let force = largest_force(&solution);
-    // Multipliers are among the terms of gradients, and none of the others is more than ten times as large here.
+    // Multipliers are among the terms of gradients, and none of the others is more than ten times
+    // as large here.
     assert!(found.stationarity.max(found.complementarity) <= 10.0 * relative * force, "{found} of {force:e}");
     assert!(found.dynamics.max(found.inequalities) <= 10.0 * relative, "{found}");
     assert!(statistics.iterations <= 16, "{statistics:?}");
-    // Where slack and multiplier both vanish, either may be the root of their product; and see above for the reference.
+    // Where slack and multiplier both vanish, either may be the root of their product; and see
+    // above for the reference.
     let error = chain.error(&solution)?;
     assert!(error < (10.0 * relative * force / UNIT).sqrt() + 1e-5, "{error:e}");
     Ok(())

@@ -51,7 +51,8 @@ impl Counts {
             println!("{seed}: {found:?}");
         }
     }
-    /// Whether no more than so many of a thousand, or one of a few, were given up with the residuals that were reached.
+    /// Whether no more than so many of a thousand, or one of a few, were given up with the
+    /// residuals that were reached.
     fn unsolved(&self, most: u64) -> bool {
         1000 * (self.iterations_used_up + self.stalled) <= most * self.all.max(1000)
     }
@@ -67,7 +68,8 @@ fn multipliers<'a>(stage: &SolutionStage<'a, f64>) -> impl Iterator<Item = &'a f
 
 /// What is wrong with a point that is said to be the solution.
 ///
-/// With residuals of at most `r`, convexity says `f(v) − f* ≤ ∇f(v)ᵀ (v − v*) ≤ r (|v − v*|₁ + |λ|₁ + |π|₁ + sides)`, and weak duality
+/// With residuals of at most `r`, convexity says
+/// `f(v) − f* ≤ ∇f(v)ᵀ (v − v*) ≤ r (|v − v*|₁ + |λ|₁ + |π|₁ + sides)`, and weak duality
 /// `f* − f(v) ≤ r (|λ*|₁ + |π*|₁)`.
 fn wrong(known: &Known, found: &HeapSolution<f64>, tolerance: f64) -> Option<String> {
     let (r, objective) = residuals(known.qp.view(), found);
@@ -227,8 +229,9 @@ fn other_units() -> Test {
     Ok(())
 }
 
-/// A problem made infeasible: the rows `c` and `−c/2`, both of a stage with a solution, are bounded such that no value is between. What is
-/// said must be true of the point that is left, and the distance no more than what the rows lack.
+/// A problem made infeasible: the rows `c` and `−c/2`, both of a stage with a solution, are bounded
+/// such that no value is between. What is said must be true of the point that is left, and the
+/// distance no more than what the rows lack.
 #[test]
 fn infeasible() -> Test {
     for (hessian, distance) in [(Hessian::Definite, 1.0), (Hessian::Zero, 1e-3), (Hessian::LowRank, 1e4)] {
@@ -243,7 +246,8 @@ fn infeasible() -> Test {
             let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
             counts.count(seed, &found.map(|s| (s.iterations, Some("solved".into()))));
             let Err(QpError::Infeasible { violation, .. }) = found else { continue };
-            // The named violation is the largest of the point, and at least half of what is missing is at one of the rows.
+            // The named violation is the largest of the point, and at least half of what is missing
+            // is at one of the rows.
             let (r, _) = residuals(qp.view(), &solution);
             assert!(
                 (r.inequalities - violation).abs() <= 1e-9 * (1.0 + violation),
@@ -326,9 +330,10 @@ fn copy(from: &Stage<'_, f64>, to: &mut StageMut<'_, f64>) {
     bounds(from.g_bounds(), to.g_bounds_mut());
 }
 
-/// Problems with a control without bounds whose square costs less than nothing, or, where later stages cost enough, something:
-/// no verdict but `NotConvex` or a point that satisfies the conditions of optimality, and `NotConvex` only where the Hessian that is
-/// left when states are eliminated has a negative eigenvalue.
+/// Problems with a control without bounds whose square costs less than nothing, or, where later
+/// stages cost enough, something: no verdict but `NotConvex` or a point that satisfies the
+/// conditions of optimality, and `NotConvex` only where the Hessian that is left when states are
+/// eliminated has a negative eigenvalue.
 #[test]
 fn not_convex() -> Test {
     let mut counts = Counts::default();

@@ -102,7 +102,8 @@ fn wrong_lengths() -> Test {
     Ok(())
 }
 
-/// Everything in arrays, of exactly the lengths that the constant functions say, and in ones that are too short.
+/// Everything in arrays, of exactly the lengths that the constant functions say, and in ones that
+/// are too short.
 #[test]
 fn memory_of_the_owner() -> Test {
     const DATA: usize = Qp::<f64, (), ()>::memory(&DIMS);
@@ -140,7 +141,8 @@ fn memory_of_the_owner() -> Test {
     Ok(())
 }
 
-/// Options that make no sense are named, with their values; the largest number of iterations does not overflow and ends.
+/// Options that make no sense are named, with their values; the largest number of iterations does
+/// not overflow and ends.
 #[test]
 fn options() -> Test {
     type Spoil = fn(&mut casados::qp::InteriorPointOptions);

@@ -26,8 +26,9 @@ fn close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "{found} instead of {expected}");
 }
 
-/// Without inequalities Newton's method is exact after one step. The scalar Riccati equation has the solution
-/// `p = q + a² p − (a b p)² / (r + b² p)`: with `q = r = a = b = 1` the golden ratio, `u = −p / (1 + p) x`.
+/// Without inequalities Newton's method is exact after one step. The scalar Riccati equation has
+/// the solution `p = q + a² p − (a b p)² / (r + b² p)`: with `q = r = a = b = 1` the golden ratio,
+/// `u = −p / (1 + p) x`.
 #[test]
 fn no_inequality() -> Test {
     let mut qp = integrator(60, 1.0)?;
@@ -72,7 +73,8 @@ fn equal_bounds() -> Test {
     Ok(())
 }
 
-/// An equation of states and controls at the end of a horizon, and its multiplier: `min ½ (x² + u²)`, `x + u = 2`.
+/// An equation of states and controls at the end of a horizon, and its multiplier:
+/// `min ½ (x² + u²)`, `x + u = 2`.
 #[test]
 fn a_general_equation() -> Test {
     let mut qp = HeapQp::<f64>::new(&[StageDims::new(1, 1, 1)])?;
@@ -115,7 +117,8 @@ fn redundant_constraints() -> Test {
     Ok(())
 }
 
-/// Two controls that do the same and cost nothing: the Hessian is singular, and their sum is determined.
+/// Two controls that do the same and cost nothing: the Hessian is singular, and their sum is
+/// determined.
 #[test]
 fn singular_hessian() -> Test {
     let mut dims = [StageDims::new(1, 2, 0); 4];
@@ -154,8 +157,8 @@ fn nearly_singular_hessian() -> Test {
     Ok(())
 }
 
-/// `min ½ x²` with the soft bound `x ≥ 1`: with a linear penalty `ρ < 1` it is `x = ρ`, with a quadratic one `Z` it is
-/// `x = Z / (1 + Z)`, and with `ρ > 1` the bound holds.
+/// `min ½ x²` with the soft bound `x ≥ 1`: with a linear penalty `ρ < 1` it is `x = ρ`, with a
+/// quadratic one `Z` it is `x = Z / (1 + Z)`, and with `ρ > 1` the bound holds.
 #[test]
 fn soft_bounds() -> Test {
     for (linear, quadratic, expected) in
@@ -176,8 +179,8 @@ fn soft_bounds() -> Test {
     Ok(())
 }
 
-/// A state at the start without bounds goes where it costs least, one with bounds to the nearest of them, and one of which
-/// a component is given keeps it.
+/// A state at the start without bounds goes where it costs least, one with bounds to the nearest of
+/// them, and one of which a component is given keeps it.
 #[test]
 fn the_state_at_the_start_is_free_or_bounded() -> Test {
     for (lower, upper, expected) in
@@ -249,7 +252,8 @@ fn contradictions() -> Test {
             return Err(format!("{found:?}").into());
         };
         assert_eq!((field, stage), (Field::GeneralBounds, 2));
-        // The sum of both violations is what is smallest, and the larger one is at least half of it.
+        // The sum of both violations is what is smallest, and the larger one is at least half of
+        // it.
         assert!(found >= 0.5 * violation - 1e-6 && found <= violation + 1e-6, "{found}");
     }
     Ok(())
@@ -319,7 +323,8 @@ fn soft_bounds_that_mean_none() -> Test {
     Ok(())
 }
 
-/// A row `0 ≤ 0`, beside variables and in a stage without any: every multiplier of it satisfies the conditions, NaN does not.
+/// A row `0 ≤ 0`, beside variables and in a stage without any: every multiplier of it satisfies the
+/// conditions, NaN does not.
 #[test]
 fn rows_without_variables() -> Test {
     let mut qp = HeapQp::<f64>::new(&[StageDims::new(1, 1, 0), StageDims::new(0, 0, 1)])?;

@@ -1,12 +1,13 @@
-//! Random problems whose solution is known: a point, multipliers and active sides are drawn first, and the gradient is what
-//! makes them satisfy the conditions of optimality. Where the Hessian is positive semidefinite that point is a minimum, whatever
-//! else is degenerate.
+//! Random problems whose solution is known: a point, multipliers and active sides are drawn first,
+//! and the gradient is what makes them satisfy the conditions of optimality. Where the Hessian is
+//! positive semidefinite that point is a minimum, whatever else is degenerate.
 
 use casados::qp::{HeapQp, HeapSolution, QpError, StageDims};
 
 const INFINITY: f64 = f64::INFINITY;
 
-/// Numbers from a seed (splitmix64: Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
+/// Numbers from a seed (splitmix64: Steele, Lea, Flood, "Fast splittable pseudorandom number
+/// generators", OOPSLA 2014).
 pub struct Numbers(u64);
 
 impl Numbers {
@@ -103,7 +104,8 @@ fn row(random: &mut Numbers, kind: &Kind, value: f64) -> Row {
     }
 }
 
-/// A row with soft sides: violated, at its bound, or not reached; the other side may mean that there is none.
+/// A row with soft sides: violated, at its bound, or not reached; the other side may mean that
+/// there is none.
 fn soft(random: &mut Numbers, value: f64, huge: f64) -> Row {
     let linear = if random.chance(0.2) { 0.0 } else { 0.1 + 3.0 * random.next().abs() };
     let quadratic = if linear > 0.0 && random.chance(0.5) { 0.0 } else { 0.1 + 3.0 * random.next().abs() };

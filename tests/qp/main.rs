@@ -1,5 +1,6 @@
-//! Quadratic programs of optimal control: stored ones against their reference solutions, hard ones, mistakes, and random
-//! ones against clarabel. Every solution is judged by `residuals`, which is written from the definition of the problem.
+//! Quadratic programs of optimal control: stored ones against their reference solutions, hard ones,
+//! mistakes, and random ones against clarabel. Every solution is judged by `residuals`, which is
+//! written from the definition of the problem.
 
 #[path = "../data/mod.rs"]
 mod data;
@@ -30,8 +31,8 @@ fn solve_to(tolerance: f64, qp: &HeapQp<f64>) -> Result<(HeapSolution<f64>, Stat
     let mut solution = HeapSolution::new(qp.dims())?;
     let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
     let (residuals, objective) = residuals(qp.view(), &solution);
-    // Sums of at most some hundred terms of sizes up to 1e2, rounded in a different order; and soft violations are
-    // complementary to the tolerance only.
+    // Sums of at most some hundred terms of sizes up to 1e2, rounded in a different order; and soft
+    // violations are complementary to the tolerance only.
     assert!(residuals.largest() < 10.0 * tolerance, "{residuals}");
     assert!((objective - statistics.objective).abs() <= 1e-8 * (1.0 + objective.abs()));
     Ok((solution, statistics, residuals))

@@ -8,7 +8,8 @@ use casados::qp::{
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// The same problems in every run: with others, one in some thousands is beyond the most iterations.
+/// The same problems in every run: with others, one in some thousands is beyond the most
+/// iterations.
 fn config(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
@@ -32,7 +33,8 @@ impl Numbers {
     }
 }
 
-/// A problem with a point inside of all hard bounds; Hessians are `G Gᵀ` of random `G`, singular in a third of the stages.
+/// A problem with a point inside of all hard bounds; Hessians are `G Gᵀ` of random `G`, singular in
+/// a third of the stages.
 fn problem(dims: &[StageDims], seed: u64) -> Result<HeapQp<f64>, Box<dyn std::error::Error>> {
     let mut random = Numbers(seed);
     let mut qp = HeapQp::<f64>::new(dims)?;
@@ -101,7 +103,8 @@ fn problem(dims: &[StageDims], seed: u64) -> Result<HeapQp<f64>, Box<dyn std::er
     Ok(qp)
 }
 
-/// How much of the objective one unit of a violated condition is worth, at least 1: the largest multiplier.
+/// How much of the objective one unit of a violated condition is worth, at least 1: the largest
+/// multiplier.
 fn size(solution: &HeapSolution<f64>) -> f64 {
     let all = solution.stages().flat_map(|s| {
         [s.dynamics, s.x_lower, s.x_upper, s.u_lower, s.u_upper, s.g_lower, s.g_upper].into_iter().flatten()
@@ -117,7 +120,8 @@ fn dims() -> impl Strategy<Value = Vec<StageDims>> {
 proptest! {
     #![proptest_config(config(200))]
 
-    /// Both find the same minimum. Products of slacks and multipliers of 1e-9, of at most 300 sides, leave 3e-7 of the objective.
+    /// Both find the same minimum. Products of slacks and multipliers of 1e-9, of at most 300
+    /// sides, leave 3e-7 of the objective.
     #[test]
     fn same_minimum_as_clarabel(dims in dims(), seed: u64) {
         let qp = problem(&dims, seed).map_err(|e| TestCaseError::fail(e.to_string()))?;
@@ -129,8 +133,8 @@ proptest! {
                 let difference = (clarabel.objective - own.objective).abs();
                 prop_assert!(difference <= 3e-7 * size(&found), "{clarabel:?} {own:?}");
             }
-            // Free states at the start may make a problem unbounded; and clarabel gives up where a Hessian is singular
-            // sooner. The residuals of what was found have been looked at.
+            // Free states at the start may make a problem unbounded; and clarabel gives up where a
+            // Hessian is singular sooner. The residuals of what was found have been looked at.
             (Err(_), _) => {}
             (clarabel, own) => prop_assert!(false, "{clarabel:?} {:?}", own.map(|own| own.1)),
         }
@@ -140,7 +144,8 @@ proptest! {
 proptest! {
     #![proptest_config(config(100))]
 
-    /// The problem with eliminated states has the same minimum, and what is expanded satisfies the conditions of optimality.
+    /// The problem with eliminated states has the same minimum, and what is expanded satisfies the
+    /// conditions of optimality.
     #[test]
     fn condensed_is_uncondensed(dims in dims(), seed: u64, block in 1..5usize) {
         let fail = |e: &dyn std::fmt::Display| TestCaseError::fail(e.to_string());
@@ -163,8 +168,8 @@ proptest! {
 proptest! {
     #![proptest_config(config(200))]
 
-    /// From the solution of a problem nearby, with other linear terms and another state at the start, to the minimum that a
-    /// cold start finds.
+    /// From the solution of a problem nearby, with other linear terms and another state at the
+    /// start, to the minimum that a cold start finds.
     #[test]
     fn warm_is_cold(dims in dims(), seed: u64, distance in 0..4_i32) {
         let fail = |e: &dyn std::fmt::Display| TestCaseError::fail(e.to_string());

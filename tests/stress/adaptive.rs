@@ -1,5 +1,5 @@
-//! Adaptive integration of what has no solution, several, or one that is hard to represent: an answer or an error that says
-//! why, and no other end.
+//! Adaptive integration of what has no solution, several, or one that is hard to represent: an
+//! answer or an error that says why, and no other end.
 
 use casados::error::{Quantity, Refusal};
 use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Error, Radau, RadauIIA, dae, ode};
@@ -152,8 +152,8 @@ fn t25_the_branch_of_the_start_is_kept() {
     }
 }
 
-/// A solution that slides along a jump of the model cannot be followed: there is an end, with an error or within the
-/// tolerance of steps that chatter.
+/// A solution that slides along a jump of the model cannot be followed: there is an end, with an
+/// error or within the tolerance of steps that chatter.
 #[test]
 fn t29_a_jump() {
     macro_rules! check {

@@ -1,13 +1,13 @@
-//! The elimination planned by the macro, on models made to break a static order: the pivoted factorisation of
-//! the whole matrix takes over, and results stay right.
+//! The elimination planned by the macro, on models made to break a static order: the pivoted
+//! factorisation of the whole matrix takes over, and results stay right.
 
 use casados::memory::fallback::Refusing;
 use casados::mode;
 use casados::prelude::*;
 use nalgebra::{SVector, vector};
 
-/// `A(p) k = b` in two algebraic unknowns, the first pivot of which may vanish at run time: `p z₀ + z₁ = 1`,
-/// `z₀ + z₁ = u`. Exactly: `z₀ = (1 − u)/(p − 1)`, `z₁ = u − z₀`.
+/// `A(p) k = b` in two algebraic unknowns, the first pivot of which may vanish at run time:
+/// `p z₀ + z₁ = 1`, `z₀ + z₁ = u`. Exactly: `z₀ = (1 − u)/(p − 1)`, `z₁ = u − z₀`.
 #[dae]
 fn vanishing(xdot: f64, x: f64, z: [f64; 2], u: [f64; 1], p: [f64; 1]) -> [f64; 3] {
     [xdot + x - z[0], p[0] * z[0] + z[1] - 1.0, z[0] + z[1] - u[0]]
@@ -36,8 +36,8 @@ fn t21_pivots_that_vanish() {
     }
 }
 
-/// Without memory to pivot the whole matrix: the same bits where the plan is good enough, in less memory, and an error where
-/// it is not; after which the integrator is as it was.
+/// Without memory to pivot the whole matrix: the same bits where the plan is good enough, in less
+/// memory, and an error where it is not; after which the integrator is as it was.
 #[test]
 fn without_a_fallback() {
     fn check<const S: usize>(newton: Newton)
@@ -70,11 +70,13 @@ fn without_a_fallback() {
     check::<1>(fixed);
     check::<3>(fixed);
     check::<2>(Newton::default());
-    // These equations are linear: with any number of stages one iteration is exact, and the mean Jacobian has no part in it.
+    // These equations are linear: with any number of stages one iteration is exact, and the mean
+    // Jacobian has no part in it.
     check::<4>(Newton::default());
 }
 
-/// A Jacobian for each step, as the option says, and a step for each Jacobian: with enough iterations the same as Newton's own.
+/// A Jacobian for each step, as the option says, and a step for each Jacobian: with enough
+/// iterations the same as Newton's own.
 #[test]
 fn frozen_means_once_in_a_step() {
     let run = |jacobian, fixed_iterations| {
@@ -120,8 +122,9 @@ fn t21_rows_of_any_scale() {
     }
 }
 
-/// `x ż-type` coupling whose coefficient crosses zero along the trajectory: `cos(t) a + sin(t) b = 1`,
-/// `−sin(t) a + cos(t) b = x`. Exactly `a = cos t − x sin t`, `b = sin t + x cos t`, whichever entry vanishes.
+/// `x ż-type` coupling whose coefficient crosses zero along the trajectory:
+/// `cos(t) a + sin(t) b = 1`, `−sin(t) a + cos(t) b = x`. Exactly `a = cos t − x sin t`,
+/// `b = sin t + x cos t`, whichever entry vanishes.
 #[dae]
 fn rotating(xdot: f64, x: f64, z: [f64; 2], t: f64) -> [f64; 3] {
     let (s, c) = t.sin_cos();
@@ -138,7 +141,8 @@ fn a_pivot_crosses_zero() {
         let step = irk.forward(&x, &SVector::zeros(), h).unwrap();
         let (s, c) = (start + h).sin_cos();
         let (a, b) = (c - step.x[0] * s, s + step.x[0] * c);
-        // A rotation has condition one; the time at the last stage carries a few roundings of t ≤ 4.
+        // A rotation has condition one; the time at the last stage carries a few roundings of t ≤
+        // 4.
         assert!((step.z[0] - a).abs() <= 32.0 * f64::EPSILON, "{n}: {} {a}", step.z[0]);
         assert!((step.z[1] - b).abs() <= 32.0 * f64::EPSILON, "{n}: {} {b}", step.z[1]);
         let by_x = step.dx_dx0[(0, 0)];
@@ -147,7 +151,8 @@ fn a_pivot_crosses_zero() {
     }
 }
 
-/// The plan of a model has the pattern of its Newton matrix, and each unknown is the pivot of one equation.
+/// The plan of a model has the pattern of its Newton matrix, and each unknown is the pivot of one
+/// equation.
 #[test]
 fn every_unknown_has_one_pivot() {
     fn check<M: Dae>(unknowns: usize) {
@@ -172,7 +177,8 @@ fn any_matrix(xdot: f64, x: f64, z: [f64; 2], p: [f64; 4]) -> [f64; 3] {
     [xdot + x, p[0] * z[0] + p[1] * z[1] - x, p[2] * z[0] + p[3] * z[1] - 1.0]
 }
 
-/// Permutations, and matrices next to them: of two orders one has a pivot of zero, and the other one gives the answer.
+/// Permutations, and matrices next to them: of two orders one has a pivot of zero, and the other
+/// one gives the answer.
 #[test]
 fn the_whole_matrix_is_pivoted_where_the_plan_fails() {
     let mut pivoted = 0;
@@ -194,8 +200,8 @@ fn the_whole_matrix_is_pivoted_where_the_plan_fails() {
     assert!(pivoted > 0, "no static order is right for all of these");
 }
 
-/// An algebraic part that was planned for a range, and is used outside of it, where the coefficient of `z₀` vanishes:
-/// `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`.
+/// An algebraic part that was planned for a range, and is used outside of it, where the coefficient
+/// of `z₀` vanishes: `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`.
 #[dae(range(u = 40.0..=60.0), nominal(x = 0.5))]
 fn out_of_range(xdot: f64, x: f64, z: [f64; 2], u: f64) -> [f64; 3] {
     [xdot + x - z[0], (u - 30.0) * z[0] + 2.0 * z[1] - 1.0, 2.0 * z[0] + 3.0 * z[1] - u]
@@ -233,7 +239,8 @@ fn t20_singular_matrices_are_refused() {
     assert!(irk.solve(&vector![1.0], &SVector::zeros(), 0.1).is_ok());
 }
 
-/// Determinants down to 1e-300, which a solution does not depend on, and matrices whose condition it does: errors are ε times it.
+/// Determinants down to 1e-300, which a solution does not depend on, and matrices whose condition
+/// it does: errors are ε times it.
 #[test]
 fn t35_near_singular_matrices() {
     let solve = |p: [f64; 4]| {
@@ -270,7 +277,8 @@ fn t35_near_singular_matrices() {
     assert!(matches!(solve([1.0, 1.0, 1.0, 1.0]), Err(casados::Error::Singular { .. })));
 }
 
-/// A matrix of `ẋ` of rank five for eight states, in equal steps: the same solution as in the form with algebraic states.
+/// A matrix of `ẋ` of rank five for eight states, in equal steps: the same solution as in the form
+/// with algebraic states.
 #[test]
 fn t23_rank_deficient_mass() {
     use super::circuits::{TransistorAmplifier, TransistorCapacitors};

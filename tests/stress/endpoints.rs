@@ -77,8 +77,8 @@ fn t37_nothing() {
     assert_eq!((hessian.x, hessian.dx_dx0, hessian.h_xx), (vector![0.7], vector![1.0], vector![0.0]));
 }
 
-/// At the end of a step `z` of Radau IIA satisfies its equation to rounding, whatever the step; with Gauss methods it is the
-/// polynomial through the stages, of order `s`.
+/// At the end of a step `z` of Radau IIA satisfies its equation to rounding, whatever the step;
+/// with Gauss methods it is the polynomial through the stages, of order `s`.
 #[test]
 fn t38_algebraic_states_at_the_end() {
     let u = 0.9;
@@ -105,8 +105,8 @@ fn t38_algebraic_states_at_the_end() {
     check!(1 2 3 4 5 6 7 8 9);
 }
 
-/// The integral of a product of squares over `[0, 1]`, `∫ (t − 1)^r Π (t − c_i)² dt`, by the formula of Gauss with nine
-/// nodes: exact to degree 17.
+/// The integral of a product of squares over `[0, 1]`, `∫ (t − 1)^r Π (t − c_i)² dt`, by the
+/// formula of Gauss with nine nodes: exact to degree 17.
 fn error_constant(nodes: &[f64], end: bool) -> f64 {
     let rule = <Gauss<9> as Method<9>>::TABLEAU;
     let terms = rule.c().iter().zip(rule.b()).map(|(t, b)| {

@@ -2,8 +2,8 @@
 
 use casados::dae;
 
-/// A fully implicit model with every kind of variable: `z` and parameters that enter nonlinearly, time, a state-dependent
-/// mass matrix.
+/// A fully implicit model with every kind of variable: `z` and parameters that enter nonlinearly,
+/// time, a state-dependent mass matrix.
 #[dae]
 pub fn everything(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1], p: [f64; 2], t: f64) -> [f64; 3] {
     let [stiffness, mass] = p;

@@ -65,7 +65,8 @@ fn options(steps: usize) -> Options {
     Options { steps, ..Default::default() }
 }
 
-/// `1 − hλ = 0` of implicit Euler, a row of zeros: an error, and the bits of a fresh integrator afterwards.
+/// `1 − hλ = 0` of implicit Euler, a row of zeros: an error, and the bits of a fresh integrator
+/// afterwards.
 #[test]
 fn t20_singular_matrices() {
     let mut irk = Irk::<Growth, RadauIIA<1>>::new(options(1)).expect("valid");
@@ -103,10 +104,11 @@ fn t20_singular_matrices() {
     check!(Adaptive::<EmptyRow, Radau>::new(AdaptiveOptions::default()));
 }
 
-/// The index is one by construction: what a model shows to be more is no program (`tests/ui/structurally_singular.rs`: the
-/// pendulum of index two is). What shows at run time alone is an error at the start of adaptive integration, and of an interval
-/// without length: there the Newton matrix is `∂f/∂(ẋ, z)`. Steps of a given size have a solution all the same, which is right:
-/// that of the method for index two.
+/// The index is one by construction: what a model shows to be more is no program
+/// (`tests/ui/structurally_singular.rs`: the pendulum of index two is). What shows at run time
+/// alone is an error at the start of adaptive integration, and of an interval without length: there
+/// the Newton matrix is `∂f/∂(ẋ, z)`. Steps of a given size have a solution all the same, which is
+/// right: that of the method for index two.
 #[test]
 fn t22_index_two() {
     let mut adaptive = Adaptive::<Hidden, Radau>::new(AdaptiveOptions::default()).expect("valid");
@@ -117,7 +119,8 @@ fn t22_index_two() {
     irk.set_parameters(&vector![0.0]).expect("finite");
     let error = irk.solve(&vector![0.0], &none(), 0.0).map(|step| step.x);
     assert!(matches!(error, Err(Error::Singular { unknown: "z", .. })), "{error:?}");
-    // x is exact at the nodes, and z = ẋ of a polynomial of degree three: its error falls by 2³ as steps are halved.
+    // x is exact at the nodes, and z = ẋ of a polynomial of degree three: its error falls by 2³ as
+    // steps are halved.
     let mut before = f64::INFINITY;
     for steps in [4, 8, 16, 32] {
         let mut irk = Irk::<Hidden, RadauIIA<3>>::new(options(steps)).expect("valid");
@@ -173,7 +176,8 @@ fn t26_models_without_a_value() {
     };
     macro_rules! check {
         ($($integrator:ident $method:ty;)*) => {$(
-            // NaN at the second stage, or where there is one beyond the middle: in the first step of one.
+            // NaN at the second stage, or where there is one beyond the middle: in the first step
+            // of one.
             fails::<SquareRoot, _>(|| $integrator::<SquareRoot, $method>::new(options(1)).expect("valid"), 1.0, [1.0, 0.4], residual(None));
             fails::<Overflow, _>(|| $integrator::<Overflow, $method>::new(options(1)).expect("valid"), 1.0, [1.0, 0.4], residual(None));
             fails::<Exponential, _>(|| $integrator::<Exponential, $method>::new(options(1)).expect("valid"), 1000.0, [0.1, 0.1], residual(Some(0)));
@@ -224,7 +228,8 @@ fn t29_discontinuity() {
     }
     let slope = (errors[0] / errors[1]).log2();
     assert!((slope - 4.0).abs() <= 0.5, "{slope} of {errors:?}");
-    // Without it steps are refused until the one that contains the jump is short, and the error is that of the tolerance.
+    // Without it steps are refused until the one that contains the jump is short, and the error is
+    // that of the tolerance.
     macro_rules! check {
         ($method:ty) => {
             for rtol in [1e-4, 1e-6, 1e-8] {
@@ -234,8 +239,8 @@ fn t29_discontinuity() {
                 let error = (x - exact).abs();
                 println!("{} {rtol:e}: {error:e} {:?}", stringify!($method), adaptive.statistics());
                 assert!(error <= 100.0 * rtol, "{rtol:e}: {error:e}");
-                // A stop, and integration of the rest: at the jump the model has the value of the other side, which
-                // is the control's until there.
+                // A stop, and integration of the rest: at the jump the model has the value of the
+                // other side, which is the control's until there.
                 let x = adaptive.solve(&x0, &vector![2.0], 5.0).expect("a solution").x;
                 adaptive.set_time(5.0).expect("finite");
                 let x = adaptive.solve(&x, &u, 3.0).expect("a solution").x[0];
@@ -249,8 +254,9 @@ fn t29_discontinuity() {
     check!(DormandPrince8);
 }
 
-/// The polynomial of the last step of Van der Pol's oscillator satisfies its equations at the stages: `D x = h f(x)`, with the
-/// derivatives `D` of the Lagrange polynomials of the start and the stages, to rounding of the terms.
+/// The polynomial of the last step of Van der Pol's oscillator satisfies its equations at the
+/// stages: `D x = h f(x)`, with the derivatives `D` of the Lagrange polynomials of the start and
+/// the stages, to rounding of the terms.
 fn is_collocation(irk: &mut Irk<VanDerPol, RadauIIA<3>>, mu: f64, h: f64) {
     let root = 6.0f64.sqrt();
     let nodes = [0.0, (4.0 - root) / 10.0, (4.0 + root) / 10.0, 1.0];
@@ -273,7 +279,8 @@ fn is_collocation(irk: &mut Irk<VanDerPol, RadauIIA<3>>, mu: f64, h: f64) {
             let sum = slopes.iter().sum::<f64>() - h * rate.iter().sum::<f64>();
             let size = slopes.iter().map(|slope| slope.abs()).sum::<f64>()
                 + h * sizes[state].iter().map(|size| size.abs()).sum::<f64>();
-            // Interpolation and differentiation of four values, and Newton's method to rounding: some tens of ε.
+            // Interpolation and differentiation of four values, and Newton's method to rounding:
+            // some tens of ε.
             assert!(
                 f64::abs(sum) <= 100.0 * f64::EPSILON * size,
                 "stage {i}, state {state}: {sum:e} of {size:e}"
@@ -300,8 +307,9 @@ fn t31_newton_divergence() {
         Err(Error::Overflow { .. }) => {}
         Err(other) => panic!("{other}"),
     }
-    // A step of implicit Euler with `h = 1` has no solution: `k = (1 + k)²` has no real root. Relative to its terms, `|k|` and
-    // `2 (1 + k)²`, the residual is `(k² + k + 1)/(|k| + 2 (1 + k)²) ≥ 1/3`, which it is at `k = 1`.
+    // A step of implicit Euler with `h = 1` has no solution: `k = (1 + k)²` has no real root.
+    // Relative to its terms, `|k|` and `2 (1 + k)²`, the residual is
+    // `(k² + k + 1)/(|k| + 2 (1 + k)²) ≥ 1/3`, which it is at `k = 1`.
     let mut irk = Irk::<Riccati, RadauIIA<1>>::new(options(1)).expect("valid");
     match irk.solve(&vector![1.0], &none(), 1.0).map(|step| step.x) {
         Err(Error::NotConverged { residual, increment, at, .. }) => {
@@ -330,8 +338,8 @@ fn t31_newton_divergence() {
     assert_eq!(irk.statistics().iterations, 1);
 }
 
-/// With one stage the stage is known from outside: `k = (x₊ − x)/h`. Its residual is rounding, at a thousand points; and no
-/// iteration went round in circles.
+/// With one stage the stage is known from outside: `k = (x₊ − x)/h`. Its residual is rounding, at a
+/// thousand points; and no iteration went round in circles.
 #[test]
 fn t32_newton_reaches_rounding() {
     let mut seed = 3u64;

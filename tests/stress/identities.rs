@@ -1,5 +1,6 @@
-//! Identities that hold to rounding whatever the model: adjoint and forward sensitivities are transposes of each other,
-//! Hessians are symmetric and derivatives of gradients, calls repeat their bits, Gauss methods keep quadratic invariants.
+//! Identities that hold to rounding whatever the model: adjoint and forward sensitivities are
+//! transposes of each other, Hessians are symmetric and derivatives of gradients, calls repeat
+//! their bits, Gauss methods keep quadratic invariants.
 
 use super::everything::Everything;
 use super::interval::{check, options};
@@ -40,7 +41,8 @@ fn implicit_model_with_everything() {
     );
 }
 
-/// A rigid body without torque (Euler): kinetic energy and the square of the angular momentum are quadratic invariants.
+/// A rigid body without torque (Euler): kinetic energy and the square of the angular momentum are
+/// quadratic invariants.
 #[ode]
 fn rigid_body(x: [f64; 3]) -> [f64; 3] {
     const INERTIA: [f64; 3] = [1.0, 2.0, 3.5];
@@ -72,9 +74,9 @@ where
     worst
 }
 
-/// Gauss methods keep quadratic invariants (Cooper 1987), with steps that are far from accurate too. Each step rounds the
-/// update of a state and the residual of its stages: a few epsilon of the invariant, with random sign;
-/// here all of them are granted the same sign.
+/// Gauss methods keep quadratic invariants (Cooper 1987), with steps that are far from accurate
+/// too. Each step rounds the update of a state and the residual of its stages: a few epsilon of the
+/// invariant, with random sign; here all of them are granted the same sign.
 #[test]
 fn gauss_keeps_quadratic_invariants() {
     const INTERVALS: usize = 200;

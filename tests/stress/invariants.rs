@@ -5,7 +5,8 @@ use super::orbit::{Kepler, STEP, changes, perihelion};
 use casados::{Adaptive, AdaptiveOptions, Erk, Gauss, Irk, Options, Radau, RadauIIA, Rk4, ode};
 use nalgebra::{SVector, vector};
 
-/// Each step rounds `x` a few times: a random walk of steps of four roundings, and three standard deviations.
+/// Each step rounds `x` a few times: a random walk of steps of four roundings, and three standard
+/// deviations.
 fn random_walk(steps: usize) -> f64 {
     3.0 * (steps as f64).sqrt() * 4.0 * f64::EPSILON / 2.0
 }
@@ -37,8 +38,8 @@ fn t08_angular_momentum() {
 /// The energy is kept as far as the method solves the equation.
 #[test]
 fn t07_energy() {
-    // Rounding of x changes the energy more than the momentum: at the perihelion 1/r and v² cancel, and each is
-    // six times the energy.
+    // Rounding of x changes the energy more than the momentum: at the perihelion 1/r and v² cancel,
+    // and each is six times the energy.
     let bound = 6.0 * random_walk(STEPS);
     for [_, energy] in [of_steps!(Gauss<8>), of_steps!(Gauss<9>)] {
         assert!(energy <= bound, "{energy:e}");
@@ -62,7 +63,8 @@ fn t09_compensated_sums() {
     assert!(compensated[1] <= 6.0 * random_walk(2000) / 2.0, "{compensated:?}");
 }
 
-/// Without dynamics nothing but the sum is left: one is lost in each step of `ẋ = 2⁻⁵³`, beside one, unless it is carried along.
+/// Without dynamics nothing but the sum is left: one is lost in each step of `ẋ = 2⁻⁵³`, beside
+/// one, unless it is carried along.
 #[ode]
 fn creep(_x: f64, u: f64) -> f64 {
     u
@@ -123,7 +125,8 @@ fn t11_linear_invariants() {
         let sum = forward.dx_dx0.column(column).sum();
         println!("{:e}", sum - 1.0);
         assert!((sum - 1.0).abs() <= rounding, "x0[{column}]: {:e} {rounding:e}", sum - 1.0);
-        // A step adds three products to an element, 4 ε/2 of terms that, times the parameter, are 1/2 at most; in three rows.
+        // A step adds three products to an element, 4 ε/2 of terms that, times the parameter, are
+        // 1/2 at most; in three rows.
         let sum = forward.dx_dp.column(column).sum() * [0.04, 3e7, 1e4][column];
         println!("{sum:e} {}", forward.dx_dp.column(column).amax());
         assert!(sum.abs() <= 3.0 * rounding, "p[{column}]: {sum:e} {rounding:e}");

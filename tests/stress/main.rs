@@ -1,5 +1,5 @@
-//! Stress: forty things that break integrators, and must not break here. The name of a test begins with its number:
-//! `cargo test t07`. What was measured is in `docs/accuracy.md`.
+//! Stress: forty things that break integrators, and must not break here. The name of a test begins
+//! with its number: `cargo test t07`. What was measured is in `docs/accuracy.md`.
 //!
 //! | number | what | where |
 //! | --- | --- | --- |
@@ -21,8 +21,9 @@
 //! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `endpoints` |
 //! | 39 | rounding of the data | `stiffness` |
 //!
-//! Besides: random equations with known solutions (`properties`), anything into every entry (`tests/fuzz.rs`, which is compiled beside; into
-//! the macro in `casados-macros/src/fuzz.rs`), single precision (`precision`).
+//! Besides: random equations with known solutions (`properties`), anything into every entry
+//! (`tests/fuzz.rs`, which is compiled beside; into the macro in `casados-macros/src/fuzz.rs`),
+//! single precision (`precision`).
 
 #[allow(dead_code)]
 #[path = "../../examples/models/ivp/chemistry.rs"]

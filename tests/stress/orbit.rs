@@ -31,7 +31,8 @@ fn energy(x: &SVector<f64, 4>) -> f64 {
     (x[2] * x[2] + x[3] * x[3]) / 2.0 - 1.0 / x[0].hypot(x[1])
 }
 
-/// The largest relative changes of angular momentum and energy, looked at after each of so many intervals.
+/// The largest relative changes of angular momentum and energy, looked at after each of so many
+/// intervals.
 pub fn changes(
     integrator: &mut impl Integrator<Kepler>,
     mut x: SVector<f64, 4>,

@@ -58,11 +58,11 @@ fn steps(first: f64, ratio: f64, count: i32) -> Vec<usize> {
     steps
 }
 
-/// The order in the limit of small steps: `log e = log C + p log h + D h^m + E h^2m`, fitted to the errors
-/// above 1e-12.
+/// The order in the limit of small steps: `log e = log C + p log h + D h^m + E h^2m`, fitted to the
+/// errors above 1e-12.
 ///
-/// The last terms are those of the next orders of the expansion, `m = 2` for symmetric methods. Methods of high
-/// order are at rounding long before these are negligible.
+/// The last terms are those of the next orders of the expansion, `m = 2` for symmetric methods.
+/// Methods of high order are at rounding long before these are negligible.
 fn slope(report: &Convergence, m: i32) -> f64 {
     let rows: Vec<_> = report.rows.iter().filter(|row| row.1 > 1e-12 && row.1 < 0.03).collect();
     let rows = &rows[rows.len().saturating_sub(9)..];
@@ -75,8 +75,9 @@ fn slope(report: &Convergence, m: i32) -> f64 {
     matrix.svd(true, true).solve(&errors, 1e-14).map_or(f64::NAN, |solution| solution[1])
 }
 
-/// The slope is within 0.1 of the order above errors of 1e-12, unless the order is larger than `visible`: then the
-/// asymptote of this problem is below rounding. Methods of order 8 and more reach rounding.
+/// The slope is within 0.1 of the order above errors of 1e-12, unless the order is larger than
+/// `visible`: then the asymptote of this problem is below rounding. Methods of order 8 and more
+/// reach rounding.
 #[track_caller]
 fn check(name: &str, order: usize, m: i32, visible: usize, report: &Convergence) {
     let found = slope(report, m);
@@ -111,7 +112,8 @@ explicit_orders!(t04_explicit_on_kepler, Kepler, kepler_start(), KEPLER_TIME, ke
 );
 
 system! {
-    /// A pendulum of length one with the tension `z`, index 1: `q̈ = −z q − (0, g)`, `0 = q·q̈ + |q̇|²`.
+    /// A pendulum of length one with the tension `z`, index 1: `q̈ = −z q − (0, g)`,
+    /// `0 = q·q̈ + |q̇|²`.
     Pendulum [4, 1, 0, 0] S |v, f| {
         let (xdot, [qx, qy, vx, vy, z]) = (&v[..4], [v[4], v[5], v[6], v[7], v[8]]);
         let g = S::from_f64(GRAVITY);
@@ -125,7 +127,8 @@ const PENDULUM_TIME: f64 = 0.8;
 /// From the lowest point, rad.
 const PENDULUM_ANGLE: f64 = 2.0;
 
-/// Elliptic functions `(sn, cn, dn)(u, k)` by descending Landen transformations (Abramowitz and Stegun 16.4).
+/// Elliptic functions `(sn, cn, dn)(u, k)` by descending Landen transformations (Abramowitz and
+/// Stegun 16.4).
 fn jacobi(u: f64, k: f64) -> (f64, f64, f64) {
     let (mut a, mut c) = (vec![1.0], vec![k]);
     let mut b = (1.0 - k * k).sqrt();
@@ -218,7 +221,8 @@ fn oscillator() -> [f64; 2] {
     [0.6 * cos + 0.8 * sin, 0.8 * cos - 0.6 * sin]
 }
 
-// The solution is entire: the asymptote is visible for every order, errors of 1e-12 are reached with long steps.
+// The solution is entire: the asymptote is visible for every order, errors of 1e-12 are reached
+// with long steps.
 implicit_orders!(t04_gauss_on_oscillator, Gauss, 2, Oscillator, vector![0.6, 0.8], OSCILLATOR_TIME, oscillator(), 18,
     1 4096.0 1.2 8, 2 512.0 1.3 12, 3 128.0 1.3 12, 4 40.0 1.2 15, 5 24.0 1.15 16, 6 16.0 1.15 16, 7 12.0 1.12 16,
     8 10.0 1.1 16, 9 8.0 1.1 16,

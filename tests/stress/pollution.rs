@@ -1,5 +1,6 @@
-//! Pollution of the air: 25 reactions of 20 species (J. Verwer, Gauss-Seidel iteration for stiff ODEs from chemical kinetics, SIAM
-//! J. Sci. Comput. 15 (1994)), as in the Test Set for IVP Solvers of the University of Bari.
+//! Pollution of the air: 25 reactions of 20 species (J. Verwer, Gauss-Seidel iteration for stiff
+//! ODEs from chemical kinetics, SIAM J. Sci. Comput. 15 (1994)), as in the Test Set for IVP Solvers
+//! of the University of Bari.
 
 use casados::ode;
 

@@ -1,5 +1,5 @@
-//! Single precision is double precision with other roundings: the differences are those of the arguments, propagated by the
-//! derivatives, and of the steps.
+//! Single precision is double precision with other roundings: the differences are those of the
+//! arguments, propagated by the derivatives, and of the steps.
 
 use super::everything::Everything;
 use casados::{Erk, Gauss, Irk, Options, RadauIIA, Rk4, ode};
@@ -13,9 +13,10 @@ fn pushed(x: [f64; 2], u: f64, p: [f64; 2]) -> [f64; 2] {
 
 /// `|x₃₂ − x₆₄|` and `|S₃₂ − S₆₄|` beside the bounds that conditions give, worst of many points.
 ///
-/// Rounding the arguments to `ε/2` of their size changes `x` by `Σ_j |S_ij w_j| ε/2`; each step rounds `x`, its stages and
-/// their increments, a dozen roundings, which the remaining steps propagate with at most `max |S|`; and derivatives change
-/// by second derivatives, which are of the size of `|S|² M` with the curvature `M` of the model.
+/// Rounding the arguments to `ε/2` of their size changes `x` by `Σ_j |S_ij w_j| ε/2`; each step
+/// rounds `x`, its stages and their increments, a dozen roundings, which the remaining steps
+/// propagate with at most `max |S|`; and derivatives change by second derivatives, which are of the
+/// size of `|S|² M` with the curvature `M` of the model.
 macro_rules! compare {
     ($name:literal, $single:expr, $double:expr, $steps:expr, $curvature:expr, $points:expr, $h:expr) => {{
         let (mut single, mut double) = ($single.expect("valid"), $double.expect("valid"));
@@ -78,7 +79,8 @@ fn single_precision_is_what_conditions_predict() {
     pushed!("Gauss, s = 1", Irk, Gauss<1>, 16);
     pushed!("Radau IIA, s = 4", Irk, RadauIIA<4>, 4);
     pushed!("RK4", Erk, Rk4, 16);
-    // A fully implicit model: its algebraic state and the matrix of ẋ have conditions of order one to ten at these points.
+    // A fully implicit model: its algebraic state and the matrix of ẋ have conditions of order one
+    // to ten at these points.
     let points = || {
         (0..40).map(|k| {
             let wave = |i: i32| (f64::from(5 * k + 3 * i)).sin();

@@ -9,7 +9,8 @@ fn numbers(count: usize) -> impl Strategy<Value = Vec<f64>> {
     prop::collection::vec(-1.0f64..1.0, count)
 }
 
-/// Linear systems `ẋ = A x` whose elements are parameters, row by row: `x = e^{Ah} x₀` and `dx/dx₀ = e^{Ah}`.
+/// Linear systems `ẋ = A x` whose elements are parameters, row by row: `x = e^{Ah} x₀` and
+/// `dx/dx₀ = e^{Ah}`.
 macro_rules! linear_systems {
     ($($name:ident $model:ident $test:ident $n:literal $nn:literal;)*) => {$(
         #[ode]
@@ -29,8 +30,9 @@ macro_rules! linear_systems {
                 let (a, x0) = (SMatrix::<f64, $n, $n>::from_row_slice(&p), SVector::<f64, $n>::from_column_slice(&x0));
                 let exact = (a * h).exp();
                 let norm = a.abs().row_sum().amax() * h;
-                // |A|h ≤ 8: eight steps have |A|h/8 ≤ 1, and the error of order 12 or 13 is below ε. Roundings of the stages
-                // and of Padé's approximant in `exp`, a hundred, grow as e^{|A|h}.
+                // |A|h ≤ 8: eight steps have |A|h/8 ≤ 1, and the error of order 12 or 13 is below
+                // ε. Roundings of the stages and of Padé's approximant in `exp`, a hundred,
+                // grow as e^{|A|h}.
                 let bound = 100.0 * f64::EPSILON * norm.exp();
                 for method in 0..2 {
                     let options = Options { steps: 8, ..Default::default() };
@@ -60,8 +62,8 @@ linear_systems! {
     linear_four LinearFour linear_systems_of_four 4 16;
 }
 
-/// Fully implicit equations that the functions `x_i = a_i + b_i sin(ω_i t)`, `z = c cos(t) + a₀` solve, whatever the matrices
-/// that couple them: p = (a, b, ω, c, couplings).
+/// Fully implicit equations that the functions `x_i = a_i + b_i sin(ω_i t)`, `z = c cos(t) + a₀`
+/// solve, whatever the matrices that couple them: p = (a, b, ω, c, couplings).
 macro_rules! manufactured {
     ($($name:ident $model:ident $test:ident $n:literal $np:literal $equations:literal;)*) => {$(
         #[dae]
@@ -73,7 +75,8 @@ macro_rules! manufactured {
             }
             for i in 0..$n {
                 let rate = xdot[i] - p[$n + i] * p[2 * $n + i] * (p[2 * $n + i] * t).cos();
-                // A matrix of ẋ that depends on the state, couplings of all states, and of the algebraic one.
+                // A matrix of ẋ that depends on the state, couplings of all states, and of the
+                // algebraic one.
                 f[i] = (1.5 + 0.4 * x[i].sin()) * rate + p[3 * $n + 1] * z_error;
                 for j in 0..$n {
                     f[i] += p[3 * $n + 2 + $n * i + j] * (error[j] + 0.3 * error[j] * error[j]);
@@ -102,15 +105,16 @@ macro_rules! manufactured {
                     *irk.forward(&solution(0.0), &SVector::zeros(), h).expect("a solution")
                 };
                 let (coarse, fine) = (run(4), run(8));
-                // The difference of two step numbers is the error of the longer steps, more than a hundred times that of the
-                // shorter ones; and eight steps of twenty roundings, which errors of the size of e^{3h n} propagate.
+                // The difference of two step numbers is the error of the longer steps, more than a
+                // hundred times that of the shorter ones; and eight steps of twenty roundings,
+                // which errors of the size of e^{3h n} propagate.
                 let rounding = 160.0 * f64::EPSILON * (3.0 * h * $n as f64).exp();
                 let error = (fine.x - solution(h)).amax();
                 prop_assert!(error <= (fine.x - coarse.x).amax() + rounding, "{error:e}");
                 let error = (fine.z[0] - algebraic(h)).abs();
                 prop_assert!(error <= (fine.z - coarse.z).amax() + 10.0 * rounding, "{error:e} of z");
-                // The solution knows nothing of the couplings: its derivatives by them are zero. By the numbers that it is made
-                // of, start value included, they are known.
+                // The solution knows nothing of the couplings: its derivatives by them are zero. By
+                // the numbers that it is made of, start value included, they are known.
                 for coupling in 3 * $n + 1..$np {
                     let error = fine.dx_dp.column(coupling).amax();
                     let tolerance = (fine.dx_dp - coarse.dx_dp).amax() + 10.0 * rounding;

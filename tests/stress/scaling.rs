@@ -1,12 +1,13 @@
-//! Rows of a model that differ by hundreds of orders of magnitude, known to the macro or not: the results are those of
-//! the model with rows as they come.
+//! Rows of a model that differ by hundreds of orders of magnitude, known to the macro or not: the
+//! results are those of the model with rows as they come.
 
 use casados::prelude::*;
 use casados::{dae, ode};
 use nalgebra::{SVector, vector};
 
-/// An oscillator with a force that is an algebraic state, its rows multiplied by numbers that the macro does not see (it
-/// takes any numbers around one for them when it chooses pivots), or by the literals that it does.
+/// An oscillator with a force that is an algebraic state, its rows multiplied by numbers that the
+/// macro does not see (it takes any numbers around one for them when it chooses pivots), or by the
+/// literals that it does.
 macro_rules! oscillators {
     ($($name:ident $literal:ident $type:ident $literal_type:ident [$a:literal, $b:literal, $c:literal];)*) => {
         $(
@@ -55,7 +56,8 @@ oscillators! {
     farther farther_literal Farther FartherLiteral [1.0, 1e-200, 1e200];
 }
 
-/// `x₊` alone, and `x₊`, `dx₊/dx₀`, `dx₊/du`, the gradient and the Hessian of `λᵀx₊` by `x₀`, one after the other.
+/// `x₊` alone, and `x₊`, `dx₊/dx₀`, `dx₊/du`, the gradient and the Hessian of `λᵀx₊` by `x₀`, one
+/// after the other.
 fn found<M: Dae<Shape = casados::Dims<2, 1, 1, 0, 3, 7, 3>>>() -> Vec<f64> {
     let mut irk = Irk::<M, Gauss<3>>::new(Options { steps: 3, ..Default::default() }).unwrap();
     let (x0, u, lambda) = (vector![1.0, 0.5], vector![0.3], vector![0.7, -0.4]);
@@ -66,8 +68,9 @@ fn found<M: Dae<Shape = casados::Dims<2, 1, 1, 0, 3, 7, 3>>>() -> Vec<f64> {
     [parts.concat(), step.h_xx.as_slice().to_vec()].concat()
 }
 
-/// Rows multiplied by numbers that are no powers of two have entries that differ by a rounding. Three steps, each a system of
-/// condition below ten, some ten roundings; all results are of size one.
+/// Rows multiplied by numbers that are no powers of two have entries that differ by a rounding.
+/// Three steps, each a system of condition below ten, some ten roundings; all results are of size
+/// one.
 fn compare(name: &str, found: &[f64], expected: &[f64]) {
     assert!(expected.len() == 16 && found.len() == 16);
     for (found, expected) in found.iter().zip(expected) {
@@ -86,7 +89,8 @@ fn homogeneous_rates(x: [f64; 2], u: f64) -> [f64; 2] {
     [x[1] - 0.3 * x[0], u - 3.0 * x[0]]
 }
 
-/// States and controls multiplied by powers of two over the whole range of numbers: the same bits in everything.
+/// States and controls multiplied by powers of two over the whole range of numbers: the same bits
+/// in everything.
 #[test]
 fn t27_scale_invariance() {
     macro_rules! check {
@@ -129,7 +133,8 @@ fn decay(x: [f64; 2], p: f64) -> [f64; 2] {
     [p * x[0], p * x[1] + x[0]]
 }
 
-/// Numbers that fall below the smallest normal one become denormal and zero, and nothing else; it takes no more iterations.
+/// Numbers that fall below the smallest normal one become denormal and zero, and nothing else; it
+/// takes no more iterations.
 #[test]
 fn t28_denormal_numbers() {
     let options = Options { steps: 60, ..Default::default() };
@@ -158,7 +163,8 @@ fn t28_denormal_numbers() {
     assert!(adaptive.statistics().steps <= 200, "{:?}", adaptive.statistics());
 }
 
-/// Steps of any length: those of 1e-300 change nothing, and those of 1e300 with rates of 1e-300 are steps of length one.
+/// Steps of any length: those of 1e-300 change nothing, and those of 1e300 with rates of 1e-300 are
+/// steps of length one.
 #[test]
 fn t36_lengths_of_steps() {
     macro_rules! check {

@@ -1,4 +1,5 @@
-//! Derivatives: identities, independent ways to the same numbers, what cancels, and what an iteration that stops early leaves.
+//! Derivatives: identities, independent ways to the same numbers, what cancels, and what an
+//! iteration that stops early leaves.
 
 use super::chemistry::{AkzoNobel, Robertson};
 use super::data::Record;
@@ -28,7 +29,8 @@ fn next(seed: &mut u64) -> f64 {
     (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// `λᵀ(S v)` of the forward derivatives is `(Sᵀλ)ᵀ v` of the adjoint, relative to the sizes of the terms.
+/// `λᵀ(S v)` of the forward derivatives is `(Sᵀλ)ᵀ v` of the adjoint, relative to the sizes of the
+/// terms.
 macro_rules! identity {
     ($integrator:expr, $x0:expr, $u:expr, $h:expr, $p:expr, $nx:literal, $nu:literal, $np:literal) => {{
         let (mut integrator, x0, u, h, mut seed) = ($integrator, $x0, $u, $h, 7);
@@ -91,8 +93,8 @@ fn t13_adjoint_and_forward() {
     identity!(Erk::<Swing, DormandPrince8>::new(options).expect("valid"), x0, u, 0.3, p, 2, 1, 2);
 }
 
-/// One step in complex numbers, `x₀ + i 1e-200 e_j`: the stages by fixed-point iteration, until only rounding is left. Nothing of
-/// Newton's method or of its derivatives is in it.
+/// One step in complex numbers, `x₀ + i 1e-200 e_j`: the stages by fixed-point iteration, until
+/// only rounding is left. Nothing of Newton's method or of its derivatives is in it.
 fn complex_step<const S: usize>(x0: [f64; 2], u: f64, p: [f64; 2], h: f64, direction: usize) -> [f64; 2]
 where
     Gauss<S>: Method<S>,
@@ -168,7 +170,8 @@ fn t16_hessians_are_symmetric() {
     check!(Adaptive::<Everything, Radau>::new(AdaptiveOptions::default()), 0.3);
 }
 
-/// Solutions of linear equations have no second derivatives by `x₀` and `u`, not even rounding errors.
+/// Solutions of linear equations have no second derivatives by `x₀` and `u`, not even rounding
+/// errors.
 #[test]
 fn t17_no_curvature() {
     let (x0, u, lambda) = (vector![1.0, -0.5], vector![0.8], vector![0.7, 0.9]);
@@ -186,7 +189,8 @@ fn t17_no_curvature() {
     check!(Adaptive::<Oscillator, Radau>::new(AdaptiveOptions::default()));
 }
 
-/// Derivatives that decay over many decades keep their sign and six digits each, down to 1e-12 of the largest.
+/// Derivatives that decay over many decades keep their sign and six digits each, down to 1e-12 of
+/// the largest.
 #[test]
 fn t18_cancellation() {
     macro_rules! check {
@@ -224,8 +228,8 @@ fn t18_cancellation() {
     check!(VanDerPol, "van_der_pol_1e3", 2, 1, vector![2.0, 0.0], vector![1e3], 1e-15);
 }
 
-/// Derivatives are those at the stages that the iteration found. If it stops short by `δ`, they are off by the second
-/// derivatives times that.
+/// Derivatives are those at the stages that the iteration found. If it stops short by `δ`, they are
+/// off by the second derivatives times that.
 #[test]
 fn t19_derivatives_of_what_was_iterated() {
     let (x0, u, p, h) = (vector![0.4, -0.7], vector![0.6], vector![9.81, 0.1], 0.2);
@@ -244,14 +248,16 @@ fn t19_derivatives_of_what_was_iterated() {
         println!("{iterations} iterations: x off by {left:e}, its derivatives by {error:e}");
         assert!(left < before || left <= 4.0 * f64::EPSILON);
         before = left;
-        // x is the sum of h b k, and the derivative of f is Lipschitz with a constant of g/l = 9.81: an error of the stages
-        // δ = left/h changes it by h p₀ δ h, and each solve of the stages at most doubles that.
+        // x is the sum of h b k, and the derivative of f is Lipschitz with a constant of g/l =
+        // 9.81: an error of the stages δ = left/h changes it by h p₀ δ h, and each solve of the
+        // stages at most doubles that.
         assert!(error <= 2.0 * 9.81 * left + 16.0 * f64::EPSILON, "{iterations}: {error:e} {left:e}");
     }
     assert!(before <= 4.0 * f64::EPSILON);
 }
 
-/// Ten thousand steps turn the oscillator by ten thousand angles of `R(ih)`, and so are their derivatives.
+/// Ten thousand steps turn the oscillator by ten thousand angles of `R(ih)`, and so are their
+/// derivatives.
 #[test]
 fn derivatives_through_ten_thousand_steps() {
     const STEPS: usize = 10_000;

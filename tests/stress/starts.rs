@@ -103,7 +103,8 @@ fn t25_wrong_branches() {
     }
 }
 
-/// A thousand calls give the same bits, and a warm start differs from a cold one by rounding; whatever the calls before were.
+/// A thousand calls give the same bits, and a warm start differs from a cold one by rounding;
+/// whatever the calls before were.
 #[test]
 fn t33_determinism_and_warm_starts() {
     let x0 = vector![0.444, 0.00123, 0.0, 0.007, 0.0];

@@ -27,8 +27,8 @@ fn dahlquist(x: f64, p: f64) -> f64 {
     p * x
 }
 
-/// Stiff problems reduce the order to that of the stages, and no further; and the stiffer, the better is Radau IIA. Gauss
-/// methods, which do not damp, come to a limit.
+/// Stiff problems reduce the order to that of the stages, and no further; and the stiffer, the
+/// better is Radau IIA. Gauss methods, which do not damp, come to a limit.
 #[test]
 fn t05_order_reduction() {
     /// Steps of 1/2 to 1/32, all of them long beside `1/λ`.
@@ -90,8 +90,8 @@ fn ends(name: &str) -> (Vec<f64>, Vec<f64>, Vec<Record>) {
     )
 }
 
-/// The relative errors of the worst component at the end times of a problem, of all or of the first states; and how many
-/// iterations a step took at most.
+/// The relative errors of the worst component at the end times of a problem, of all or of the first
+/// states; and how many iterations a step took at most.
 fn errors<M: Dae>(
     name: &str,
     nx: usize,
@@ -165,8 +165,8 @@ fn t06_stiffness_of_1e12() {
     check!(1 2 3 4 5 6 7 8 9);
 }
 
-/// Every component is right relative to its own size: concentrations from 1 to 1e-14 (Robertson), to 1e-18 (pollution of
-/// the air), to 1e-65 (E5). Absolute tolerances are below all of them.
+/// Every component is right relative to its own size: concentrations from 1 to 1e-14 (Robertson),
+/// to 1e-18 (pollution of the air), to 1e-65 (E5). Absolute tolerances are below all of them.
 #[test]
 fn t12_relative_accuracy_over_decades() {
     for rtol in [1e-6, 1e-9] {
@@ -186,8 +186,9 @@ fn t12_relative_accuracy_over_decades() {
     }
 }
 
-/// The constants of a problem are rounded to `f64`, which changes its solution: by 2.8e-15 of the Oregonator, 1.9e-15 of HIRES.
-/// That, and the rounding errors of some hundred steps, is what is left at the tightest tolerance.
+/// The constants of a problem are rounded to `f64`, which changes its solution: by 2.8e-15 of the
+/// Oregonator, 1.9e-15 of HIRES. That, and the rounding errors of some hundred steps, is what is
+/// left at the tightest tolerance.
 #[test]
 fn t39_data_rounding_floor() {
     let tight = 1e-14;

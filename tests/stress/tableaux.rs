@@ -1,4 +1,5 @@
-//! Butcher tableaux: bits of the constants, order conditions, interpolation, checks of a user's own.
+//! Butcher tableaux: bits of the constants, order conditions, interpolation, checks of a user's
+//! own.
 
 use casados::{
     Butcher6, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4, Tableau,
@@ -6,7 +7,8 @@ use casados::{
 };
 use serde_json::Value;
 
-/// Runs a block for all Gauss and Radau IIA tableaux, with the name of the family in the reference data.
+/// Runs a block for all Gauss and Radau IIA tableaux, with the name of the family in the reference
+/// data.
 macro_rules! for_collocation {
     (|$tableau:ident, $family:ident| $body:block) => {
         for_collocation!(@ $tableau $family $body Gauss "gauss" 1 2 3 4 5 6 7 8 9);
@@ -107,7 +109,8 @@ fn t02_simplifying_assumptions_hold_to_rounding() {
         for (name, residual) in ["B", "C", "D"].iter().zip(simplifying_assumptions(&t, orders)) {
             assert!(residual <= 4.0 * f64::EPSILON, "{}: {name} {residual:e}", t.name());
         }
-        // One order more is violated by far more (s = 9: B by 1e-11 and less is not told from rounding).
+        // One order more is violated by far more (s = 9: B by 1e-11 and less is not told from
+        // rounding).
         if s <= 5 {
             let more = simplifying_assumptions(&t, orders.map(|o| o + 1));
             assert!(more.iter().all(|&residual| residual > 1e-9), "{}: {more:?}", t.name());
@@ -137,7 +140,8 @@ fn properties() {
     for_explicit!(|t| {
         assert!(t.is_explicit() && !t.is_symplectic() && !t.is_stiffly_accurate(), "{}", t.name());
     });
-    // The implicit midpoint rule written by hand, and the trapezoidal rule: stiffly accurate, not symplectic.
+    // The implicit midpoint rule written by hand, and the trapezoidal rule: stiffly accurate, not
+    // symplectic.
     let midpoint = Tableau::new([[0.5]], [1.0], [0.5]).unwrap();
     assert!(midpoint.is_symplectic() && midpoint.is_collocation());
     let trapezoidal = Tableau::new([[0.0, 0.0], [0.5, 0.5]], [0.5, 0.5], [0.0, 1.0]).unwrap();
@@ -147,7 +151,8 @@ fn properties() {
 
 #[test]
 fn orders_of_other_published_methods() {
-    // Lobatto IIIC with three stages: order 4, C(2); it is stiffly accurate but no collocation method.
+    // Lobatto IIIC with three stages: order 4, C(2); it is stiffly accurate but no collocation
+    // method.
     let lobatto = Tableau::new(
         [
             [1.0 / 6.0, -1.0 / 3.0, 1.0 / 6.0],
@@ -206,8 +211,8 @@ fn wrong_tableaux_are_refused() {
 fn weights_at_the_nodes_are_the_tableau() {
     for_collocation!(|t, _family| {
         let s = t.c().len();
-        // The condition of interpolation is the Lebesgue constant Σ|ℓ_i|, below 4 in [0, 1] for s ≤ 9
-        // (Gauss nodes: 3.3 at the ends); each of the 2s factors of ℓ_i has three roundings.
+        // The condition of interpolation is the Lebesgue constant Σ|ℓ_i|, below 4 in [0, 1] for s ≤
+        // 9 (Gauss nodes: 3.3 at the ends); each of the 2s factors of ℓ_i has three roundings.
         let tolerance = 4.0 * 6.0 * s as f64 * f64::EPSILON;
         for i in 0..s {
             let (weights, lagrange) = (t.weights(t.c()[i]), t.lagrange(t.c()[i]));
@@ -230,7 +235,8 @@ fn interpolation_is_exact_for_polynomials() {
         let s = t.c().len();
         for theta in [-0.5, 0.0, 1e-9, 0.3, 0.77, 1.0, 1.25] {
             let (weights, lagrange) = (t.weights(theta), t.lagrange(theta));
-            // Values at the nodes are at most one: the error is the sum of |ℓ_i| in roundings, outside [0, 1] too.
+            // Values at the nodes are at most one: the error is the sum of |ℓ_i| in roundings,
+            // outside [0, 1] too.
             let lebesgue: f64 = lagrange.iter().map(|l| l.abs()).sum::<f64>().max(1.0);
             let integrals: f64 = weights.iter().map(|w| w.abs()).sum();
             for k in 0..s as i32 {
@@ -254,7 +260,8 @@ fn interpolation_is_exact_for_polynomials() {
     });
 }
 
-/// `c_i = Σ_j a_ij` makes `t` an ordinary state: the end of a step of a quadrature of degree `p − 1` is exact.
+/// `c_i = Σ_j a_ij` makes `t` an ordinary state: the end of a step of a quadrature of degree
+/// `p − 1` is exact.
 #[test]
 fn explicit_weights_integrate_polynomials() {
     for_explicit!(|t| {

@@ -124,8 +124,8 @@ pub fn hessian<M: Equations, S: Lanes>(
     }
 }
 
-/// `system!(Name [NX, NZ, NU, NP], |v, f| body)`: a model with the residual `f(v)`, where `body` may use the
-/// scalar type `S`.
+/// `system!(Name [NX, NZ, NU, NP], |v, f| body)`: a model with the residual `f(v)`, where `body`
+/// may use the scalar type `S`.
 #[macro_export]
 macro_rules! system {
     ($(#[$doc:meta])* $name:ident [$nx:literal, $nz:literal, $nu:literal, $np:literal] $s:ident |$v:ident, $f:ident| $body:block) => {

@@ -1,11 +1,13 @@
-//! How long a program that uses a model takes to compile, its dependencies built before; and how that grows.
+//! How long a program that uses a model takes to compile, its dependencies built before; and how
+//! that grows.
 //!
 //! ```text
 //! cargo run --release --manifest-path benches/Cargo.toml --bin compile_time [-- FILE.md]
 //! ```
 //!
-//! Writes a package to `target/compile_time` that integrates one model in all modes, and times `cargo build --release` after the
-//! source is touched: the macro, the compiler, the linker. With a file, the table goes between its lines `<!-- compile time -->` and
+//! Writes a package to `target/compile_time` that integrates one model in all modes, and times
+//! `cargo build --release` after the source is touched: the macro, the compiler, the linker. With a
+//! file, the table goes between its lines `<!-- compile time -->` and
 //! `<!-- end of compile time -->`.
 
 use casados_benches::record::{insert, repository};

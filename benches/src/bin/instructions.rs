@@ -1,12 +1,14 @@
-//! Instructions of one call, counted by callgrind, against the reviewed counts of `instructions.txt`.
+//! Instructions of one call, counted by callgrind, against the reviewed counts of
+//! `instructions.txt`.
 //!
 //! ```text
 //! cargo run --release --manifest-path benches/Cargo.toml --bin instructions            compares; fails beyond 2 %
 //! cargo run --release --manifest-path benches/Cargo.toml --bin instructions -- accept  writes the counts
 //! ```
 //!
-//! Counts do not depend on what else the machine does, but on the compiler, so a new one means new counts. The program runs itself under
-//! valgrind with a few calls and with more: the difference is what the calls cost.
+//! Counts do not depend on what else the machine does, but on the compiler, so a new one means new
+//! counts. The program runs itself under valgrind with a few calls and with more: the difference is
+//! what the calls cost.
 
 use casados::prelude::Start;
 use casados_benches::calls::{open, options};

@@ -7,8 +7,9 @@
 //! {"runs": [{"solver": "diffsol, BDF", "tolerance": 1e-4, "y": [..], "derivatives": [..], "time": 2e-4, "steps": 80} | {.., "error": ".."}]}
 //! ```
 //!
-//! Equations are those of the models, derivatives their directional derivatives by dual numbers: what diffsol asks for.
-//! `atol` is relative to the tolerance. Times are the least CPU seconds of a call that makes a solver and integrates.
+//! Equations are those of the models, derivatives their directional derivatives by dual numbers:
+//! what diffsol asks for. `atol` is relative to the tolerance. Times are the least CPU seconds of a
+//! call that makes a solver and integrates.
 
 use casados::GraphDae;
 use casados::shape::Shape;
@@ -119,7 +120,8 @@ fn runs(model: Model, request: &Request) -> Vec<Value> {
     runs
 }
 
-/// The variables of the model, `ẋ = 0` in front, then the states, parameters and time, and its residual: memory of a call.
+/// The variables of the model, `ẋ = 0` in front, then the states, parameters and time, and its
+/// residual: memory of a call.
 #[derive(Clone)]
 struct Buffers<T> {
     v: Vec<T>,
@@ -152,7 +154,8 @@ impl<T: Copy + From<f64>> Buffers<T> {
     }
 }
 
-/// `f(ẋ, y, p, t) = C ẋ − r(y, p, t)` as `C ẋ = r`; where `C` is one number in each row and column it is divided by.
+/// `f(ẋ, y, p, t) = C ẋ − r(y, p, t)` as `C ẋ = r`; where `C` is one number in each row and column
+/// it is divided by.
 #[derive(Clone)]
 struct Equations {
     model: Model,

@@ -1,12 +1,14 @@
-//! Optimal control of the chain of masses: whole solutions, their linearisations and QPs, beside IPOPT with direct collocation (CasADi,
-//! where `CASADOS_PYTHON` or `python3` has it) and acados' SQP (where `ACADOS_SOURCE_DIR` lists installations) in the same run.
+//! Optimal control of the chain of masses: whole solutions, their linearisations and QPs, beside
+//! IPOPT with direct collocation (CasADi, where `CASADOS_PYTHON` or `python3` has it) and acados'
+//! SQP (where `ACADOS_SOURCE_DIR` lists installations) in the same run.
 //!
 //! ```text
 //! cargo run --release --manifest-path benches/Cargo.toml --bin ocp
 //! ```
 //!
-//! Times are CPU seconds of one thread, the best of five medians. All end at a residual of 1e-6, from `x = x_rest`, `u = 0`; "condensed"
-//! in blocks of five intervals. Ratios are those of the better one. acados is measured in the same rounds, in its fastest setting; see
+//! Times are CPU seconds of one thread, the best of five medians. All end at a residual of 1e-6,
+//! from `x = x_rest`, `u = 0`; "condensed" in blocks of five intervals. Ratios are those of the
+//! better one. acados is measured in the same rounds, in its fastest setting; see
 //! `benches/peers/acados_ocp.py`.
 
 #[path = "../../../examples/models/chain_problem.rs"]
@@ -50,7 +52,8 @@ impl Peers {
         Some(1e3 * answer["seconds"].as_f64()?)
     }
 
-    /// Milliseconds of acados, whole and linearisation, where they are less than those known so far.
+    /// Milliseconds of acados, whole and linearisation, where they are less than those known so
+    /// far.
     fn acados(&mut self, request: &Value, known: &mut [f64; 2], objective: f64) {
         for acados in &mut self.acados {
             let answer = match acados.ask(request) {

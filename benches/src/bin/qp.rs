@@ -1,12 +1,13 @@
-//! One QP of the chain of masses at a tolerance of 1e-8: the library's interior point, condensed and not, cold and warm, beside
-//! clarabel in the same run.
+//! One QP of the chain of masses at a tolerance of 1e-8: the library's interior point, condensed
+//! and not, cold and warm, beside clarabel in the same run.
 //!
 //! ```text
 //! cargo run --release --manifest-path benches/Cargo.toml --features clarabel --bin qp
 //! ```
 //!
-//! The reference column is HPIPM (mode `speed`; warm: as acados runs it, condensed to ten blocks) on another day on a machine on
-//! which clarabel took what the last column says: the ratio of the two columns of clarabel carries it here.
+//! The reference column is HPIPM (mode `speed`; warm: as acados runs it, condensed to ten blocks)
+//! on another day on a machine on which clarabel took what the last column says: the ratio of the
+//! two columns of clarabel carries it here.
 
 use casados::qp::{
     Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, StageDims, Start,

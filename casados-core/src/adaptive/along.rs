@@ -12,10 +12,11 @@ use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with those of the solution; see
-    /// [`quadrature`](crate::quadrature).
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
+    /// those of the solution; see [`quadrature`](crate::quadrature).
     ///
-    /// The steps are chosen for the states, then taken again to rounding: value and derivatives belong to each other.
+    /// The steps are chosen for the states, then taken again to rounding: value and derivatives
+    /// belong to each other.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -71,8 +72,9 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Inte
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
-    /// Takes an integrand along, for its integral over all intervals and its derivatives with those of the solution; see
-    /// [`quadrature`](crate::quadrature). Derivatives by all controls are returned, and those in the integrand are zero.
+    /// Takes an integrand along, for its integral over all intervals and its derivatives with those
+    /// of the solution; see [`quadrature`](crate::quadrature). Derivatives by all controls are
+    /// returned, and those in the integrand are zero.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -111,8 +113,8 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         self.integrator.forward_along(x0, controls, ends, self.integrand)
     }
 
-    /// See [`Piecewise::hessian`]; gradient and Hessian are those of `λᵀx` at the end and the integral over all intervals. The
-    /// integral and its derivatives.
+    /// See [`Piecewise::hessian`]; gradient and Hessian are those of `λᵀx` at the end and the
+    /// integral over all intervals. The integral and its derivatives.
     ///
     /// # Errors
     /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
@@ -129,7 +131,8 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
         self.integrator.hessian_along(x0, controls, ends, lambda, self.integrand)
     }
 
-    /// See [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end and the integral over all intervals.
+    /// See [`Piecewise::adjoint`]; the gradient is that of `λᵀx` at the end and the integral over
+    /// all intervals.
     ///
     /// # Errors
     /// See [`Piecewise`]; [`Error::NonFiniteFunction`].
@@ -145,11 +148,11 @@ impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Piec
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Takes an integrand along, up to the end and over all events, where it may jump with the state; see
-    /// [`quadrature`](crate::quadrature).
+    /// Takes an integrand along, up to the end and over all events, where it may jump with the
+    /// state; see [`quadrature`](crate::quadrature).
     ///
-    /// At events derivatives are those of the solution, as those of the state: what is integrated before the event, less what
-    /// is after it, times the derivative of its time.
+    /// At events derivatives are those of the solution, as those of the state: what is integrated
+    /// before the event, less what is after it, times the derivative of its time.
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,

@@ -1,10 +1,11 @@
-//! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton, the estimate of its error, and its polynomial.
+//! One step of a Radau IIA or Gauss method with `S` stages: simplified Newton, the estimate of its
+//! error, and its polynomial.
 //!
-//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for `f(ẋ, x, z, t) = 0` with unknowns
-//! `k_i`, `z_i` instead of increments of `y`.
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; for
+//! `f(ẋ, x, z, t) = 0` with unknowns `k_i`, `z_i` instead of increments of `y`.
 //!
-//! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of the last repeats the
-//! last stage.
+//! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of
+//! the last repeats the last stage.
 
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
@@ -26,8 +27,9 @@ use bytemuck::allocation::try_zeroed_box;
 use core::array::from_fn;
 use core::marker::PhantomData;
 
-/// Increments that shrink no more are rounding errors, if they are this small beside what is tolerated: of a state near zero that
-/// follows from large ones by an equation, they may be above the tolerance of the iteration.
+/// Increments that shrink no more are rounding errors, if they are this small beside what is
+/// tolerated: of a state near zero that follows from large ones by an equation, they may be above
+/// the tolerance of the iteration.
 const NOISE: f64 = 0.01;
 
 /// An estimate that is smaller lets the next step grow, whatever it is of.
@@ -146,8 +148,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         });
     }
 
-    /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of the squares of the
-    /// changes of `(ξ, z)` relative to what is tolerated.
+    /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of
+    /// the squares of the changes of `(ξ, z)` relative to what is tolerated.
     fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
         let Memory { y, points, rows, .. } = &mut *self.memory;
         let mut points = points.each_mut().map(|points| points.as_mut());
@@ -183,10 +185,11 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
 
     /// The larger one of the two estimates, from the defect at the point that is there.
     ///
-    /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where nothing is a stage it is how far
-    /// the extrapolated derivative is from the solution at the state that was reached: of stiff components
-    /// this is their error, which no method with `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the
-    /// solve takes it out of the estimate. The second, of the states, is that of [`Transport`].
+    /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where
+    /// nothing is a stage it is how far the extrapolated derivative is from the solution at the
+    /// state that was reached: of stiff components this is their error, which no method with
+    /// `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the solve takes it out of
+    /// the estimate. The second, of the states, is that of [`Transport`].
     fn estimate(
         &mut self,
         start: &Start<'_, M, T>,
@@ -201,8 +204,9 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         if at_end || !start.known || larger <= first.max(UNDOUBTED) {
             return Ok(larger);
         }
-        // Newton's method leaves a residual of algebraic equations at the start, which does not shrink with the step: not
-        // of this step, and without it only the second estimate is below its tolerance.
+        // Newton's method leaves a residual of algebraic equations at the start, which does not
+        // shrink with the step: not of this step, and without it only the second estimate is below
+        // its tolerance.
         let mut defect = self.memory.f_point;
         self.memory.point = *start.point;
         self.evaluate_point(residuals)?;
@@ -398,7 +402,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
             rows[slot::<M>(equation)] = [[Complex::real(-*f)]];
         }
         factors.solve(rows);
-        // The real one is the first. Of methods with an even number of stages there is none; the error is the real part.
+        // The real one is the first. Of methods with an even number of stages there is none; the
+        // error is the real part.
         let (re, im) = self.basis.values().scaled(h).get(0);
         for (index, (error, [[row]])) in residual.as_mut().iter_mut().zip(rows.as_ref()).enumerate() {
             let (real, imaginary) = row.get(0);
@@ -431,8 +436,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         let mut point = ArrayV::<M, T>::zeroed();
         let at_end = self.estimates(start, &mut point);
         self.memory.point = point;
-        // What the method misses is how far the derivative of its polynomial, extrapolated to the start of the step,
-        // is from the solution there.
+        // What the method misses is how far the derivative of its polynomial, extrapolated to the
+        // start of the step, is from the solution there.
         let error = self.estimate(start, at_end, residuals)?;
         if at_end || !(again && error >= 1.0) {
             return Ok(error);

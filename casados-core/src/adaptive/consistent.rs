@@ -53,7 +53,8 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         Ok(euler)
     }
 
-    /// From the start values in `y`: `(ẋ, z)` there; the number of points at which the model was evaluated.
+    /// From the start values in `y`: `(ẋ, z)` there; the number of points at which the model was
+    /// evaluated.
     ///
     /// # Errors
     /// [`Error::InconsistentStart`]; the others of Newton's method.
@@ -67,7 +68,8 @@ impl<M: Dae, T: Real> Consistent<M, T> {
         Ok(statistics.residuals + statistics.jacobians)
     }
 
-    /// As [`Consistent::solve`], from start values that may be far away: an error says what they have to do with it.
+    /// As [`Consistent::solve`], from start values that may be far away: an error says what they
+    /// have to do with it.
     ///
     /// # Errors
     /// As [`Consistent::solve`]; [`Error::NonFiniteStart`].

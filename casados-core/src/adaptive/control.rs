@@ -1,7 +1,8 @@
 //! The step size: from the estimated error of a step to the length of the next one.
 //!
-//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; K. Gustafsson, Control-theoretic
-//! techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans. Math. Softw. 20 (1994).
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8; K. Gustafsson,
+//! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
+//! Math. Softw. 20 (1994).
 
 use crate::scalar::Scalar;
 
@@ -26,8 +27,9 @@ pub struct Predictive {
 }
 
 impl Predictive {
-    /// The factor for the step size after a step of size `h` with the estimated error `error`, relative to the tolerance,
-    /// that behaves like `h^(1/exponent)`. `effort` is one, or less if the step took many iterations.
+    /// The factor for the step size after a step of size `h` with the estimated error `error`,
+    /// relative to the tolerance, that behaves like `h^(1/exponent)`. `effort` is one, or less if
+    /// the step took many iterations.
     pub fn factor(&mut self, h: f64, error: f64, exponent: f64, effort: f64, limits: &Limits) -> f64 {
         let safety = limits.safety * effort;
         let (least, most) = (1.0 / limits.grow, 1.0 / limits.shrink);
@@ -48,8 +50,9 @@ impl Predictive {
     }
 }
 
-/// The controller of explicit methods: what the error of the last step was takes part (K. Gustafsson, Control theoretic
-/// techniques for stepsize selection in explicit Runge-Kutta methods, ACM Trans. Math. Softw. 17 (1991)).
+/// The controller of explicit methods: what the error of the last step was takes part (K.
+/// Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods,
+/// ACM Trans. Math. Softw. 17 (1991)).
 #[derive(Clone, Copy, Debug)]
 pub struct Proportional {
     last: f64,
@@ -62,7 +65,8 @@ impl Default for Proportional {
 }
 
 impl Proportional {
-    /// The factor for the step size after a step whose error behaves like `h^(1/exponent)`, within a range.
+    /// The factor for the step size after a step whose error behaves like `h^(1/exponent)`, within
+    /// a range.
     pub fn factor(&mut self, error: f64, exponent: f64, memory: f64, range: (f64, f64)) -> f64 {
         let present = power(error, exponent - 0.75 * memory);
         if error > 1.0 {

@@ -1,5 +1,5 @@
-//! Explicit pairs for models that are not stiff: the method of higher order advances the solution, the difference to the
-//! other one decides about the step.
+//! Explicit pairs for models that are not stiff: the method of higher order advances the solution,
+//! the difference to the other one decides about the step.
 
 use super::consistent::At;
 use super::control::{Proportional, power};
@@ -227,7 +227,8 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
 }
 
-/// As long as an explicit Euler step changes the solution, and its derivative, by a hundredth of their size.
+/// As long as an explicit Euler step changes the solution, and its derivative, by a hundredth of
+/// their size.
 fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,

@@ -1,7 +1,7 @@
 //! Derivatives of integrals over intervals with controls of their own.
 //!
-//! An integrand sees one interval at a time, with derivatives by `(x_k, u_k, p)`; here they become those by all of
-//! `W = (x₀, u₀, …, u_{N−1}, p)`:
+//! An integrand sees one interval at a time, with derivatives by `(x_k, u_k, p)`; here they become
+//! those by all of `W = (x₀, u₀, …, u_{N−1}, p)`:
 //!
 //! ```text
 //! dq/dW = Σ_k dq_k/d(x_k, u_k, p) D_k        H = Σ_k D_kᵀ H_k D_k        D_k = d(x_k, u_k, p)/dW
@@ -56,7 +56,8 @@ pub struct PiecewiseLeastSquares<M: Dae, T: Real = f64> {
 listed!([F: Function, T: Plain] PiecewiseQuadrature<F, T> { dq_dx0, dq_du, dq_dp });
 listed!([M: Dae, T: Real] PiecewiseLeastSquares<M, T> { grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
 
-/// An integrand whose derivatives over several intervals have a form of their own: [`Quadrature`] and [`LeastSquares`].
+/// An integrand whose derivatives over several intervals have a form of their own: [`Quadrature`]
+/// and [`LeastSquares`].
 pub trait Spanning<M: Dae, T: Real>: Integrand<M, T> {
     /// That form.
     type Derivatives;
@@ -177,7 +178,8 @@ impl<M: Dae, T: Real> Sums<M, T> {
         Ok(Self { at, gradients, matrix, second, product })
     }
 
-    /// Adds interval `k`, whose start has the derivatives `v`, and what it was added from forgets it. `full` is memory.
+    /// Adds interval `k`, whose start has the derivatives `v`, and what it was added from forgets
+    /// it. `full` is memory.
     pub(super) fn add(
         &mut self,
         k: usize,

@@ -22,17 +22,19 @@ use core::marker::PhantomData;
 
 /// An adaptive integrator of the method `B` for the model `M`; see [`Adaptive`](super::Adaptive).
 ///
-/// All calls take the state at the start of the interval, the control, and the length `h` of the interval, as those of
-/// [`Irk`](crate::Irk) and [`Erk`](crate::Erk) do; it may be negative or zero. The interval begins at the time of
-/// [`set_time`](Self::set_time). Times that are asked for or returned, as in [`dense`](Self::dense), are times, not distances from
-/// the start. All calls return a reference to results in the memory of the integrator.
+/// All calls take the state at the start of the interval, the control, and the length `h` of the
+/// interval, as those of [`Irk`](crate::Irk) and [`Erk`](crate::Erk) do; it may be negative or
+/// zero. The interval begins at the time of [`set_time`](Self::set_time). Times that are asked for
+/// or returned, as in [`dense`](Self::dense), are times, not distances from the start. All calls
+/// return a reference to results in the memory of the integrator.
 ///
 /// # Errors
-/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`]; [`Error::InconsistentStart`] if there are no
-/// consistent `ẋ` and `z` at the start, [`Error::Singular`] if no step can be solved; [`Error::NonFiniteModel`] if the
-/// model has no finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
-/// [`Error::OutOfMemory`]. Then the integrator is usable, and steps that are frozen stay so; until a call succeeds there is no
-/// dense output and nothing to be frozen, [`Error::NoResult`].
+/// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`];
+/// [`Error::InconsistentStart`] if there are no consistent `ẋ` and `z` at the start,
+/// [`Error::Singular`] if no step can be solved; [`Error::NonFiniteModel`] if the model has no
+/// finite value at a point of the solution; [`Error::StepSizeUnderflow`], [`Error::TooManySteps`];
+/// [`Error::OutOfMemory`]. Then the integrator is usable, and steps that are frozen stay so; until
+/// a call succeeds there is no dense output and nothing to be frozen, [`Error::NoResult`].
 pub struct Integrator<M: Dae, B: Kind<M, T>, T: Real> {
     pub(super) options: AdaptiveOptions,
     pub(super) base: Box<Base<M, T>>,
@@ -107,8 +109,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// Start values `ẋ` and `z` from which consistent ones are found; if never set, the nominal values of the model,
-    /// [`Dae::START`]. Where there are several solutions they decide for one.
+    /// Start values `ẋ` and `z` from which consistent ones are found; if never set, the nominal
+    /// values of the model, [`Dae::START`]. Where there are several solutions they decide for one.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
@@ -143,15 +145,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// Whether the derivatives of the solution take part in the choice of the steps of all following calls: then a step is
-    /// accepted if its estimated errors of the states and of every column of `V = d(x, z)/d(x₀, u, p)` are below the tolerances.
+    /// Whether the derivatives of the solution take part in the choice of the steps of all
+    /// following calls: then a step is accepted if its estimated errors of the states and of every
+    /// column of `V = d(x, z)/d(x₀, u, p)` are below the tolerances.
     ///
-    /// Without it steps are chosen for the states, and derivatives are the exact ones of these steps: those of the solution
-    /// up to an error that need not follow the tolerance. The error of `V_rc` is measured by `atol_r / s_c + rtol_r |V_rc|`,
-    /// with the magnitudes `s` of [`Integrator::set_sensitivity_scales`]. Results are still exact derivatives of the steps that
-    /// are taken. Each step that the states accept is differentiated once more than without, in every call that
-    /// chooses steps, `solve` included; steps that are frozen cost nothing more. Over several intervals, and between events, `V` begins
-    /// as the identity in each.
+    /// Without it steps are chosen for the states, and derivatives are the exact ones of these
+    /// steps: those of the solution up to an error that need not follow the tolerance. The error of
+    /// `V_rc` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the magnitudes `s` of
+    /// [`Integrator::set_sensitivity_scales`]. Results are still exact derivatives of the steps
+    /// that are taken. Each step that the states accept is differentiated once more than without,
+    /// in every call that chooses steps, `solve` included; steps that are frozen cost nothing more.
+    /// Over several intervals, and between events, `V` begins as the identity in each.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -164,8 +168,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The magnitudes of `x₀`, `u` and `p` by which errors of derivatives are measured, as `p̄` of CVODES. For those that are
-    /// zero, and if never set, the absolute value in each call, or one if that is zero.
+    /// The magnitudes of `x₀`, `u` and `p` by which errors of derivatives are measured, as `p̄` of
+    /// CVODES. For those that are zero, and if never set, the absolute value in each call, or one
+    /// if that is zero.
     ///
     /// # Errors
     /// [`Error::InvalidOption`] if one is negative or not finite: then the last ones stay.
@@ -202,7 +207,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         &self.statistics
     }
 
-    /// The times between the accepted steps of the last call, the start first, if steps are remembered.
+    /// The times between the accepted steps of the last call, the start first, if steps are
+    /// remembered.
     pub fn times(&self) -> impl Iterator<Item = T> {
         let end = self.last.map(|span| span.end);
         self.tape.entries().iter().map(|entry| entry.t).chain(end)
@@ -239,11 +245,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(&self.base.result)
     }
 
-    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times, which lie between the start
-    /// `t` and `t + h`, while the integration passes them; steps need not be remembered for it.
+    /// As [`Integrator::solve`], and `output` is called with the solution at each of these times,
+    /// which lie between the start `t` and `t + h`, while the integration passes them; steps need
+    /// not be remembered for it.
     ///
     /// # Errors
-    /// See [`Integrator`]; [`Error::OutsideInterval`] of a time that is outside or before the one that precedes it.
+    /// See [`Integrator`]; [`Error::OutsideInterval`] of a time that is outside or before the one
+    /// that precedes it.
     pub fn solve_at(
         &mut self,
         x0: &VectorX<M, T>,
@@ -292,7 +300,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// The solution at the time `t`, as the model sees it: inside the interval of the last call.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if that call failed or steps are not remembered; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::NoResult`], also if that call failed or steps are not remembered;
+    /// [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         check(Argument::T, &[t])?;
         let span = self.last.ok_or(Error::NoResult)?;
@@ -318,9 +327,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(dense)
     }
 
-    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`: of the steps that were taken, exactly.
+    /// The solution, and its derivatives with respect to `x₀`, `u` and `p`: of the steps that were
+    /// taken, exactly.
     ///
-    /// The steps are chosen as in [`Integrator::solve`], then kept, and their stages solved to rounding, each from where the run took it.
+    /// The steps are chosen as in [`Integrator::solve`], then kept, and their stages solved to
+    /// rounding, each from where the run took it.
     ///
     /// # Errors
     /// See [`Integrator`]; those of Newton's method with steps that are kept.
@@ -342,7 +353,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(&self.done(span)?.hessian.first.forward)
     }
 
-    /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as [`Integrator::forward`].
+    /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as
+    /// [`Integrator::forward`].
     ///
     /// # Errors
     /// As [`Integrator::forward`].
@@ -374,7 +386,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(&self.done(span)?.adjoint)
     }
 
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as [`Integrator::forward`].
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as
+    /// [`Integrator::forward`].
     ///
     /// # Errors
     /// As [`Integrator::forward`].
@@ -422,8 +435,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(&self.base.result)
     }
 
-    /// Following calls take the steps of the last successful one, whatever they are given, and solve them to rounding:
-    /// one smooth function of `x₀`, `u` and `p`. Their interval has to be the same.
+    /// Following calls take the steps of the last successful one, whatever they are given, and
+    /// solve them to rounding: one smooth function of `x₀`, `u` and `p`. Their interval has to be
+    /// the same.
     ///
     /// # Errors
     /// [`Error::NoResult`], also if steps were not remembered.
@@ -444,7 +458,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// The end of an interval of this length.
     ///
     /// # Errors
-    /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not resolve.
+    /// [`Error::NonFiniteInput`]; [`Error::StepSizeUnderflow`] of a length that the time does not
+    /// resolve.
     pub(super) fn end(&self, h: T) -> Result<T, Error> {
         check(Argument::H, &[h])?;
         let end = self.start + h;
@@ -477,7 +492,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         Ok(())
     }
 
-    /// The steps that derivatives are taken of: chosen now, or frozen. Until these are there, there is no result.
+    /// The steps that derivatives are taken of: chosen now, or frozen. Until these are there, there
+    /// is no result.
     fn steps(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
         self.last = None;
         self.reserve()?;

@@ -1,4 +1,5 @@
-//! The loops of a collocation step, compiled for each machine: stages lie side by side in groups of four.
+//! The loops of a collocation step, compiled for each machine: stages lie side by side in groups of
+//! four.
 
 use crate::linalg::{Arithmetic, Complex, Kernel, PARTS, slot};
 use crate::model::{ArrayK, ArrayV, Dae};

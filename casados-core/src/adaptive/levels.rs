@@ -54,7 +54,8 @@ impl<M: Dae, T: Real> Levels<M, T> {
     }
 }
 
-/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`, `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
+/// The polynomial of a step: `x(t_n + θh) = x_n + h Σ_i b_i(θ) k_i`,
+/// `z(t_n + θh) = Σ_i ℓ_i(θ) z_i`.
 pub(super) fn interpolate<M: Dae, T: Real>(
     stages: &dyn Stages<M, T>,
     x: &[T],

@@ -1,20 +1,24 @@
-//! Integration with steps of variable size, chosen so that the estimated error of each stays below a tolerance.
+//! Integration with steps of variable size, chosen so that the estimated error of each stays below
+//! a tolerance.
 //!
-//! Radau IIA methods for stiff and differential-algebraic equations, with one Jacobian for all stages and, for
-//! [`Radau`], a number of stages (3, 5 or 7: orders 5, 9 and 13) that follows from how Newton's method converges. The
-//! algorithm is that of the codes RADAU5 and RADAU (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II,
-//! section IV.8; Stiff differential equations solved by Radau methods, J. Comput. Appl. Math. 111 (1999)), for fully
-//! implicit equations. [`Gauss`] methods of orders 4 to 12, where oscillations are not to be damped, with an estimate of the
-//! same kind: how far the derivative of the polynomial, extrapolated to the end of the step, is from the solution there,
-//! through the matrix of one eigenvalue. Explicit pairs of orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that
-//! are not stiff.
+//! Radau IIA methods for stiff and differential-algebraic equations, with one Jacobian for all
+//! stages and, for [`Radau`], a number of stages (3, 5 or 7: orders 5, 9 and 13) that follows from
+//! how Newton's method converges. The algorithm is that of the codes RADAU5 and RADAU (E. Hairer,
+//! G. Wanner, Solving Ordinary Differential Equations II, section IV.8; Stiff differential
+//! equations solved by Radau methods, J. Comput. Appl. Math. 111 (1999)), for fully implicit
+//! equations. [`Gauss`] methods of orders 4 to 12, where oscillations are not to be damped, with an
+//! estimate of the same kind: how far the derivative of the polynomial, extrapolated to the end of
+//! the step, is from the solution there, through the matrix of one eigenvalue. Explicit pairs of
+//! orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that are not stiff.
 //!
-//! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels` its loops, `transport` the second estimate of its error, `levels` the
-//! methods of a family, `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run` the
-//! steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and `explicit` the explicit methods,
-//! `replay` and `sensitivities` derivatives of runs, `variational` derivatives that take part in the choice of the steps,
-//! `along` an integrand, `segment` one of several intervals, `piecewise` those with controls of their own, `columns` their
-//! derivatives and `integrals` those of an integrand, `events`, `integrator` what users see.
+//! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels`
+//! its loops, `transport` the second estimate of its error, `levels` the methods of a family,
+//! `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run`
+//! the steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and
+//! `explicit` the explicit methods, `replay` and `sensitivities` derivatives of runs, `variational`
+//! derivatives that take part in the choice of the steps, `along` an integrand, `segment` one of
+//! several intervals, `piecewise` those with controls of their own, `columns` their derivatives and
+//! `integrals` those of an integrand, `events`, `integrator` what users see.
 
 mod along;
 mod collocation;
@@ -60,7 +64,8 @@ use alloc::boxed::Box;
 use replay::{Single, Three};
 use stages::Stages;
 
-/// The adaptive integrator of the method `B` for the model `M`, with numbers `T`: `Adaptive<Model, Radau>`.
+/// The adaptive integrator of the method `B` for the model `M`, with numbers `T`:
+/// `Adaptive<Model, Radau>`.
 pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 
 /// A method that an adaptive integrator takes.
@@ -74,7 +79,8 @@ pub trait AdaptiveMethod {
     type Integrator<M: Dae, T: Real>;
 }
 
-/// Radau IIA methods of 3, 5 and 7 stages: more of them where Newton's method converges fast, fewer where it is slow.
+/// Radau IIA methods of 3, 5 and 7 stages: more of them where Newton's method converges fast, fewer
+/// where it is slow.
 #[derive(Clone, Copy, Debug)]
 pub struct Radau;
 
@@ -94,7 +100,8 @@ mod sealed {
 
     /// What integrates with steps of variable size, for the models that it can.
     pub trait Engine<M: Dae, T: Real>: Kind<M, T> {
-        /// Whether `z` at the end of a step is that of a stage; else it is found from the equations.
+        /// Whether `z` at the end of a step is that of a stage; else it is found from the
+        /// equations.
         const ENDS_ON_STAGE: bool;
         /// What takes its steps again.
         type Replays: Replay<M, T>;
@@ -109,7 +116,8 @@ mod sealed {
             span: Span<T>,
             after: After<'_, M, T>,
         ) -> Result<(), Error>;
-        /// The solution inside a step, from its numbers; `inputs` are variables of the model, of which `u` and `p` count.
+        /// The solution inside a step, from its numbers; `inputs` are variables of the model, of
+        /// which `u` and `p` count.
         ///
         /// # Errors
         /// A value of the model that is not finite.
@@ -167,7 +175,8 @@ macro_rules! single {
             const ENDS_ON_STAGE: bool = $ends_on_stage;
             type Replays<M: Dae, T: Real> = Single<M, Self, T, $stages>;
             fn open<M: Dae, T: Real>(_: usize) -> Result<Box<dyn Stages<M, T> + Send + Sync>, Error> {
-                // As many lanes as there are eigenvalues, filled up to registers; stages in groups of four.
+                // As many lanes as there are eigenvalues, filled up to registers; stages in groups
+                // of four.
                 Ok(Box::new(collocation::Collocation::<M, Self, T, $stages, $groups>::new()?))
             }
         })*

@@ -13,11 +13,13 @@ pub struct AdaptiveOptions {
     pub initial_step: Option<f64>,
     /// No step is longer; above zero, infinite by default.
     pub max_step: f64,
-    /// A step that would have to be shorter is the error `StepSizeUnderflow`; between zero, the default, and `max_step`.
+    /// A step that would have to be shorter is the error `StepSizeUnderflow`; between zero, the
+    /// default, and `max_step`.
     pub min_step: f64,
     /// More steps than these, refused ones included, are the error `TooManySteps`; at least one.
     pub max_steps: usize,
-    /// Whether steps are remembered: dense output over the whole interval and sensitivities need them.
+    /// Whether steps are remembered: dense output over the whole interval and sensitivities need
+    /// them.
     pub keep_steps: bool,
 }
 
@@ -36,12 +38,14 @@ impl Default for AdaptiveOptions {
     }
 }
 
-/// The smallest relative tolerance, in ε: below, rounding errors are taken for errors of the method.
+/// The smallest relative tolerance, in ε: below, rounding errors are taken for errors of the
+/// method.
 const FINEST: f64 = 10.0;
 
 impl AdaptiveOptions {
     /// # Errors
-    /// [`Error::InvalidOption`] for the first value that makes no sense. `epsilon` is that of the number type.
+    /// [`Error::InvalidOption`] for the first value that makes no sense. `epsilon` is that of the
+    /// number type.
     pub fn check(&self, epsilon: f64) -> Result<(), Error> {
         let invalid = |option, value, reason| Err(Error::InvalidOption { option, value, reason });
         check_relative(self.rtol, epsilon)?;

@@ -1,16 +1,19 @@
-//! Explicit pairs: two methods on the same stages, whose difference estimates the error, and their dense output.
+//! Explicit pairs: two methods on the same stages, whose difference estimates the error, and their
+//! dense output.
 //!
-//! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5, II.6 and II.10; the
-//! coefficients of the codes DOPRI5 and DOP853.
+//! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5,
+//! II.6 and II.10; the coefficients of the codes DOPRI5 and DOP853.
 
 use crate::scalar::Scalar;
 use crate::tableau::{DormandPrince5, DormandPrince8, Method};
 
-/// What a method of `S` stages needs besides its tableau. A stage follows them whose point is the end of the step.
+/// What a method of `S` stages needs besides its tableau. A stage follows them whose point is the
+/// end of the step.
 pub trait Pair<const S: usize>: Method<S> {
     /// The difference to the other method: of the stages, and of the one at the end.
     const DIFFERENCE: ([f64; S], f64);
-    /// The difference to a third one of low order: the estimate is then that of higher order, as far as the two agree.
+    /// The difference to a third one of low order: the estimate is then that of higher order, as
+    /// far as the two agree.
     const COARSE: Option<[f64; S]>;
     /// The error of one step behaves like `h` to this power.
     const ORDER: f64;
@@ -18,10 +21,11 @@ pub trait Pair<const S: usize>: Method<S> {
     const RANGE: (f64, f64);
     /// How much of the last error the controller takes into account.
     const MEMORY: f64;
-    /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one at the end and of the
-    /// ones before it.
+    /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one
+    /// at the end and of the ones before it.
     const MORE: &'static [More<S>];
-    /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end, of those above.
+    /// Coefficients of the polynomial beyond the cubic one: of the stages, of the one at the end,
+    /// of those above.
     const POLYNOMIAL: &'static [([f64; S], f64, [f64; 3])];
 
     /// The estimate from the two differences.

@@ -1,5 +1,5 @@
-//! Integration over controls that are piecewise constant: an adaptive integration for each interval, one after the other,
-//! and the derivatives of all of them together.
+//! Integration over controls that are piecewise constant: an adaptive integration for each
+//! interval, one after the other, and the derivatives of all of them together.
 //!
 //! With `x_{k+1} = Φ_k(x_k, u_k, p)` and `W = (x₀, u₀, …, u_{N−1}, p)`:
 //!
@@ -37,15 +37,17 @@ use bytemuck::Zeroable;
 /// let end = horizon.forward(&x0, &controls, &ends)?;      // end.x, end.dx_dx0, end.dx_du[k], end.dx_dp
 /// ```
 ///
-/// The first interval begins at the time that was set ([`Integrator::set_time`]), each of the others at the end of the one
-/// before. Steps end where intervals end. `ends` are times as the model sees them, not lengths, and so is that of
-/// [`dense`](Self::dense).
+/// The first interval begins at the time that was set ([`Integrator::set_time`]), each of the
+/// others at the end of the one before. Steps end where intervals end. `ends` are times as the
+/// model sees them, not lengths, and so is that of [`dense`](Self::dense).
 ///
-/// Later calls of a kind do not allocate, but for the lists that results of derivatives own and the sums of an integrand.
+/// Later calls of a kind do not allocate, but for the lists that results of derivatives own and the
+/// sums of an integrand.
 ///
 /// # Errors
-/// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for each interval;
-/// [`Error::OutsideInterval`] if the ends are not in order, or not those of the steps that are kept.
+/// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for
+/// each interval; [`Error::OutsideInterval`] if the ends are not in order, or not those of the
+/// steps that are kept.
 pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     segments: Vec<Segment<M, T>>,
@@ -177,11 +179,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok(&self.nominal)
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the intervals of the last call; where two of them meet, that of
-    /// the first.
+    /// The solution at the time `t`, as the model sees it, inside the intervals of the last call;
+    /// where two of them meet, that of the first.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`],
+    /// [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         if !self.solved {
             return Err(Error::NoResult);
@@ -240,7 +243,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         Ok((self.backwards(forward, lambda, &mut sums.second, Some(integrand))?, derivatives))
     }
 
-    /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and `p`.
+    /// The solution at the end, and the gradient of `λᵀx` with respect to `x₀`, all controls and
+    /// `p`.
     ///
     /// # Errors
     /// See [`Piecewise`].
@@ -308,7 +312,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         result
     }
 
-    /// The gradient and the Hessian after [`Piecewise::sweep`], with what an integrand has added to `sum`.
+    /// The gradient and the Hessian after [`Piecewise::sweep`], with what an integrand has added to
+    /// `sum`.
     fn backwards(
         &mut self,
         forward: PiecewiseForward<M, T>,
@@ -351,7 +356,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         }
     }
 
-    /// Following calls take the steps of the last successful one, whatever they are given, and solve them to rounding.
+    /// Following calls take the steps of the last successful one, whatever they are given, and
+    /// solve them to rounding.
     ///
     /// # Errors
     /// [`Error::NoResult`], also if that call failed.
@@ -371,7 +377,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         self.frozen = false;
     }
 
-    /// Takes all steps, or prepares those that are kept for other controls. There is a result as soon as the caller says so.
+    /// Takes all steps, or prepares those that are kept for other controls. There is a result as
+    /// soon as the caller says so.
     fn steps(&mut self, x0: &VectorX<M, T>, controls: &[VectorU<M, T>], ends: &[T]) -> Result<(), Error> {
         self.solved = false;
         let count = ends.len();
@@ -475,7 +482,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         finish(&mut along)
     }
 
-    /// The same with derivatives, and what those of second order need; with an integrand and what it adds up, or without.
+    /// The same with derivatives, and what those of second order need; with an integrand and what
+    /// it adds up, or without.
     fn sweep(
         &mut self,
         x0: &VectorX<M, T>,

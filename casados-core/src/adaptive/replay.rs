@@ -1,7 +1,8 @@
-//! A step that is known is taken again, to rounding, and differentiated: it is an interval of one step for the integrator
-//! with steps of equal size.
+//! A step that is known is taken again, to rounding, and differentiated: it is an interval of one
+//! step for the integrator with steps of equal size.
 //!
-//! Nothing here is called through a table of functions: a program contains the derivatives that it asks for, and no others.
+//! Nothing here is called through a table of functions: a program contains the derivatives that it
+//! asks for, and no others.
 
 use super::consistent::At;
 use crate::error::Error;
@@ -46,7 +47,8 @@ pub trait Replay<M: Dae, T: Real> {
         step: &Taken<'_, M, T>,
         along: Along<'_, '_, M, T>,
     ) -> Result<&Forward<M, T>, Error>;
-    /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for each direction.
+    /// Of the last step with derivatives: those of `Σ_i weight_i k_i` by `(x_n, u, p)`, a row for
+    /// each direction.
     ///
     /// # Errors
     /// [`Error::NoResult`]

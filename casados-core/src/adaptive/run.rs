@@ -192,8 +192,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     known: accepted_h.is_some(),
                     h,
                 };
-                // In the middle of the step, as far as that is foreseen: nearer to all stages than the start is. Where the
-                // step fails, at the start.
+                // In the middle of the step, as far as that is foreseen: nearer to all stages than
+                // the start is. Where the step fails, at the start.
                 current = accepted_h.is_none() || rejected;
                 if !current {
                     stages.predict(&start, &mut self.base.middle);
@@ -409,9 +409,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             *tight = (before.1, *asked * *atol);
             finest = finest.min(before.1.to_f64());
         }
-        // Where the error of the iteration is small beside that of the step. It is the same in step after step, and what is not damped
-        // adds up over as many as there are, like the tolerance to the power of −1/(2s): of Gauss methods, which damp nothing, it is smaller
-        // by that, and of Radau methods by a power of what superconvergence takes for granted. It stays above rounding.
+        // Where the error of the iteration is small beside that of the step. It is the same in step
+        // after step, and what is not damped adds up over as many as there are, like the tolerance
+        // to the power of −1/(2s): of Gauss methods, which damp nothing, it is smaller by that, and
+        // of Radau methods by a power of what superconvergence takes for granted. It stays above
+        // rounding.
         let wanted = if B::ENDS_ON_STAGE {
             let spread = (LENIENT / *finer).min(1.0);
             Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03) * Scalar::sqrt(spread)

@@ -1,11 +1,13 @@
-//! Derivatives of a run: the accepted steps are kept as they are, and each is differentiated exactly.
+//! Derivatives of a run: the accepted steps are kept as they are, and each is differentiated
+//! exactly.
 //!
 //! ```text
 //! x_{n+1} = Φ_n(x_n, u, p)        V_{n+1} = ∂Φ_n/∂x V_n + ∂Φ_n/∂(u, p)        λ_n = (∂Φ_n/∂x)ᵀ λ_{n+1}
 //! d²(λᵀ x_N)/dw² = Σ_n D_nᵀ ∇²(λ_{n+1}ᵀ Φ_n) D_n        D_n = d(x_n, u, p)/dw
 //! ```
 //!
-//! An integrand takes part step by step: forwards with the derivatives of its stages by `(x₀, u, p)`, backwards in `λ_n`.
+//! An integrand takes part step by step: forwards with the derivatives of its stages by
+//! `(x₀, u, p)`, backwards in `λ_n`.
 
 use super::consistent::{At, Consistent};
 use super::replay::{Replay, Taken};
@@ -49,8 +51,9 @@ pub struct Frozen<'a, M: Dae, T: Real> {
     pub span: Span<T>,
     /// Start values of `(ẋ, z)`.
     pub given: ArrayK<M, T>,
-    /// Whether the steps were chosen for these inputs: then each is taken from where the run took it. Steps that are solved to rounding one
-    /// after the other lead elsewhere than those that were solved to a coarse tolerance, where errors grow by much, and do not fit there.
+    /// Whether the steps were chosen for these inputs: then each is taken from where the run took
+    /// it. Steps that are solved to rounding one after the other lead elsewhere than those that
+    /// were solved to a coarse tolerance, where errors grow by much, and do not fit there.
     pub chosen: bool,
 }
 
@@ -260,7 +263,8 @@ impl<M: Dae, T: Real> Frozen<'_, M, T> {
     /// The gradient and the Hessian of `λᵀx`, after [`Frozen::forward`] with its history.
     ///
     /// # Errors
-    /// Those of Newton's method; a singular matrix; a second derivative that is not finite; [`Error::Overflow`].
+    /// Those of Newton's method; a singular matrix; a second derivative that is not finite;
+    /// [`Error::Overflow`].
     pub fn hessian<B: Engine<M, T>>(
         &mut self,
         state: &mut B::State,

@@ -8,12 +8,14 @@ use alloc::vec::Vec;
 /// The most stages.
 pub(super) const MOST: usize = 9;
 
-/// The Newton matrix is that of the last Jacobian, so that the iteration converges linearly. It is expected to take no
-/// more than this many iterations, and this many more with each stage above three.
+/// The Newton matrix is that of the last Jacobian, so that the iteration converges linearly. It is
+/// expected to take no more than this many iterations, and this many more with each stage above
+/// three.
 pub(super) const ITERATIONS: f64 = 7.0;
 pub(super) const MORE_ITERATIONS: f64 = 2.5;
 
-/// An iteration that converges at this rate, or is over at once, keeps its Jacobian for the next step.
+/// An iteration that converges at this rate, or is over at once, keeps its Jacobian for the next
+/// step.
 pub(super) const FAST: f64 = 1e-3;
 
 /// Where a step begins and what it is measured by.
@@ -73,11 +75,13 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// The unknown for which there is no pivot.
     fn factor(&mut self, jacobian: &M::Jacobian<T>, h: T) -> Result<bool, usize>;
-    /// From now on, whether every matrix is to be pivoted as a whole; whether that changes anything.
+    /// From now on, whether every matrix is to be pivoted as a whole; whether that changes
+    /// anything.
     fn set_pivoted(&mut self, pivoted: bool) -> bool;
     /// Starts from the same `ẋ` and `z` at all stages, those of the start of the step.
     fn begin(&mut self, point: &ArrayV<M, T>);
-    /// Starts from the polynomial of the last accepted step, whose size is given relative to this one.
+    /// Starts from the polynomial of the last accepted step, whose size is given relative to this
+    /// one.
     fn continue_from_last(&mut self, ratio: f64);
     /// The variables in the middle of the step from its start values.
     fn predict(&self, start: &Start<'_, M, T>, middle: &mut ArrayV<M, T>);
@@ -94,14 +98,14 @@ pub trait Stages<M: Dae, T: Real> {
         convergence: &mut Convergence,
         residuals: &mut usize,
     ) -> Result<(), Failure>;
-    /// The estimated error relative to what is tolerated; `again` if a second, more careful look is to decide whether a
-    /// large one is real.
+    /// The estimated error relative to what is tolerated; `again` if a second, more careful look is
+    /// to decide whether a large one is real.
     ///
     /// # Errors
     /// [`Failure::NotFinite`]
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
-    /// The variables where the estimate compares the derivative of the polynomial with the solution; whether that is the
-    /// end of the step, and not its start.
+    /// The variables where the estimate compares the derivative of the polynomial with the
+    /// solution; whether that is the end of the step, and not its start.
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
     /// From a residual there to the estimated error of `(x, z)`, in its place.
     fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>);
@@ -111,8 +115,8 @@ pub trait Stages<M: Dae, T: Real> {
     fn transport(&self) -> &Transport;
     /// The unknowns of the step that was solved last, stages innermost, at the end of a list.
     fn unknowns(&self, to: &mut Vec<T>);
-    /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a stage: else they are
-    /// extrapolated.
+    /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a
+    /// stage: else they are extrapolated.
     fn end(&self, h: T, point: &mut ArrayV<M, T>) -> bool;
     /// The step is accepted.
     fn accept(&mut self);

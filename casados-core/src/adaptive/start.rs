@@ -21,7 +21,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let at = At { x: x0, u, p: parameters, t: span.start };
         match self.consistent.solve_from_afar(&at, start) {
             Ok(points) => self.statistics.residuals += points,
-            // Without algebraic states all equations may still be solvable: the matrix of ẋ has not full rank.
+            // Without algebraic states all equations may still be solvable: the matrix of ẋ has not
+            // full rank.
             Err(Error::InconsistentStart { singular: true, .. }) if M::Shape::NZ == 0 => {
                 *start = Zeroable::zeroed()
             }
@@ -79,9 +80,9 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         result.z.as_mut_slice().copy_from_slice(&states[nx..nx + M::Shape::NZ]);
     }
 
-    /// The length of the first step: that in which an explicit Euler step changes the solution, and its derivative, by
-    /// a hundredth of their size (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I,
-    /// section II.4).
+    /// The length of the first step: that in which an explicit Euler step changes the solution, and
+    /// its derivative, by a hundredth of their size (E. Hairer, S. P. Nørsett, G. Wanner, Solving
+    /// Ordinary Differential Equations I, section II.4).
     pub(super) fn first_step(&mut self, span: Span<T>, longest: f64) -> Result<f64, Error> {
         if let Some(step) = self.options.initial_step {
             return Ok(step.min(longest));

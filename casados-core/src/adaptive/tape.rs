@@ -17,7 +17,8 @@ pub struct Entry<T> {
     begin: usize,
 }
 
-/// Steps one after the other, with the numbers of each: the states at its start, then the unknowns of its stages.
+/// Steps one after the other, with the numbers of each: the states at its start, then the unknowns
+/// of its stages.
 #[derive(Debug)]
 pub struct Tape<T> {
     entries: Vec<Entry<T>>,
@@ -89,7 +90,8 @@ impl<T: Real> Tape<T> {
         Ok(())
     }
 
-    /// The steps that were kept fill another interval, each its part of it; whatever they were stretched to before.
+    /// The steps that were kept fill another interval, each its part of it; whatever they were
+    /// stretched to before.
     pub fn stretch(&mut self, start: T, end: T) {
         let (Some(first), Some(last)) = (self.kept.first(), self.kept.last()) else { return };
         let (begin, length) = (first.t, last.t + last.h - first.t);

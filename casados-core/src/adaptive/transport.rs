@@ -1,37 +1,42 @@
-//! The second estimate of the error of a step: what the linear part of the equations makes of the defect.
+//! The second estimate of the error of a step: what the linear part of the equations makes of the
+//! defect.
 //!
-//! The polynomial `u` of a collocation step leaves the defect `u̇ − f(u) ≈ d ℓ(τ)` with `ℓ` zero at the nodes and one where
-//! `d` is looked at. By the formula of variation of constants the end of the step is wrong by
+//! The polynomial `u` of a collocation step leaves the defect `u̇ − f(u) ≈ d ℓ(τ)` with `ℓ` zero at
+//! the nodes and one where `d` is looked at. By the formula of variation of constants the end of
+//! the step is wrong by
 //!
 //! ```text
 //! h φ(hJ) d        φ(z) = ∫₀¹ exp(z (1 − τ)) ℓ(τ) dτ
 //! ```
 //!
-//! At small `z` that is of order `z^(s−1)`, which is why a tolerance may be taken for granted there that the estimate of
-//! order `s` does not reach; on the imaginary axis beyond it is `1/|z|` and no smaller than that estimate. So oscillations
-//! whose periods are not much longer than the steps, and components that are stiff, lose the order that other ones have: order
-//! reduction (A. Prothero, A. Robinson, Math. Comp. 28 (1974); E. Hairer, G. Wanner, Solving Ordinary Differential
-//! Equations II, section IV.15). In place of `φ` stands
+//! At small `z` that is of order `z^(s−1)`, which is why a tolerance may be taken for granted there
+//! that the estimate of order `s` does not reach; on the imaginary axis beyond it is `1/|z|` and no
+//! smaller than that estimate. So oscillations whose periods are not much longer than the steps,
+//! and components that are stiff, lose the order that other ones have: order reduction (A.
+//! Prothero, A. Robinson, Math. Comp. 28 (1974); E. Hairer, G. Wanner, Solving Ordinary
+//! Differential Equations II, section IV.15). In place of `φ` stands
 //!
 //! ```text
 //! r(z) = q z^(s−1) / Q(z)        Q(z) = Π_i (1 − μ_i z) = 1 + … + q z^s
 //! ```
 //!
-//! with the eigenvalues `μ_i` of `A`: `1/z` at infinity; of Radau IIA methods twice `φ` at zero, and along
-//! the imaginary axis between 0.6 and 2 times. As `r(z) = Σ_i c_i / (1 − μ_i z)`, one solve with the factors that Newton's method has
-//! gives it. The same solve gives `r(z)/z²`: of an oscillation it points against the error, of a decay along it.
+//! with the eigenvalues `μ_i` of `A`: `1/z` at infinity; of Radau IIA methods twice `φ` at zero,
+//! and along the imaginary axis between 0.6 and 2 times. As `r(z) = Σ_i c_i / (1 − μ_i z)`, one
+//! solve with the factors that Newton's method has gives it. The same solve gives `r(z)/z²`: of an
+//! oscillation it points against the error, of a decay along it.
 
 use super::control::power;
 use crate::linalg::{Complex, PARTS};
 use crate::scalar::{Real, Scalar};
 
-/// Errors of components that decay are damped by the steps that follow: no more than one of them is there at a time, and it may
-/// be some tolerances.
+/// Errors of components that decay are damped by the steps that follow: no more than one of them is
+/// there at a time, and it may be some tolerances.
 const DAMPED: f64 = 0.2;
 /// The errors of oscillations add up: over more steps the more accurate these are.
 const KEPT: f64 = 4.0;
-/// Where the first estimate is asked for this much less than the solution, or even less, its tolerance says nothing of components that lose
-/// their order; where it is asked for about as much, it says all, and the second one fades out.
+/// Where the first estimate is asked for this much less than the solution, or even less, its
+/// tolerance says nothing of components that lose their order; where it is asked for about as much,
+/// it says all, and the second one fades out.
 pub(super) const LENIENT: f64 = 4.0;
 
 /// A complex number.
@@ -47,7 +52,8 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// From the eigenvalues of a method with `S` stages; of complex conjugate ones there is one, and a real one is the first.
+    /// From the eigenvalues of a method with `S` stages; of complex conjugate ones there is one,
+    /// and a real one is the first.
     pub fn new<T: Real, const S: usize>(values: &Complex<T, PARTS>) -> Self {
         let value = |l: usize| {
             let (re, im) = values.get(l);
@@ -89,8 +95,9 @@ impl Transport {
         &self.weights
     }
 
-    /// The estimate of lower order or, if that is larger, the power of this one that behaves like it: of errors relative to the
-    /// tolerance that was asked for, which is `finer` than that of the first as a factor, and `(hJ)⁻²` times them.
+    /// The estimate of lower order or, if that is larger, the power of this one that behaves like
+    /// it: of errors relative to the tolerance that was asked for, which is `finer` than that of
+    /// the first as a factor, and `(hJ)⁻²` times them.
     pub fn larger<T: Real>(&self, first: f64, finer: f64, relative: impl Iterator<Item = (T, T)>) -> f64 {
         let (mut square, mut product, mut bent_square, mut count) = (0.0f64, 0.0f64, 0.0f64, 0usize);
         for (error, bent) in relative {

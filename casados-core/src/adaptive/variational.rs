@@ -1,16 +1,19 @@
-//! Derivatives in the choice of the steps: the estimate of the error of a step, applied to `V = dx/d(x₀, u, p)`.
+//! Derivatives in the choice of the steps: the estimate of the error of a step, applied to
+//! `V = dx/d(x₀, u, p)`.
 //!
-//! A step that the states accept is taken again to rounding and differentiated. Its estimate is a linear function of the
-//! slopes of its stages, and so is that of a column of `V`, with the derivatives `dk_i` of the slopes:
+//! A step that the states accept is taken again to rounding and differentiated. Its estimate is a
+//! linear function of the slopes of its stages, and so is that of a column of `V`, with the
+//! derivatives `dk_i` of the slopes:
 //!
 //! ```text
 //! δ = (f_ẋ Σ_i w_i dk_i + f_x V + f_z Z + f_w) e_c        E = −hμ (f_ẋ + hμ f_x | f_z)⁻¹ δ        implicit
 //! E = h Σ_i e_i dk_i e_c                                                                        explicit
 //! ```
 //!
-//! where the implicit methods look at their estimate: the start of the step or, if that has no stage there, the end. An
-//! element of `E` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the magnitude `s_c` of what is varied (A. C. Hindmarsh,
-//! R. Serban, User documentation for CVODES, "forward sensitivity analysis"); the worst column counts.
+//! where the implicit methods look at their estimate: the start of the step or, if that has no
+//! stage there, the end. An element of `E` is measured by `atol_r / s_c + rtol_r |V_rc|`, with the
+//! magnitude `s_c` of what is varied (A. C. Hindmarsh, R. Serban, User documentation for CVODES,
+//! "forward sensitivity analysis"); the worst column counts.
 
 use super::consistent::{At, Consistent};
 use super::norm::mean;
@@ -30,7 +33,8 @@ use bytemuck::Zeroable;
 use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
-/// What differentiates a step, whatever the method is: a program that does not ask for it contains none of it.
+/// What differentiates a step, whatever the method is: a program that does not ask for it contains
+/// none of it.
 pub trait Differentiate<M: Dae, T: Real>: Send + Sync {
     /// # Errors
     /// Those of Newton's method; a singular matrix.
@@ -114,7 +118,8 @@ impl<M: Dae, T: Real> Variational<M, T> {
         Ok(Self { replays: Box::new(replays), memory, unknowns })
     }
 
-    /// At the start of a run, with the magnitudes of `(x₀, u, p)`: those that are not given are of what is there.
+    /// At the start of a run, with the magnitudes of `(x₀, u, p)`: those that are not given are of
+    /// what is there.
     ///
     /// # Errors
     /// As [`Consistent::forward`].
@@ -202,8 +207,8 @@ impl<M: Dae, T: Real> Variational<M, T> {
         Ok(())
     }
 
-    /// The estimated error of the derivatives over an implicit step that was solved, relative to what is tolerated;
-    /// `again` as in [`Stages::error`].
+    /// The estimated error of the derivatives over an implicit step that was solved, relative to
+    /// what is tolerated; `again` as in [`Stages::error`].
     ///
     /// # Errors
     /// The step cannot be differentiated.
@@ -265,7 +270,8 @@ impl<M: Dae, T: Real> Variational<M, T> {
 }
 
 impl<M: Ode, T: Real> Variational<M, T> {
-    /// The same of a step of an explicit pair with its end; not finite if it cannot be differentiated.
+    /// The same of a step of an explicit pair with its end; not finite if it cannot be
+    /// differentiated.
     pub fn explicit<B: Pair<S>, const S: usize>(
         &mut self,
         step: &Taken<'_, M, T>,

@@ -11,12 +11,14 @@ use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, assign};
 use bytemuck::Zeroable;
 
-/// A result of several intervals, with a number for each of them in the lanes of its registers. All of it is inlined
-/// into kernels.
+/// A result of several intervals, with a number for each of them in the lanes of its registers. All
+/// of it is inlined into kernels.
 pub trait Wide<E: Lanes, R> {
-    /// Whether all numbers are finite, lane by lane, but for those that were looked at when they were written: matrices.
+    /// Whether all numbers are finite, lane by lane, but for those that were looked at when they
+    /// were written: matrices.
     fn is_finite(&self) -> E::Mask;
-    /// The results of the lanes that are good, each in its element of a slice that has it somewhere inside.
+    /// The results of the lanes that are good, each in its element of a slice that has it somewhere
+    /// inside.
     fn unpack<Q>(&self, good: &[bool], results: &mut [Q], get: impl Fn(&mut Q) -> &mut R + Copy);
 }
 
@@ -111,7 +113,8 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send {
     /// The same with a number for each lane.
     type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
 
-    /// Bytes of the factors, where Newton's method takes those of the `mean` Jacobian or not, and of their right-hand sides.
+    /// Bytes of the factors, where Newton's method takes those of the `mean` Jacobian or not, and
+    /// of their right-hand sides.
     fn working_set<E: Lanes, const S: usize>(mean: bool) -> usize;
 
     /// For several intervals at once.

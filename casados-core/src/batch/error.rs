@@ -7,7 +7,8 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BatchError {
-    /// A slice has not one element for each interval (nor one for all, where that is allowed). Nothing was computed.
+    /// A slice has not one element for each interval (nor one for all, where that is allowed).
+    /// Nothing was computed.
     Length {
         /// What it is the slice of.
         slice: Slice,

@@ -1,7 +1,7 @@
 //! Intervals side by side: one in each lane of registers, through the same engine as a single one.
 //!
-//! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy their equations;
-//! lanes never mix, so that one that fails takes nobody with it.
+//! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy
+//! their equations; lanes never mix, so that one that fails takes nobody with it.
 
 use super::answer::{unpack, yes};
 use super::intervals::Interval;
@@ -104,8 +104,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         }
     }
 
-    /// Puts an interval into each lane; `given` are start values for Newton's method, and `records` the stages of
-    /// earlier solutions, if all lanes have them.
+    /// Puts an interval into each lane; `given` are start values for Newton's method, and `records`
+    /// the stages of earlier solutions, if all lanes have them.
     pub fn place<T: Plain>(
         &mut self,
         intervals: &[&Interval<'_, M, T>],
@@ -282,8 +282,8 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
-    /// The steps of the interval, with `after` called after each, with what is remembered of it, if anything is; whether all went well,
-    /// lane by lane.
+    /// The steps of the interval, with `after` called after each, with what is remembered of it, if
+    /// anything is; whether all went well, lane by lane.
     fn run(
         &mut self,
         records: &mut [HessianStep<M, E, S>],

@@ -18,10 +18,12 @@ use crate::tableau::{Custom, Method, Tableau};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
-/// Integrates many intervals of one model with `S` stages of the method `B`; see [`Batch`](super::Batch).
+/// Integrates many intervals of one model with `S` stages of the method `B`; see
+/// [`Batch`](super::Batch).
 ///
-/// Every call writes one result for each interval into the caller's slice. An interval that fails is reported with
-/// the error that a single call would return, leaves no result in its element of the slice, and has no influence on the others.
+/// Every call writes one result for each interval into the caller's slice. An interval that fails
+/// is reported with the error that a single call would return, leaves no result in its element of
+/// the slice, and has no influence on the others.
 ///
 /// # Errors
 /// Of every call: [`BatchError::Length`], [`BatchError::OutOfMemory`] before anything is computed;
@@ -55,8 +57,8 @@ impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T> {
     /// A batch for a tableau of the user's own.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and two nodes
-    /// are equal.
+    /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and
+    /// two nodes are equal.
     pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Self::build(options, tableau)
     }
@@ -81,8 +83,9 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         })
     }
 
-    /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals, instead of the nominal values of the model: with
-    /// [`Start::Zero`] they are not read, and with [`Start::Warm`] only where there is no warm start.
+    /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals, instead of the
+    /// nominal values of the model: with [`Start::Zero`] they are not read, and with
+    /// [`Start::Warm`] only where there is no warm start.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
@@ -93,7 +96,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         Ok(())
     }
 
-    /// How many threads share the intervals; as many as rayon has if never set. Results are the same to the last bit.
+    /// How many threads share the intervals; as many as rayon has if never set. Results are the
+    /// same to the last bit.
     #[cfg(feature = "parallel")]
     pub fn set_threads(&mut self, threads: usize) {
         self.threads = threads.max(1);
@@ -148,8 +152,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         self.run(&Inputs::new(intervals, None, None, results.len())?, results)
     }
 
-    /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for each interval, or one
-    /// for all.
+    /// The solutions, and the gradients of `λᵀx₊` with respect to `x₀`, `u` and `p`; one `λ` for
+    /// each interval, or one for all.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -188,8 +192,9 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         self.run(&Inputs::new(intervals, Some(lambda), None, results.len())?, results)
     }
 
-    /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`, with the algebraic states `z₀` at the
-    /// starts of the intervals; one `ν` for each interval, or one for all.
+    /// The solutions, their derivatives, and the gradients and Hessians of `λᵀx₊ + νᵀz₀`, with the
+    /// algebraic states `z₀` at the starts of the intervals; one `ν` for each interval, or one for
+    /// all.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -226,7 +231,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         }
         let missing = self.options.start == Start::Given && self.given.is_none();
         let lanes = if missing { 1 } else { width::<M, T, R, S>(&self.options.newton) };
-        // Stages of models that are too large to be differentiated side by side may still be found so.
+        // Stages of models that are too large to be differentiated side by side may still be found
+        // so.
         let simulated =
             if missing || lanes > 1 { 1 } else { width::<M, T, Nominal<M, T>, S>(&self.options.newton) };
         let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);

@@ -8,8 +8,8 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 
-/// Many intervals of one model: one element of each slice for each interval. Of all but `x0` there may be one element
-/// for all of them instead.
+/// Many intervals of one model: one element of each slice for each interval. Of all but `x0` there
+/// may be one element for all of them instead.
 #[derive(Debug)]
 pub struct Intervals<'a, M: Dae, T: Plain = f64> {
     /// States at the start: as many as there are intervals.

@@ -1,16 +1,18 @@
 //! Many intervals of one model at once, as multiple shooting wants them.
 //!
-//! Intervals `(x₀, u, p, λ)` of a horizon do not depend on each other. So each of them gets a lane of the widest
-//! registers that the machine has, and all lanes go through the same engine as a single call: the model, Newton's
-//! method, elimination, derivatives. Results are written into the caller's slice.
+//! Intervals `(x₀, u, p, λ)` of a horizon do not depend on each other. So each of them gets a lane
+//! of the widest registers that the machine has, and all lanes go through the same engine as a
+//! single call: the model, Newton's method, elimination, derivatives. Results are written into the
+//! caller's slice.
 //!
-//! Every lane is judged by itself. An interval whose iteration did not converge in its group, whose derivatives do not
-//! satisfy their equations, or whose result is not finite, is computed again alone, with all that a single call can do: the
-//! whole matrix pivoted, and an error that says what is wrong. Within a group the Jacobian is renewed as the
-//! slowest lane needs it: so neighbours change a result by rounding errors.
+//! Every lane is judged by itself. An interval whose iteration did not converge in its group, whose
+//! derivatives do not satisfy their equations, or whose result is not finite, is computed again
+//! alone, with all that a single call can do: the whole matrix pivoted, and an error that says what
+//! is wrong. Within a group the Jacobian is renewed as the slowest lane needs it: so neighbours
+//! change a result by rounding errors.
 //!
-//! One file for each thing: `intervals` what is given, `answer` what is asked, `group` intervals side by side, `work` who
-//! computes what, `integrator` what users see.
+//! One file for each thing: `intervals` what is given, `answer` what is asked, `group` intervals
+//! side by side, `work` who computes what, `integrator` what users see.
 
 mod answer;
 mod error;
@@ -29,7 +31,8 @@ use crate::model::Dae;
 use crate::scalar::Real;
 use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 
-/// The implicit integrator of many intervals, of the method `B` for the model `M`, with numbers `T`.
+/// The implicit integrator of many intervals, of the method `B` for the model `M`, with numbers
+/// `T`.
 ///
 /// ```
 /// # use casados_core::{Batch, BatchError, Gauss, Dae, Error, Intervals, Options, result::Forward, model::{VectorU, VectorX}};

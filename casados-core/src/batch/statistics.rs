@@ -7,9 +7,11 @@ use crate::statistics::Statistics;
 pub struct BatchStatistics {
     /// How many times several intervals were computed side by side.
     pub groups: usize,
-    /// Intervals that were computed alone from the beginning, or differentiated alone after their stages were found side by side.
+    /// Intervals that were computed alone from the beginning, or differentiated alone after their
+    /// stages were found side by side.
     pub alone: usize,
-    /// Intervals that were computed alone after the group did not arrive at a trustworthy result, or at stages, for them.
+    /// Intervals that were computed alone after the group did not arrive at a trustworthy result,
+    /// or at stages, for them.
     pub redone: usize,
     /// Intervals without a result.
     pub failed: usize,

@@ -1,4 +1,5 @@
-//! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a result for.
+//! Who computes what: intervals in groups, groups on threads, and those alone that no group gives a
+//! result for.
 
 use super::answer::{Answer, Wide};
 use super::error::BatchError;
@@ -22,12 +23,15 @@ use bytemuck::Zeroable;
 use core::any::Any;
 use core::marker::PhantomData;
 
-/// Groups whose factors and right-hand sides need more of the second-level cache are smaller, or computed one interval after the other:
-/// what does not lie in it is fetched from afar again and again. Measured: of half a megabyte (AVX2, chains of masses, s = 4) 290 kB
-/// were faster side by side, 480 kB slower; of one megabyte (AVX-512) 0.9 MB still were, by a third (the aircraft, 7 masses).
+/// Groups whose factors and right-hand sides need more of the second-level cache are smaller, or
+/// computed one interval after the other: what does not lie in it is fetched from afar again and
+/// again. Measured: of half a megabyte (AVX2, chains of masses, s = 4) 290 kB were faster side by
+/// side, 480 kB slower; of one megabyte (AVX-512) 0.9 MB still were, by a third (the aircraft, 7
+/// masses).
 const WORKING_SET: f64 = 7.0 / 8.0;
 
-/// How many intervals are computed together: as many as the widest register has whose group fits into the cache.
+/// How many intervals are computed together: as many as the widest register has whose group fits
+/// into the cache.
 pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton) -> usize {
     let mean = S > 2
         && options.fixed_iterations.is_none()

@@ -1,8 +1,8 @@
 //! Models written over dual numbers: derivatives at run time, by the arithmetic of [`num_dual`].
 //!
-//! Such a model may be any Rust at all: branches on data, tables, other crates. First derivatives are
-//! forward duals, second ones hyper-duals. One evaluation yields the derivatives in the direction of several
-//! variables at once where no equation depends on two of them; see [`Passes`].
+//! Such a model may be any Rust at all: branches on data, tables, other crates. First derivatives
+//! are forward duals, second ones hyper-duals. One evaluation yields the derivatives in the
+//! direction of several variables at once where no equation depends on two of them; see [`Passes`].
 //!
 //! The patterns of a dual model are dense: what it depends on is known only when it has run.
 
@@ -23,9 +23,11 @@ use num_dual::{Dual64, HyperDual64};
 use std::sync::OnceLock;
 use structure::{hessian_entry, jacobian_entry};
 
-/// A model over dual numbers: written by `#[dae]` and `#[ode]` on a function that is generic over `DualNum`.
+/// A model over dual numbers: written by `#[dae]` and `#[ode]` on a function that is generic over
+/// `DualNum`.
 pub trait DualModel: Dae {
-    /// Evaluates the residual: reads variables by their index in `(ẋ, x, z, u, p, t)` and hands over the equations.
+    /// Evaluates the residual: reads variables by their index in `(ẋ, x, z, u, p, t)` and hands
+    /// over the equations.
     fn evaluate<T>(variable: impl Fn(usize) -> T, equation: impl FnMut(usize, T))
     where
         T: DualNum<Primitive = f64> + DualNumCopy;
@@ -34,8 +36,8 @@ pub trait DualModel: Dae {
     fn passes() -> &'static OnceLock<Passes>;
 }
 
-/// The passes of a model, found when it is first differentiated. Which point it is differentiated at does not matter:
-/// a model that looks at its variables gets dense passes.
+/// The passes of a model, found when it is first differentiated. Which point it is differentiated
+/// at does not matter: a model that looks at its variables gets dense passes.
 fn passes<M: DualModel>(point: impl Fn(usize) -> f64) -> &'static Passes {
     M::passes().get_or_init(|| {
         Passes::find(M::Shape::NV, M::Shape::NK, point, |variable, equation| {

@@ -4,11 +4,12 @@ use super::tracked::{Tape, Tracked};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// A colouring of the variables: no equation depends on two variables of one colour, so one evaluation with all of them
-/// seeded gives each of these derivatives apart. Pairs of colours give second derivatives in the same way.
+/// A colouring of the variables: no equation depends on two variables of one colour, so one
+/// evaluation with all of them seeded gives each of these derivatives apart. Pairs of colours give
+/// second derivatives in the same way.
 ///
-/// If the model looks at its variables (a comparison, a value taken out), what it depends on at one point need
-/// not be what it depends on at another. Then every variable has a colour of its own.
+/// If the model looks at its variables (a comparison, a value taken out), what it depends on at one
+/// point need not be what it depends on at another. Then every variable has a colour of its own.
 #[derive(Debug)]
 pub struct Passes {
     /// Colour of each variable; `t` has none.

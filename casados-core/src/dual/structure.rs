@@ -26,7 +26,8 @@ pub const fn jacobian_pattern<M: Shape, const N: usize>() -> ([u32; N], [u32; N]
     (rows, columns)
 }
 
-/// Rows and columns of all `N = (NV − 1) NV / 2` entries of the lower triangle of the Hessian, row by row.
+/// Rows and columns of all `N = (NV − 1) NV / 2` entries of the lower triangle of the Hessian, row
+/// by row.
 #[must_use]
 pub const fn hessian_pattern<const N: usize>() -> ([u32; N], [u32; N]) {
     let (mut rows, mut columns) = ([0; N], [0; N]);

@@ -14,7 +14,8 @@ std::thread_local! {
     static TAPE: RefCell<Tape> = const { RefCell::new(Tape::empty()) };
 }
 
-/// What the numbers of one run depend on, and whether the run looked at one that depends on anything.
+/// What the numbers of one run depend on, and whether the run looked at one that depends on
+/// anything.
 #[derive(Debug)]
 pub(super) struct Tape {
     /// Words of one set of variables.
@@ -56,8 +57,8 @@ impl Tape {
         Self { words: 0, sets: Vec::new(), pairs: Vec::new(), looked: false }
     }
 
-    /// Records a run with so many variables. A run inside a run would take the tape away from it: none happens, because
-    /// a model does not differentiate itself.
+    /// Records a run with so many variables. A run inside a run would take the tape away from it:
+    /// none happens, because a model does not differentiate itself.
     pub(super) fn record(variables: usize, run: impl FnOnce()) -> Self {
         let words = variables.div_ceil(64);
         let tape = Self { words, sets: vec![0; words], pairs: vec![0; variables * words], looked: false };
@@ -114,7 +115,8 @@ impl Tape {
     }
 }
 
-/// A number that knows which variables it depends on. Outside of a run that records, it is a number.
+/// A number that knows which variables it depends on. Outside of a run that records, it is a
+/// number.
 #[derive(Clone, Copy)]
 pub struct Tracked {
     value: f64,

@@ -19,8 +19,8 @@ use bytemuck::Zeroable;
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub(super) struct Sweep<M: Ode, T: Real, R: Array<T>, const S: usize> {
-    /// The memory of the forward sweep, which is never needed at the same time: `k̄_i` of the current stage is
-    /// in `dxi`, `ξ̄_i` in `dk`.
+    /// The memory of the forward sweep, which is never needed at the same time: `k̄_i` of the
+    /// current stage is in `dxi`, `ξ̄_i` in `dk`.
     pub forward: Variation<M, T, R, S>,
     gradient: ArrayV<M, T>,
     /// `(λ_n, λ_u, λ_p)`
@@ -37,8 +37,8 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         }
     }
 
-    /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of every
-    /// stage for the Hessian. An integrand takes part if there is one seed.
+    /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of
+    /// every stage for the Hessian. An integrand takes part if there is one seed.
     #[expect(clippy::too_many_arguments)]
     pub fn run(
         &mut self,

@@ -44,8 +44,8 @@ pub(super) fn forward<M: Ode, T: Real>(
 }
 
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those of the solution; see
-    /// [`quadrature`](crate::quadrature).
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those
+    /// of the solution; see [`quadrature`](crate::quadrature).
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,

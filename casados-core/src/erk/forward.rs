@@ -88,8 +88,8 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
 }
 
 impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
-    /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage when `k_i` and `dξ_i`
-    /// are known.
+    /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage when `k_i` and
+    /// `dξ_i` are known.
     pub fn run(
         &mut self,
         scheme: &Scheme<M, T, S>,
@@ -181,7 +181,8 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
     }
 }
 
-/// Copies row-major `rows` to columns of a matrix of the result. A value that is not finite is an error.
+/// Copies row-major `rows` to columns of a matrix of the result. A value that is not finite is an
+/// error.
 pub(super) fn write<T: Real, R: Array<T>>(
     rows: &[R],
     source: Range<usize>,

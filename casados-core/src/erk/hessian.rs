@@ -1,5 +1,5 @@
-//! Second order: `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with `D_i = d(ξ_i, u, p)/dw` from the
-//! forward sweep and `μ_i` from the adjoint.
+//! Second order: `d²(λᵀx_N)/dw² = Σ_n Σ_i D_iᵀ ∇²(μ_iᵀ f)_i D_i` with `D_i = d(ξ_i, u, p)/dw` from
+//! the forward sweep and `μ_i` from the adjoint.
 
 use super::step::{Point, Scheme, add, check, directions};
 use crate::error::{Error, Place, Quantity};

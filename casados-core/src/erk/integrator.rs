@@ -1,4 +1,5 @@
-//! An explicit integrator: how it is made, what is set, simulation. Its derivatives are in `sensitivities`.
+//! An explicit integrator: how it is made, what is set, simulation. Its derivatives are in
+//! `sensitivities`.
 
 use super::adjoint::Sweep;
 use super::along::{Along, begin, finish};
@@ -20,8 +21,8 @@ use core::marker::PhantomData;
 
 /// An explicit Runge-Kutta integrator of model `M` with method `B`, which has `S` stages.
 ///
-/// An interval of length `h` is divided into [`Options::steps`] equal steps. Derivatives are those of
-/// the discrete map, exact to rounding.
+/// An interval of length `h` is divided into [`Options::steps`] equal steps. Derivatives are those
+/// of the discrete map, exact to rounding.
 ///
 /// ```text
 /// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
@@ -109,7 +110,8 @@ impl<M: Ode, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fall
 where
     Inline<Mode, STEPS, F>: Memory,
 {
-    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS` steps.
+    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS`
+    /// steps.
     ///
     /// # Errors
     /// As `with_tableau`.
@@ -193,8 +195,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// The state at the end of an interval of length `h`.
     ///
     /// # Errors
-    /// Input or model values that are not finite, parameters that were never set, overflow, and in the
-    /// first call of a mode [`Error::OutOfMemory`].
+    /// Input or model values that are not finite, parameters that were never set, overflow, and in
+    /// the first call of a mode [`Error::OutOfMemory`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
         self.solve_along(x0, u, h, None)
     }

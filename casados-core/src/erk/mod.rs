@@ -5,8 +5,8 @@
 //! ξ_i = x_n + h Σ_{j<i} a_ij k_j      k_i = g(ξ_i, u, p, t_n + c_i h)      x_{n+1} = x_n + h Σ_i b_i k_i
 //! ```
 //!
-//! The derivatives of `g` are those of the residual `f = c (ẋ − g)`; see [`Ode`].
-//! There is no dense output: an explicit method has no polynomial through its stages that keeps its order.
+//! The derivatives of `g` are those of the residual `f = c (ẋ − g)`; see [`Ode`]. There is no dense
+//! output: an explicit method has no polynomial through its stages that keeps its order.
 
 mod adjoint;
 mod along;

@@ -53,7 +53,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&result.forward)
     }
 
-    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row
+    /// for each direction.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -270,8 +271,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let multipliers = W::hessian_tape(&mut self.multipliers, grid.steps)?;
         let scheme = &self.scheme;
 
-        // The adjoint first: then the forward sweep meets each stage with its multipliers known, and no
-        // derivative of a stage has to be kept.
+        // The adjoint first: then the forward sweep meets each stage with its multipliers known,
+        // and no derivative of a stage has to be kept.
         let start = base.x;
         sweep.seed(1, |x, _| lambda.as_slice()[x]);
         curvature.start();

@@ -26,7 +26,8 @@ pub(crate) struct Scheme<M: Ode, T: Real, const S: usize> {
     pub c: [T; S],
     /// Of each equation.
     pub rows: ArrayK<M, Row<T>>,
-    /// Of each direction `w`: whether the model has a second derivative with respect to its variable.
+    /// Of each direction `w`: whether the model has a second derivative with respect to its
+    /// variable.
     pub curved: ArrayW<M, bool>,
 }
 
@@ -57,8 +58,8 @@ impl<M: Ode, T: Real, const S: usize> Scheme<M, T, S> {
     }
 }
 
-/// The directions `w` of an entry of the Hessian: `x`, `u`, `p` are numbered alike among the variables and
-/// the directions. `None` for an entry of `ẋ`, which occurs linearly.
+/// The directions `w` of an entry of the Hessian: `x`, `u`, `p` are numbered alike among the
+/// variables and the directions. `None` for an entry of `ẋ`, which occurs linearly.
 pub(super) fn directions<M: Ode>(entry: usize) -> Option<(usize, usize)> {
     let (row, column) = M::STRUCTURE.hessian.at(entry);
     Some((row.checked_sub(M::Shape::NX)?, column.checked_sub(M::Shape::NX)?))
@@ -205,7 +206,8 @@ impl<M: Ode, T: Real, const S: usize> Record<M, T, S> {
         Ok(())
     }
 
-    /// `x_{n+1} = x_n + h Σ_i b_i k_i`; `rest` is what was rounded off from `x_n`, if sums are compensated.
+    /// `x_{n+1} = x_n + h Σ_i b_i k_i`; `rest` is what was rounded off from `x_n`, if sums are
+    /// compensated.
     pub fn end(
         &self,
         scheme: &Scheme<M, T, S>,
@@ -318,7 +320,8 @@ pub(super) fn add<T: Real>(a: T, y: &[T], sum: &mut [T]) {
     }
 }
 
-/// Whether numbers are looked at one by one. Where registers take several of them all are, without a branch for each.
+/// Whether numbers are looked at one by one. Where registers take several of them all are, without
+/// a branch for each.
 const ONE_BY_ONE: bool = !REGISTERS;
 
 /// The first value that is infinite or NaN.

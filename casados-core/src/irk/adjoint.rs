@@ -4,7 +4,8 @@
 //! Jᵀ μ = h (b ⊗ λ_{n+1}, 0)        λ_n = λ_{n+1} − Σ_i f_x,iᵀ μ_i        λ_w −= Σ_i f_w,iᵀ μ_i
 //! ```
 //!
-//! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i` there is `ℓ_i(0) ν`.
+//! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
+//! there is `ℓ_i(0) ν`.
 
 use super::along::Along;
 use super::evaluate::entry;
@@ -30,7 +31,8 @@ pub struct Backward<M: Dae, T: Plain, const S: usize, const C: usize> {
     pub(crate) gradient: ArrayW<M, [T; C]>,
     /// `μ`, one row per slot and stage.
     pub(crate) mu: Aligned<ArrayK<M, [[T; C]; S]>>,
-    /// What an integrand, or weights of `z₀`, add to the right-hand side of the unknowns at the stages,
+    /// What an integrand, or weights of `z₀`, add to the right-hand side of the unknowns at the
+    /// stages,
     pub(crate) source: ArrayK<M, [T; S]>,
     /// and to `(λ_n, λ_w)`.
     pub(crate) shift: ArrayW<M, T>,
@@ -57,7 +59,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         }
     }
 
-    /// What weights of `z₀` add to the right-hand side, in the first step, after what an integrand does.
+    /// What weights of `z₀` add to the right-hand side, in the first step, after what an integrand
+    /// does.
     pub(crate) fn weigh(&mut self, coefficients: &Coefficients<E, S>) {
         if const { M::Shape::NZ == 0 } || !self.weighted {
             return;
@@ -71,7 +74,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         dispatch(Weigh { nu: self.nu.as_slice(), start: &coefficients.start, source });
     }
 
-    /// `μ` of a step that is linearised, by the factors that were `kept` or are there; whether it satisfies its equations.
+    /// `μ` of a step that is linearised, by the factors that were `kept` or are there; whether it
+    /// satisfies its equations.
     pub(crate) fn stages<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
@@ -112,8 +116,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
 }
 
 impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
-    /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without. What was `kept` of it is brought back where it
-    /// does not do, and is `None` then.
+    /// `λ_n` from `λ_{n+1}` over a step that is linearised, with an integrand or without. What was
+    /// `kept` of it is brought back where it does not do, and is `None` then.
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.

@@ -1,4 +1,5 @@
-//! An integrand at the stages of the steps, and what it adds to their adjoint; see [`quadrature`](crate::quadrature).
+//! An integrand at the stages of the steps, and what it adds to their adjoint; see
+//! [`quadrature`](crate::quadrature).
 //!
 //! With `g_i = h b_i ∇_v φ_i`:
 //!
@@ -121,8 +122,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
 }
 
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with those of the solution; see
-    /// [`quadrature`](crate::quadrature).
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
+    /// those of the solution; see [`quadrature`](crate::quadrature).
     pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
         &'a mut self,
         integrand: &'b mut Q,
@@ -187,7 +188,8 @@ impl<'a, M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
         self.integrator.hessian_along(x0, u, h, lambda, &[], Some(self.integrand))
     }
 
-    /// See [`Integrator::hessian_with_z0`]; gradient and Hessian are those of `λᵀx + νᵀz₀` and the integral.
+    /// See [`Integrator::hessian_with_z0`]; gradient and Hessian are those of `λᵀx + νᵀz₀` and the
+    /// integral.
     ///
     /// # Errors
     /// See [`Integrator`]; [`Error::NonFiniteFunction`].

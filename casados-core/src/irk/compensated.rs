@@ -1,17 +1,19 @@
-//! Sums of long runs: what a step rounds comes back in every step, and an orbit that returns to the same points collects
-//! the same errors. With [`Options::compensated`](crate::Options::compensated) four things are therefore not rounded to the
-//! digits of `x`:
+//! Sums of long runs: what a step rounds comes back in every step, and an orbit that returns to the
+//! same points collects the same errors. With [`Options::compensated`](crate::Options::compensated)
+//! four things are therefore not rounded to the digits of `x`:
 //!
-//! - `x` carries what was rounded off from it (E. Hairer, R. I. McLachlan, A. Razakarivony, "Achieving Brouwer's law with
-//!   implicit Runge-Kutta methods", BIT 48, 2008), and the change of a step, `h Σ_i b_i k_i`, has twice the digits;
-//! - so have the sums of the stages, `ξ_i + δ_i = x + h Σ_j a_ij k_j`. The model sees `ξ_i`, and `f_x δ_i` is added to its
-//!   residual: the Jacobian of any iteration is good enough for that;
-//! - coefficients of a method that keeps quadratic invariants are those of a method that does so to twice the digits,
-//!   `b_i a_ij + b_j a_ji = b_i b_j`: a symplectic method whose order conditions hold to rounding has no drift, one that is
-//!   symplectic to rounding only has one that grows with every step.
+//! - `x` carries what was rounded off from it (E. Hairer, R. I. McLachlan, A. Razakarivony,
+//!   "Achieving Brouwer's law with implicit Runge-Kutta methods", BIT 48, 2008), and the change of
+//!   a step, `h Σ_i b_i k_i`, has twice the digits;
+//! - so have the sums of the stages, `ξ_i + δ_i = x + h Σ_j a_ij k_j`. The model sees `ξ_i`, and
+//!   `f_x δ_i` is added to its residual: the Jacobian of any iteration is good enough for that;
+//! - coefficients of a method that keeps quadratic invariants are those of a method that does so to
+//!   twice the digits, `b_i a_ij + b_j a_ji = b_i b_j`: a symplectic method whose order conditions
+//!   hold to rounding has no drift, one that is symplectic to rounding only has one that grows with
+//!   every step.
 //!
-//! What is left is the rounding of the model itself. Products are exact where the machine multiplies and adds in one
-//! instruction; elsewhere only sums are compensated.
+//! What is left is the rounding of the model itself. Products are exact where the machine
+//! multiplies and adds in one instruction; elsewhere only sums are compensated.
 
 use super::evaluate::{dot, entries};
 use super::record::{Coefficients, Work};

@@ -1,8 +1,8 @@
-//! `Σ_i D_iᵀ H_i D_i` over the stages of a step, with `H_i` sparse and symmetric: first `G = −H D`, a few columns at a time,
-//! then the lower triangle of `Dᵀ G`.
+//! `Σ_i D_iᵀ H_i D_i` over the stages of a step, with `H_i` sparse and symmetric: first `G = −H D`,
+//! a few columns at a time, then the lower triangle of `Dᵀ G`.
 //!
-//! In a panel of `D` the stages of a variable lie beside each other, or, where it is large, variables of a stage do: what is multiplied is
-//! then in the nearest cache.
+//! In a panel of `D` the stages of a variable lie beside each other, or, where it is large,
+//! variables of a stage do: what is multiplied is then in the nearest cache.
 
 use super::directions::{NEAREST, panel, panels, width};
 use super::multiply::multiply;
@@ -12,12 +12,13 @@ use crate::scalar::Lanes;
 use crate::shape::Array;
 use core::marker::PhantomData;
 
-/// So many columns of `G` are there at a time: two panels, where registers are enough for their products, or one and what the adjoint
-/// makes of it (`curved_adjoint`). In firmware memory is dearer than time.
+/// So many columns of `G` are there at a time: two panels, where registers are enough for their
+/// products, or one and what the adjoint makes of it (`curved_adjoint`). In firmware memory is
+/// dearer than time.
 pub const COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
 
-/// Whether all stages of a variable lie together: unless a panel is too large for the nearest cache, or numbers are registers of which
-/// there may be sixteen, too few for more than two stages.
+/// Whether all stages of a variable lie together: unless a panel is too large for the nearest
+/// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
 pub(super) const fn together<M: Dae, E, const S: usize>() -> bool {
     let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, M::STRUCTURE.directions.len()) * size_of::<E>();
     panel <= NEAREST / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
@@ -33,7 +34,8 @@ pub const fn row_of<M: Dae, E, const S: usize>(variable: usize, stage: usize) ->
     }
 }
 
-/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins with zero.
+/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins
+/// with zero.
 pub struct Subtract<'a, M, E, R, const S: usize> {
     pub entries: &'a [[E; S]],
     pub d: &'a [E],
@@ -69,7 +71,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
             return;
         }
         let mut stage = 0;
-        // Rows that go through their columns together fit the registers with pairs of stages, or with wider panels.
+        // Rows that go through their columns together fit the registers with pairs of stages, or
+        // with wider panels.
         while const { W <= 4 } && stage + 2 <= S {
             self.stages::<A, 1, 2, W, P>(stage, column);
             stage += 2;
@@ -97,7 +100,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
         }
     }
 
-    /// `sum −= Dᵀ G` for some rows of panels of `−G`, from a first one on, which belong to rows of `D` from another one on.
+    /// `sum −= Dᵀ G` for some rows of panels of `−G`, from a first one on, which belong to rows of
+    /// `D` from another one on.
     #[inline(always)]
     fn tiles<A: Arithmetic, const W: usize, const P: usize>(
         &mut self,
@@ -133,9 +137,9 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
     }
 }
 
-/// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each tile is in registers while it
-/// goes through all variables at all stages, in as many strands as hide how long an addition takes. Above the diagonal it
-/// writes what nobody reads.
+/// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each
+/// tile is in registers while it goes through all variables at all stages, in as many strands as
+/// hide how long an addition takes. Above the diagonal it writes what nobody reads.
 #[inline(always)]
 fn tiles<
     A: Arithmetic,
@@ -175,7 +179,8 @@ fn tiles<
             let row = sum.get_mut(row + t * ROWS + r).and_then(|sum| sum.as_mut().get_mut(column..));
             let columns = row.and_then(|row| row.as_chunks_mut::<W>().0.first_chunk_mut::<P>());
             let Some(columns) = columns else { continue };
-            // In registers: of loops over single elements the compiler makes one over rows, which lie far apart.
+            // In registers: of loops over single elements the compiler makes one over rows, which
+            // lie far apart.
             for (columns, tile) in columns.iter_mut().zip(tile) {
                 let mut sum = if fresh { [E::from_f64(0.0); W] } else { *columns };
                 A::subtract_row(&mut sum, E::from_f64(1.0), tile);

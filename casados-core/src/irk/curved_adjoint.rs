@@ -1,14 +1,16 @@
-//! `Σ_n Σ_i D_iᵀ H_i D_i` without products of all directions with each other: the adjoint, backwards over the steps, of what second
-//! derivatives add at their stages, in all directions at once.
+//! `Σ_n Σ_i D_iᵀ H_i D_i` without products of all directions with each other: the adjoint,
+//! backwards over the steps, of what second derivatives add at their stages, in all directions at
+//! once.
 //!
 //! ```text
 //! Jᵀ M = h (b ⊗ Λ_{n+1}, 0) + Qᵀ G        (Qᵀ G)_k,j = G_ẋ,j + h Σ_i a_ij G_x,i        (Qᵀ G)_z,j = G_z,j
 //! Λ_n = Λ_{n+1} − Σ_i f_x,iᵀ M_i + Σ_i G_x,i        Λ_w += − Σ_i f_w,iᵀ M_i + Σ_i G_w,i
 //! ```
 //!
-//! with `G_i = −H_i D_i`, and `Λ_N = 0`. Since `D` is what the forward sweep makes of unit vectors, and this the same sweep transposed,
-//! `(Λ_0, Λ_w) = −Σ_n Σ_i D_iᵀ H_i D_i`. Products of panels (`curvature`) take as many operations as there are curved variables for each pair
-//! of directions; this takes a sparse solve for each direction, which is less where a model is large.
+//! with `G_i = −H_i D_i`, and `Λ_N = 0`. Since `D` is what the forward sweep makes of unit vectors,
+//! and this the same sweep transposed, `(Λ_0, Λ_w) = −Σ_n Σ_i D_iᵀ H_i D_i`. Products of panels
+//! (`curvature`) take as many operations as there are curved variables for each pair of directions;
+//! this takes a sparse solve for each direction, which is less where a model is large.
 
 use super::curvature::{COLUMNS, row_of};
 use super::curved_advance::{Advance, Inverse, add_stages, columns, is_direct};
@@ -27,9 +29,11 @@ use crate::scalar::Lanes;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
 
-/// Whether second derivatives are summed in this way: where it takes fewer products, counted for each direction, those of the solve half
-/// as much again, which wait for memory while products of panels do not. Chains of masses on Zen 4 are even at 0.66 with two stages and
-/// at 0.85 with four; 33 masses are at 0.37 and 0.61. Only of single numbers: registers of them leave no room for packets.
+/// Whether second derivatives are summed in this way: where it takes fewer products, counted for
+/// each direction, those of the solve half as much again, which wait for memory while products of
+/// panels do not. Chains of masses on Zen 4 are even at 0.66 with two stages and at 0.85 with four;
+/// 33 masses are at 0.37 and 0.61. Only of single numbers: registers of them leave no room for
+/// packets.
 pub(super) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
     if COLUMNS < 16 || size_of::<E>() > 8 || structure.elimination.pivots.is_empty() {
@@ -56,7 +60,8 @@ pub(super) struct Back<'a, M: Dae, E: Plain, R, const S: usize> {
     pub g: &'a mut ArrayV<M, [[E; COLUMNS]; S]>,
     /// `(Λ, Λ_w)`, over the directions that have any influence: a row for each, and a column.
     pub sum: &'a mut [R],
-    /// Whether the step is the first of the interval: of its result nobody needs more than the lower triangle.
+    /// Whether the step is the first of the interval: of its result nobody needs more than the
+    /// lower triangle.
     pub first: bool,
     /// Whether it is the last one: `Λ_N = 0`.
     pub last: bool,

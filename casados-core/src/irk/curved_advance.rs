@@ -1,11 +1,12 @@
-//! What comes out of a step of the adjoint in all directions: `Λ_n`, and what it adds to `Λ_w`; see `curved_adjoint`.
+//! What comes out of a step of the adjoint in all directions: `Λ_n`, and what it adds to `Λ_w`; see
+//! `curved_adjoint`.
 //!
 //! ```text
 //! Λ_n = Λ_{n+1} − Σ_i (f_x,iᵀ M_i − G_x,i) = (1 − bᵀ A⁻¹ 1) Λ_{n+1} + Σ_i ω_i (f_ẋ,iᵀ M_i − G_ẋ,i)        ω = (hA)⁻¹ 1
 //! ```
 //!
-//! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these are summed up already: it takes the
-//! entries of `f_ẋ` alone, most often one for each state.
+//! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these
+//! are summed up already: it takes the entries of `f_ẋ` alone, most often one for each state.
 
 use super::curvature::row_of;
 use super::directions::before;
@@ -16,7 +17,8 @@ use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Array, Plain, Shape};
 
-/// Whether each equation that has a derivative has that of one state, in their order: the entries of `f_ẋ` then are those of the states.
+/// Whether each equation that has a derivative has that of one state, in their order: the entries
+/// of `f_ẋ` then are those of the states.
 pub(super) const fn is_direct<M: Dae>() -> bool {
     let (count, pattern) = (M::STRUCTURE.blocks[1], &M::STRUCTURE.jacobian);
     let mut entry = 0;

@@ -1,4 +1,5 @@
-//! The rows of `D` that enter second derivatives: of curved variables at all stages, from the derivatives of a step.
+//! The rows of `D` that enter second derivatives: of curved variables at all stages, from the
+//! derivatives of a step.
 
 use super::curvature::row_of;
 use super::directions::Directions;

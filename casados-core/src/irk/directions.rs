@@ -1,7 +1,8 @@
 //! Directions of sensitivities, in panels.
 //!
-//! A panel is a few columns of everything that has a column for each direction: rows `[E; W]` that fit registers. Panels
-//! lie one after the other, so that all that is done to one happens in the nearest cache.
+//! A panel is a few columns of everything that has a column for each direction: rows `[E; W]` that
+//! fit registers. Panels lie one after the other, so that all that is done to one happens in the
+//! nearest cache.
 
 use crate::model::{Dae, NO_COLUMN};
 use crate::scalar::{Field, Lanes};
@@ -10,7 +11,8 @@ use core::marker::PhantomData;
 /// So many bytes are in the nearest cache, beside others.
 pub(super) const NEAREST: usize = 1 << 15;
 
-/// How many of some numbers, in their order, come before one: of directions that have any influence, of curved variables.
+/// How many of some numbers, in their order, come before one: of directions that have any
+/// influence, of curved variables.
 pub(super) const fn before(numbers: &[u32], number: usize) -> usize {
     let mut count = 0;
     while count < numbers.len() && (numbers[count] as usize) < number {
@@ -19,16 +21,17 @@ pub(super) const fn before(numbers: &[u32], number: usize) -> usize {
     count
 }
 
-/// How many columns the widest panels have: eight; of numbers that are registers themselves four, or the packet of all stages would not
-/// fit beside what it is multiplied by. Of two stages eight do where there are thirty-two registers: if columns are many, factors, which
-/// then come from the second cache, are read half as often.
+/// How many columns the widest panels have: eight; of numbers that are registers themselves four,
+/// or the packet of all stages would not fit beside what it is multiplied by. Of two stages eight
+/// do where there are thirty-two registers: if columns are many, factors, which then come from the
+/// second cache, are read half as often.
 pub(super) const fn width<E>(stages: usize, count: usize) -> usize {
     let many = size_of::<E>() == 64 && stages <= 2 && count >= 16;
     if size_of::<E>() <= 8 || many { 8 } else { 4 }
 }
 
-/// Evaluates an expression for each panel of `$S` stages: from `$column` on, `$W` columns, as many as [`width`] says, four, two or one.
-/// It may begin with a later panel.
+/// Evaluates an expression for each panel of `$S` stages: from `$column` on, `$W` columns, as many
+/// as [`width`] says, four, two or one. It may begin with a later panel.
 macro_rules! panels {
     ($count:expr, $E:ty, $S:expr, $column:ident, $W:ident => $panel:expr) => {
         panels!($count, $E, $S, $column from 0, $W => $panel)
@@ -166,8 +169,8 @@ impl<E: Lanes, const C: usize> Directions<E> for Seeded<'_, E, C> {
     }
 }
 
-/// The weight of a direction in the first sum over all of them, or in the second: neither equal nor alternating, so that
-/// no structure hides an error.
+/// The weight of a direction in the first sum over all of them, or in the second: neither equal nor
+/// alternating, so that no structure hides an error.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn weight<E: Field>(direction: usize, second: bool) -> E {
     let rank = if second { 2 * direction + 1 } else { 3 * direction } % 7;

@@ -1,11 +1,15 @@
-//! Whether linear equations determine their solution, or only the digits that rounding has left of a matrix that is singular.
+//! Whether linear equations determine their solution, or only the digits that rounding has left of
+//! a matrix that is singular.
 //!
-//! One iteration of Newton's method solves them, and leaves residuals at rounding level however large the condition of the matrix is.
-//! Nonlinear equations that are as bad do not converge; of linear ones nothing would be seen. A pivot that is small beside the terms of its
-//! equation is the reason to look: an iteration leads from any point to the solution of linear equations, so that from a few points
-//! around it solutions differ by what rounding makes of the residual there, and are known to the digits that they have in common
-//! (stochastic arithmetic: J. Vignes, Math. Comput. Simul. 35 (1993)). What is looked at are residuals as the model evaluates them: a
-//! matrix may be as stiff as it likes. Where the planned elimination is to blame, pivoting the whole matrix tells.
+//! One iteration of Newton's method solves them, and leaves residuals at rounding level however
+//! large the condition of the matrix is. Nonlinear equations that are as bad do not converge; of
+//! linear ones nothing would be seen. A pivot that is small beside the terms of its equation is the
+//! reason to look: an iteration leads from any point to the solution of linear equations, so that
+//! from a few points around it solutions differ by what rounding makes of the residual there, and
+//! are known to the digits that they have in common (stochastic arithmetic: J. Vignes, Math.
+//! Comput. Simul. 35 (1993)). What is looked at are residuals as the model evaluates them: a matrix
+//! may be as stiff as it likes. Where the planned elimination is to blame, pivoting the whole
+//! matrix tells.
 
 use super::record::{Coefficients, Work};
 use crate::linalg::kinematic;
@@ -13,20 +17,23 @@ use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Lanes, Scalar};
 
-/// A pivot is small if what it is divided by this leaves less of the terms of its equation, in units of rounding: five digits are left.
+/// A pivot is small if what it is divided by this leaves less of the terms of its equation, in
+/// units of rounding: five digits are left.
 const SMALL: f64 = 1.0 / 65536.0;
 /// Points that are tried.
 const POINTS: usize = 4;
-/// How far away they are at most, in parts of the unknowns: far enough that nothing is rounded as it was.
+/// How far away they are at most, in parts of the unknowns: far enough that nothing is rounded as
+/// it was.
 const DISTANCE: f64 = 0.5;
-/// Where a state rests its derivative has no digits: a change in a step below this part of the state counts as one of this size.
+/// Where a state rests its derivative has no digits: a change in a step below this part of the
+/// state counts as one of this size.
 const CHANGE: f64 = 1.0 / 64.0;
 /// Solutions that differ by this part of themselves are none.
 const UNKNOWN: f64 = 1.0 / 32.0;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
-    /// Whether a pivot is so small beside the terms of its equation, which were just [found](Self::is_satisfied), that `y` may be
-    /// rounding errors.
+    /// Whether a pivot is so small beside the terms of its equation, which were just
+    /// [found](Self::is_satisfied), that `y` may be rounding errors.
     pub(super) fn has_small_pivot(&self, x: &ArrayX<M, E>, y: &ArrayK<M, [E; S]>) -> bool {
         let factors = self.linear.factors.planned();
         let h = self.inputs.time.step.abs();
@@ -51,7 +58,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         E::any(small)
     }
 
-    /// The lanes in which `y` is a solution to more than a digit, and an unknown that is not in the others.
+    /// The lanes in which `y` is a solution to more than a digit, and an unknown that is not in the
+    /// others.
     #[cold]
     #[inline(never)]
     pub(super) fn is_determined(
@@ -114,8 +122,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 }
 
-/// The size of an unknown at its stages; of a derivative at least one by which a state changes in a step by a part of itself, and
-/// infinite in an interval without length, in which it changes nothing. Below normal numbers there are no digits to be lost.
+/// The size of an unknown at its stages; of a derivative at least one by which a state changes in a
+/// step by a part of itself, and infinite in an interval without length, in which it changes
+/// nothing. Below normal numbers there are no digits to be lost.
 fn size<E: Lanes, const S: usize>(y: &[E; S], x: Option<E>, h: E) -> E {
     let least = E::from_f64(E::SMALLEST / E::EPSILON);
     let own = y.iter().fold(least, |size, y| y.abs().max(size));

@@ -1,7 +1,7 @@
 //! The model at the stages of a step.
 //!
-//! Every variable, equation and entry of the Jacobian has its values at all stages side by side: where the machine
-//! has registers of that many numbers, one call of the model computes them all.
+//! Every variable, equation and entry of the Jacobian has its values at all stages side by side:
+//! where the machine has registers of that many numbers, one call of the model computes them all.
 
 use super::kinematic::{self, are_together, derivative, unknowns};
 use super::record::{Coefficients, Times, Work};
@@ -36,7 +36,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         dispatch(Place::<M, E, S, false> { points: &mut self.points, jacobian, x, y, a, c, time, step });
     }
 
-    /// The same, with the `k_i` of [kinematic](super::kinematic) states as they follow from others, whatever is in their places.
+    /// The same, with the `k_i` of [kinematic](super::kinematic) states as they follow from others,
+    /// whatever is in their places.
     #[inline]
     pub(crate) fn place_unknowns(
         &mut self,
@@ -64,8 +65,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.complete();
     }
 
-    /// The residual at all stages, which may be there, and one Jacobian for all of them: that in their middle. Of a single lane it is that of
-    /// each, as its stages are evaluated side by side where a machine can: the mean of those is taken.
+    /// The residual at all stages, which may be there, and one Jacobian for all of them: that in
+    /// their middle. Of a single lane it is that of each, as its stages are evaluated side by side
+    /// where a machine can: the mean of those is taken.
     pub(crate) fn evaluate_middle(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -221,7 +223,8 @@ impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_
             return;
         }
         let minus_ha = coupling(a, h);
-        // Of kinematic states, which are most often the first or the last, there is nothing to copy.
+        // Of kinematic states, which are most often the first or the last, there is nothing to
+        // copy.
         let (first, end) = if UNKNOWNS { const { unknowns::<M>() } } else { (0, y.len()) };
         let k = first..nx.min(end).max(first);
         let (xdot, rest) = points.split_at_mut(nx);

@@ -46,8 +46,8 @@ pub struct ForwardPass<M: Dae, T: Plain, const S: usize> {
 copy!([M: Dae, T: Plain, const S: usize] ForwardPass<M, T, S>);
 
 impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
-    /// A step that is linearised, by the factors that were `kept` or are there, as [`ForwardPass::step`]; whether the derivatives satisfy
-    /// their equations.
+    /// A step that is linearised, by the factors that were `kept` or are there, as
+    /// [`ForwardPass::step`]; whether the derivatives satisfy their equations.
     pub(crate) fn advance<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
@@ -80,7 +80,8 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
         }
     }
 
-    /// What is left to be written after the last step. Zero if all derivatives are finite, else NaN.
+    /// What is left to be written after the last step. Zero if all derivatives are finite, else
+    /// NaN.
     pub(crate) fn end(&self, nominal: &Nominal<M, E>, to: &mut Forward<M, E>) -> E {
         to.nominal = *nominal;
         Split::<M, _>::new(&mut to.dx_dx0, &mut to.dx_du, &mut to.dx_dp).fill_others();
@@ -115,8 +116,8 @@ impl StepOf {
 }
 
 impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
-    /// After a step that is linearised; refined where digits were lost, if that is asked for. The last one writes derivatives of `x` to
-    /// the result, the first and the last those of `z`.
+    /// After a step that is linearised; refined where digits were lost, if that is asked for. The
+    /// last one writes derivatives of `x` to the result, the first and the last those of `z`.
     ///
     /// # Errors
     /// [`Error::Singular`]

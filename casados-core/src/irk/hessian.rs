@@ -4,8 +4,9 @@
 //! d²(λᵀ x_N)/dw² = − Σ_n Σ_i D_iᵀ [∇²(μ_iᵀ f)_i] D_i
 //! ```
 //!
-//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of `curvature`. With weights `ν` of `z₀`,
-//! which is a sum of unknowns, it is `d²(λᵀ x_N + νᵀ z₀)/dw²`: they are in `μ` alone.
+//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of
+//! `curvature`. With weights `ν` of `z₀`, which is a sum of unknowns, it is
+//! `d²(λᵀ x_N + νᵀ z₀)/dw²`: they are in `μ` alone.
 
 use super::adjoint::Backward;
 use super::along::Along;
@@ -64,8 +65,8 @@ pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting>
 copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
-    /// Whether the factors of every step are made where they will be kept: no other step has the same ones, nor does Newton's method leave
-    /// those of the solution.
+    /// Whether the factors of every step are made where they will be kept: no other step has the
+    /// same ones, nor does Newton's method leave those of the solution.
     #[cfg(feature = "alloc")]
     pub(crate) const DIRECT: bool = {
         let structure = &M::STRUCTURE;
@@ -87,7 +88,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
         self.linear.copy_from(&work.linear);
     }
 
-    /// What was remembered, if the step is not the `last` one, whose linearisation is still where it was made.
+    /// What was remembered, if the step is not the `last` one, whose linearisation is still where
+    /// it was made.
     pub(crate) fn kept(&self, last: bool) -> Option<&Linearization<M, E, S, F>> {
         (!last).then_some(&self.linear)
     }
@@ -159,8 +161,9 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
         }
     }
 
-    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of this one `kept` or there. After the first
-    /// one the result will be written, which may lie far `ahead`.
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of
+    /// this one `kept` or there. After the first one the result will be written, which may lie far
+    /// `ahead`.
     pub(crate) fn subtract<F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
@@ -218,8 +221,8 @@ impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, 
 }
 
 impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
-    /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if all of these are finite, else
-    /// NaN.
+    /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if
+    /// all of these are finite, else NaN.
     pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>, result: &mut Hessian<M, E>) -> E {
         let nx = M::Shape::NX;
         let Self { backward, sum, .. } = self;

@@ -138,7 +138,8 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     }
 }
 
-/// `y ← y − Δ` of some unknowns, in lanes that are `active`; in the others there is no increment. A single lane is, or it would not be here.
+/// `y ← y − Δ` of some unknowns, in lanes that are `active`; in the others there is no increment. A
+/// single lane is, or it would not be here.
 #[inline(always)]
 fn subtract<E: Lanes, const S: usize, const N: usize>(
     y: &mut [[E; S]; N],
@@ -173,7 +174,8 @@ pub(super) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
 /// What is known of the increments of some unknowns, in `N` strands.
 struct Increments<E, const N: usize> {
     largest: [E; N],
-    /// By how much one, and the one that is expected next, is too large; not positive if that is below the tolerance.
+    /// By how much one, and the one that is expected next, is too large; not positive if that is
+    /// below the tolerance.
     excess: [E; N],
     /// The sum of what is not a number is not a number, which a maximum may lose.
     sum: [E; N],
@@ -205,7 +207,8 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
         for n in 0..N {
             new[n] = new[n] * weights[n];
         }
-        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only where it must be.
+        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only
+        // where it must be.
         if self.full {
             for n in 0..N {
                 let rate = new[n] / old[n];
@@ -217,7 +220,8 @@ impl<E: Lanes, const N: usize> Increments<E, N> {
             }
         }
         for n in 0..N {
-            // Where increments hardly shrink, nothing is expected but that the next one is as large.
+            // Where increments hardly shrink, nothing is expected but that the next one is as
+            // large.
             let expected = excess[n].max(new[n] + new[n] - old[n]);
             let own = new[n] - self.tolerance;
             // The smaller one.

@@ -1,4 +1,5 @@
-//! The integrator as its users see it: how it is made, what is set, simulation. Its derivatives are in `sensitivities`.
+//! The integrator as its users see it: how it is made, what is set, simulation. Its derivatives are
+//! in `sensitivities`.
 
 use super::along::{Along, begin, finish};
 use super::dense::Point;
@@ -20,21 +21,25 @@ use core::marker::PhantomData;
 /// An implicit Runge-Kutta integrator with `S` stages of the method `B` for the model `M`; see
 /// [`Irk`](super::Irk).
 ///
-/// All calls take the state at the start of the interval, the control, and the length `h` of the interval,
-/// which may be negative or zero. They return a reference to results in the memory of the integrator.
+/// All calls take the state at the start of the interval, the control, and the length `h` of the
+/// interval, which may be negative or zero. They return a reference to results in the memory of the
+/// integrator.
 ///
 /// # Start values
-/// The stages of the first step are found by Newton's method from `z` at the nominal values of the model,
-/// `#[dae(nominal(z = 0.1))]`, which are zero where the attribute says nothing, and `ẋ = 0`; from the values of
-/// [`set_start`](Self::set_start) if that was called; with [`Start::Warm`](crate::options::Start) from the stages of the last
-/// call. Later steps continue the solution of the step before. Of several roots of the equations the one is taken to which
-/// Newton's method leads from there, which need not be the nearest: which one it is, the result `z0` tells.
+/// The stages of the first step are found by Newton's method from `z` at the nominal values of the
+/// model, `#[dae(nominal(z = 0.1))]`, which are zero where the attribute says nothing, and `ẋ = 0`;
+/// from the values of [`set_start`](Self::set_start) if that was called; with
+/// [`Start::Warm`](crate::options::Start) from the stages of the last call. Later steps continue
+/// the solution of the step before. Of several roots of the equations the one is taken to which
+/// Newton's method leads from there, which need not be the nearest: which one it is, the result
+/// `z0` tells.
 ///
 /// # Errors
 /// Of every call: [`Error::NonFiniteInput`], [`Error::ParametersNotSet`], [`Error::StartNotGiven`],
-/// [`Error::NonFiniteModel`], [`Error::NonFiniteStart`], [`Error::Singular`], [`Error::NotConverged`], [`Error::Overflow`], and
-/// [`Error::OutOfMemory`] of the first call of its kind. Then the integrator is as it was before the call:
-/// usable, with the same warm start and the same dense output.
+/// [`Error::NonFiniteModel`], [`Error::NonFiniteStart`], [`Error::Singular`],
+/// [`Error::NotConverged`], [`Error::Overflow`], and [`Error::OutOfMemory`] of the first call of
+/// its kind. Then the integrator is as it was before the call: usable, with the same warm start and
+/// the same dense output.
 pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
     pub(super) run: Run<M, T, S, W>,
     pub(super) forward: W::Forward<ForwardMemory<M, T, S>>,
@@ -63,8 +68,8 @@ impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T, Heap> {
     /// An integrator for a tableau of the user's own, with its memory on the heap.
     ///
     /// # Errors
-    /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and two nodes
-    /// are equal.
+    /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and
+    /// two nodes are equal.
     pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Self::build(options, tableau)
     }
@@ -89,7 +94,8 @@ impl<M: Dae, const S: usize, T: Real, Mode: 'static, const STEPS: usize, F: Fall
 where
     Inline<Mode, STEPS, F>: Memory,
 {
-    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS` steps.
+    /// An integrator for a tableau of the user's own that is its own memory, for at most `STEPS`
+    /// steps.
     ///
     /// # Errors
     /// As `with_tableau`.
@@ -130,7 +136,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.set_parameters(p)
     }
 
-    /// The time at the start of the interval of all following calls; zero if never set. It does not move on by itself.
+    /// The time at the start of the interval of all following calls; zero if never set. It does not
+    /// move on by itself.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last time stays.
@@ -138,9 +145,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.set_time(t)
     }
 
-    /// Start values `ẋ` and `z` for Newton's method, at all stages, instead of the nominal values of the model: with
-    /// [`Start::Zero`](crate::options::Start) they are not read, and with `Start::Warm` only where there is no warm start. Of states
-    /// that are [kinematic](crate::model::Kinematic) `ẋ` is known, and is not read. They stay until they are set again.
+    /// Start values `ẋ` and `z` for Newton's method, at all stages, instead of the nominal values
+    /// of the model: with [`Start::Zero`](crate::options::Start) they are not read, and with
+    /// `Start::Warm` only where there is no warm start. Of states that are
+    /// [kinematic](crate::model::Kinematic) `ẋ` is known, and is not read. They stay until they are
+    /// set again.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
@@ -210,13 +219,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.points()
     }
 
-    /// The error of the last call, whose first step started at `y`, with what that has to do with it.
+    /// The error of the last call, whose first step started at `y`, with what that has to do with
+    /// it.
     #[cfg(feature = "alloc")]
     pub(crate) fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
         self.run.explain_from(error, y)
     }
 
-    /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages innermost.
+    /// The unknowns `(k, z)` at the stages of the first step of the last successful call, stages
+    /// innermost.
     #[cfg(feature = "alloc")]
     pub(crate) fn stages(&mut self) -> Result<&[T], Error> {
         let steps = self.run.last()?.steps;
@@ -257,11 +268,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&self.run.keep()?.result)
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the interval of the last successful call.
+    /// The solution at the time `t`, as the model sees it, inside the interval of the last
+    /// successful call.
     ///
     /// # Errors
-    /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`], [`Error::Overflow`];
-    /// [`Error::NoInterpolation`] if the tableau is not one of collocation.
+    /// [`Error::NoResult`], [`Error::OutsideInterval`], [`Error::NonFiniteInput`],
+    /// [`Error::Overflow`]; [`Error::NoInterpolation`] if the tableau is not one of collocation.
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         let last = self.run.last()?;
         let work = last.work;

@@ -7,7 +7,8 @@ use crate::scalar::Lanes;
 use crate::shape::Array;
 use core::marker::PhantomData;
 
-/// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit matrix.
+/// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit
+/// matrix.
 pub(super) struct Lone<'a, M, E, R, const S: usize> {
     pub entries: &'a [[E; S]],
     pub sum: &'a mut [R],

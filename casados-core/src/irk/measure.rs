@@ -1,4 +1,5 @@
-//! How large an increment of Newton's method is, relative to the unknowns, and what that means for kinematic states.
+//! How large an increment of Newton's method is, relative to the unknowns, and what that means for
+//! kinematic states.
 
 use super::increment::{part, part_mut};
 use super::kinematic::{count, is_any, minus_c, unknowns, velocity};
@@ -124,7 +125,8 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
     }
 }
 
-/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its change within the step.
+/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its
+/// change within the step.
 struct Velocities<'a, M: Dae, E: Plain, const S: usize> {
     followed: &'a Followed<'a, M, E, S>,
     x: &'a ArrayX<M, E>,
@@ -175,11 +177,14 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
     }
 }
 
-/// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to half of the largest `Σ_j |a_ij| |Δ_j|` if they have one
-/// sign at all stages, and less if not. (With the bound itself 5 masses take an iteration more in each step than their own increments ask for.)
+/// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to
+/// half of the largest `Σ_j |a_ij| |Δ_j|` if they have one sign at all stages, and less if not.
+/// (With the bound itself 5 masses take an iteration more in each step than their own increments
+/// ask for.)
 const TYPICAL: f64 = 0.25;
 
-/// What increments of velocities are measured by too: `k_q` of [kinematic](super::kinematic) states.
+/// What increments of velocities are measured by too: `k_q` of [kinematic](super::kinematic)
+/// states.
 pub(super) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// Where their `k` are.

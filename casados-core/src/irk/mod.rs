@@ -7,16 +7,18 @@
 //! x_{n+1} = x_n + h Σ_i b_i k_i
 //! ```
 //!
-//! by Newton's method. Sensitivities are the exact derivatives of this discrete map, by the implicit
-//! function theorem at the converged stages: the Jacobian is evaluated and factorised there, whatever the
-//! iteration took. `z` at the ends of an interval is the polynomial through the stages; for stiffly
-//! accurate methods its value at the end is the last stage.
+//! by Newton's method. Sensitivities are the exact derivatives of this discrete map, by the
+//! implicit function theorem at the converged stages: the Jacobian is evaluated and factorised
+//! there, whatever the iteration took. `z` at the ends of an interval is the polynomial through the
+//! stages; for stiffly accurate methods its value at the end is the last stage.
 //!
-//! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its `progress`, and, where that does
-//! not arrive, `pivoted`, what errors say about where it `started`, and the `doubt` about linear equations, `step`, `forward` by `sweep` over panels of `directions` from their `right_side`, `adjoint`, `hessian`
-//! by products of panels (`curvature`) or by a `curved_adjoint` of large models,
-//! `along` an integrand, `verify` what was solved, states that are `kinematic`, `dense`; `record` is the memory, `run` what all calls share, `integrator` and its
-//! `sensitivities` what users see.
+//! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its
+//! `progress`, and, where that does not arrive, `pivoted`, what errors say about where it
+//! `started`, and the `doubt` about linear equations, `step`, `forward` by `sweep` over panels of
+//! `directions` from their `right_side`, `adjoint`, `hessian` by products of panels (`curvature`)
+//! or by a `curved_adjoint` of large models, `along` an integrand, `verify` what was solved, states
+//! that are `kinematic`, `dense`; `record` is the memory, `run` what all calls share, `integrator`
+//! and its `sensitivities` what users see.
 
 mod adjoint;
 mod along;

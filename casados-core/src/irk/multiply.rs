@@ -1,4 +1,5 @@
-//! `G = −H D`: the sparse second derivatives of a step times derivatives of its variables, a few columns at a time.
+//! `G = −H D`: the sparse second derivatives of a step times derivatives of its variables, a few
+//! columns at a time.
 
 use super::curvature::together;
 use super::directions::panel;
@@ -7,7 +8,8 @@ use crate::model::{Dae, Term};
 use crate::scalar::Lanes;
 use crate::structure::MOST_ROWS;
 
-/// `G = −H D` at all stages in the panel that begins with a column; its rows lie as those of the panel do.
+/// `G = −H D` at all stages in the panel that begins with a column; its rows lie as those of the
+/// panel do.
 #[inline(always)]
 pub(super) fn multiply_panel<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
     entries: &[[E; S]],
@@ -74,8 +76,9 @@ struct Multiply<'a, E, const S: usize, const L: usize, const N: usize, const W: 
 impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize>
     Multiply<'_, E, S, L, N, W, P>
 {
-    /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied with is fetched once for all of them, so many
-    /// columns and stages at a time that it fits registers beside them; of sixteen registers it seldom does.
+    /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied
+    /// with is fetched once for all of them, so many columns and stages at a time that it fits
+    /// registers beside them; of sixteen registers it seldom does.
     #[inline(always)]
     fn rows<A: Arithmetic, M: Dae, const R: usize>(
         &self,

@@ -4,28 +4,33 @@
 //! J Δ = −f(y),   y ← y + Δ
 //! ```
 //!
-//! Increments are measured relative to the size of each unknown, `‖Δ‖ = max_c max_i |Δ_ci| / max_i |y_ci|`: however
-//! equations and unknowns are scaled. (For a derivative `ẋ` a change that rounds to none in `x` is none.) They shrink
-//! by `θ`, so that the next one is expected to be `θ ‖Δ‖/(1−θ)` with a Jacobian that was kept (Hairer and Wanner,
-//! Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since then `θ` squares too. Both are asked unknown by
-//! unknown: a norm of all would let a linear one, corrected at once, speak for a nonlinear one. It has converged as
-//! soon as the next increment is below the tolerance. Where increments stop shrinking because the rounding errors of the model are
-//! larger than expected, it has converged too if they are small, or if the residual is at the level of the rounding errors of its
-//! terms: more cannot be known. (Where a model rests, unknowns are differences of large terms that cancel: they have no digits
-//! by which an increment could be small.)
+//! Increments are measured relative to the size of each unknown,
+//! `‖Δ‖ = max_c max_i |Δ_ci| / max_i |y_ci|`: however equations and unknowns are scaled. (For a
+//! derivative `ẋ` a change that rounds to none in `x` is none.) They shrink by `θ`, so that the
+//! next one is expected to be `θ ‖Δ‖/(1−θ)` with a Jacobian that was kept (Hairer and Wanner,
+//! Solving ODEs II, IV.8), and `θ² ‖Δ‖` with the current one, since then `θ` squares too. Both are
+//! asked unknown by unknown: a norm of all would let a linear one, corrected at once, speak for a
+//! nonlinear one. It has converged as soon as the next increment is below the tolerance. Where
+//! increments stop shrinking because the rounding errors of the model are larger than expected, it
+//! has converged too if they are small, or if the residual is at the level of the rounding errors
+//! of its terms: more cannot be known. (Where a model rests, unknowns are differences of large
+//! terms that cancel: they have no digits by which an increment could be small.)
 //!
-//! [Kinematic](crate::model::Kinematic) states, as `q` in `q̇ = v`, are no unknowns: their `k` follows from that of `v` before each iteration and
-//! after the last, whatever start values are given for it.
+//! [Kinematic](crate::model::Kinematic) states, as `q` in `q̇ = v`, are no unknowns: their `k`
+//! follows from that of `v` before each iteration and after the last, whatever start values are
+//! given for it.
 //!
-//! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step or of the start
-//! values is kept as long as the iterations that are still expected with it cost less than a new one. How many that are is known from
-//! two increments by the same; of the first one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new one, with
-//! three stages or more, is the mean of those of the stages, or that in their middle where they are not evaluated side by side. Its system is
-//! solved in the eigenbasis of the tableau, in numbers that may be [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for
-//! each stage.
+//! Which Jacobian the iteration takes follows one rule ([`Jacobian::Auto`]): that of the last step
+//! or of the start values is kept as long as the iterations that are still expected with it cost
+//! less than a new one. How many that are is known from two increments by the same; of the first
+//! one, which begins far away with a Jacobian of its own, the residual that it leaves tells. A new
+//! one, with three stages or more, is the mean of those of the stages, or that in their middle
+//! where they are not evaluated side by side. Its system is solved in the eigenbasis of the
+//! tableau, in numbers that may be [coarse](Lanes::Coarse): it costs a fraction of one with a
+//! Jacobian for each stage.
 //!
-//! Linear equations take one iteration; then their residual is looked at, and refined if digits were lost; and whether
-//! they [determine](super::doubt) a solution.
+//! Linear equations take one iteration; then their residual is looked at, and refined if digits
+//! were lost; and whether they [determine](super::doubt) a solution.
 //!
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
@@ -43,17 +48,19 @@ use bytemuck::Zeroable;
 
 /// Increments below this many ε are rounding errors.
 const ROUNDING: f64 = 1.0;
-/// Where sums over the steps are compensated, what an iteration leaves undone must not add up either: it has the same sign
-/// in every step.
+/// Where sums over the steps are compensated, what an iteration leaves undone must not add up
+/// either: it has the same sign in every step.
 const LITTLE: f64 = 1.0 / 64.0;
 
-/// The first mean Jacobian is that of start values, which may be far away: that increments grow with it is not its fault.
+/// The first mean Jacobian is that of start values, which may be far away: that increments grow
+/// with it is not its fault.
 const FAR: usize = 1;
 /// So often the mean Jacobian is renewed in a step before the stages' own are taken.
 const MEANS: usize = 3;
 
-/// So many iterations new factors still take themselves: by blocks, and of the mean Jacobian, with which increments never shrink quadratically. (With two, 17 masses
-/// had a factorisation more and 65 had two more, in one iteration less: 12 and 20 % more time.)
+/// So many iterations new factors still take themselves: by blocks, and of the mean Jacobian, with
+/// which increments never shrink quadratically. (With two, 17 masses had a factorisation more and
+/// 65 had two more, in one iteration less: 12 and 20 % more time.)
 const STILL: [f64; 2] = [2.0, 3.0];
 
 /// Linear equations are refined so often if one iteration was not enough.
@@ -65,18 +72,21 @@ pub(crate) struct Solved<E: Lanes> {
     pub converged: E::Mask,
     /// Whether the factors that are there are those of the solution.
     pub exact: bool,
-    /// An unknown of linear equations that they do not determine, in some lane that has not converged for that.
+    /// An unknown of linear equations that they do not determine, in some lane that has not
+    /// converged for that.
     pub undetermined: Option<usize>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
-    /// The operations of an iteration with old factors: what is computed for all stages side by side counts once.
+    /// The operations of an iteration with old factors: what is computed for all stages side by
+    /// side counts once.
     const ITERATION: f64 = {
         let blocks = M::STRUCTURE.elimination.slots.len() as f64;
         M::STRUCTURE.operations.residual as f64 + blocks * S as f64 + 1.0
     };
 
-    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in the eigenbasis.
+    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in
+    /// the eigenbasis.
     const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
         let (s, inverses) = (S as f64, 4.0 * plan.pivots.len() as f64);
@@ -92,8 +102,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The cost of a residual, in iterations.
     const RESIDUAL: f64 = M::STRUCTURE.operations.residual as f64 / Self::ITERATION;
 
-    /// Whether factors by blocks cost no more than the iterations that they save where start values are near: with mean Jacobians, which are
-    /// renewed up to three times, it took 7 to 12 of them, with blocks 4 or 5 (Robertson, Van der Pol, Oregonator, HIRES, Akzo Nobel).
+    /// Whether factors by blocks cost no more than the iterations that they save where start values
+    /// are near: with mean Jacobians, which are renewed up to three times, it took 7 to 12 of them,
+    /// with blocks 4 or 5 (Robertson, Van der Pol, Oregonator, HIRES, Akzo Nobel).
     const EXACT: bool = Self::RENEWAL[0] <= 10.0;
 
     /// Solves the stages of a step from the start values in `y`.
@@ -121,8 +132,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         solved
     }
 
-    /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is computed before it is known
-    /// whether it is needed.
+    /// Iterations until the increment is small enough. Of its own, or what it computes in `f64` is
+    /// computed before it is known whether it is needed.
     #[inline(never)]
     #[allow(clippy::too_many_arguments)]
     fn converge(
@@ -190,7 +201,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             if renew || early {
                 statistics.jacobians += 1;
                 statistics.factorizations += 1;
-                // Where the mean of the stages says too little about each of them, their own Jacobians are taken.
+                // Where the mean of the stages says too little about each of them, their own
+                // Jacobians are taken.
                 mean = basis.is_some() && !near && (simplified || renewals < MEANS);
                 renewals += usize::from(renew);
                 factored = true;
@@ -282,7 +294,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             near &= !verdict.stuck;
             let cheap = basis.is_some() && (simplified || renewals < MEANS);
             let expensive = STILL[usize::from(cheap)] + Self::RENEWAL[usize::from(cheap)];
-            // The first increment of new factors against the last of old ones does not tell how good the new ones are.
+            // The first increment of new factors against the last of old ones does not tell how
+            // good the new ones are.
             let fresh = early || renew && iteration > 1;
             let slow = verdict.remaining > expensive && (!fresh || verdict.grows);
             renew = !exact && (full || adaptive && !near && slow);
@@ -291,8 +304,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
-    /// So many iterations, whose increments nobody asks for: on a processor without an FPU for double precision they take
-    /// no operation of it.
+    /// So many iterations, whose increments nobody asks for: on a processor without an FPU for
+    /// double precision they take no operation of it.
     #[allow(clippy::too_many_arguments)]
     fn iterate(
         &mut self,
@@ -339,7 +352,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         Solved { converged: E::le(zero, zero), exact: false, undetermined: None }
     }
 
-    /// Factors of the mean Jacobian, if there is memory for them. Of one stage or two there is no eigenbasis, and nothing is compiled.
+    /// Factors of the mean Jacobian, if there is memory for them. Of one stage or two there is no
+    /// eigenbasis, and nothing is compiled.
     #[inline(always)]
     fn factor_mean(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
         if const { S > 2 }
@@ -369,10 +383,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         factors.factor_by_plan(jacobian, &coefficients.a, h);
     }
 
-    /// Whether the residual that an increment leaves, of the `first` one, lets so many iterations be expected that new factors cost less.
-    /// Where it leaves more than a sixteenth, those of where it led to would soon be renewed as well. Where it leaves more than there
-    /// was, another increment by the same factors would be longer than the first, and may lead to another root than Newton's
-    /// method does.
+    /// Whether the residual that an increment leaves, of the `first` one, lets so many iterations
+    /// be expected that new factors cost less. Where it leaves more than a sixteenth, those of
+    /// where it led to would soon be renewed as well. Where it leaves more than there was, another
+    /// increment by the same factors would be longer than the first, and may lead to another root
+    /// than Newton's method does.
     fn leaves_much(&self, first: E, tolerance: f64, cheap: bool) -> bool {
         let left = dispatch(Largest { residual: self.f.as_ref().as_flattened() }) / first;
         let expensive = STILL[usize::from(cheap)] + Self::RESIDUAL + Self::RENEWAL[usize::from(cheap)];

@@ -1,13 +1,14 @@
-//! The careful way: Newton's method with the current Jacobian in every iteration, the whole matrix pivoted, and every
-//! value looked at. It is taken where there is no plan of elimination, and where the fast way did not arrive: then it
-//! gives the solution, or says what is wrong.
+//! The careful way: Newton's method with the current Jacobian in every iteration, the whole matrix
+//! pivoted, and every value looked at. It is taken where there is no plan of elimination, and where
+//! the fast way did not arrive: then it gives the solution, or says what is wrong.
 //!
-//! It has converged as soon as one of these holds, both of them invariant under scaling of equations and of variables:
+//! It has converged as soon as one of these holds, both of them invariant under scaling of
+//! equations and of variables:
 //! - the residual of every equation is at rounding level, `|f_r| ≤ 4 ε Σ_c |∂f_r/∂v_c v_c|`;
 //! - the increment that would come next, at most `θ/(1−θ) ‖Δ‖`, is below the tolerance.
 //!
-//! Where rounding errors of the model are larger than expected, residual and increments stop shrinking. Then
-//! it has converged too if either is small: more cannot be known.
+//! Where rounding errors of the model are larger than expected, residual and increments stop
+//! shrinking. Then it has converged too if either is small: more cannot be known.
 
 use super::evaluate::not_finite;
 use super::record::{Coefficients, Work};
@@ -22,7 +23,8 @@ use bytemuck::Zeroable;
 
 /// Residuals below this many ε of their terms are rounding errors.
 const ROUNDING: f64 = 4.0;
-/// Residuals that no longer shrink are rounding errors of the model below this many ε of their terms.
+/// Residuals that no longer shrink are rounding errors of the model below this many ε of their
+/// terms.
 const NOISE: f64 = 256.0;
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
@@ -64,7 +66,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 let (residual, equation, stage) = self.relative_residual();
                 let stuck = iteration > 1 && residual >= before;
                 before = residual;
-                // Start values that happen to be good are not yet as good as what one iteration makes of them.
+                // Start values that happen to be good are not yet as good as what one iteration
+                // makes of them.
                 if iteration > 0 && residual <= rounding || stuck && residual <= noise {
                     return Ok(());
                 }
@@ -97,7 +100,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             if test {
                 if iteration > 1 {
                     let rate = increment.size / last.size;
-                    // With the current Jacobian it will be less, but how much less differs from unknown to unknown.
+                    // With the current Jacobian it will be less, but how much less differs from
+                    // unknown to unknown.
                     let next = rate / (T::ONE - rate) * increment.size;
                     // A rate near one says nothing about the next increment.
                     let shrinks = rate + rate < T::ONE;
@@ -141,7 +145,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     }
 
     /// # Errors
-    /// The first value of the model that is not finite: of the residual, which says more, or of the Jacobian.
+    /// The first value of the model that is not finite: of the residual, which says more, or of the
+    /// Jacobian.
     pub(crate) fn check_model(&self, step: usize, iteration: usize) -> Result<(), Error> {
         let (f, jacobian) = (self.f.as_ref(), self.linear.jacobian.as_ref());
         let error = |quantity, equation, stage, value| Error::NonFiniteModel {
@@ -159,9 +164,9 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         Ok(())
     }
 
-    /// The largest residual relative to the magnitude of its terms, `|f_r| / Σ_c |∂f_r/∂v_c v_c|`, and its
-    /// equation and stage. Rounding errors of the model are a few ε of this, however equations and
-    /// variables are scaled.
+    /// The largest residual relative to the magnitude of its terms, `|f_r| / Σ_c |∂f_r/∂v_c v_c|`,
+    /// and its equation and stage. Rounding errors of the model are a few ε of this, however
+    /// equations and variables are scaled.
     pub(crate) fn relative_residual(&self) -> (T, usize, usize) {
         let mut magnitude: ArrayK<M, [T; S]> = Zeroable::zeroed();
         let Pattern { rows, columns } = M::STRUCTURE.jacobian;
@@ -179,8 +184,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         let mut largest = (T::ZERO, 0, 0);
         for (equation, (f, magnitude)) in self.f.as_ref().iter().zip(magnitude.as_ref()).enumerate() {
             for (stage, (f, magnitude)) in f.iter().zip(magnitude).enumerate() {
-                // A residual of zero is zero even where all terms are, and none is rounded finer than normal numbers are. Terms
-                // that overflow say nothing.
+                // A residual of zero is zero even where all terms are, and none is rounded finer
+                // than normal numbers are. Terms that overflow say nothing.
                 let relative = if *f == T::ZERO {
                     T::ZERO
                 } else if magnitude.is_finite() {
@@ -196,7 +201,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         largest
     }
 
-    /// `y ← y − Δ`; the largest increment relative to the unknown, of which the largest stage counts.
+    /// `y ← y − Δ`; the largest increment relative to the unknown, of which the largest stage
+    /// counts.
     fn update(&self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
         let mut largest = Increment { size: T::ZERO, unknown: 0 };
         for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.increment.as_ref()).enumerate() {
@@ -208,7 +214,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                     change = delta.abs();
                 }
             }
-            // No increment is none, also of zero; an unknown that became zero changed by all it was.
+            // No increment is none, also of zero; an unknown that became zero changed by all it
+            // was.
             let relative = if change == T::ZERO {
                 T::ZERO
             } else {

@@ -4,8 +4,9 @@ use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::scalar::Lanes;
 use bytemuck::Zeroable;
 
-/// Unknowns that were larger than their first increment, and have moved by no more than so much of their size since then, still are of that size, and
-/// what follows them too, whose increments count for so much of their bound ([`TYPICAL`](super::measure)).
+/// Unknowns that were larger than their first increment, and have moved by no more than so much of
+/// their size since then, still are of that size, and what follows them too, whose increments count
+/// for so much of their bound ([`TYPICAL`](super::measure)).
 const LITTLE_MOVED: f64 = 1.0 / 8.0;
 
 /// What is known of every lane. One that is neither active nor has converged has failed.
@@ -19,7 +20,8 @@ pub(super) struct Progress<E: Lanes> {
     last: E,
     /// How fast increments shrink; zero if that is not known.
     rate: E,
-    /// How far unknowns have moved since they were measured, in parts of their sizes; infinite if increments were as large.
+    /// How far unknowns have moved since they were measured, in parts of their sizes; infinite if
+    /// increments were as large.
     moved: E,
     /// What the next increment has to be below.
     tolerance: E,
@@ -84,7 +86,8 @@ impl<E: Lanes> Progress<E> {
         E::and(self.active, E::le(E::from_f64(0.5), self.rate))
     }
 
-    /// The slowest rate of those that have converged: lanes that failed have no say in what the others do next.
+    /// The slowest rate of those that have converged: lanes that failed have no say in what the
+    /// others do next.
     pub fn slowest_rate(&self) -> f64 {
         let mut cell: E::Cell = Zeroable::zeroed();
         E::select(self.converged, self.rate, E::from_f64(0.0)).store(&mut cell);
@@ -127,7 +130,8 @@ impl<E: Lanes> Judge<'_, E> {
             Look::First { .. } | Look::Later => {
                 let mut expected = size;
                 if let Look::First { new } = look {
-                    // What the last step found out holds for its factors only; and too roughly to stop by it.
+                    // What the last step found out holds for its factors only; and too roughly to
+                    // stop by it.
                     rate = if new { zero } else { rate };
                     moved = E::select(E::lt(size, one), zero, E::from_f64(f64::INFINITY));
                 } else {
@@ -158,7 +162,8 @@ impl<E: Lanes> Judge<'_, E> {
     }
 }
 
-/// How many times a size is to be multiplied by a rate to be no larger than the tolerance; 64 times at most.
+/// How many times a size is to be multiplied by a rate to be no larger than the tolerance; 64 times
+/// at most.
 #[inline(always)]
 pub(super) fn remaining<E: Lanes>(active: E::Mask, mut size: E, rate: E, tolerance: E) -> f64 {
     let mut count = 0.0;

@@ -32,7 +32,8 @@ pub(crate) struct Coefficients<E, const S: usize> {
     pub start: [E; S],
     /// Lagrange polynomials at its end.
     pub end: [E; S],
-    /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them; if there are any.
+    /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them;
+    /// if there are any.
     pub next: Option<[[E; S]; S]>,
     /// The eigenbasis of `A`, if iterations in it are cheaper than with blocks.
     pub basis: Option<Eigenbasis<E, S, S>>,
@@ -136,8 +137,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     pub(crate) linear: Linearization<M, T, S, F>,
     /// Factors of the mean Jacobian of the stages, which iterations take where that is cheaper.
     pub(crate) mean: F::Place<MeanFactors<M, T, S>>,
-    /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While stages are solved with
-    /// compensated sums, what they are beyond their digits.
+    /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While
+    /// stages are solved with compensated sums, what they are beyond their digits.
     pub(crate) probe: [Aligned<ArrayV<M, [T; S]>>; 2],
     pub(crate) terms: Aligned<ArrayK<M, [T; S]>>,
     /// What the factors that are there are good for.

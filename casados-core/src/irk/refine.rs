@@ -1,15 +1,17 @@
-//! Forward derivatives to the digits that the equations determine, not only those of the assembled Jacobian.
+//! Forward derivatives to the digits that the equations determine, not only those of the assembled
+//! Jacobian.
 //!
-//! An entry of the Jacobian is a sum that rounds away what is small in it. Where the sum of several equations is slow while
-//! each is fast, as with the mass of a chemical reaction over a long step, what is small is all there is of the slow motion. A
-//! tangent of the model has no such sums: terms that equations share are rounded once, and cancel. So
+//! An entry of the Jacobian is a sum that rounds away what is small in it. Where the sum of several
+//! equations is slow while each is fast, as with the mass of a chemical reaction over a long step,
+//! what is small is all there is of the slow motion. A tangent of the model has no such sums: terms
+//! that equations share are rounded once, and cancel. So
 //!
 //! ```text
 //! r_i = f_ẋ dk_i + f_x (V_n + h Σ_j a_ij dk_j) + f_z dz_i + f_w
 //! ```
 //!
-//! is computed by tangents, and corrected with the factors that are there (iterative refinement; C. B. Moler, J. ACM 14, 1967).
-//! One sum of all directions tells whether that is worth it.
+//! is computed by tangents, and corrected with the factors that are there (iterative refinement; C.
+//! B. Moler, J. ACM 14, 1967). One sum of all directions tells whether that is worth it.
 
 use super::directions::{Directions, panel, panel_mut, panels};
 use super::record::{Coefficients, Work};
@@ -31,8 +33,8 @@ const ROUNDING: f64 = 4096.0;
 const REFINEMENTS: usize = 3;
 
 impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
-    /// After a step whose derivatives satisfy their equations as the Jacobian has them: mends them, and what follows from them,
-    /// where those of the model are others.
+    /// After a step whose derivatives satisfy their equations as the Jacobian has them: mends them,
+    /// and what follows from them, where those of the model are others.
     pub(super) fn refine<D: Directions<T>, G: Target<T>, F: Fallback>(
         &mut self,
         work: &mut Work<M, T, S, F>,
@@ -59,8 +61,8 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         }
     }
 
-    /// The largest correction of the sum of all directions, relative to each unknown; of a slope also to what it changes,
-    /// `V_n / h`. The sum is where it was tried on the equations.
+    /// The largest correction of the sum of all directions, relative to each unknown; of a slope
+    /// also to what it changes, `V_n / h`. The sum is where it was tried on the equations.
     fn correction<F: Fallback>(&self, work: &mut Work<M, T, S, F>, coefficients: &Coefficients<T, S>) -> f64 {
         let (nx, h) = (M::Shape::NX, work.inputs.time.step);
         work.probe_tangent();

@@ -1,5 +1,5 @@
-//! What all calls of an integrator share: arguments checked, steps taken, and the record of them kept only
-//! if everything succeeded.
+//! What all calls of an integrator share: arguments checked, steps taken, and the record of them
+//! kept only if everything succeeded.
 
 use super::evaluate::not_finite;
 use super::record::{Coefficients, Step, Work};
@@ -180,7 +180,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         Ok(())
     }
 
-    /// Start values of the stages of the first step, as a warm start: the unknowns `(k, z)`, stages innermost.
+    /// Start values of the stages of the first step, as a warm start: the unknowns `(k, z)`, stages
+    /// innermost.
     #[cfg(feature = "alloc")]
     pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
         let [first, second] = &mut self.tapes;
@@ -200,7 +201,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         Ok(&W::nominal(&mut self.work)?.points)
     }
 
-    /// The error of the last call, whose first step started at `y`, with what that has to do with it.
+    /// The error of the last call, whose first step started at `y`, with what that has to do with
+    /// it.
     #[cfg(feature = "alloc")]
     pub fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
         let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());

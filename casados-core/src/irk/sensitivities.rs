@@ -82,7 +82,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.keep_forward()
     }
 
-    /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the derivatives.
+    /// The solution, its derivatives, and the gradient of `λᵀx₊`: the product of `λ` with the
+    /// derivatives.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -103,7 +104,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&W::forward(&mut self.forward)?.result)
     }
 
-    /// [`Integrator::forward_adjoint`] into a result elsewhere, which is no result if there is an error.
+    /// [`Integrator::forward_adjoint`] into a result elsewhere, which is no result if there is an
+    /// error.
     #[cfg(feature = "alloc")]
     pub(crate) fn forward_adjoint_to(
         &mut self,
@@ -160,7 +162,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&W::forward(&mut self.forward)?.result.forward)
     }
 
-    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row for each direction.
+    /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row
+    /// for each direction.
     ///
     /// # Errors
     /// [`Error::NoResult`]
@@ -178,11 +181,11 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(())
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the interval of the last successful call, and its derivatives with
-    /// respect to `x₀`, `u` and `p`.
+    /// The solution at the time `t`, as the model sees it, inside the interval of the last
+    /// successful call, and its derivatives with respect to `x₀`, `u` and `p`.
     ///
-    /// The stages of that call are differentiated step by step up to the one that contains the time; times
-    /// in the same step or a later one go on from there.
+    /// The stages of that call are differentiated step by step up to the one that contains the
+    /// time; times in the same step or a later one go on from there.
     ///
     /// # Errors
     /// Those of [`Integrator::dense`], and of [`Integrator::forward`].
@@ -260,7 +263,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&memory.result)
     }
 
-    /// Allocates what `adjoint_many` with `C` seeds needs, so that no call of it will. `adjoint` has one.
+    /// Allocates what `adjoint_many` with `C` seeds needs, so that no call of it will. `adjoint`
+    /// has one.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -395,10 +399,12 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.hessian_along(x0, u, h, lambda, &[], None)
     }
 
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the algebraic states `z₀` at the
-    /// start of the interval, which are [`z0`](crate::result::Nominal::z0) of the results: in the same pass.
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the
+    /// algebraic states `z₀` at the start of the interval, which are
+    /// [`z0`](crate::result::Nominal::z0) of the results: in the same pass.
     ///
-    /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on algebraic states.
+    /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on
+    /// algebraic states.
     ///
     /// # Errors
     /// See [`Integrator`].
@@ -426,7 +432,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.hessian_along(x0, u, h, lambda, nu.as_slice(), None)
     }
 
-    /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an integrand.
+    /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an
+    /// integrand.
     pub(crate) fn hessian_along(
         &mut self,
         x0: &VectorX<M, T>,
@@ -443,7 +450,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         Ok(&W::hessian(&mut self.hessian)?.result)
     }
 
-    /// The same, written to the memory of `hessian` or elsewhere, where there is no result if there is an error.
+    /// The same, written to the memory of `hessian` or elsewhere, where there is no result if there
+    /// is an error.
     pub(crate) fn hessian_to(
         &mut self,
         arguments: &Arguments<'_, M, T>,

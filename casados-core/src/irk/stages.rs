@@ -11,7 +11,8 @@ use core::ops::{Deref, DerefMut};
 #[repr(C)]
 pub(crate) struct Stages<A, T, const S: usize> {
     cells: A,
-    /// For the last cells of what begins with another stage: nothing that is looked for there is ever written.
+    /// For the last cells of what begins with another stage: nothing that is looked for there is
+    /// ever written.
     beyond: [T; S],
 }
 
@@ -35,9 +36,10 @@ impl<A: Array<[T; S]>, T: Plain, const S: usize> Stages<A, T, S> {
     #[inline(always)]
     pub fn seen_from(&self, stage: usize) -> &A {
         let stage = stage.min(S);
-        // SAFETY: `A` is an array of `[T; S]`, the only type that is an `Array` of these; behind it, in the same struct and without a
-        // gap, as both are aligned as `T` is, lie `S` more of `T`. So from its number `stage ≤ S` on there are as many as it has, which
-        // are numbers, aligned as they ask, and borrowed with `self`.
+        // SAFETY: `A` is an array of `[T; S]`, the only type that is an `Array` of these; behind
+        // it, in the same struct and without a gap, as both are aligned as `T` is, lie `S` more of
+        // `T`. So from its number `stage ≤ S` on there are as many as it has, which are numbers,
+        // aligned as they ask, and borrowed with `self`.
         unsafe { &*core::ptr::from_ref(self).cast::<T>().add(stage).cast::<A>() }
     }
 
@@ -54,7 +56,8 @@ impl<A: Array<[T; S]>, T: Plain, const S: usize> Stages<A, T, S> {
 mod tests {
     use super::*;
 
-    /// What is seen from a stage are its numbers, in the order of the cells, and nothing else is written.
+    /// What is seen from a stage are its numbers, in the order of the cells, and nothing else is
+    /// written.
     #[test]
     fn first_numbers_are_those_of_the_stage() {
         let mut stages: Stages<[[f64; 4]; 3], f64, 4> = Zeroable::zeroed();

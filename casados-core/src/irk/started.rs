@@ -27,8 +27,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         }
     }
 
-    /// The error, with the algebraic state that led to it and its start value, which is zero if there is none; of a model without
-    /// any such state as it is.
+    /// The error, with the algebraic state that led to it and its start value, which is zero if
+    /// there is none; of a model without any such state as it is.
     #[cold]
     pub(super) fn explain_from(&mut self, error: Error, start: impl Fn(usize) -> Option<f64>) -> Error {
         if const { M::Shape::NZ == 0 } {
@@ -59,8 +59,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         places.filter(move |place| place.0 == equation).map(|place| place.1.saturating_sub(M::Shape::NX))
     }
 
-    /// The algebraic state for whose value an equation has none: with another one it has. The points of the stages are left
-    /// anywhere.
+    /// The algebraic state for whose value an equation has none: with another one it has. The
+    /// points of the stages are left anywhere.
     fn without_value(&mut self, equation: usize) -> Option<usize> {
         Self::algebraic_of(equation).find(|unknown| {
             let variable = unknown + M::Shape::NX;

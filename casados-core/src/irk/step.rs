@@ -33,8 +33,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.rest.as_mut().fill(E::from_f64(0.0));
     }
 
-    /// Start values of the stages of step `n`: after the first one the polynomial of the step before, continued, or if that is not worth
-    /// much its algebraic states.
+    /// Start values of the stages of step `n`: after the first one the polynomial of the step
+    /// before, continued, or if that is not worth much its algebraic states.
     pub(crate) fn start(
         &mut self,
         coefficients: &Coefficients<E, S>,
@@ -102,8 +102,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 }
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
-    /// Integrates the interval: `x` at its start becomes `x` at its end. After each step, `after` is called
-    /// with what is known about it, and whether the factors that are there are those of its solution.
+    /// Integrates the interval: `x` at its start becomes `x` at its end. After each step, `after`
+    /// is called with what is known about it, and whether the factors that are there are those of
+    /// its solution.
     ///
     /// # Errors
     /// Those of Newton's method; [`Error::Overflow`].
@@ -136,8 +137,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         Ok(())
     }
 
-    /// The stages of a step, the fast way, and where that does not arrive the careful one; whether the factors
-    /// that are there are those of the solution.
+    /// The stages of a step, the fast way, and where that does not arrive the careful one; whether
+    /// the factors that are there are those of the solution.
     #[allow(clippy::too_many_arguments)]
     fn solve(
         &mut self,
@@ -184,7 +185,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         }
     }
 
-    /// The linearisation at the solution of a step, `exact` if the factors that are there are its own.
+    /// The linearisation at the solution of a step, `exact` if the factors that are there are its
+    /// own.
     ///
     /// # Errors
     /// A value of the model that is not finite, a singular matrix.
@@ -206,7 +208,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
-    /// The linearisation at the solution of a step, by the plan if there is one; its factors in `to` another place, if it is given.
+    /// The linearisation at the solution of a step, by the plan if there is one; its factors in
+    /// `to` another place, if it is given.
     pub(crate) fn linearize_planned(
         &mut self,
         coefficients: &Coefficients<E, S>,

@@ -1,13 +1,16 @@
-//! Weighted sums of the derivatives of the stages over all directions, by which they are checked (`verify`, `refine`).
+//! Weighted sums of the derivatives of the stages over all directions, by which they are checked
+//! (`verify`, `refine`).
 
 use super::directions::weight;
 use crate::linalg::{Ahead, Arithmetic, Packet, Viewer};
 use crate::scalar::Field;
 
-/// So many strands a sum over all columns has; of numbers that are registers themselves only the first is used.
+/// So many strands a sum over all columns has; of numbers that are registers themselves only the
+/// first is used.
 pub(super) const STRANDS: usize = 4;
 
-/// Whether sums have one strand: those of other rows are computed meanwhile, and its memory is written once for each row of a panel.
+/// Whether sums have one strand: those of other rows are computed meanwhile, and its memory is
+/// written once for each row of a panel.
 const fn is_one<E>() -> bool {
     size_of::<E>() > 8
 }

@@ -1,5 +1,5 @@
-//! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to `V_{n+1}`, which after the last step is a
-//! result, and to what second derivatives need of both.
+//! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to
+//! `V_{n+1}`, which after the last step is a result, and to what second derivatives need of both.
 
 use super::curved_rows::CurvedRows;
 use super::directions::{Directions, NEAREST, panel, panel_mut, panels};
@@ -72,8 +72,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         self.begun = D::SPARSE;
     }
 
-    /// The step that follows, which is linearised; the `first` of the interval or a later one. Whether the derivatives
-    /// of the stages satisfy their equations.
+    /// The step that follows, which is linearised; the `first` of the interval or a later one.
+    /// Whether the derivatives of the stages satisfy their equations.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn step<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
@@ -156,7 +156,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         })];
     }
 
-    /// What follows from derivatives of the stages that are others now: `V_{n+1}`, and the sums over all directions.
+    /// What follows from derivatives of the stages that are others now: `V_{n+1}`, and the sums
+    /// over all directions.
     pub(super) fn conclude<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &Work<M, E, S, F>,
@@ -302,14 +303,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
-    /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model each is filled when its turn comes.
+    /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model
+    /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
         let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
         bytes <= NEAREST && is_short::<A, Scatter<'_, M, E, D, S>>()
     }
 
-    /// Whether sums are made of what is in the memory: of small models all of it is in the nearest cache, and registers are few. (Chains of
-    /// 5 masses took 3 % more otherwise; where numbers are registers it takes 2 to 4 % less to see them when they are found.)
+    /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
+    /// cache, and registers are few. (Chains of 5 masses took 3 % more otherwise; where numbers are
+    /// registers it takes 2 to 4 % less to see them when they are found.)
     const fn sums_late<A: Arithmetic>() -> bool {
         size_of::<E>() <= 8 && Self::is_small::<A>()
     }

@@ -1,5 +1,6 @@
-//! Second derivatives, which are found as the lower triangle of a matrix over all directions that have any influence, to the matrices of
-//! results: those over one part of `w = (x₀, u, p)` have both triangles, those over two parts lie whole in the one that was found.
+//! Second derivatives, which are found as the lower triangle of a matrix over all directions that
+//! have any influence, to the matrices of results: those over one part of `w = (x₀, u, p)` have
+//! both triangles, those over two parts lie whole in the one that was found.
 
 use super::directions::{Identity, before};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
@@ -29,8 +30,8 @@ impl<M: Dae, E: Lanes> Triangle<'_, M, E> {
         E::from_f64(0.0) * total
     }
 
-    /// Its part over the directions of one part of `w` and those of another, which is not before it; the sum, which is finite only if
-    /// all of it is.
+    /// Its part over the directions of one part of `w` and those of another, which is not before
+    /// it; the sum, which is finite only if all of it is.
     fn part<B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usize>(&self, to: &mut B) -> E {
         let columns = to.as_mut_slice();
         if columns.is_empty() {
@@ -115,7 +116,8 @@ impl<M: Dae, E: Lanes, B: Matrix<E>, const OF_ROWS: usize, const OF_COLUMNS: usi
 /// So many rows or columns are exchanged at a time.
 const SQUARE: usize = 4;
 
-/// Writes one triangle of a matrix of so many rows, the first elements of its columns, to the other one; the sum of the former.
+/// Writes one triangle of a matrix of so many rows, the first elements of its columns, to the other
+/// one; the sum of the former.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn mirror<A: Arithmetic, E: Lanes>(columns: &mut [E], n: usize) -> E {
     let zero = E::from_f64(0.0);

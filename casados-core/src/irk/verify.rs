@@ -1,11 +1,13 @@
-//! Derivatives are tried on their own equations before they are trusted: nothing else would notice an elimination
-//! that lost digits.
+//! Derivatives are tried on their own equations before they are trusted: nothing else would notice
+//! an elimination that lost digits.
 //!
-//! Forward derivatives `D` of all variables satisfy `∂f/∂v D = 0` at every stage, adjoints `μ` satisfy `Jᵀμ = h (b ⊗ λ, 0)`.
-//! A sum over all directions (with weights that are neither equal nor alternating, so that no structure hides an
-//! error) is held against the sizes of its terms, equation by equation: however equations and unknowns are scaled. What is solved
-//! for is `dk`, so that `dξ = V + h Σ a dk` counts with its own terms (W. Oettli, W. Prager, Compatibility of approximate
-//! solution of linear equations with given error bounds, Numer. Math. 6 (1964)): where they cancel, no elimination is to blame.
+//! Forward derivatives `D` of all variables satisfy `∂f/∂v D = 0` at every stage, adjoints `μ`
+//! satisfy `Jᵀμ = h (b ⊗ λ, 0)`. A sum over all directions (with weights that are neither equal nor
+//! alternating, so that no structure hides an error) is held against the sizes of its terms,
+//! equation by equation: however equations and unknowns are scaled. What is solved for is `dk`, so
+//! that `dξ = V + h Σ a dk` counts with its own terms (W. Oettli, W. Prager, Compatibility of
+//! approximate solution of linear equations with given error bounds, Numer. Math. 6 (1964)): where
+//! they cancel, no elimination is to blame.
 
 use super::adjoint::Backward;
 use super::directions::{Directions, weight};
@@ -28,8 +30,8 @@ const RESIDUAL: f64 = 16.0;
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
     ///
-    /// Where the directions happen to cancel in the sum, its rounding errors look large beside it. They hardly do in
-    /// a second sum too.
+    /// Where the directions happen to cancel in the sum, its rounding errors look large beside it.
+    /// They hardly do in a second sum too.
     pub(crate) fn verify_forward<R: Array<E>, D: Directions<E>>(
         &mut self,
         sweep: &Sweep<M, E, R, S>,
@@ -58,7 +60,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         })
     }
 
-    /// Whether the adjoints of a step satisfy their equations, which may have been `kept`, lane by lane, with `λ` at the end of the step.
+    /// Whether the adjoints of a step satisfy their equations, which may have been `kept`, lane by
+    /// lane, with `λ` at the end of the step.
     pub(crate) fn verify_adjoint<const C: usize>(
         &mut self,
         kept: Option<&Linearization<M, E, S, F>>,
@@ -81,8 +84,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
-    /// Whether the residual is at the level of the rounding errors of its terms, `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`,
-    /// lane by lane.
+    /// Whether the residual is at the level of the rounding errors of its terms,
+    /// `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`, lane by lane.
     pub(crate) fn is_satisfied(&mut self) -> E::Mask {
         self.complete();
         dispatch(Satisfied::<M, E, S> {

@@ -21,8 +21,8 @@ pub(crate) trait Target<E> {
 }
 
 impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
-    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are `weights`. All of these say zero if all that is
-    /// written is finite, else NaN.
+    /// Writes the derivatives of `x` at the point of the step where the weights, `h` included, are
+    /// `weights`. All of these say zero if all that is written is finite, else NaN.
     pub(crate) fn write_differential<D: Directions<E>>(
         &self,
         weights: &[E; S],
@@ -31,7 +31,8 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         self.write::<D, _, false>(Some(self.v()), weights, to)
     }
 
-    /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are `lagrange`.
+    /// Writes the derivatives of `z` at the point of the step where the Lagrange polynomials are
+    /// `lagrange`.
     pub(crate) fn write_algebraic<D: Directions<E>>(&self, lagrange: &[E; S], to: &mut impl Target<E>) -> E {
         self.write::<D, _, true>(None, lagrange, to)
     }

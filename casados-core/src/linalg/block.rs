@@ -1,7 +1,8 @@
 //! Kernels on s×s blocks and on rows of s×C right-hand sides.
 //!
-//! Generic over the scalar, so that the same code serves one number and registers of them. Blocks lie column after
-//! column: a column is a vector over the stages, which is what one right-hand side wants.
+//! Generic over the scalar, so that the same code serves one number and registers of them. Blocks
+//! lie column after column: a column is a vector over the stages, which is what one right-hand side
+//! wants.
 
 use super::fused::Arithmetic;
 use crate::scalar::Field;
@@ -103,8 +104,8 @@ pub fn subtract_transposed<A: Arithmetic, E: Field, const S: usize, const W: usi
     }
 }
 
-/// The inverse by Gauss-Jordan elimination with partial pivoting: rows are exchanged lane by lane, where any lane
-/// wants it. A singular block gives elements that are not finite.
+/// The inverse by Gauss-Jordan elimination with partial pivoting: rows are exchanged lane by lane,
+/// where any lane wants it. A singular block gives elements that are not finite.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let (zero, one) = (E::from_f64(0.0), E::from_f64(1.0));
@@ -159,8 +160,9 @@ pub fn inverse<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> 
 /// So many steps of an elimination can be written one after the other.
 const STEPS: usize = 4;
 
-/// The same in place: registers hold the block, but not the unit matrix beside it. The steps are written one after the other, or indices
-/// that the optimiser does not know would keep the block in the memory.
+/// The same in place: registers hold the block, but not the unit matrix beside it. The steps are
+/// written one after the other, or indices that the optimiser does not know would keep the block in
+/// the memory.
 #[inline(always)]
 fn inverse_in_registers<A: Arithmetic, E: Field, const S: usize>(block: &Block<E, S>) -> Block<E, S> {
     let zero = E::from_f64(0.0);
@@ -236,7 +238,8 @@ mod tests {
     /// Two complex numbers and a real one, each a system of its own.
     type Three = Complex<f64, 5>;
 
-    /// Permutations, another one in each system, and a little of everything else: what is largest is never where the others have it.
+    /// Permutations, another one in each system, and a little of everything else: what is largest
+    /// is never where the others have it.
     fn block<const S: usize>(seed: usize) -> Block<Three, S> {
         let wave = |k: usize| 0.05 * ((seed * 37 + k) as f64).sin();
         let mut block = [[Complex { parts: [0.0; 5] }; S]; S];
@@ -256,7 +259,8 @@ mod tests {
         block
     }
 
-    /// Blocks with conditions below two, in infinity norms: `S²` products and as many sums, rounded, both ways.
+    /// Blocks with conditions below two, in infinity norms: `S²` products and as many sums,
+    /// rounded, both ways.
     fn inverts<const S: usize>() {
         for seed in 0..8 * S {
             let block = block::<S>(seed);

@@ -4,8 +4,8 @@ use crate::scalar::{Field, Lanes};
 use bytemuck::Zeroable;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// `⌊N/2⌋` complex numbers side by side, and a real one if `N` is odd: what elimination computes with where it solves systems of
-/// one pattern at once.
+/// `⌊N/2⌋` complex numbers side by side, and a real one if `N` is odd: what elimination computes
+/// with where it solves systems of one pattern at once.
 #[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 #[repr(transparent)] // All parts beside each other, so that they may be one register.
 pub struct Complex<T, const N: usize> {

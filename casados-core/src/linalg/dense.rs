@@ -43,7 +43,8 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
         }
     }
 
-    /// Adds values that couple an equation at one stage with an unknown at all stages: `factor · row`.
+    /// Adds values that couple an equation at one stage with an unknown at all stages:
+    /// `factor · row`.
     #[inline(always)]
     pub fn add_row(&mut self, equation: usize, unknown: usize, stage: usize, factor: T, row: &[T; S]) {
         if let Some(block) = self.block(equation, unknown, stage) {
@@ -59,9 +60,10 @@ impl<M: Dae, T: Real, const S: usize> Dense<M, T, S> {
 
     /// Replaces the matrix by its factors.
     ///
-    /// Pivots are compared relative to the largest element of their row, so that the choice does not
-    /// depend on the scaling of equations. A pivot is zero if it is not larger than the rounding errors
-    /// that it carries, `n ε Σ_j |l_ij u_jk|`, whatever the scaling of equations and unknowns.
+    /// Pivots are compared relative to the largest element of their row, so that the choice does
+    /// not depend on the scaling of equations. A pivot is zero if it is not larger than the
+    /// rounding errors that it carries, `n ε Σ_j |l_ij u_jk|`, whatever the scaling of equations
+    /// and unknowns.
     ///
     /// # Errors
     /// The column `(unknown, stage)` that has no pivot.

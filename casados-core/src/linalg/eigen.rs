@@ -7,10 +7,11 @@
 //! [f_ẋ + hμ_l f_x | f_z] ŷ_l = b̂_l        b̂ = V⁻¹ b        y = V ŷ
 //! ```
 //!
-//! of which complex conjugate ones need to be solved only once (J. C. Butcher 1976; E. Hairer, G. Wanner, Solving
-//! Ordinary Differential Equations II, section IV.8). All have the pattern and the elimination plan of the model, so they
-//! are solved side by side: `⌊S/2⌋` complex numbers and a real one if `S` is odd. Where registers are to be filled, a real eigenvalue
-//! takes part as a complex one, and what is left of a register repeats the last.
+//! of which complex conjugate ones need to be solved only once (J. C. Butcher 1976; E. Hairer, G.
+//! Wanner, Solving Ordinary Differential Equations II, section IV.8). All have the pattern and the
+//! elimination plan of the model, so they are solved side by side: `⌊S/2⌋` complex numbers and a
+//! real one if `S` is odd. Where registers are to be filled, a real eigenvalue takes part as a
+//! complex one, and what is left of a register repeats the last.
 
 use super::complex::Complex;
 use super::fused::Arithmetic;
@@ -18,21 +19,23 @@ use crate::scalar::Lanes;
 use crate::tableau::Tableau;
 use core::array::from_fn;
 
-/// `A = V diag(μ) V⁻¹` of a tableau with at most one real eigenvalue, such as those of Gauss and Radau, all in real numbers: one
-/// for each part of what is complex.
+/// `A = V diag(μ) V⁻¹` of a tableau with at most one real eigenvalue, such as those of Gauss and
+/// Radau, all in real numbers: one for each part of what is complex.
 #[derive(Clone, Copy, Debug)]
 pub struct Eigenbasis<T, const S: usize, const N: usize> {
-    /// `μ`; of conjugate ones that with the positive imaginary part. A real one is the real number at the end, or the first of the
-    /// complex ones if there is no such.
+    /// `μ`; of conjugate ones that with the positive imaginary part. A real one is the real number
+    /// at the end, or the first of the complex ones if there is no such.
     pub(super) values: Complex<T, N>,
     /// Columns of `V⁻¹`, one for each stage.
     left: [Complex<T, N>; S],
-    /// Columns of `V`, one for each part, with a factor of two where they stand for a conjugate too.
+    /// Columns of `V`, one for each part, with a factor of two where they stand for a conjugate
+    /// too.
     right: [[T; S]; N],
 }
 
 impl<T: Lanes, const S: usize, const N: usize> Eigenbasis<T, S, N> {
-    /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than `1e-10`.
+    /// `None` if `A` has no such basis, or one so skew that it reproduces `A` only to more than
+    /// `1e-10`.
     pub fn new(tableau: &Tableau<S>) -> Option<Self> {
         const {
             assert!(
@@ -147,8 +150,8 @@ impl<const S: usize, const N: usize> Eigenbasis<f64, S, N> {
     }
 }
 
-/// All eigenvalues, to half the digits at least: the zeros of the characteristic polynomial (D. K. Faddeev), all at once
-/// by the iteration of Durand and Kerner.
+/// All eigenvalues, to half the digits at least: the zeros of the characteristic polynomial (D. K.
+/// Faddeev), all at once by the iteration of Durand and Kerner.
 fn eigenvalues<const S: usize>(a: &[[f64; S]; S]) -> [Number; S] {
     // p(μ) = μˢ + c_{S−1} μ^{S−1} + … + c_0
     let mut coefficients = [0.0; S];
@@ -165,7 +168,8 @@ fn eigenvalues<const S: usize>(a: &[[f64; S]; S]) -> [Number; S] {
         let trace: f64 = (0..S).map(|i| product[i][i]).sum();
         coefficients[S - k] = -trace / k as f64;
     }
-    // All zeros are of the size of the geometric mean of them; the start values lie around it, not symmetric.
+    // All zeros are of the size of the geometric mean of them; the start values lie around it, not
+    // symmetric.
     let size = if S == 0 { 1.0 } else { root_of(coefficients[0].abs(), S) };
     let turn = Complex { parts: [0.4, 0.9] };
     let mut power = Complex::real(size);
@@ -203,8 +207,8 @@ fn root_of(a: f64, n: usize) -> f64 {
     high
 }
 
-/// From an approximate eigenvalue: the eigenvalue, and the left and the right eigenvector with product one. Two-sided
-/// inverse iteration with the quotient of Rayleigh (A. M. Ostrowski 1959).
+/// From an approximate eigenvalue: the eigenvalue, and the left and the right eigenvector with
+/// product one. Two-sided inverse iteration with the quotient of Rayleigh (A. M. Ostrowski 1959).
 fn eigenvectors<const S: usize>(
     a: &[[f64; S]; S],
     start: Number,
@@ -279,8 +283,8 @@ mod tests {
     use super::*;
     use crate::tableau::{Gauss, Method, RadauIIA};
 
-    /// Whether the systems of the basis are those of `A`: `V μ V⁻¹ b = A b`. Errors are those of eigenvectors, ε times
-    /// the condition of the basis, which is the size of the terms of the sum.
+    /// Whether the systems of the basis are those of `A`: `V μ V⁻¹ b = A b`. Errors are those of
+    /// eigenvectors, ε times the condition of the basis, which is the size of the terms of the sum.
     fn check<const S: usize, const N: usize>(tableau: &Tableau<S>) {
         let basis = Eigenbasis::<f64, S, N>::new(tableau).expect("a basis");
         for column in 0..S {
@@ -295,7 +299,8 @@ mod tests {
                     terms += (right[N - 1] * image.parts[N - 1]).abs();
                 }
                 let error = (found - tableau.a()[stage][column]).abs();
-                // The elimination that finds an eigenvector, and the sums of `split` and `join`, round S² times.
+                // The elimination that finds an eigenvector, and the sums of `split` and `join`,
+                // round S² times.
                 let roundings = f64::max(64.0, (S * S) as f64);
                 assert!(
                     error <= roundings * f64::EPSILON * terms,
@@ -330,8 +335,9 @@ mod tests {
         check::<9, 9>(&RadauIIA::<9>::TABLEAU);
     }
 
-    /// The real eigenvalue of the three-stage Radau IIA method: 1/γ with γ = (6 + 81^(1/3) − 9^(1/3)) / 30 … its inverse
-    /// `3 + 3^(2/3) − 3^(1/3)` is published in Hairer and Wanner, section IV.8.
+    /// The real eigenvalue of the three-stage Radau IIA method: 1/γ with γ = (6 + 81^(1/3) −
+    /// 9^(1/3)) / 30 … its inverse `3 + 3^(2/3) − 3^(1/3)` is published in Hairer and Wanner,
+    /// section IV.8.
     #[test]
     fn published_eigenvalue() {
         let basis = Eigenbasis::<f64, 3, 3>::new(&RadauIIA::<3>::TABLEAU).expect("a basis");

@@ -1,5 +1,5 @@
-//! Factors in the eigenbasis of the tableau that say whether they hold, with whole matrices pivoted where they do not: what
-//! steps of variable size iterate with.
+//! Factors in the eigenbasis of the tableau that say whether they hold, with whole matrices pivoted
+//! where they do not: what steps of variable size iterate with.
 
 use super::block::Block;
 use super::complex::Complex;
@@ -31,7 +31,8 @@ pub struct EigenFactors<M: Dae, T: Plain> {
     /// The Jacobian, and `hμ`: what kinematic states are eliminated by.
     jacobian: M::Jacobian<T>,
     scale: Complex<T, PARTS>,
-    /// Memory that is touched only where the plan is not good enough: real and imaginary part as two stages.
+    /// Memory that is touched only where the plan is not good enough: real and imaginary part as
+    /// two stages.
     dense: [Dense<M, T, 2>; LANES],
     is_dense: bool,
     pivoted: bool,

@@ -53,8 +53,8 @@ impl<M: Dae, T: Plain, const S: usize, F: Fallback> Clone for Factors<M, T, S, F
 impl<M: Dae, T: Plain, const S: usize, F: Fallback> Copy for Factors<M, T, S, F> {}
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
-    /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all stages. A pivot
-    /// that vanishes leaves elements that are not finite.
+    /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all
+    /// stages. A pivot that vanishes leaves elements that are not finite.
     pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
         self.is_dense = false;
         let blocks = &mut self.blocks;
@@ -62,7 +62,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         sparse::factor::<M, E, S>(blocks.as_mut());
     }
 
-    /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots. Rows of kinematic states stay.
+    /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots. Rows of
+    /// kinematic states stay.
     pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) => dense.solve(b),
@@ -70,7 +71,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
         }
     }
 
-    /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their slots. Rows of kinematic states stay.
+    /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their
+    /// slots. Rows of kinematic states stay.
     pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
         match self.dense() {
             Some(dense) => dense.solve_transposed(b),
@@ -227,7 +229,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
     }
 }
 
-/// Where an entry of the Jacobian goes in a whole matrix, which has kinematic states, but nothing in their columns.
+/// Where an entry of the Jacobian goes in a whole matrix, which has kinematic states, but nothing
+/// in their columns.
 pub struct InDense {
     /// The row.
     pub slot: usize,
@@ -237,7 +240,8 @@ pub struct InDense {
     pub order: u32,
 }
 
-/// The entries of `f_ẋ`, `f_x` and `f_z`, but for those of equations of kinematic states, each with `−c` if it belongs to such a state.
+/// The entries of `f_ẋ`, `f_x` and `f_z`, but for those of equations of kinematic states, each with
+/// `−c` if it belongs to such a state.
 pub fn each_entry<M: Dae, V: Copy>(jacobian: &[V], mut at: impl FnMut(InDense, &V, Option<&V>)) {
     let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
     for (e, values) in jacobian.iter().enumerate().take(blocks[3]) {

@@ -1,8 +1,9 @@
-//! Kernels compiled for every machine, and for those that multiply and add in one instruction: AVX2, AVX-512.
+//! Kernels compiled for every machine, and for those that multiply and add in one instruction:
+//! AVX2, AVX-512.
 //!
-//! A plain x86-64 binary must run on machines without AVX2 and FMA. So a kernel is generic over its [`Arithmetic`],
-//! everything in it is inlined, and [`dispatch`] enters it through a function that is compiled for the better
-//! machine if this is one. Results differ by rounding only.
+//! A plain x86-64 binary must run on machines without AVX2 and FMA. So a kernel is generic over its
+//! [`Arithmetic`], everything in it is inlined, and [`dispatch`] enters it through a function that
+//! is compiled for the better machine if this is one. Results differ by rounding only.
 
 use super::block::Block;
 #[cfg(target_arch = "x86_64")]
@@ -13,7 +14,8 @@ use core::mem::ManuallyDrop;
 
 /// How `t − a b` is computed.
 pub trait Arithmetic {
-    /// Whether it rounds once: it is that of machines that matter, which loops become straight lines for.
+    /// Whether it rounds once: it is that of machines that matter, which loops become straight
+    /// lines for.
     const FUSED: bool = false;
     /// Whether numbers side by side fill the registers of AVX-512.
     const WIDE: bool = false;
@@ -46,8 +48,8 @@ pub trait Arithmetic {
             *target = Self::subtract(*target, factor, element);
         }
     }
-    /// `target = block`, in as few instructions as the numbers will be read in: until all that it wants has arrived in the nearest cache, a
-    /// wider one would wait.
+    /// `target = block`, in as few instructions as the numbers will be read in: until all that it
+    /// wants has arrived in the nearest cache, a wider one would wait.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
         *target = *block;
@@ -78,7 +80,8 @@ impl Arithmetic for Separate {
     }
 }
 
-/// Rounded once, in one instruction; on numbers side by side in registers as `WIDE` as those of AVX-512 are, or half as wide.
+/// Rounded once, in one instruction; on numbers side by side in registers as `WIDE` as those of
+/// AVX-512 are, or half as wide.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub struct Fused<const WIDE: bool>;
 
@@ -126,27 +129,29 @@ pub trait Kernel {
     type Number;
     /// Its result.
     type Output;
-    /// Whether it is long: AVX-512 then takes fewer instructions, as it multiplies by numbers that are still in memory.
+    /// Whether it is long: AVX-512 then takes fewer instructions, as it multiplies by numbers that
+    /// are still in memory.
     #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
     const WIDE: bool = false;
     /// To be `#[inline(always)]`, with everything that it calls.
     fn run<A: Arithmetic>(self) -> Self::Output;
 }
 
-/// What kernels are compiled for. Each has a module of its own, since the compiler works on modules side by side: with all kernels in one
-/// the aircraft would take a tenth longer.
+/// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
+/// side by side: with all kernels in one the aircraft would take a tenth longer.
 ///
-/// Those with instructions that not every machine has find the kernel where it was made: it is made of pointers, one after the other, and a
-/// copy would be made of two at a time, which the processor waits for until both have arrived in the nearest cache. (Calls of the pendulum took
-/// up to a fifth more.)
+/// Those with instructions that not every machine has find the kernel where it was made: it is made
+/// of pointers, one after the other, and a copy would be made of two at a time, which the processor
+/// waits for until both have arrived in the nearest cache. (Calls of the pendulum took up to a
+/// fifth more.)
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod compiled {
     pub mod base {
         use super::super::{Kernel, Separate};
 
-        // Never inlined beside others, so that callers are small. Where it is the only one, the optimiser is to see from outside
-        // that nothing in it panics.
+        // Never inlined beside others, so that callers are small. Where it is the only one, the
+        // optimiser is to see from outside that nothing in it panics.
         #[cfg_attr(feature = "std", inline(never))]
         #[cfg_attr(not(feature = "std"), inline(always))]
         pub fn run<K: Kernel>(kernel: K) -> K::Output {
@@ -187,17 +192,19 @@ mod compiled {
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     use compiled::{avx2, avx512, base};
-    // Numbers that are registers, which are aligned to themselves, need what these are made of, and nothing else. Of other kernels short
-    // ones are up to a tenth faster without AVX-512; and unoptimised programs, where each copy of a kernel is much to compile and
-    // none is fast, have the one copy that runs everywhere.
+    // Numbers that are registers, which are aligned to themselves, need what these are made of, and
+    // nothing else. Of other kernels short ones are up to a tenth faster without AVX-512; and
+    // unoptimised programs, where each copy of a kernel is much to compile and none is fast, have
+    // the one copy that runs everywhere.
     if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
         return base::run(kernel);
     }
     // One of those that follow takes it, and nobody after that.
     let mut kernel = ManuallyDrop::new(kernel);
     if const { align_of::<K::Number>() > 32 } {
-        // SAFETY: the other condition of calling a function with target features is that the machine has them. Numbers that are
-        // registers of AVX-512 are computed with only where it has; see the head of `lanes`.
+        // SAFETY: the other condition of calling a function with target features is that the
+        // machine has them. Numbers that are registers of AVX-512 are computed with only where it
+        // has; see the head of `lanes`.
         unsafe { avx512::run(&mut kernel) }
     } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
         // SAFETY: the same of AVX2.
@@ -226,7 +233,8 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     }
 }
 
-/// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one instruction.
+/// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one
+/// instruction.
 #[cfg(target_arch = "aarch64")]
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {

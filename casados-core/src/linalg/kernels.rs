@@ -18,7 +18,8 @@ pub(crate) fn divide<T: Field>(x: &mut [T], a: T) {
     }
 }
 
-/// Whether all elements are neither infinite nor NaN. Without an early exit, so that it is a SIMD loop.
+/// Whether all elements are neither infinite nor NaN. Without an early exit, so that it is a SIMD
+/// loop.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(crate) fn are_finite<T: Real>(values: &[T]) -> bool {
     let mut finite = true;

@@ -1,5 +1,6 @@
-//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau, of [coarse](Lanes::Coarse) numbers: increments that they
-//! give are corrected by the next iteration in any case.
+//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau, of
+//! [coarse](Lanes::Coarse) numbers: increments that they give are corrected by the next iteration
+//! in any case.
 
 use super::complex::Complex;
 use super::eigen::Eigenbasis;
@@ -12,8 +13,8 @@ use crate::scalar::Lanes;
 use crate::shape::Aligned;
 use bytemuck::Zeroable;
 
-/// Factors of the mean Jacobian of the stages for all eigenvalues, by the plan: what an iteration takes that need
-/// not be exact.
+/// Factors of the mean Jacobian of the stages for all eigenvalues, by the plan: what an iteration
+/// takes that need not be exact.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct MeanFactors<M: Dae, E: Lanes, const S: usize> {
@@ -32,8 +33,8 @@ impl<M: Dae, E: Lanes, const S: usize> Clone for MeanFactors<M, E, S> {
 impl<M: Dae, E: Lanes, const S: usize> Copy for MeanFactors<M, E, S> {}
 
 impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
-    /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be there for the `first_only` of stages that
-    /// are alike, but not of a single lane.
+    /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
+    /// there for the `first_only` of stages that are alike, but not of a single lane.
     pub fn factor(
         &mut self,
         jacobian: &M::Jacobian<[E; S]>,
@@ -51,7 +52,8 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         sparse::factor::<M, _, 1>(self.blocks.as_mut());
     }
 
-    /// Solves the Newton system of the stages: what is in the rows of the solution that belong to kinematic states stays there.
+    /// Solves the Newton system of the stages: what is in the rows of the solution that belong to
+    /// kinematic states stays there.
     pub fn solve(
         &mut self,
         basis: &Eigenbasis<E, S, S>,

@@ -1,17 +1,20 @@
 //! The linear systems of the stages.
 //!
-//! Unknowns are ordered by variable, stages innermost: `(k₀₁ … k₀ₛ, k₁₁ … k₁ₛ, …)`. The Newton matrix
-//! then is a matrix of `S × S` blocks with the pattern of the model. Right-hand sides have one row per
-//! slot, all columns side by side; [`slot`] tells where the row of an equation is.
+//! Unknowns are ordered by variable, stages innermost: `(k₀₁ … k₀ₛ, k₁₁ … k₁ₛ, …)`. The Newton
+//! matrix then is a matrix of `S × S` blocks with the pattern of the model. Right-hand sides have
+//! one row per slot, all columns side by side; [`slot`] tells where the row of an equation is.
 //!
-//! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed. They are found
-//! by the plan of the model (`sparse`, `substitution`, `transposed`), and by pivoting the whole matrix (`dense`) where that one is not good enough.
-//! [Kinematic](crate::model::Kinematic) states have slots, but neither pivots nor blocks: what is there stays there.
-//! Stages that share one Jacobian have smaller systems in the eigenbasis of the tableau (`eigen`): `MeanFactors` for
-//! iterations that need not be exact (`mean`, solved supernode by supernode in `mean_solve`), `EigenFactors` for steps of variable size.
+//! [`Factors`] is everything that the rest of the library knows: factor, solve, solve transposed.
+//! They are found by the plan of the model (`sparse`, `substitution`, `transposed`), and by
+//! pivoting the whole matrix (`dense`) where that one is not good enough.
+//! [Kinematic](crate::model::Kinematic) states have slots, but neither pivots nor blocks: what is
+//! there stays there. Stages that share one Jacobian have smaller systems in the eigenbasis of the
+//! tableau (`eigen`): `MeanFactors` for iterations that need not be exact (`mean`, solved supernode
+//! by supernode in `mean_solve`), `EigenFactors` for steps of variable size.
 //!
-//! What a kernel consists of is inlined, so that it is compiled for the machine's instructions. Without optimisation helpers that know
-//! nothing of a model are functions like others: inlined they would be no faster, and compiled once more for each kernel of each model.
+//! What a kernel consists of is inlined, so that it is compiled for the machine's instructions.
+//! Without optimisation helpers that know nothing of a model are functions like others: inlined
+//! they would be no faster, and compiled once more for each kernel of each model.
 
 mod block;
 mod complex;

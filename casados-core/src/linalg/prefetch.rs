@@ -14,7 +14,8 @@ impl<T> Ahead<'_, T> {
             #[cfg(all(target_arch = "x86_64", not(miri)))]
             {
                 use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-                // SAFETY: the instruction neither reads nor writes as far as a program can see, whatever its address is.
+                // SAFETY: the instruction neither reads nor writes as far as a program can see,
+                // whatever its address is.
                 unsafe { _mm_prefetch::<_MM_HINT_T1>(line.as_ptr().cast()) };
             }
             #[cfg(not(all(target_arch = "x86_64", not(miri))))]

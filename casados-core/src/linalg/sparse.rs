@@ -6,12 +6,14 @@
 //! M = (I + L) (P + U)        L_ik = B_ik P_k⁻¹,   B_ij ← B_ij − L_ik B_kj
 //! ```
 //!
-//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above. Everything is
-//! indexed by *slots*: a slot is an unknown, and also the equation that determines it in the plan. So right-hand side
-//! and solution share one array, and no permutation is ever applied.
+//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above.
+//! Everything is indexed by *slots*: a slot is an unknown, and also the equation that determines it
+//! in the plan. So right-hand side and solution share one array, and no permutation is ever
+//! applied.
 //!
-//! Where the plan is short its loops are straight lines (`straight`). In longer ones the compiler does not look into the tables of the
-//! plan; elements are fetched with `get`, whose never-taken exit costs nothing beside a block and leaves no panic in the program.
+//! Where the plan is short its loops are straight lines (`straight`). In longer ones the compiler
+//! does not look into the tables of the plan; elements are fetched with `get`, whose never-taken
+//! exit costs nothing beside a block and leaves no panic in the program.
 
 use super::block::{Block, inverse, product};
 use super::fused::{Arithmetic, Kernel, dispatch};
@@ -34,8 +36,9 @@ impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
 }
 impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
 
-/// Factorises in place: `blocks` holds the matrix (fill zero, unless it [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot block
-/// that is singular leaves elements that are not finite.
+/// Factorises in place: `blocks` holds the matrix (fill zero, unless it
+/// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot
+/// block that is singular leaves elements that are not finite.
 pub fn factor<M: Dae, E: Field, const S: usize>(blocks: &mut [Block<E, S>]) {
     dispatch(Factor::<M, E, S> { blocks, model: PhantomData });
 }
@@ -117,13 +120,15 @@ fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
     A::subtract_blocks(block, lower, upper);
 }
 
-/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less work than to ask; and where it is little.
+/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less
+/// work than to ask; and where it is little.
 pub const fn begins_with_update<M: Dae, E>() -> bool {
     let plan = &M::STRUCTURE.elimination;
     align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
 }
 
-/// Always; but the optimiser then knows their number, and with it how often loops over constant tables go round.
+/// Always; but the optimiser then knows their number, and with it how often loops over constant
+/// tables go round.
 #[inline(always)]
 pub fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
     blocks.len() == M::STRUCTURE.elimination.slots.len()

@@ -1,13 +1,15 @@
 //! Loops over the constant tables of a model, as straight lines where they are short.
 //!
-//! The optimiser sees through constant tables only where indices are constants too. In a straight line addresses of blocks and
-//! rows are part of the instructions; in a loop most instructions of a small block are spent on finding it: a solve with the blocks of
-//! two stages takes a fifth of the instructions.
+//! The optimiser sees through constant tables only where indices are constants too. In a straight
+//! line addresses of blocks and rows are part of the instructions; in a loop most instructions of a
+//! small block are spent on finding it: a solve with the blocks of two stages takes a fifth of the
+//! instructions.
 
 use super::fused::Arithmetic;
 use crate::model::{Dae, Pivot, Supernode, Update};
 
-// Where nothing is optimised straight lines would only be long, and in firmware memory is dearer than time.
+// Where nothing is optimised straight lines would only be long, and in firmware memory is dearer
+// than time.
 #[cfg(any(test, all(feature = "std", not(debug_assertions))))]
 mod lines;
 
@@ -20,12 +22,14 @@ const CHUNK: usize = 8;
 /// So many chunks, and so many pivots, can be written one after the other.
 const MOST: usize = 48;
 
-/// They are not longer than so many instructions: they share the nearest cache, and take long to compile.
+/// They are not longer than so many instructions: they share the nearest cache, and take long to
+/// compile.
 const MOST_INSTRUCTIONS: usize = 2000;
 
-/// So much longer they may be where each step has so few instructions that a loop would spend most of its time on finding what it is about:
-/// rows of `FEW`, and updates of blocks of one number. (The aircraft with four stages takes 2 to 6 % less. Lines of solves would be another 1 %,
-/// and a third of the time to compile it.)
+/// So much longer they may be where each step has so few instructions that a loop would spend most
+/// of its time on finding what it is about: rows of `FEW`, and updates of blocks of one number.
+/// (The aircraft with four stages takes 2 to 6 % less. Lines of solves would be another 1 %, and a
+/// third of the time to compile it.)
 const LONGER: usize = 2;
 const FEW: usize = 8;
 
@@ -67,7 +71,8 @@ pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
 
 /// What is done at each pivot of a plan.
 pub trait AtPivot {
-    /// About how many instructions that takes for each block of the factors, or for each update of one.
+    /// About how many instructions that takes for each block of the factors, or for each update of
+    /// one.
     const INSTRUCTIONS: usize;
     /// Whether it is done for each update, or for each block.
     const UPDATES: bool = false;
@@ -97,7 +102,8 @@ pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     }
 }
 
-/// From the last pivot to the first, without updates; with those that follow where they are asked for.
+/// From the last pivot to the first, without updates; with those that follow where they are asked
+/// for.
 #[inline(always)]
 pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     if const { is_short_plan::<A, M, V>() } {
@@ -105,8 +111,9 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         return lines::from_last::<A, M, V>(visit);
     }
     let all = M::STRUCTURE.elimination.pivots;
-    // The optimiser makes a straight line of a loop over indices where a plan is short, as in firmware, but not of one that goes backwards
-    // through a slice, which is faster where it stays a loop.
+    // The optimiser makes a straight line of a loop over indices where a plan is short, as in
+    // firmware, but not of one that goes backwards through a slice, which is faster where it stays
+    // a loop.
     if const { !V::OTHERS && cfg!(feature = "std") } {
         for pivot in all.iter().rev() {
             visit.at::<A>(pivot, &[], &[]);
@@ -122,7 +129,8 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
     }
 }
 
-/// Whether pivots of a [supernode](Supernode) are taken together. In firmware each is one of its own.
+/// Whether pivots of a [supernode](Supernode) are taken together. In firmware each is one of its
+/// own.
 pub const GROUPED: bool = cfg!(feature = "std");
 
 /// What is done at each supernode of a plan.

@@ -1,7 +1,9 @@
-//! Right-hand sides by the factors of a plan (`sparse`): down through `I + L`, up through `P + U`, and both transposed.
+//! Right-hand sides by the factors of a plan (`sparse`): down through `I + L`, up through `P + U`,
+//! and both transposed.
 //!
-//! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each other. Where one column fills
-//! registers, what is added to a row is added in them instead, and stored once.
+//! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each
+//! other. Where one column fills registers, what is added to a row is added in them instead, and
+//! stored once.
 
 use super::block::{Block, Packet, negate, subtract};
 use super::fused::{Arithmetic, Kernel, dispatch};
@@ -14,8 +16,8 @@ use crate::scalar::Field;
 use crate::shape::{Array, Plain, Shape};
 use core::marker::PhantomData;
 
-/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are registers themselves two at a time, or the
-/// packet of all stages would not fit them.
+/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
+/// registers themselves two at a time, or the packet of all stages would not fit them.
 macro_rules! packets {
     ($first:ty, $second:ty: $solve:expr) => {{
         let Solve { factors, rows } = $solve;
@@ -40,10 +42,11 @@ macro_rules! packets {
     }};
 }
 
-/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all columns.
+/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
+/// columns.
 ///
-/// Columns are taken in packets that fit registers, each through the whole elimination: a packet of all
-/// rows stays in the nearest cache.
+/// Columns are taken in packets that fit registers, each through the whole elimination: a packet of
+/// all rows stays in the nearest cache.
 pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
@@ -107,8 +110,8 @@ impl<E, const S: usize, const W: usize> Viewer<E, S, W> for Ahead<'_, E> {
     }
 }
 
-/// Solves two triangular systems in place for `W` columns, inside of a kernel. What is solved through the second is shown to somebody,
-/// while it is in registers.
+/// Solves two triangular systems in place for `W` columns, inside of a kernel. What is solved
+/// through the second is shown to somebody, while it is in registers.
 #[inline(always)]
 pub fn sweeps<
     A: Arithmetic,
@@ -238,9 +241,10 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
         if slot >= rows.len() {
             return;
         }
-        // Directions that have not reached this unknown, as at the start of an interval. Of registers the memory is asked: a packet of
-        // which single elements are looked at is not kept in registers. Of numbers the packet is, all of it at once: one after the other
-        // in memory took up to 7 % of a call more (chains of 3 and 5 masses).
+        // Directions that have not reached this unknown, as at the start of an interval. Of
+        // registers the memory is asked: a packet of which single elements are looked at is not
+        // kept in registers. Of numbers the packet is, all of it at once: one after the other in
+        // memory took up to 7 % of a call more (chains of 3 and 5 masses).
         if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
@@ -309,8 +313,9 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
     }
 }
 
-/// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in another column. Of large blocks that
-/// the second cache holds the processor fetches some columns ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
+/// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in
+/// another column. Of large blocks that the second cache holds the processor fetches some columns
+/// ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
 /// aircraft, with up to nineteen blocks in a row, 6 % more.
 const fn goes_by_rows<M: Dae>(block: usize) -> bool {
     let pivots = M::STRUCTURE.elimination.pivots;

@@ -1,7 +1,9 @@
-//! Right-hand sides by the transposed factors of a plan: what is done at a pivot on the way through `(P + U)ᵀ` and `(I + L)ᵀ`.
+//! Right-hand sides by the transposed factors of a plan: what is done at a pivot on the way through
+//! `(P + U)ᵀ` and `(I + L)ᵀ`.
 //!
-//! A row of `(I + L)ᵀ` is a column of `L`, so that on the way back what is added to a row is added in registers, and stored once. Packets
-//! take two blocks at a time, so that additions need not wait for each other.
+//! A row of `(I + L)ᵀ` is a column of `L`, so that on the way back what is added to a row is added
+//! in registers, and stored once. Packets take two blocks at a time, so that additions need not
+//! wait for each other.
 
 use super::block::{Block, negate, subtract_transposed};
 use super::fused::Arithmetic;

@@ -1,4 +1,5 @@
-//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the integrator, `z = ζ(x, u, p)`.
+//! Algebraic states at nodes: what depends on `(x, u, z)` there depends on `(x, u)` through the
+//! integrator, `z = ζ(x, u, p)`.
 //!
 //! With `L = l + μᵀg` and `ν = ∂L/∂z`:
 //!
@@ -6,7 +7,8 @@
 //! ∇L = L_v + Zᵀν        ∇²L = [I; Z]ᵀ L'' [I; Z] + Σ_j ν_j ∇²ζ_j        v = (x, u), Z = ∂ζ/∂v
 //! ```
 //!
-//! The last term comes from the integrator, which is told `ν` for it, as it is told `π` for that of the dynamics.
+//! The last term comes from the integrator, which is told `ν` for it, as it is told `π` for that of
+//! the dynamics.
 
 use super::constraint::Constraints;
 use super::cost::{At, Cost};
@@ -86,7 +88,8 @@ impl<'a, T: Real> Extended<'a, T> {
         get(self.terms.hessian, i.min(j) * self.terms.ld + i.max(j))
     }
 
-    /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of the constraints it is all there is.
+    /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of
+    /// the constraints it is all there is.
     pub(super) fn fold<S: Shape>(&self, dz: &[T], to: &mut Terms<'_, T>, columns: &mut [T], ld: usize) {
         let [n, _] = lengths::<S>();
         let rows = || dz.chunks_exact(n.max(1)).enumerate();
@@ -110,8 +113,9 @@ impl<'a, T: Real> Extended<'a, T> {
         }
     }
 
-    /// Adds what parameters do through `z` as well: `dz` as in [`Extended::fold`], `dp` the columns of `∂z/∂p`, `direct` what they do over
-    /// `(x, u, z)` where `z` stays, and `slopes` the rows of `∂g/∂p`.
+    /// Adds what parameters do through `z` as well: `dz` as in [`Extended::fold`], `dp` the columns
+    /// of `∂z/∂p`, `direct` what they do over `(x, u, z)` where `z` stays, and `slopes` the rows of
+    /// `∂g/∂p`.
     #[cfg(feature = "alloc")]
     pub(super) fn fold_parameters<S: Shape>(
         &self,
@@ -142,8 +146,8 @@ impl<'a, T: Real> Extended<'a, T> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states themselves are simulated for them. Nothing
-    /// where nothing depends on these.
+    /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states
+    /// themselves are simulated for them. Nothing where nothing depends on these.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]

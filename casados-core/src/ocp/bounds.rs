@@ -149,12 +149,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if found { Ok(()) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
     }
 
-    /// Bounds of a state or control, or of all of them that a name means (`u` means `u[0]`, `u[1]`, …), at some stages: `..` are
-    /// all of them, the last one has no controls. An infinite bound is none. While the initial state is fixed, bounds of states
-    /// do not touch stage 0.
+    /// Bounds of a state or control, or of all of them that a name means (`u` means `u[0]`, `u[1]`,
+    /// …), at some stages: `..` are all of them, the last one has no controls. An infinite bound is
+    /// none. While the initial state is fixed, bounds of states do not touch stage 0.
     ///
     /// # Errors
-    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::CrossedBounds`],
+    /// [`OcpError::InvalidValue`]
     pub fn bound(
         &mut self,
         name: &str,
@@ -176,8 +177,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// Makes bounds of states or controls soft: leaving one by `e` costs `linear · e + ½ quadratic · e²`. An infinite linear
-    /// penalty makes them hard again.
+    /// Makes bounds of states or controls soft: leaving one by `e` costs
+    /// `linear · e + ½ quadratic · e²`. An infinite linear penalty makes them hard again.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::InvalidValue`]
@@ -196,7 +197,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Bounds of the path constraints at some stages.
     ///
     /// # Errors
-    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::CrossedBounds`],
+    /// [`OcpError::InvalidValue`]
     pub fn set_path_bounds(
         &mut self,
         stages: impl RangeBounds<usize>,

@@ -7,7 +7,8 @@ use crate::scalar::Real;
 use crate::shape::{Array, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
 
-/// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is both.
+/// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is
+/// both.
 pub trait Constraints<S: Shape, T: Real> {
     /// How many rows.
     const ROWS: usize;
@@ -20,7 +21,8 @@ pub trait Constraints<S: Shape, T: Real> {
     /// [`OcpError::NotThere`]
     #[doc(hidden)]
     fn check(&self, there: There) -> Result<(), OcpError>;
-    /// The bounds that hold where nothing else is said: lower ones, upper ones, linear and quadratic penalties.
+    /// The bounds that hold where nothing else is said: lower ones, upper ones, linear and
+    /// quadratic penalties.
     #[doc(hidden)]
     fn bounds(&self, limits: [&mut [T]; 4]);
     /// The values.
@@ -45,7 +47,8 @@ pub trait Constraints<S: Shape, T: Real> {
     /// Adds the Hessian of `μᵀg`.
     #[doc(hidden)]
     fn curve(&mut self, v: &S::ArrayV<T>, mu: &[T], terms: &mut Terms<'_, T>);
-    /// `∂g/∂p`, a row for each of the constraints; adds what parameters change of the gradient of `μᵀg`, if `μ` is given.
+    /// `∂g/∂p`, a row for each of the constraints; adds what parameters change of the gradient of
+    /// `μᵀg`, if `μ` is given.
     #[doc(hidden)]
     fn cross(&mut self, v: &S::ArrayV<T>, mu: Option<&[T]>, slopes: &mut [T], cross: &mut Cross<'_, T>);
     /// The function of a row, and which of its outputs it is.
@@ -130,7 +133,8 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
     }
 }
 
-/// `lower ≤ g(x, z, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal bounds are an equation.
+/// `lower ≤ g(x, z, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal
+/// bounds are an equation.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Constraint<F: Function, T: Plain = f64> {

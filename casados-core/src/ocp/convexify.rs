@@ -1,4 +1,5 @@
-//! Hessians of stages made positive definite, each for itself: what the Riccati recursion needs keeps its structure.
+//! Hessians of stages made positive definite, each for itself: what the Riccati recursion needs
+//! keeps its structure.
 
 use crate::qp::part_mut;
 use crate::scalar::Real;
@@ -6,13 +7,15 @@ use crate::scalar::Real;
 /// What is done with the Hessian of a stage that is not positive definite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convexification {
-    /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and bounds leave, a multiple of the
-    /// identity is added to all of them, as little as it takes (A. Wächter, L. T. Biegler, "On the
-    /// implementation of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math. Program.
-    /// 106, 2006, section 3.1). Near a solution with second-order sufficient conditions nothing is added, and convergence is
+    /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and
+    /// bounds leave, a multiple of the identity is added to all of them, as little as it takes (A.
+    /// Wächter, L. T. Biegler, "On the implementation of an interior-point filter line-search
+    /// algorithm for large-scale nonlinear programming", Math. Program. 106, 2006, section 3.1).
+    /// Near a solution with second-order sufficient conditions nothing is added, and convergence is
     /// quadratic. This is what [`Sqp`](super::Sqp) does; a QP without it is that of `None`.
     Reduced,
-    /// Nothing. The reduced Hessian may be positive definite where that of a stage is not; the QP says if it is not.
+    /// Nothing. The reduced Hessian may be positive definite where that of a stage is not; the QP
+    /// says if it is not.
     None,
     /// Eigenvalues that are too small become a small positive number.
     #[default]
@@ -28,8 +31,8 @@ const LEAST: f64 = 1e-6;
 /// Sweeps of Jacobi's method; it converges quadratically.
 const SWEEPS: usize = 30;
 
-/// Makes a matrix positive definite, whose lower triangle lies column after column, `ld` apart. `scratch` has room for two such
-/// matrices and a vector.
+/// Makes a matrix positive definite, whose lower triangle lies column after column, `ld` apart.
+/// `scratch` has room for two such matrices and a vector.
 pub(super) fn convexify<T: Real>(
     method: Convexification,
     h: &mut [T],
@@ -53,7 +56,8 @@ pub(super) fn convexify<T: Real>(
     }
     if method == Convexification::LevenbergMarquardt {
         let mut shift = least;
-        // The shift cannot be more than the sum of a row, which `n` times the largest element bounds.
+        // The shift cannot be more than the sum of a row, which `n` times the largest element
+        // bounds.
         while !is_positive_shifted(h, ld, n, least, shift, work) {
             shift = shift * T::from_f64(4.0);
             if !shift.is_finite() {
@@ -125,7 +129,8 @@ fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T
     }
     for k in 0..n {
         let pivot = get(work, ld, k, k);
-        // A pivot may be smaller than an eigenvalue, not larger than all of them: half is for rounding.
+        // A pivot may be smaller than an eigenvalue, not larger than all of them: half is for
+        // rounding.
         let is_positive = pivot > T::from_f64(0.5) * least;
         if !is_positive {
             return false;
@@ -146,7 +151,8 @@ fn is_positive_shifted<T: Real>(h: &[T], ld: usize, n: usize, least: T, shift: T
     true
 }
 
-/// Jacobi's method: rotates a symmetric matrix until it is diagonal; columns of `vectors` are its eigenvectors.
+/// Jacobi's method: rotates a symmetric matrix until it is diagonal; columns of `vectors` are its
+/// eigenvectors.
 fn diagonalise<T: Real>(a: &mut [T], vectors: &mut [T], ld: usize, n: usize) {
     let small = T::from_f64(T::EPSILON);
     for _ in 0..SWEEPS {

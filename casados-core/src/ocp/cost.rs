@@ -7,11 +7,13 @@ use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape};
 use bytemuck::Zeroable;
 
-/// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their sum.
+/// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their
+/// sum.
 pub trait Cost<S: Shape, T: Real> {
     /// How many numbers a reference has.
     const REFERENCES: usize;
-    /// Whether the Hessian that [`Cost::add`] adds is positive semidefinite where an exact one is not asked for.
+    /// Whether the Hessian that [`Cost::add`] adds is positive semidefinite where an exact one is
+    /// not asked for.
     const CONVEX: bool;
     /// Whether it depends on algebraic states.
     const ALGEBRAIC: bool;
@@ -63,8 +65,8 @@ pub struct At<'a, T> {
     pub(super) stage: usize,
     pub(super) factor: T,
     pub(super) exact: bool,
-    /// `(x, u)`, if the gradient is to be that of the quadratic model at zero: `∇f − H (x, u)` with the Hessian `H` that is added, which is
-    /// [convex](Cost::CONVEX). Else it is empty.
+    /// `(x, u)`, if the gradient is to be that of the quadratic model at zero: `∇f − H (x, u)` with
+    /// the Hessian `H` that is added, which is [convex](Cost::CONVEX). Else it is empty.
     pub(super) from: &'a [T],
 }
 

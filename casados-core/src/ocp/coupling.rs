@@ -13,8 +13,8 @@ use crate::qp::{Solution, StageDims};
 use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`, …).
-    /// The initial state is to be free. [`Ipm`](super::Ipm) solves such problems.
+    /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`,
+    /// …). The initial state is to be free. [`Ipm`](super::Ipm) solves such problems.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`]

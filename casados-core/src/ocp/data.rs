@@ -22,9 +22,11 @@ pub(super) struct Data<'a, T> {
     pub upper: &'a mut [T],
     /// Algebraic states of every stage but the last, and `∂z/∂(x, u)`, row after row.
     pub algebraic: &'a mut [T],
-    /// Weights of the second derivatives of algebraic states, of every stage but the last, if anything depends on these.
+    /// Weights of the second derivatives of algebraic states, of every stage but the last, if
+    /// anything depends on these.
     pub weights: &'a mut [T],
-    /// Room for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and its constraints; nothing if there is no `z`.
+    /// Room for derivatives over `(x, u, z)` of a stage: a gradient, a Hessian and its constraints;
+    /// nothing if there is no `z`.
     pub extended: &'a mut [T],
     /// Room for two matrices and a vector over `(x, u)`.
     pub scratch: &'a mut [T],
@@ -93,7 +95,8 @@ pub(super) struct Node<'a, T> {
     pub p: &'a [T],
     /// Of its cost.
     pub reference: &'a [T],
-    /// What its cost is multiplied by: the length of the interval that begins there, if costs are rates.
+    /// What its cost is multiplied by: the length of the interval that begins there, if costs are
+    /// rates.
     pub factor: T,
 }
 

@@ -30,7 +30,8 @@ pub struct Interval<'a, T> {
     pub p: &'a [T],
     /// The multipliers `π` of its end.
     pub multipliers: &'a [T],
-    /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if nothing depends on these.
+    /// The weights `ν` of the algebraic states at its start, for second derivatives; empty if
+    /// nothing depends on these.
     pub nu: &'a [T],
     /// The time at its start.
     pub t: T,
@@ -82,7 +83,8 @@ impl<'a, T: Real> Nodes<'a, T> {
     }
 }
 
-/// What comes out of an interval: matrices as slices, column after column. What was not asked for is empty.
+/// What comes out of an interval: matrices as slices, column after column. What was not asked for
+/// is empty.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a, T> {
     /// The state at the end, `φ(x, u, p)`.
@@ -173,9 +175,9 @@ pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
 
 /// What happens between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.
 ///
-/// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or on the heap;
-/// [`Along`](super::Along) is one with an integral cost, [`Map`](super::Map) a function that is `φ` itself, and
-/// `Shooting` a batch that takes all intervals at once.
+/// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or
+/// on the heap; [`Along`](super::Along) is one with an integral cost, [`Map`](super::Map) a
+/// function that is `φ` itself, and `Shooting` a batch that takes all intervals at once.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say what happens between two nodes of a horizon",
     note = "`Irk`, `Erk`, `Shooting` (over a `Batch`), `Along` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
@@ -207,8 +209,8 @@ pub trait Dynamics<T: Real> {
     note = "integrators with `Heap` or `Inline<mode::Hessian>` memory have them"
 )]
 pub trait SecondOrder<T: Real>: Dynamics<T> {
-    /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + νᵀζ + integral)` with the multipliers `π` and the weights
-    /// `ν` of the [`Interval`].
+    /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + νᵀζ + integral)` with the
+    /// multipliers `π` and the weights `ν` of the [`Interval`].
     ///
     /// # Errors
     /// [`OcpError::Integration`]

@@ -88,7 +88,8 @@ pub struct ConstraintName {
     pub side: Side,
 }
 
-/// What is wrong with a problem, or what went wrong where it was evaluated: what, at which stage, and the values.
+/// What is wrong with a problem, or what went wrong where it was evaluated: what, at which stage,
+/// and the values.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum OcpError {
@@ -159,8 +160,8 @@ pub enum OcpError {
         /// The stage.
         stage: usize,
     },
-    /// A cost or constraint depends on something that does not exist where it is evaluated: algebraic states or controls at the end of
-    /// the horizon, algebraic states of a map.
+    /// A cost or constraint depends on something that does not exist where it is evaluated:
+    /// algebraic states or controls at the end of the horizon, algebraic states of a map.
     NotThere {
         /// The function.
         function: &'static str,

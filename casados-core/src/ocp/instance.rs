@@ -31,11 +31,13 @@ pub(super) enum Initial {
 /// min  Σ_k l(x_k, u_k) + e(x_N)     x_{k+1} = φ(x_k, u_k)     lb ≤ (x_k, u_k) ≤ ub     lg ≤ g(x_k, u_k) ≤ ug
 /// ```
 ///
-/// It holds the data of every stage, an iterate with multipliers, and the QP that [`Ocp::linearise`] writes at the iterate.
-/// The variables of this QP are states and controls themselves, not their changes: bounds are written into it once, its
-/// solution is the next iterate, and its conditions of optimality at the iterate are those of the problem.
+/// It holds the data of every stage, an iterate with multipliers, and the QP that
+/// [`Ocp::linearise`] writes at the iterate. The variables of this QP are states and controls
+/// themselves, not their changes: bounds are written into it once, its solution is the next
+/// iterate, and its conditions of optimality at the iterate are those of the problem.
 ///
-/// With the feature `alloc`, `Problem::on` allocates the memory; elsewhere [`Problem::on_horizon`] takes it.
+/// With the feature `alloc`, `Problem::on` allocates the memory; elsewhere [`Problem::on_horizon`]
+/// takes it.
 pub struct Ocp<P, T, D, M> {
     pub(super) problem: P,
     pub(super) initial: Initial,
@@ -54,8 +56,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// The problem on a horizon, with memory on the heap.
     ///
     /// # Errors
-    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
-    /// [`OcpError::OutOfMemory`]
+    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`],
+    /// [`OcpError::InvalidValue`], [`OcpError::OutOfMemory`]
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
     where
@@ -101,11 +103,12 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
             + data::length::<Self, T>(dims.len().saturating_sub(1))
     }
 
-    /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims` are
-    /// [`Problem::dims`].
+    /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims`
+    /// are [`Problem::dims`].
     ///
     /// # Errors
-    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]; [`OcpError::Length`] if memory or dimensions do not fit.
+    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`],
+    /// [`OcpError::InvalidValue`]; [`OcpError::Length`] if memory or dimensions do not fit.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,
@@ -190,7 +193,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.qp.dims().len().saturating_sub(1)
     }
 
-    /// The functions of the problem: weights of costs and options of integrators may be changed there.
+    /// The functions of the problem: weights of costs and options of integrators may be changed
+    /// there.
     pub fn problem(&mut self) -> &mut P {
         &mut self.problem
     }
@@ -226,7 +230,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.iterate.stage(stage).ok_or(OcpError::NoSuchStage { part: Part::States, stage, stages })
     }
 
-    /// A state and a control as the iterate at every stage, and no multipliers: a start that is always there.
+    /// A state and a control as the iterate at every stage, and no multipliers: a start that is
+    /// always there.
     ///
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -239,7 +244,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// A state and a control as the iterate at one stage, and no multipliers there. The last stage has no control.
+    /// A state and a control as the iterate at one stage, and no multipliers there. The last stage
+    /// has no control.
     ///
     /// # Errors
     /// [`OcpError::NoSuchStage`], [`OcpError::Length`], [`OcpError::InvalidValue`]
@@ -287,7 +293,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// Everything of the iterate one interval earlier, as the start of the problem of the next sampling instant.
+    /// Everything of the iterate one interval earlier, as the start of the problem of the next
+    /// sampling instant.
     pub fn shift(&mut self) {
         self.iterate.shift();
     }

@@ -1,4 +1,5 @@
-//! The conditions of optimality at a point: those of the problem where the QP was written at this point.
+//! The conditions of optimality at a point: those of the problem where the QP was written at this
+//! point.
 
 use crate::qp::{
     Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, larger,
@@ -6,8 +7,9 @@ use crate::qp::{
 };
 use crate::scalar::{Packed, Real, Registers};
 
-/// The residuals, and penalties of soft bounds. Residuals as in [`qp::residuals`](crate::qp::residuals), which goes element by
-/// element and needs no scratch, here with room for two vectors over `(x, u)`.
+/// The residuals, and penalties of soft bounds. Residuals as in
+/// [`qp::residuals`](crate::qp::residuals), which goes element by element and needs no scratch,
+/// here with room for two vectors over `(x, u)`.
 pub(super) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     at: &Solution<T, D, M>,

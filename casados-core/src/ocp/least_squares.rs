@@ -10,9 +10,11 @@ use crate::shape::{Array, Matrix, Outputs, Plain};
 use bytemuck::Zeroable;
 use core::ops::Range;
 
-/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and a reference `r`, which every stage has for itself.
+/// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and a reference `r`,
+/// which every stage has for itself.
 ///
-/// Its Hessian is `JᵀWJ`, that of Gauss and Newton; the exact one has the second derivatives of `y` too.
+/// Its Hessian is `JᵀWJ`, that of Gauss and Newton; the exact one has the second derivatives of `y`
+/// too.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
@@ -152,7 +154,8 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
     }
 }
 
-/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; or `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)` from a point `v` on.
+/// Adds gradient and Hessian, `JᵀW (y − r)` and `JᵀWJ`; or
+/// `Jᵀ W (y − r) − JᵀWJ v = JᵀW (y − r − J v)` from a point `v` on.
 struct Square<'a, 'b, F: Function, T: Plain> {
     weights: &'a MatrixYY<F, T>,
     /// `y − r`

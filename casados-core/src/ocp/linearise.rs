@@ -30,15 +30,17 @@ pub trait Curvature<D, T: Real>: Copy {
     fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
 }
 
-/// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have none.
+/// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have
+/// none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GaussNewton {
     /// What is done where a general cost is not convex.
     pub convexification: Convexification,
 }
 
-/// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all intervals are
-/// simulated first: what second derivatives of these states are multiplied by depends on them.
+/// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all
+/// intervals are simulated first: what second derivatives of these states are multiplied by depends
+/// on them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exact {
     /// What is done where it is not convex. Default [`Convexification::Reduced`].
@@ -72,7 +74,8 @@ impl<D: SecondOrder<T>, T: Real> Curvature<D, T> for Exact {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic programming.
+    /// Writes the QP at the iterate: its solution is the full step of sequential quadratic
+    /// programming.
     ///
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
@@ -106,7 +109,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut stages = qp.stages_mut();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
-        // Whether intervals add to costs: all of them do, or none. Then these are cleared where those at nodes are added.
+        // Whether intervals add to costs: all of them do, or none. Then these are cleared where
+        // those at nodes are added.
         let mut adding = false;
         C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
@@ -239,8 +243,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// How well the iterate satisfies the conditions of optimality of the problem, and the objective with penalties of soft
-    /// bounds; after [`Ocp::linearise`].
+    /// How well the iterate satisfies the conditions of optimality of the problem, and the
+    /// objective with penalties of soft bounds; after [`Ocp::linearise`].
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
@@ -251,8 +255,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         (residuals, self.objective.to_f64() + penalties)
     }
 
-    /// The objective at some point, without penalties; and what is left of its dynamics and constraints in `ends`: `φ` of every
-    /// interval, then `g` of every stage, in the layout of [`Ocp::ends`].
+    /// The objective at some point, without penalties; and what is left of its dynamics and
+    /// constraints in `ends`: `φ` of every interval, then `g` of every stage, in the layout of
+    /// [`Ocp::ends`].
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
@@ -296,8 +301,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         P::Path::ROWS
     }
 
-    /// Constants of the linearised dynamics and constraints such that these are exact at some point, whose `ends` are given: what a
-    /// second-order correction solves.
+    /// Constants of the linearised dynamics and constraints such that these are exact at some
+    /// point, whose `ends` are given: what a second-order correction solves.
     pub(super) fn correct(&mut self, at: &Solution<T, D, M>, ends: &[T]) {
         let intervals = self.intervals();
         let (nx, path) = (P::Shape::NX, P::Path::ROWS);

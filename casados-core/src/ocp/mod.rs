@@ -11,34 +11,41 @@
 //! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`GeneralCost`], pairs of costs; integrals with [`Along`] |
 //! | `g` | [`Constraint`], pairs of constraints |
 //!
-//! All of these are `#[function]`s of the arguments of the model: derivatives are exact and not written by anybody. [`Problem`] puts them
-//! together, `problem.on(horizon)` gives them memory: an [`Ocp`], which knows bounds by the names of the model
-//! (`ocp.bound("u", .., -1.0, 1.0)?`), references and parameters of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves it:
+//! All of these are `#[function]`s of the arguments of the model: derivatives are exact and not
+//! written by anybody. [`Problem`] puts them together, `problem.on(horizon)` gives them memory: an
+//! [`Ocp`], which knows bounds by the names of the model (`ocp.bound("u", .., -1.0, 1.0)?`),
+//! references and parameters of every stage, an iterate, and the QP at this iterate. [`Sqp`] solves
+//! it:
 //!
 //! ```text
 //! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        GaussNewton: JᵀWJ of least squares alone; Exact: all of it, regularised where a QP is not convex
 //! QP at (x̄, ū): variables (x, u), data φ − A x̄ − B ū, …, solution the next iterate
 //! ```
 //!
-//! with line searches (merit function, filter, second-order correction) or full steps, penalties where a QP is infeasible
-//! (elastic mode), and an [`Outcome`] that says how it ended, at which constraint if there is one to blame. [`RealTime`] takes one step in
-//! each sample, in two phases. `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback gains.
+//! with line searches (merit function, filter, second-order correction) or full steps, penalties
+//! where a QP is infeasible (elastic mode), and an [`Outcome`] that says how it ended, at which
+//! constraint if there is one to blame. [`RealTime`] takes one step in each sample, in two phases.
+//! `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback
+//! gains.
 //!
-//! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its stages to there (`z0` of its results), with their exact
-//! first derivatives; those of second order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of the horizon there
-//! are none.
+//! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its
+//! stages to there (`z0` of its results), with their exact first derivatives; those of second
+//! order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of
+//! the horizon there are none.
 //!
-//! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call, from the stages of the last one: these converge with the
-//! iterates, to the same solution.
+//! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call,
+//! from the stages of the last one: these converge with the iterates, to the same solution.
 //!
-//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians, and those whose states are periodic
-//! (`ocp.periodic("x")?`, `x₀ = x_N`).
+//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians, and those
+//! whose states are periodic (`ocp.periodic("x")?`, `x₀ = x_N`).
 //!
-//! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with `ocp.free_initial_state()` and the other states at
-//! stage 0 given by equal bounds. So are parameters that are to be found.
+//! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with
+//! `ocp.free_initial_state()` and the other states at stage 0 given by equal bounds. So are
+//! parameters that are to be found.
 //!
-//! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose length is a constant of the types
-//! ([`Problem::memory`]), and integrators with `Inline` memory are dynamics too.
+//! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose
+//! length is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory
+//! are dynamics too.
 
 mod algebraic;
 mod bounds;

@@ -131,7 +131,8 @@ impl<T: Real> Terms<'_, T> {
     }
 }
 
-/// The entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value; computed in `hessian`.
+/// The entries of `∇²(μᵀy)` of the outputs of a function, as two variables and a value; computed in
+/// `hessian`.
 #[inline(always)]
 fn each_entry<F: Function, T: Real>(
     v: &ArrayV<F, T>,
@@ -150,7 +151,8 @@ fn each_entry<F: Function, T: Real>(
     }
 }
 
-/// Derivatives of a gradient over `(x, u)`, or `(x, u, z)`, with respect to parameters, a column for each, to be added to.
+/// Derivatives of a gradient over `(x, u)`, or `(x, u, z)`, with respect to parameters, a column
+/// for each, to be added to.
 pub struct Cross<'a, T> {
     pub(super) columns: &'a mut [T],
     /// The distance of columns.
@@ -164,7 +166,8 @@ impl<T: Real> Cross<'_, T> {
             *element = *element + value;
         }
     }
-    /// Adds what parameters change of `factor ∇(μᵀy)` of the outputs of a function; entries of its Hessian are computed in `hessian`.
+    /// Adds what parameters change of `factor ∇(μᵀy)` of the outputs of a function; entries of its
+    /// Hessian are computed in `hessian`.
     pub(super) fn curvature<F: Function>(
         &mut self,
         v: &ArrayV<F, T>,

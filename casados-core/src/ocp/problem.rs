@@ -6,7 +6,8 @@ use super::dynamics::Dynamics;
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// Dynamics, costs and constraints. Each call of the builder puts a function in its place; what is not said is not there.
+/// Dynamics, costs and constraints. Each call of the builder puts a function in its place; what is
+/// not said is not there.
 ///
 /// A problem on a horizon is an [`Ocp`](super::Ocp).
 #[derive(Clone, Debug)]

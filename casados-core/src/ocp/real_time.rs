@@ -1,6 +1,7 @@
-//! The real-time iteration: of sequential quadratic programming one full step in each sample, cut in two where the state
-//! becomes known (M. Diehl, H. G. Bock, J. P. Schlöder, "A real-time iteration scheme for nonlinear optimization in
-//! optimal feedback control", SIAM J. Control Optim. 43, 2005).
+//! The real-time iteration: of sequential quadratic programming one full step in each sample, cut
+//! in two where the state becomes known (M. Diehl, H. G. Bock, J. P. Schlöder, "A real-time
+//! iteration scheme for nonlinear optimization in optimal feedback control", SIAM J. Control Optim.
+//! 43, 2005).
 //!
 //! ```text
 //! prepare      linearise at the plan (x̄, ū): all integrations and derivatives; nothing of it depends on the state
@@ -22,7 +23,8 @@ use alloc::vec::Vec;
 
 /// A controller that takes one step of sequential quadratic programming in each sample.
 ///
-/// Its order is that of its types: [`RealTime::prepare`] gives what alone has `feedback`, which takes it away.
+/// Its order is that of its types: [`RealTime::prepare`] gives what alone has `feedback`, which
+/// takes it away.
 ///
 /// ```
 /// # use casados_core::ocp::{Curvature, Formulation, OcpError, RealTime};
@@ -65,10 +67,11 @@ use alloc::vec::Vec;
 /// # }
 /// ```
 ///
-/// Between two samples the plan may be followed with the gains of its QP, `gains` (feature `alloc`) of [`RealTime::ocp`]: `u_k + K_k (x − x_k)`.
+/// Between two samples the plan may be followed with the gains of its QP, `gains` (feature `alloc`)
+/// of [`RealTime::ocp`]: `u_k + K_k (x − x_k)`.
 ///
-/// What a sample takes is bounded by the options of the solver of QPs: `max_iterations`, and `locate` switched off. After
-/// any error the plan is as it was before the call.
+/// What a sample takes is bounded by the options of the solver of QPs: `max_iterations`, and
+/// `locate` switched off. After any error the plan is as it was before the call.
 pub struct RealTime<P, S, C, T, D, M> {
     /// The Hessian.
     pub curvature: C,
@@ -104,8 +107,8 @@ pub struct Feedback<'a, T> {
 
 #[cfg(feature = "alloc")]
 impl<P: Formulation<T>, T: Real> HeapRealTime<P, HeapInteriorPoint<T>, GaussNewton, T> {
-    /// A controller for a problem whose iterate is the first plan, with the library's own solver of QPs and the Hessian of
-    /// Gauss and Newton.
+    /// A controller for a problem whose iterate is the first plan, with the library's own solver of
+    /// QPs and the Hessian of Gauss and Newton.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -124,8 +127,8 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real>
         Solution::<T, (), ()>::memory(dims)
     }
 
-    /// A controller for a problem of these dimensions whose iterate is the first plan, in given memory of
-    /// [`RealTime::memory`] numbers.
+    /// A controller for a problem of these dimensions whose iterate is the first plan, in given
+    /// memory of [`RealTime::memory`] numbers.
     ///
     /// # Errors
     /// [`OcpError::Qp`] if memory or dimensions do not fit.
@@ -174,7 +177,8 @@ where
         &self.ocp
     }
 
-    /// The problem, with the plan as its iterate, to be changed: references, bounds, the plan itself.
+    /// The problem, with the plan as its iterate, to be changed: references, bounds, the plan
+    /// itself.
     pub fn ocp_mut(&mut self) -> &mut Ocp<P, T, D, M> {
         &mut self.ocp
     }

@@ -49,7 +49,8 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
         &mut self.batch
     }
 
-    /// Copies the intervals to where the batch takes them from, and their multipliers if they are asked for.
+    /// Copies the intervals to where the batch takes them from, and their multipliers if they are
+    /// asked for.
     fn take(&mut self, nodes: &Nodes<'_, T>, multipliers: bool) -> Result<(), OcpError> {
         let n = nodes.len();
         reserve(&mut self.x, n)?;

@@ -1,4 +1,5 @@
-//! Integrators of single intervals as dynamics: one interval after the other, without other memory than theirs.
+//! Integrators of single intervals as dynamics: one interval after the other, without other memory
+//! than theirs.
 
 use super::dynamics::{Dynamics, IntegralTerms, Interval, Names, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
@@ -17,9 +18,9 @@ pub(super) const fn names<M: Dae>() -> Names {
     Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
 }
 
-/// An integrator with an integral cost: `∫ l dt` of a [`Quadrature`] with one output, or half the integral of a square
-/// of [`LeastSquares`], which has the matrix of Gauss and Newton. Of a quadrature, which has no such matrix, the Hessian is
-/// known to exact methods only.
+/// An integrator with an integral cost: `∫ l dt` of a [`Quadrature`] with one output, or half the
+/// integral of a square of [`LeastSquares`], which has the matrix of Gauss and Newton. Of a
+/// quadrature, which has no such matrix, the Hessian is known to exact methods only.
 ///
 /// References of integrals are parameters, which every stage has for itself.
 #[derive(Clone, Debug)]

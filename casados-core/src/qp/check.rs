@@ -135,10 +135,12 @@ fn find_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> R
     Ok(())
 }
 
-/// How well a point satisfies the conditions of optimality of the QP, and its objective with penalties.
+/// How well a point satisfies the conditions of optimality of the QP, and its objective with
+/// penalties.
 ///
-/// The variables `e` of soft bounds are eliminated: they are the violations, and the multiplier of a violated soft bound
-/// must be `linear + quadratic · e`; of one that is not violated it may be anything from zero to that.
+/// The variables `e` of soft bounds are eliminated: they are the violations, and the multiplier of
+/// a violated soft bound must be `linear + quadratic · e`; of one that is not violated it may be
+/// anything from zero to that.
 pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     solution: &Solution<T, D, M>,

@@ -15,11 +15,12 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 
 /// Clarabel's interior point for sparse problems.
 ///
-/// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order cones, and shares no code with it.
-/// Every start is cold. Its symbolic factorisation is kept as long as the elements that are not zero stay the same.
+/// Slower than [`InteriorPoint`](super::InteriorPoint) where that fits, but it takes second-order
+/// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept as
+/// long as the elements that are not zero stay the same.
 ///
-/// Of an infeasible problem it names the constraint with the largest multiplier in the certificate, and a violation that at
-/// least one constraint must have.
+/// Of an infeasible problem it names the constraint with the largest multiplier in the certificate,
+/// and a violation that at least one constraint must have.
 pub struct Clarabel {
     /// Clarabel's own options.
     pub settings: DefaultSettings<f64>,
@@ -108,7 +109,8 @@ impl Clarabel {
                 kept.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
             });
         if !updated {
-            // What clarabel checks here are the dimensions, which are right by construction, and the user's settings.
+            // What clarabel checks here are the dimensions, which are right by construction, and
+            // the user's settings.
             let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, self.settings.clone());
             let invalid =
                 QpError::InvalidValue { field: Field::Settings, stage: 0, index: 0, value: f64::NAN };

@@ -1,15 +1,16 @@
 //! Partial condensing: the states inside of blocks of intervals are eliminated.
 //!
-//! A block of stages `k .. k + m` becomes one stage with the state `x_k` and the controls `(u_{k+m−1}, …, u_k)`, latest first.
-//! Bounds of eliminated states become general constraints. Backwards over the block, with `V` the Hessian of what comes
-//! later and `Z` the rows that depend on `x_{j+1}` (mixed second derivatives, constraints, and `x_{k+m}` itself):
+//! A block of stages `k .. k + m` becomes one stage with the state `x_k` and the controls
+//! `(u_{k+m−1}, …, u_k)`, latest first. Bounds of eliminated states become general constraints.
+//! Backwards over the block, with `V` the Hessian of what comes later and `Z` the rows that depend
+//! on `x_{j+1}` (mixed second derivatives, constraints, and `x_{k+m}` itself):
 //!
 //! ```text
 //! V ← H_j + [A B]ᵀ V [A B]        Z ← Z [A B]
 //! ```
 //!
-//! Short blocks pay where there are few controls: the Riccati recursion then goes over larger matrices fewer times, and less
-//! memory passes by in each iteration.
+//! Short blocks pay where there are few controls: the Riccati recursion then goes over larger
+//! matrices fewer times, and less memory passes by in each iteration.
 
 use super::error::{Field, QpError};
 use super::interior::{
@@ -99,7 +100,8 @@ fn blocks(stages: usize, block: usize) -> impl Iterator<Item = core::ops::Range<
 }
 
 impl<T: Real, S> Condensing<T, S> {
-    /// Dimensions of the condensed problem, and where its general constraints come from, stage by stage.
+    /// Dimensions of the condensed problem, and where its general constraints come from, stage by
+    /// stage.
     fn plan(&mut self, qp: QpView<'_, T>) -> Result<(), QpError> {
         core::mem::swap(&mut self.dims, &mut self.old);
         self.dims.clear();
@@ -364,7 +366,8 @@ fn at(to: &Place, origin: &Origin, variable: usize) -> usize {
     match origin.kind {
         Kind::State => origin.index * to.ld + variable,
         Kind::Constraint => (to.next + origin.index) * to.ld + variable,
-        // Below the diagonal: a later control comes first, so this is its row with states, and its column with controls.
+        // Below the diagonal: a later control comes first, so this is its row with states, and its
+        // column with controls.
         Kind::Control if variable < to.nx => to.matrix() + variable * to.ld + to.nx + origin.index,
         Kind::Control => to.matrix() + (to.nx + origin.index) * to.ld + variable,
     }
@@ -519,7 +522,8 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         let (minus, g) = work.split_at_mut_checked(most).unwrap_or_default();
         T::registers(Expand { qp, block: *block, solution: solution.reborrow(), minus, g });
         result.map_err(|error| translate(error, qp, *block, dims, rows)).map(|statistics| {
-            // Penalties are the same; what is constant in eliminated states is in none of the condensed costs.
+            // Penalties are the same; what is constant in eliminated states is in none of the
+            // condensed costs.
             let g = work.get_mut(..pad::<T>(largest.n.max(condensed_n))).unwrap_or_default();
             let difference = quadratic(qp, solution.v, g)
                 - quadratic(condensed.view(), start_and_solution.view_mut().v, g);

@@ -66,7 +66,8 @@ pub enum Side {
 
 /// Why there is no solution: what, at which stage, and the values that say so.
 ///
-/// After `Infeasible`, `MaxIterations`, `Stalled` and `NotConvex` the solution holds the best iterate.
+/// After `Infeasible`, `MaxIterations`, `Stalled` and `NotConvex` the solution holds the best
+/// iterate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {
@@ -94,7 +95,8 @@ pub enum QpError {
         /// Its upper bound.
         upper: f64,
     },
-    /// A number is infinite or NaN and must not be (a bound may be infinite on its own side), or a penalty is negative.
+    /// A number is infinite or NaN and must not be (a bound may be infinite on its own side), or a
+    /// penalty is negative.
     InvalidValue {
         /// Where.
         field: Field,
@@ -105,7 +107,8 @@ pub enum QpError {
         /// Its value.
         value: f64,
     },
-    /// No point satisfies all constraints. This is the largest violation where their sum is smallest.
+    /// No point satisfies all constraints. This is the largest violation where their sum is
+    /// smallest.
     Infeasible {
         /// Which bounds.
         field: Field,
@@ -134,7 +137,8 @@ pub enum QpError {
         /// What they reached.
         residuals: Residuals,
     },
-    /// Steps became too short, or residuals no longer shrink: rounding errors, or an unbounded problem.
+    /// Steps became too short, or residuals no longer shrink: rounding errors, or an unbounded
+    /// problem.
     Stalled {
         /// The iterations.
         iterations: usize,

@@ -1,7 +1,8 @@
 //! Dimensions of the stages, and where each stage lies in flat memory.
 //!
-//! A stage has the variables `v = (x, u)`. Its matrices lie column after column, and every column begins at a
-//! multiple of [`pad`] numbers, so that whole registers can be read from it. What is padding is zero.
+//! A stage has the variables `v = (x, u)`. Its matrices lie column after column, and every column
+//! begins at a multiple of [`pad`] numbers, so that whole registers can be read from it. What is
+//! padding is zero.
 
 use crate::scalar::lanes::REGISTERS;
 use core::iter::FusedIterator;
@@ -26,8 +27,9 @@ impl StageDims {
     }
 }
 
-/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of type `T`. Where there are no registers an
-/// even number is enough, which tiles need: firmware has half the memory then, and nothing to compute with what is padding.
+/// `n` rounded up to whole registers (64 bytes, the widest there are) of numbers of type `T`. Where
+/// there are no registers an even number is enough, which tiles need: firmware has half the memory
+/// then, and nothing to compute with what is padding.
 #[must_use]
 pub(crate) const fn pad<T>(n: usize) -> usize {
     let width = if REGISTERS { 64 / size_of::<T>() } else { 2 };
@@ -53,7 +55,8 @@ pub(crate) struct Place {
     pub ld: usize,
     /// The length of a vector of next states, padded.
     pub ld_next: usize,
-    /// The length of a vector over all constraints: `ld` for the bounds, `ng` padded for the general ones.
+    /// The length of a vector over all constraints: `ld` for the bounds, `ng` padded for the
+    /// general ones.
     pub rows: usize,
     /// Columns of the factors: those of the variables that are eliminated at this stage.
     pub pivots: usize,
@@ -100,7 +103,8 @@ impl Place {
     pub const fn hessian(&self) -> usize {
         self.ld * self.n
     }
-    /// All data of the stage: matrix, Hessian, gradient, offset, and six vectors over its constraints.
+    /// All data of the stage: matrix, Hessian, gradient, offset, and six vectors over its
+    /// constraints.
     pub const fn data_len(&self) -> usize {
         self.matrix() + self.hessian() + self.ld + self.ld_next + 6 * self.rows
     }
@@ -176,7 +180,8 @@ impl<'a, T> Places<'a, T> {
 impl<T> Iterator for Places<'_, T> {
     type Item = Place;
 
-    // What nobody asks of a place is not computed where the optimiser sees who asks; in firmware memory is dearer.
+    // What nobody asks of a place is not computed where the optimiser sees who asks; in firmware
+    // memory is dearer.
     #[cfg_attr(feature = "std", inline(always))]
     #[cfg_attr(not(feature = "std"), inline)]
     fn next(&mut self) -> Option<Place> {
@@ -214,7 +219,8 @@ pub(crate) const fn end<T>(dims: &[StageDims]) -> Place {
     behind::<T>(Place::new::<T>(0, StageDims::new(0, 0, 0), 0), 0, dims)
 }
 
-/// Whether lengths of such a horizon are more than there is memory, and may be more than a `usize` holds.
+/// Whether lengths of such a horizon are more than there is memory, and may be more than a `usize`
+/// holds.
 pub(crate) const fn is_absurd(dims: &[StageDims]) -> bool {
     let (mut total, mut rest): (u128, _) = (0, dims);
     while let Some((&first, after)) = rest.split_first() {
@@ -249,7 +255,8 @@ const fn behind<T>(mut place: Place, mut stage: usize, dims: &[StageDims]) -> Pl
     place.end()
 }
 
-/// A part of a slice; an empty one where it ends too early, which the lengths checked on entry exclude.
+/// A part of a slice; an empty one where it ends too early, which the lengths checked on entry
+/// exclude.
 #[inline(always)]
 pub(crate) fn part<T>(slice: &[T], begin: usize, length: usize) -> &[T] {
     slice.get(begin..).and_then(|rest| rest.get(..length)).unwrap_or_default()

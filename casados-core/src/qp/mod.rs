@@ -6,11 +6,14 @@
 //!      lb ≤ (x, u) ≤ ub,   lg ≤ C x + D u ≤ ug      each side optional, each side hard or soft
 //! ```
 //!
-//! Dimensions may differ from stage to stage. The state at the start is fixed (two equal bounds), bounded or free.
+//! Dimensions may differ from stage to stage. The state at the start is fixed (two equal bounds),
+//! bounded or free.
 //!
-//! - [`Qp`] is the data, [`Solution`] a point with multipliers; both in memory of their owner, on the heap or not.
-//! - [`QpSolver`] is what every solver does: [`InteriorPoint`], which is the library's own and needs neither heap nor `std`; the same
-//!   over a problem that is partially condensed first (`Condensing`); and clarabel (feature `clarabel`).
+//! - [`Qp`] is the data, [`Solution`] a point with multipliers; both in memory of their owner, on
+//!   the heap or not.
+//! - [`QpSolver`] is what every solver does: [`InteriorPoint`], which is the library's own and
+//!   needs neither heap nor `std`; the same over a problem that is partially condensed first
+//!   (`Condensing`); and clarabel (feature `clarabel`).
 //! - [`residuals`] says how well a point satisfies the conditions of optimality, whoever found it.
 #![cfg_attr(
     feature = "alloc",

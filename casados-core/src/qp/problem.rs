@@ -10,11 +10,12 @@ use core::marker::PhantomData;
 
 /// A quadratic program with the structure of optimal control, over memory of its owner.
 ///
-/// With the feature `alloc`, `Qp::new(&dims)` has its memory on the heap; elsewhere [`Qp::in_memory`] takes arrays or
-/// static slices of [`Qp::memory`] numbers. See the [module](super) for the problem.
+/// With the feature `alloc`, `Qp::new(&dims)` has its memory on the heap; elsewhere
+/// [`Qp::in_memory`] takes arrays or static slices of [`Qp::memory`] numbers. See the
+/// [module](super) for the problem.
 ///
-/// A new QP is all zero, without bounds. A state at the start that is given is one whose two bounds are equal:
-/// [`Qp::fix_initial_state`].
+/// A new QP is all zero, without bounds. A state at the start that is given is one whose two bounds
+/// are equal: [`Qp::fix_initial_state`].
 #[derive(Clone, Debug)]
 pub struct Qp<T, D, M> {
     dims: D,
@@ -49,8 +50,8 @@ pub struct StageMut<'a, T> {
 
 /// Bounds of some components, and what it costs to leave them.
 ///
-/// A violation `e` of a soft bound costs `linear · e + ½ quadratic · e²`. A bound whose linear penalty is infinite, as
-/// that of every new QP, is hard.
+/// A violation `e` of a soft bound costs `linear · e + ½ quadratic · e²`. A bound whose linear
+/// penalty is infinite, as that of every new QP, is hard.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds<'a, T> {
     /// −∞ where there is none.

@@ -8,10 +8,12 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-/// A point of a QP and its multipliers, over memory of its owner: where solvers begin, and what they leave.
+/// A point of a QP and its multipliers, over memory of its owner: where solvers begin, and what
+/// they leave.
 ///
 /// Signs: the gradient of the Lagrangian at stage `k` is
-/// `H v + h + [A B]ᵀ π_{k+1} − (π_k, 0) + λ_upper − λ_lower + [C D]ᵀ (λ_upper − λ_lower) = 0`, with `π_0 = 0` and all `λ ≥ 0`.
+/// `H v + h + [A B]ᵀ π_{k+1} − (π_k, 0) + λ_upper − λ_lower + [C D]ᵀ (λ_upper − λ_lower) = 0`, with
+/// `π_0 = 0` and all `λ ≥ 0`.
 #[derive(Clone, Debug)]
 pub struct Solution<T, D, M> {
     dims: D,
@@ -193,8 +195,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         let place = Places::<T>::new(self.dims.as_ref()).nth(stage)?;
         Some(self.view_mut().into_stage(place))
     }
-    /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last stages stay as they
-    /// are. Stages of different dimensions are not shifted into each other.
+    /// Everything one stage earlier, as the start of the QP of the next sampling instant. The last
+    /// stages stay as they are. Stages of different dimensions are not shifted into each other.
     pub fn shift(&mut self) {
         let SolutionView { dims, v, dynamics, lower, upper } = self.view_mut();
         let places = Places::<T>::new(dims);

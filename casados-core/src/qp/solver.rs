@@ -11,14 +11,15 @@ pub enum Start {
     /// Somewhere.
     #[default]
     Cold,
-    /// At the point and multipliers in the memory of the solution: the solution of a similar QP. A solver that cannot
-    /// make use of it begins somewhere.
+    /// At the point and multipliers in the memory of the solution: the solution of a similar QP. A
+    /// solver that cannot make use of it begins somewhere.
     Warm,
 }
 
 /// A solver of QPs with the structure of optimal control.
 pub trait QpSolver<T> {
-    /// Solves a QP. The solution is in `solution` afterwards; after an error that comes from the run, the best iterate is.
+    /// Solves a QP. The solution is in `solution` afterwards; after an error that comes from the
+    /// run, the best iterate is.
     ///
     /// # Errors
     /// [`QpError`]
@@ -29,8 +30,8 @@ pub trait QpSolver<T> {
         solution: SolutionView<'_, T>,
     ) -> Result<Statistics, QpError>;
 
-    /// Asks for residuals below a tolerance for now, but not for less than its options say. A solver that cannot make use
-    /// of it solves as well as always.
+    /// Asks for residuals below a tolerance for now, but not for less than its options say. A
+    /// solver that cannot make use of it solves as well as always.
     fn relax(&mut self, tolerance: f64) {
         let _ = tolerance;
     }

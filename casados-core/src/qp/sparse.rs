@@ -1,4 +1,5 @@
-//! A QP as one sparse problem: `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then sides, then cones.
+//! A QP as one sparse problem: `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then
+//! sides, then cones.
 
 use super::layout::Places;
 use super::problem::{Bounds, QpView, Stage};
@@ -21,8 +22,9 @@ pub enum Origin {
     Cone(usize),
 }
 
-/// Rows `first .. first + count` of the general constraints of a stage, less their lower bounds, lie in the second-order cone:
-/// the first of them is at least the length of the others. Their upper bounds have no meaning.
+/// Rows `first .. first + count` of the general constraints of a stage, less their lower bounds,
+/// lie in the second-order cone: the first of them is at least the length of the others. Their
+/// upper bounds have no meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SecondOrderCone {
     /// The stage.

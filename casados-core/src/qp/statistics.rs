@@ -52,7 +52,8 @@ impl fmt::Display for Residuals {
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
-    /// Newton's steps with a matrix of their own: active sets, and iterations of the interior point.
+    /// Newton's steps with a matrix of their own: active sets, and iterations of the interior
+    /// point.
     pub iterations: usize,
     /// How many of them tried an active set.
     pub active_sets: usize,

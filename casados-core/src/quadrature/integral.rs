@@ -12,7 +12,8 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain};
 use bytemuck::Zeroable;
 
-/// `q = ∫ l dt` of the outputs of a function `F`, along the solution of an integrator that takes it along.
+/// `q = ∫ l dt` of the outputs of a function `F`, along the solution of an integrator that takes it
+/// along.
 ///
 /// | call of the integrator | what is there afterwards |
 /// | --- | --- |

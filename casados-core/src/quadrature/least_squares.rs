@@ -12,14 +12,15 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
 use bytemuck::Zeroable;
 
-/// `φ = ½ ∫ rᵀ W r dt` of the outputs of a function `F`, along the solution of an integrator that takes it along.
+/// `φ = ½ ∫ rᵀ W r dt` of the outputs of a function `F`, along the solution of an integrator that
+/// takes it along.
 ///
 /// ```text
 /// ∇φ = ∫ (dr/dw)ᵀ W r dt        H = ∫ (dr/dw)ᵀ W (dr/dw) dt        w = (x₀, u, p)
 /// ```
 ///
-/// `H` is the Hessian of `φ` without the second derivatives of `r`: the matrix of Gauss and Newton, positive semidefinite
-/// if `W` and the weights `b_i` of the method are.
+/// `H` is the Hessian of `φ` without the second derivatives of `r`: the matrix of Gauss and Newton,
+/// positive semidefinite if `W` and the weights `b_i` of the method are.
 ///
 /// | call of the integrator | what is there afterwards |
 /// | --- | --- |

@@ -4,8 +4,8 @@
 //! q = ∫ l(x, z, u, p, t) dt ≈ Σ_n Σ_i h b_i l_i        l_i = l(ξ_i, z_i, u, p, t_n + c_i h)
 //! ```
 //!
-//! is what the method would give for additional states `q̇ = l`, at the cost of evaluating `l` at the stages. Its
-//! derivatives are exact ones of this sum, with `D_i = d(ξ_i, z_i, u, p)/dw`:
+//! is what the method would give for additional states `q̇ = l`, at the cost of evaluating `l` at
+//! the stages. Its derivatives are exact ones of this sum, with `D_i = d(ξ_i, z_i, u, p)/dw`:
 //!
 //! ```text
 //! dq/dw = Σ h b_i l_v D_i
@@ -13,12 +13,13 @@
 //! d²(λᵀx + νᵀq)/dw² = Σ D_iᵀ (h b_i ∇²(νᵀl) − ∇²(μ_iᵀ f))_i D_i
 //! ```
 //!
-//! [`Quadrature`] integrates all outputs of a [`Function`](crate::Function); [`LeastSquares`] half of a weighted square of
-//! them, with the matrix of Gauss and Newton. An integrator takes one along: `irk.with(&mut cost).hessian(...)`.
+//! [`Quadrature`] integrates all outputs of a [`Function`](crate::Function); [`LeastSquares`] half
+//! of a weighted square of them, with the matrix of Gauss and Newton. An integrator takes one
+//! along: `irk.with(&mut cost).hessian(...)`.
 //!
-//! Integrands are evaluated one stage after the other, and a batch takes none along. An adaptive integrator chooses its steps
-//! for the states, not for the integral. Over intervals with controls of their own derivatives by all of them are returned
-//! beside those of the solution.
+//! Integrands are evaluated one stage after the other, and a batch takes none along. An adaptive
+//! integrator chooses its steps for the states, not for the integral. Over intervals with controls
+//! of their own derivatives by all of them are returned beside those of the solution.
 
 mod integral;
 // What the derive of `Zeroable` writes about a field of type `T`.
@@ -57,8 +58,8 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// The variables that it depends on.
     #[doc(hidden)]
     fn variables(&self) -> &'static [u32];
-    /// A place for the variables at a stage, and one for their derivatives `D`, of which the rows of
-    /// [`Integrand::variables`] count.
+    /// A place for the variables at a stage, and one for their derivatives `D`, of which the rows
+    /// of [`Integrand::variables`] count.
     #[doc(hidden)]
     fn point(&mut self) -> (&mut [T], &mut [ArrayW<M, T>]);
     /// Adds the value at the point.
@@ -67,7 +68,8 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
     fn value(&mut self, weight: T, at: Place) -> Result<(), Error>;
-    /// Adds the value at the point and its derivatives; those of second order that `hessian` is made of, if they are wanted.
+    /// Adds the value at the point and its derivatives; those of second order that `hessian` is
+    /// made of, if they are wanted.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -97,7 +99,8 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     /// [`Error::NonFiniteFunction`]
     #[doc(hidden)]
     fn density(&mut self, at: Place) -> Result<T, Error>;
-    /// The interval ends `dt = weight · time` later: adds what is integrated at the point times `dt` to the gradients.
+    /// The interval ends `dt = weight · time` later: adds what is integrated at the point times
+    /// `dt` to the gradients.
     ///
     /// # Errors
     /// [`Error::NonFiniteFunction`]
@@ -111,8 +114,8 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     fn finish(&mut self) -> Result<(), Error>;
 }
 
-/// An integrator with an integrand: its calls are those of the integrator, and gradients and Hessians those of
-/// `λᵀx + νᵀq`; see [`Integrand`].
+/// An integrator with an integrand: its calls are those of the integrator, and gradients and
+/// Hessians those of `λᵀx + νᵀq`; see [`Integrand`].
 pub struct With<'a, 'b, I, Q: ?Sized> {
     pub(crate) integrator: &'a mut I,
     pub(crate) integrand: &'b mut Q,

@@ -36,9 +36,9 @@ impl<E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, E, R, S> {
                 add::<A, E, R>(value, d, row, g, column);
             }
         }
-        // Tiles of the triangle, each over all curved variables while it is in registers. The last ones lie over
-        // those before, and leave out what these have done.
-        // Of numbers that are registers themselves, narrow ones.
+        // Tiles of the triangle, each over all curved variables while it is in registers. The last
+        // ones lie over those before, and leave out what these have done. Of numbers that are
+        // registers themselves, narrow ones.
         let wide = const { size_of::<E>() <= 8 };
         let rows = if R::LEN < 4 { 1 } else { 4 };
         let mut row = 0;
@@ -82,8 +82,8 @@ fn add<A: Arithmetic, E: Lanes, R: Array<E>>(value: E, d: &[R], from: u32, g: &m
     }
 }
 
-/// A tile of `sum −= Dᵀ G` from a row and a column on, but for the first ones that are to be skipped; above the diagonal
-/// it may write what nobody reads.
+/// A tile of `sum −= Dᵀ G` from a row and a column on, but for the first ones that are to be
+/// skipped; above the diagonal it may write what nobody reads.
 #[inline(always)]
 fn tile<A: Arithmetic, E: Lanes, R: Array<E>, const ROWS: usize, const COLUMNS: usize>(
     curved: &[u32],

@@ -1,10 +1,11 @@
-//! Complex numbers as scalars, for derivatives by the complex step: `f'(a) = Im f(a + ih) / h`, exact to
-//! rounding for `h = 1e-200`.
+//! Complex numbers as scalars, for derivatives by the complex step: `f'(a) = Im f(a + ih) / h`,
+//! exact to rounding for `h = 1e-200`.
 //!
-//! Every function is the analytic continuation of the real one from the real axis, in a formula that loses
-//! no digits of a tiny imaginary part and holds far from the axis too. Where a real function is
-//! made of pieces (`abs`, `signum`, `atan2`, `cbrt` and `powf` of negative numbers, comparisons), the real part
-//! chooses the piece. Inverse functions follow Kahan, "Branch cuts for complex elementary functions" (1987).
+//! Every function is the analytic continuation of the real one from the real axis, in a formula
+//! that loses no digits of a tiny imaginary part and holds far from the axis too. Where a real
+//! function is made of pieces (`abs`, `signum`, `atan2`, `cbrt` and `powf` of negative numbers,
+//! comparisons), the real part chooses the piece. Inverse functions follow Kahan, "Branch cuts for
+//! complex elementary functions" (1987).
 
 use super::{Field, Scalar, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};

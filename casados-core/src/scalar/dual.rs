@@ -1,12 +1,13 @@
 //! The dual numbers of `num-dual` as scalars: derivatives of emitted model code by an independent
 //! implementation of the chain rule.
 //!
-//! Functions are those of `num-dual`. Four are composed here, because `num-dual` has none or one that fails
-//! on part of the domain or loses digits:
+//! Functions are those of `num-dual`. Four are composed here, because `num-dual` has none or one
+//! that fails on part of the domain or loses digits:
 //! - `atan2` divides by the larger argument, so that an argument may be zero;
 //! - `hypot` is scaled by the larger argument;
-//! - `powf` with a constant exponent also takes zero and negative bases to integer powers, and rounds once (`num-dual`
-//!   multiplies `a^(n − 3)` by `a³`); with a variable exponent it is `exp(b ln a)`;
+//! - `powf` with a constant exponent also takes zero and negative bases to integer powers, and
+//!   rounds once (`num-dual` multiplies `a^(n − 3)` by `a³`); with a variable exponent it is
+//!   `exp(b ln a)`;
 //! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
 
 use super::{Field, Scalar, own_cell};

@@ -1,7 +1,8 @@
 //! The numbers that model code and kernels are generic over.
 //!
 //! - [`Field`]: what can be added, multiplied, divided, and compared in size.
-//! - [`Scalar`]: anything that can be computed with: `f32`, `f64`, registers of them, duals, complex numbers.
+//! - [`Scalar`]: anything that can be computed with: `f32`, `f64`, registers of them, duals,
+//!   complex numbers.
 //! - [`Lanes`]: one or more real numbers side by side, each of which can be read and written.
 //! - [`Real`]: one real number, which can be compared: what decisions are made on.
 
@@ -68,7 +69,8 @@ pub(crate) fn transposed<T: Copy, const N: usize>(rows: &[[T; N]; N]) -> [[T; N]
     columns
 }
 
-/// What elimination is generic over: numbers that can be added, multiplied, divided, and compared in size.
+/// What elimination is generic over: numbers that can be added, multiplied, divided, and compared
+/// in size.
 pub trait Field:
     Copy
     + Debug
@@ -105,8 +107,8 @@ pub trait Field:
     }
 
     /// `target − left · right` of s×s blocks that lie column after column, fused. As
-    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine, and whether it has the `WIDE`
-    /// registers of AVX-512.
+    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine, and
+    /// whether it has the `WIDE` registers of AVX-512.
     #[inline(always)]
     fn subtract_blocks<const S: usize, const WIDE: bool>(
         target: &mut [[Self; S]; S],
@@ -133,8 +135,8 @@ pub trait Field:
         }
     }
 
-    /// `target − a b`, element by element, fused. As [`subtract_product`](Field::subtract_product), only for code that
-    /// knows the machine.
+    /// `target − a b`, element by element, fused. As [`subtract_product`](Field::subtract_product),
+    /// only for code that knows the machine.
     #[inline(always)]
     fn subtract_products<const W: usize, const WIDE: bool>(
         target: &mut [Self; W],
@@ -146,20 +148,22 @@ pub trait Field:
         }
     }
 
-    /// `target = block`, a register at a time. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// `target = block`, a register at a time. As [`subtract_product`](Field::subtract_product),
+    /// only for code that knows the machine.
     #[inline(always)]
     fn write_block<const S: usize>(target: &mut [[Self; S]; S], block: &[[Self; S]; S]) {
         *target = *block;
     }
 
-    /// Rows as columns. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// Rows as columns. As [`subtract_product`](Field::subtract_product), only for code that knows
+    /// the machine.
     #[inline(always)]
     fn transposed<const N: usize>(rows: &[[Self; N]; N]) -> [[Self; N]; N] {
         transposed(rows)
     }
 
-    /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the
-    /// machine.
+    /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for
+    /// code that knows the machine.
     #[inline(always)]
     fn subtract_row<const W: usize, const WIDE: bool>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
         for (target, &element) in target.iter_mut().zip(row) {
@@ -167,8 +171,9 @@ pub trait Field:
         }
     }
 
-    /// `target − a b` of `⌊N/2⌋` complex numbers side by side, their real parts, then their imaginary ones, and of a real number
-    /// if `N` is odd, fused. As [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// `target − a b` of `⌊N/2⌋` complex numbers side by side, their real parts, then their
+    /// imaginary ones, and of a real number if `N` is odd, fused. As
+    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
     #[inline(always)]
     fn subtract_complex<const N: usize, const WIDE: bool>(
         target: &mut [Self; N],
@@ -214,8 +219,8 @@ pub trait Scalar: Field {
     /// A number to memory.
     fn store(self, cell: &mut Self::Cell);
 
-    /// Runs a piece of code that is compiled for the instructions which this type consists of. Never inlined:
-    /// pieces are long.
+    /// Runs a piece of code that is compiled for the instructions which this type consists of.
+    /// Never inlined: pieces are long.
     #[inline(never)]
     fn vectorize<P: Piece>(piece: P) {
         piece.run();
@@ -276,8 +281,9 @@ pub trait Scalar: Field {
     fn atanh(self) -> Self;
     /// `√(a² + b²)` without overflow
     fn hypot(self, other: Self) -> Self;
-    /// `a/c`. Where products are fused it is one, with the same bits, since [`dae`](https://docs.rs/casados-macros) asks for it only
-    /// if they are: of the sum `1/c` of these two numbers, the larger one rounded towards zero.
+    /// `a/c`. Where products are fused it is one, with the same bits, since
+    /// [`dae`](https://docs.rs/casados-macros) asks for it only if they are: of the sum `1/c` of
+    /// these two numbers, the larger one rounded towards zero.
     #[inline(always)]
     fn over(self, c: f64, _reciprocal: [f64; 2]) -> Self {
         self / Self::from_f64(c)
@@ -286,8 +292,8 @@ pub trait Scalar: Field {
     fn powi(self, n: i32) -> Self;
     /// `aᵇ`
     fn powf(self, other: Self) -> Self;
-    /// An elementary function of two or four arguments that do not wait for each other: two in one register where there is one that is
-    /// twice as wide, and abreast.
+    /// An elementary function of two or four arguments that do not wait for each other: two in one
+    /// register where there is one that is twice as wide, and abreast.
     #[doc(hidden)]
     #[inline(always)]
     fn together<F: elementary::Elementary<K, R>, const K: usize, const R: usize, const N: usize>(
@@ -346,7 +352,8 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     const STAGNATION: f64;
     /// The smallest normal number: where numbers are smaller, rounding errors are not.
     const SMALLEST: f64;
-    /// As many numbers with half of the digits, where that saves half of the operations: for what need not be exact.
+    /// As many numbers with half of the digits, where that saves half of the operations: for what
+    /// need not be exact.
     type Coarse: Lanes;
     /// Rounded to these, infinite beyond their largest number.
     fn coarse(self) -> Self::Coarse;
@@ -363,7 +370,8 @@ pub trait Lanes: Scalar<Cell: Plain> + Plain {
     fn max(self, other: Self) -> Self;
     /// Whether a mask is true in every lane.
     fn all(mask: Self::Mask) -> bool;
-    /// The numbers of each lane beside each other, of at most as many registers as there are lanes: `to[lane][i] = from[i][lane]`.
+    /// The numbers of each lane beside each other, of at most as many registers as there are lanes:
+    /// `to[lane][i] = from[i][lane]`.
     #[inline(always)]
     fn transpose(from: &[Self], to: &mut [Self::Cell]) {
         for (i, from) in from.iter().enumerate() {
@@ -424,8 +432,8 @@ mod sealed {
     impl Sealed for f64 {}
 }
 
-/// One real number: `f32` or `f64`. No other type can be one: kernels are entered by the alignment of
-/// their numbers, with instructions that a machine has for these.
+/// One real number: `f32` or `f64`. No other type can be one: kernels are entered by the alignment
+/// of their numbers, with instructions that a machine has for these.
 pub trait Real:
     Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default + sealed::Sealed
 {
@@ -442,8 +450,8 @@ pub trait Real:
         computation.run::<Self>();
     }
 
-    /// Runs a computation with the widest register of such numbers that this machine has and that is no wider than
-    /// `lanes`; not with those of two numbers where there are any wider ones.
+    /// Runs a computation with the widest register of such numbers that this machine has and that
+    /// is no wider than `lanes`; not with those of two numbers where there are any wider ones.
     ///
     /// # Errors
     /// The computation, if there is none.

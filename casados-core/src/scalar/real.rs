@@ -5,7 +5,8 @@ use super::{Field, Lanes, Packed, Real, Scalar, own_cell};
 #[cfg(not(feature = "std"))]
 use super::{double, single};
 
-/// The methods of one real type, from `std` where it is there, else from `libm`, `single` and `double`.
+/// The methods of one real type, from `std` where it is there, else from `libm`, `single` and
+/// `double`.
 macro_rules! real {
     ($t:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
         impl Field for $t {

@@ -1,7 +1,8 @@
 //! Numbers that lie in memory among those of other stages.
 //!
-//! A variable has its values at all stages side by side, `[E; S]`. Where no register holds them all a model is evaluated stage by stage,
-//! at the first number of each cell; arrays that begin with that of another stage make it the others' turn.
+//! A variable has its values at all stages side by side, `[E; S]`. Where no register holds them all
+//! a model is evaluated stage by stage, at the first number of each cell; arrays that begin with
+//! that of another stage make it the others' turn.
 
 use super::lanes::functions::Elementary;
 use super::{Field, Lanes, Piece, Scalar};

@@ -1,9 +1,9 @@
-//! A number with its derivative in one direction: what model code that is generic over the scalar computes with to give
-//! `∂f/∂v v'` beside `f(v)`.
+//! A number with its derivative in one direction: what model code that is generic over the scalar
+//! computes with to give `∂f/∂v v'` beside `f(v)`.
 //!
-//! That is more than the product of the Jacobian with `v'`: where terms of an equation cancel, or those of two equations do,
-//! entries of the Jacobian are sums that have rounded what is small away. Terms that expressions share are rounded once here,
-//! and cancel as they should.
+//! That is more than the product of the Jacobian with `v'`: where terms of an equation cancel, or
+//! those of two equations do, entries of the Jacobian are sums that have rounded what is small
+//! away. Terms that expressions share are rounded once here, and cancel as they should.
 
 use super::{Field, Piece, Scalar, own_cell};
 use bytemuck::Zeroable;
@@ -191,7 +191,8 @@ impl<S: Scalar> Scalar for Tangent<S> {
     fn powf(self, other: Self) -> Self {
         let (zero, one) = (c::<S>(0.0), c::<S>(1.0));
         let value = self.value.powf(other.value);
-        // Neither a power of zero that is not asked for, nor a logarithm where the exponent is constant.
+        // Neither a power of zero that is not asked for, nor a logarithm where the exponent is
+        // constant.
         let by_base = other.value * self.value.powf(other.value - one) * self.derivative;
         let by_exponent = value * self.value.ln() * other.derivative;
         let by_base = S::select(other.value.eq(zero), zero, by_base);

@@ -2,45 +2,50 @@
 
 use super::{Kinematic, Structure};
 
-/// Floating-point operations of one step with `s` stages: additions, subtractions, multiplications, divisions and
-/// elementary functions, one each.
+/// Floating-point operations of one step with `s` stages: additions, subtractions, multiplications,
+/// divisions and elementary functions, one each.
 ///
-/// Blocks are `s×s`. An inverse counts `2s³ − 2s² + s` (Gauss-Jordan elimination in place), a product of blocks `2s³ − s²`, a
-/// product that is subtracted `2s³`, a block times one column `2s² − s` and subtracted `2s²`. What a machine does
-/// beside it (loads, selections in pivoting, a fused multiply-add that is one instruction) is not in it: costs compare models and
-/// methods, they are no times. Evaluations are zero where operations are not known (dual models).
+/// Blocks are `s×s`. An inverse counts `2s³ − 2s² + s` (Gauss-Jordan elimination in place), a
+/// product of blocks `2s³ − s²`, a product that is subtracted `2s³`, a block times one column
+/// `2s² − s` and subtracted `2s²`. What a machine does beside it (loads, selections in pivoting, a
+/// fused multiply-add that is one instruction) is not in it: costs compare models and methods, they
+/// are no times. Evaluations are zero where operations are not known (dual models).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Factors of the Newton matrix: for each pivot that is no identity an inverse and a product for each block of
-    /// its `L`; a subtracted product for each update. Without a plan LU factors of the whole matrix of `n = s nk` rows,
-    /// `n (n − 1)(4n + 1)/6`.
+    /// Factors of the Newton matrix: for each pivot that is no identity an inverse and a product
+    /// for each block of its `L`; a subtracted product for each update. Without a plan LU factors
+    /// of the whole matrix of `n = s nk` rows, `n (n − 1)(4n + 1)/6`.
     pub factorisation: u64,
-    /// A solve with one right-hand side, transposed or not: a subtracted product for each block beside the diagonal and a product for
-    /// each pivot that is no identity. Without a plan `2n² − n`.
+    /// A solve with one right-hand side, transposed or not: a subtracted product for each block
+    /// beside the diagonal and a product for each pivot that is no identity. Without a plan
+    /// `2n² − n`.
     pub solve: u64,
     /// `f` at all stages: `s` times [`Operations::residual`](super::Operations::residual).
     pub residual: u64,
     /// `f` and the entries of its Jacobian that are not constant, at all stages.
     pub residual_jacobian: u64,
-    /// An iteration of Newton's method with a new factorisation: the stage states `ξ`, `2s² nx`; `f` and its Jacobian; the Newton
-    /// matrix, `s²` for each entry of `f_x` and `s` for each entry that another is added to; factors; a solve; and
-    /// `s nk` for the new unknowns.
+    /// An iteration of Newton's method with a new factorisation: the stage states `ξ`, `2s² nx`;
+    /// `f` and its Jacobian; the Newton matrix, `s²` for each entry of `f_x` and `s` for each entry
+    /// that another is added to; factors; a solve; and `s nk` for the new unknowns.
     pub iteration: u64,
-    /// Forward sensitivities in the directions that count, of [`Structure::directions`]: right-hand sides `f_x V + f_w`, `2s` for each
-    /// entry of `f_x` in each direction and `s` for each of `f_u`, `f_p`; a solve for each; `2s² + 3s` for each [`Kinematic`](super::Kinematic)
-    /// state; and `2s nx` for each for the sum over the stages. The factors are those of Newton's method.
+    /// Forward sensitivities in the directions that count, of [`Structure::directions`]: right-hand
+    /// sides `f_x V + f_w`, `2s` for each entry of `f_x` in each direction and `s` for each of
+    /// `f_u`, `f_p`; a solve for each; `2s² + 3s` for each [`Kinematic`](super::Kinematic) state;
+    /// and `2s nx` for each for the sum over the stages. The factors are those of Newton's method.
     pub forward: u64,
-    /// An adjoint: the right-hand side, `s nx`; a solve; `4s²` for each kinematic state and `2s` for each entry by which others feel it; and
-    /// `2s` for each entry of `f_x`, `f_u`, `f_p`.
+    /// An adjoint: the right-hand side, `s nx`; a solve; `4s²` for each kinematic state and `2s`
+    /// for each entry by which others feel it; and `2s` for each entry of `f_x`, `f_u`, `f_p`.
     pub adjoint: u64,
-    /// Second derivatives, beside forward and adjoint: `∇²(μᵀ f)` at all stages, `D` of the states that are curved, `2s²` for each
-    /// in each direction, and the lower triangle of `Dᵀ ∇²(μᵀ f) D`: `4s` for each non-zero (`2s` on the diagonal) in each direction,
-    /// and `2s` for each curved variable in each pair of directions.
+    /// Second derivatives, beside forward and adjoint: `∇²(μᵀ f)` at all stages, `D` of the states
+    /// that are curved, `2s²` for each in each direction, and the lower triangle of
+    /// `Dᵀ ∇²(μᵀ f) D`: `4s` for each non-zero (`2s` on the diagonal) in each direction, and `2s`
+    /// for each curved variable in each pair of directions.
     pub hessian: u64,
 }
 
 impl Structure {
-    /// What a step of an implicit method with so many stages costs: see [`Cost`] for what is counted.
+    /// What a step of an implicit method with so many stages costs: see [`Cost`] for what is
+    /// counted.
     ///
     /// ```
     /// # use casados_core::model::Structure;

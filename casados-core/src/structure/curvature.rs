@@ -5,8 +5,8 @@ use super::Pattern;
 /// No column: see [`Structure::column_of_direction`](super::Structure::column_of_direction).
 pub const NO_COLUMN: u32 = u32::MAX;
 
-/// A term of the product with the symmetric matrix `∇²(μᵀ f)`, of whose values the lower triangle is known. Rows and
-/// columns are positions in [`Structure::curved`](super::Structure::curved).
+/// A term of the product with the symmetric matrix `∇²(μᵀ f)`, of whose values the lower triangle
+/// is known. Rows and columns are positions in [`Structure::curved`](super::Structure::curved).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Term {
     /// The row.
@@ -15,11 +15,13 @@ pub struct Term {
     pub column: u32,
     /// Its value, an index into the lower triangle.
     pub entry: u32,
-    /// How many rows, this one among them, have their terms beside each other: they have the same columns.
+    /// How many rows, this one among them, have their terms beside each other: they have the same
+    /// columns.
     pub rows: u32,
 }
 
-/// The second derivative in a control or a parameter that no other one knows. Its row of `D_i` has one element.
+/// The second derivative in a control or a parameter that no other one knows. Its row of `D_i` has
+/// one element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lone {
     /// The entry of the Hessian on its diagonal.
@@ -31,9 +33,10 @@ pub struct Lone {
 /// So many rows at most have their terms beside each other; in firmware memory is dearer than time.
 pub const MOST_ROWS: usize = if cfg!(feature = "std") { 3 } else { 1 };
 
-/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern, of the `C` variables `curved`:
-/// entries of others are left out. Row by row; but rows with the same columns, as those of the coordinates of a point, go through these together, so
-/// that what is multiplied is fetched once.
+/// All `N` terms of the product with the symmetric matrix whose lower triangle has this pattern, of
+/// the `C` variables `curved`: entries of others are left out. Row by row; but rows with the same
+/// columns, as those of the coordinates of a point, go through these together, so that what is
+/// multiplied is fetched once.
 #[must_use]
 pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved: &[u32; C]) -> [Term; N] {
     let mut terms = [Term { row: 0, column: 0, entry: 0, rows: 1 }; N];
@@ -71,7 +74,8 @@ pub const fn symmetric<const C: usize, const N: usize>(hessian: &Pattern, curved
     beside(&terms, &next)
 }
 
-/// Terms row by row, given where each row ends, such that those of rows with the same columns alternate.
+/// Terms row by row, given where each row ends, such that those of rows with the same columns
+/// alternate.
 const fn beside<const C: usize, const N: usize>(by_row: &[Term; N], ends: &[usize; C]) -> [Term; N] {
     // Rows with the same columns are near each other, if there are any.
     const NEAR: usize = 8;
@@ -121,19 +125,22 @@ const fn have_same_columns(terms: &[Term], [begin, end]: [usize; 2], [other, las
     begin + term == end && other + term == last
 }
 
-/// The `N` entries of a Jacobian from one on, by columns, of which there are `V`, and within each as they are.
+/// The `N` entries of a Jacobian from one on, by columns, of which there are `V`, and within each
+/// as they are.
 #[must_use]
 pub const fn by_column<const V: usize, const N: usize>(jacobian: &Pattern, begin: usize) -> [u32; N] {
     sorted::<V, N, true>(jacobian, begin)
 }
 
-/// The first `N` entries of a Jacobian, by rows, of which there are `R`, and within each as they are.
+/// The first `N` entries of a Jacobian, by rows, of which there are `R`, and within each as they
+/// are.
 #[must_use]
 pub const fn by_row<const R: usize, const N: usize>(jacobian: &Pattern) -> [u32; N] {
     sorted::<R, N, false>(jacobian, 0)
 }
 
-/// Entries by columns, or else by rows, of which there are `K`: counted first, so that each goes to its place at once.
+/// Entries by columns, or else by rows, of which there are `K`: counted first, so that each goes to
+/// its place at once.
 const fn sorted<const K: usize, const N: usize, const COLUMNS: bool>(
     jacobian: &Pattern,
     begin: usize,
@@ -165,7 +172,8 @@ const fn key<const COLUMN: bool>(jacobian: &Pattern, entry: usize) -> usize {
     if COLUMN { column } else { row }
 }
 
-/// Where each of `N − 1` rows begins among entries that are given by rows, and where the last one ends.
+/// Where each of `N − 1` rows begins among entries that are given by rows, and where the last one
+/// ends.
 #[must_use]
 pub const fn begins<const N: usize>(jacobian: &Pattern, by_row: &[u32]) -> [u32; N] {
     let (mut begins, mut place, mut row) = ([0; N], 0, 0);
@@ -221,7 +229,8 @@ mod tests {
 
     #[test]
     fn rows_with_the_same_columns_alternate() {
-        // All of the first four with each other, and the last one, between which no other row is, with itself.
+        // All of the first four with each other, and the last one, between which no other row is,
+        // with itself.
         let hessian =
             Pattern { rows: &[0, 1, 1, 2, 2, 2, 3, 3, 3, 3, 4], columns: &[0, 0, 1, 0, 1, 2, 0, 1, 2, 3, 4] };
         let terms = symmetric::<5, 17>(&hessian, &[0, 1, 2, 3, 4]);

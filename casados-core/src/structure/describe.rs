@@ -12,8 +12,9 @@ const WORDS: usize = 64;
 /// Numbers of stages for which the cost is listed.
 const STAGES: [usize; 4] = [1, 2, 3, 4];
 
-/// Dimensions and names, equations by kind, counts of operations, sparsity, the elimination order, and the
-/// expected cost of a step: for a reader who wants to know what the library has found in a model.
+/// Dimensions and names, equations by kind, counts of operations, sparsity, the elimination order,
+/// and the expected cost of a step: for a reader who wants to know what the library has found in a
+/// model.
 ///
 /// Equations are counted from 0; long lists are cut.
 impl Display for Structure {
@@ -39,8 +40,8 @@ impl Display for Structure {
 }
 
 impl Structure {
-    /// Whether every equation has one derivative of its own, with a constant coefficient, and there are no
-    /// algebraic states.
+    /// Whether every equation has one derivative of its own, with a constant coefficient, and there
+    /// are no algebraic states.
     #[must_use]
     pub fn is_explicit(&self) -> bool {
         let nx = self.x.len();

@@ -1,4 +1,5 @@
-//! What is known about a model before it runs: facts that the macro found in its graph, as constants.
+//! What is known about a model before it runs: facts that the macro found in its graph, as
+//! constants.
 
 mod cost;
 mod curvature;
@@ -35,34 +36,40 @@ pub struct Structure {
     pub hessian: Pattern,
     /// Equations that are linear in `(ẋ, x, z, u, p)` jointly: they have no second derivatives.
     pub linear: &'static [bool],
-    /// The entries of `f_ẋ`, `f_x` and `f_z` do not depend on `(ẋ, x, z)`; on `u`, `p` and `t` they may.
-    /// The residual is then affine in the stages' unknowns: one iteration of Newton's method is exact.
+    /// The entries of `f_ẋ`, `f_x` and `f_z` do not depend on `(ẋ, x, z)`; on `u`, `p` and `t` they
+    /// may. The residual is then affine in the stages' unknowns: one iteration of Newton's method
+    /// is exact.
     pub linear_in_state: bool,
-    /// Those entries do not depend on `t` either: nothing in the Newton matrix changes within an interval but with the
-    /// size of the steps. One factorisation then serves all steps of an interval, and all intervals of the same `u` and `p`.
+    /// Those entries do not depend on `t` either: nothing in the Newton matrix changes within an
+    /// interval but with the size of the steps. One factorisation then serves all steps of an
+    /// interval, and all intervals of the same `u` and `p`.
     pub constant_matrix: bool,
     /// Nothing depends on `t`: stages at the same point have the same values.
     pub autonomous: bool,
-    /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton matrix depend on the step
-    /// size and the tableau only, so that they are assembled once; and one exact iteration of Newton's method
-    /// satisfies these equations to rounding.
+    /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton
+    /// matrix depend on the step size and the tableau only, so that they are assembled once; and
+    /// one exact iteration of Newton's method satisfies these equations to rounding.
     pub constant_rows: &'static [bool],
-    /// Equations `c ẋ_j + c′ v + c″(t) = 0` with constant `c` and `c′`, where `v` is any variable but a derivative, or
-    /// none: `q̇ = v`. They can be solved for `k_j` by hand, whatever the point. Ascending.
+    /// Equations `c ẋ_j + c′ v + c″(t) = 0` with constant `c` and `c′`, where `v` is any variable
+    /// but a derivative, or none: `q̇ = v`. They can be solved for `k_j` by hand, whatever the
+    /// point. Ascending.
     pub trivial: &'static [u32],
-    /// States that influence nobody: no equation depends on `x_j`, only on `ẋ_j`. Their columns of the Newton matrix are
-    /// `f_ẋ` alone, their columns of `dk/dx₀` are zero, and their multipliers pass through an interval unchanged. Ascending.
+    /// States that influence nobody: no equation depends on `x_j`, only on `ẋ_j`. Their columns of
+    /// the Newton matrix are `f_ẋ` alone, their columns of `dk/dx₀` are zero, and their multipliers
+    /// pass through an interval unchanged. Ascending.
     pub quadratures: &'static [u32],
-    /// Directions `w = (x₀, u, p)` that an equation depends on, as indices into `w`, ascending. For the others the stages
-    /// have no derivative: the column of `dx₊/dw` is `e_j` for the state `j` and zero for a control or a
-    /// parameter, and rows and columns of second derivatives are zero.
+    /// Directions `w = (x₀, u, p)` that an equation depends on, as indices into `w`, ascending. For
+    /// the others the stages have no derivative: the column of `dx₊/dw` is `e_j` for the state `j`
+    /// and zero for a control or a parameter, and rows and columns of second derivatives are zero.
     pub directions: &'static [u32],
-    /// For each direction its position in `directions`, or [`NO_COLUMN`]: what [`columns`] makes of them.
+    /// For each direction its position in `directions`, or [`NO_COLUMN`]: what [`columns`] makes of
+    /// them.
     pub column_of_direction: &'static [u32],
-    /// Variables that occur in the pattern of the Hessian, ascending, less those of `lone`: only their rows of `D_i` enter
-    /// second derivatives.
+    /// Variables that occur in the pattern of the Hessian, ascending, less those of `lone`: only
+    /// their rows of `D_i` enter second derivatives.
     pub curved: &'static [u32],
-    /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`] makes of it.
+    /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`]
+    /// makes of it.
     pub symmetric: &'static [Term],
     /// Controls and parameters that occur in the Hessian's diagonal only.
     pub lone: &'static [Lone],
@@ -99,7 +106,8 @@ impl Pattern {
         (self.rows[entry] as usize, self.columns[entry] as usize)
     }
 
-    /// `(row, column)` of an entry, if there is one: without a panic where the compiler does not know that.
+    /// `(row, column)` of an entry, if there is one: without a panic where the compiler does not
+    /// know that.
     #[must_use]
     #[inline(always)]
     pub fn get(&self, entry: usize) -> Option<(usize, usize)> {

@@ -74,7 +74,8 @@ impl<const S: usize> Tableau<S> {
         (1..=2 * S).take_while(|&k| holds(k)).count()
     }
 
-    /// The largest `q` with `C(q)`: `Σ_j a_ij c_j^{k−1} = c_i^k / k` for all `i`, `k ≤ q`. At most `S`.
+    /// The largest `q` with `C(q)`: `Σ_j a_ij c_j^{k−1} = c_i^k / k` for all `i`, `k ≤ q`. At most
+    /// `S`.
     fn largest_c(&self) -> usize {
         let holds = |k: usize| {
             (0..S).all(|i| {
@@ -85,7 +86,8 @@ impl<const S: usize> Tableau<S> {
         (1..=S).take_while(|&k| holds(k)).count()
     }
 
-    /// The largest `r` with `D(r)`: `Σ_i b_i c_i^{k−1} a_ij = b_j (1 − c_j^k) / k` for all `j`, `k ≤ r`.
+    /// The largest `r` with `D(r)`: `Σ_i b_i c_i^{k−1} a_ij = b_j (1 − c_j^k) / k` for all `j`,
+    /// `k ≤ r`.
     fn largest_d(&self) -> usize {
         let holds = |k: usize| {
             (0..S).all(|j| {
@@ -116,8 +118,8 @@ impl<const S: usize> Tableau<S> {
 
     /// The elementary weight `Σ_i b_i Φ_i(t)` and the density `γ(t)`.
     fn elementary_weight(&self, tree: &Tree) -> (Sum, f64) {
-        // Of the nodes at each level that wait for their parent: the product of their vectors A Φ, and
-        // the number of nodes below it. Reversed, a node comes after all its descendants.
+        // Of the nodes at each level that wait for their parent: the product of their vectors A Φ,
+        // and the number of nodes below it. Reversed, a node comes after all its descendants.
         let mut product = [[Sum::ONE; S]; LARGEST_TREE + 1];
         let mut size = [0usize; LARGEST_TREE + 1];
         let mut density = 1.0;
@@ -149,8 +151,8 @@ fn power(base: f64, n: usize) -> f64 {
     (0..n).fold(1.0, |product, _| product * base)
 }
 
-/// A rooted tree: the level of each node in preorder, the root at level 0, canonical (largest) among
-/// all orders of the children.
+/// A rooted tree: the level of each node in preorder, the root at level 0, canonical (largest)
+/// among all orders of the children.
 struct Tree {
     levels: [usize; LARGEST_TREE],
     nodes: usize,
@@ -162,8 +164,8 @@ impl Tree {
         Self { levels: core::array::from_fn(|i| i), nodes }
     }
 
-    /// The next one, if there is one. T. Beyer, S. M. Hedetniemi, Constant time generation of rooted
-    /// trees, SIAM J. Comput. 9 (1980).
+    /// The next one, if there is one. T. Beyer, S. M. Hedetniemi, Constant time generation of
+    /// rooted trees, SIAM J. Comput. 9 (1980).
     fn advance(&mut self) -> bool {
         let levels = &mut self.levels;
         let Some(p) = (1..self.nodes).rev().find(|&i| levels[i] > 1) else { return false };

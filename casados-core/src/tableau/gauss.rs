@@ -2,7 +2,8 @@
 
 use super::{Method, Tableau};
 
-/// Gauss-Legendre methods with `S` stages, order `2S`: symmetric, symplectic, A-stable, `|R(∞)| = 1`.
+/// Gauss-Legendre methods with `S` stages, order `2S`: symmetric, symplectic, A-stable,
+/// `|R(∞)| = 1`.
 ///
 /// `S = 1..=9`.
 #[derive(Clone, Copy, Debug)]

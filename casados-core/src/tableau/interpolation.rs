@@ -3,12 +3,13 @@
 use super::{Gauss, Method, Tableau};
 
 impl<const S: usize> Tableau<S> {
-    /// The Lagrange polynomials of the nodes at `theta`: `ℓ_i(θ) = Π_{j≠i} (θ − c_j) / (c_i − c_j)`.
+    /// The Lagrange polynomials of the nodes at `theta`:
+    /// `ℓ_i(θ) = Π_{j≠i} (θ − c_j) / (c_i − c_j)`.
     ///
-    /// `Σ_i ℓ_i(θ) y_i` is the polynomial of degree `S − 1` through the stage values `y_i`; `θ` is the
-    /// time since the start of the step over `h`, and may lie outside `[0, 1]`. The product form is
-    /// accurate to a few roundings for every `θ`. Not finite if two nodes are equal
-    /// (see [`Tableau::is_collocation`]).
+    /// `Σ_i ℓ_i(θ) y_i` is the polynomial of degree `S − 1` through the stage values `y_i`; `θ` is
+    /// the time since the start of the step over `h`, and may lie outside `[0, 1]`. The product
+    /// form is accurate to a few roundings for every `θ`. Not finite if two nodes are equal (see
+    /// [`Tableau::is_collocation`]).
     #[must_use]
     pub fn lagrange(&self, theta: f64) -> [f64; S] {
         core::array::from_fn(|i| {
@@ -24,8 +25,8 @@ impl<const S: usize> Tableau<S> {
 
     /// `b_i(θ) = ∫₀^θ ℓ_i`: the collocation polynomial is `x(θ) = x_n + h Σ_i b_i(θ) k_i`.
     ///
-    /// For collocation methods `b_j(c_i) = a_ij` and `b_j(1) = b_j`. The integral is a Gauss quadrature,
-    /// exact up to rounding for `S ≤ 18`.
+    /// For collocation methods `b_j(c_i) = a_ij` and `b_j(1) = b_j`. The integral is a Gauss
+    /// quadrature, exact up to rounding for `S ≤ 18`.
     #[must_use]
     pub fn weights(&self, theta: f64) -> [f64; S] {
         const FEW: Tableau<5> = Gauss::<5>::TABLEAU;

@@ -7,8 +7,9 @@
 //! x_{n+1} = x_n + h Σ_i b_i k_i
 //! ```
 //!
-//! A method is a type that names a tableau ([`Method`]): [`Gauss`], [`RadauIIA`], [`Rk4`], ...;
-//! or [`Custom`], whose tableau is made by [`Tableau::new`] and given to the integrator when it is built.
+//! A method is a type that names a tableau ([`Method`]): [`Gauss`], [`RadauIIA`], [`Rk4`], ...; or
+//! [`Custom`], whose tableau is made by [`Tableau::new`] and given to the integrator when it is
+//! built.
 
 mod conditions;
 mod explicit;
@@ -64,9 +65,9 @@ impl<const S: usize> Tableau<S> {
     /// A tableau of the user's own. Its orders are computed.
     ///
     /// # Errors
-    /// [`TableauError`] if `S = 0`, if a coefficient is not finite, or if `c_i = Σ_j a_ij` or `Σ_i b_i = 1`
-    /// is violated by more than coefficients that are rounded once to `f64` explain, which is
-    /// `(S + 1) ε` times the sum of the absolute values. Write `1.0 / 3.0`, not `0.3333`.
+    /// [`TableauError`] if `S = 0`, if a coefficient is not finite, or if `c_i = Σ_j a_ij` or
+    /// `Σ_i b_i = 1` is violated by more than coefficients that are rounded once to `f64` explain,
+    /// which is `(S + 1) ε` times the sum of the absolute values. Write `1.0 / 3.0`, not `0.3333`.
     pub fn new(a: [[f64; S]; S], b: [f64; S], c: [f64; S]) -> Result<Self, TableauError> {
         let mut tableau = Self { name: "custom", order: 0, stage_order: 0, a, b, c };
         tableau.check()?;
@@ -102,8 +103,8 @@ impl<const S: usize> Tableau<S> {
     pub const fn c(&self) -> &[f64; S] {
         &self.c
     }
-    /// Order of convergence for ordinary differential equations. For a tableau of the user's own it is
-    /// exact up to 10, above that what the simplifying assumptions `B`, `C`, `D` prove.
+    /// Order of convergence for ordinary differential equations. For a tableau of the user's own it
+    /// is exact up to 10, above that what the simplifying assumptions `B`, `C`, `D` prove.
     #[must_use]
     pub const fn order(&self) -> usize {
         self.order
@@ -170,8 +171,8 @@ impl<const S: usize> Tableau<S> {
         true
     }
 
-    /// Whether the method is the collocation method of its nodes: they are distinct, and `C(S)` holds.
-    /// Then its stages define a polynomial of degree `S`; see [`Tableau::weights`].
+    /// Whether the method is the collocation method of its nodes: they are distinct, and `C(S)`
+    /// holds. Then its stages define a polynomial of degree `S`; see [`Tableau::weights`].
     #[must_use]
     pub const fn is_collocation(&self) -> bool {
         let mut i = 0;

@@ -1,8 +1,9 @@
 //! Running error analysis: a number and a bound of its rounding error.
 //!
 //! Every operation adds what it rounds and carries on what its arguments have lost, to first order
-//! (Wilkinson; Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3). Run through emitted code it
-//! yields condition times epsilon of every entry, which is what tolerances of comparisons are made of.
+//! (Wilkinson; Higham, "Accuracy and Stability of Numerical Algorithms", section 3.3). Run through
+//! emitted code it yields condition times epsilon of every entry, which is what tolerances of
+//! comparisons are made of.
 
 use crate::scalar::{Field, Lanes, Scalar, own_cell};
 use bytemuck::Zeroable;
@@ -36,7 +37,8 @@ impl Bounded {
     }
 }
 
-/// What an argument's error becomes; an exact argument stays exact where the derivative is infinite.
+/// What an argument's error becomes; an exact argument stays exact where the derivative is
+/// infinite.
 fn carried(derivative: f64, error: f64) -> f64 {
     if error == 0.0 { 0.0 } else { derivative.abs() * error }
 }

@@ -80,8 +80,8 @@ impl Convergence {
         self.rows.iter().copied().filter(|row| row.1 > 10.0 * self.floor && row.1.is_finite()).collect()
     }
 
-    /// The slope of `log error` over `log(1/steps)` fitted to the errors above the floor; of the last
-    /// three of them, where the asymptote is closest. `None` with fewer than two.
+    /// The slope of `log error` over `log(1/steps)` fitted to the errors above the floor; of the
+    /// last three of them, where the asymptote is closest. `None` with fewer than two.
     #[must_use]
     pub fn order(&self) -> Option<f64> {
         let rows = self.above();
@@ -104,8 +104,9 @@ impl Convergence {
         self.rows.iter().fold(f64::INFINITY, |best, row| best.min(row.1))
     }
 
-    /// Panics with the table unless every run succeeded and the fitted order is within a quarter of `order`: half
-    /// way to the nearest half order, so that neither a method of another order nor one with order reduction passes.
+    /// Panics with the table unless every run succeeded and the fitted order is within a quarter of
+    /// `order`: half way to the nearest half order, so that neither a method of another order nor
+    /// one with order reduction passes.
     #[track_caller]
     pub fn assert_order(&self, order: f64) {
         let found = self.order();

@@ -15,9 +15,9 @@ use std::vec::Vec;
 /// Checks the residual, Jacobian, adjoint and Hessian of a graph model three ways:
 /// against `num-dual`, the complex step, and central differences of order 8.
 ///
-/// Compared are all entries, those outside of the declared patterns too: they must be zero. Tolerances are bounds of
-/// the rounding errors of both sides at that very point (running error analysis), to which differences
-/// add their own estimate of truncation.
+/// Compared are all entries, those outside of the declared patterns too: they must be zero.
+/// Tolerances are bounds of the rounding errors of both sides at that very point (running error
+/// analysis), to which differences add their own estimate of truncation.
 pub fn check_derivatives<M: GraphDae>(points: &Points<M>) -> Report {
     let mut report = check_by_differences(points);
     for (number, v, mu) in samples(points) {
@@ -62,9 +62,9 @@ pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
     report
 }
 
-/// Checks by differences that entries outside of the declared patterns are zero, those of the Jacobian and
-/// those of the Hessian; and that what is declared constant does not change from point to point, and what is declared to be felt by
-/// nobody has no entries.
+/// Checks by differences that entries outside of the declared patterns are zero, those of the
+/// Jacobian and those of the Hessian; and that what is declared constant does not change from point
+/// to point, and what is declared to be felt by nobody has no entries.
 pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("patterns of {}", type_name::<M>()));
     let n = variables::<M>();

@@ -1,4 +1,5 @@
-//! Central differences of order 8 with an error estimate: they need nothing of a model but its values.
+//! Central differences of order 8 with an error estimate: they need nothing of a model but its
+//! values.
 
 use super::bounded::Bounded;
 use std::vec::Vec;
@@ -10,14 +11,16 @@ const WEIGHTS: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
 /// Step sizes `2^-k` times the size of the variable, at least one.
 const STEPS: core::ops::RangeInclusive<i32> = 2..=12;
 
-/// By how much two successive differences between estimates must shrink, unless they are rounding: 256 where the
-/// order is reached. At a kink, or where the function is not resolved, they do not, and nothing is known.
+/// By how much two successive differences between estimates must shrink, unless they are rounding:
+/// 256 where the order is reached. At a kink, or where the function is not resolved, they do not,
+/// and nothing is known.
 const SHRINK: f64 = 16.0;
 
-/// The derivative of each output at `a`, with its error: that of rounding (carried through the function
-/// by running error analysis) and that of truncation (the difference between two successive step sizes, which is
-/// 255 times the truncation error of the smaller one). The step size is the one with the smallest error; where
-/// the estimates do not converge the error is infinite.
+/// The derivative of each output at `a`, with its error: that of rounding (carried through the
+/// function by running error analysis) and that of truncation (the difference between two
+/// successive step sizes, which is 255 times the truncation error of the smaller one). The step
+/// size is the one with the smallest error; where the estimates do not converge the error is
+/// infinite.
 pub(super) fn derivative(
     a: f64,
     outputs: usize,
@@ -90,7 +93,8 @@ mod tests {
         }
     }
 
-    /// Across a kink nothing is claimed; so near that no step stays on one side, and in the middle of the steps.
+    /// Across a kink nothing is claimed; so near that no step stays on one side, and in the middle
+    /// of the steps.
     #[test]
     fn kinks() {
         for distance in [1e-9, 1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3] {

@@ -1,5 +1,5 @@
-//! Forward differentiation over any scalar: `Forward<Bounded>` yields rounding bounds of first derivatives,
-//! `Forward<Forward<Bounded>>` those of second derivatives.
+//! Forward differentiation over any scalar: `Forward<Bounded>` yields rounding bounds of first
+//! derivatives, `Forward<Forward<Bounded>>` those of second derivatives.
 
 use crate::scalar::{Field, Scalar, own_cell};
 use core::f64::consts::{LN_2, LN_10};

@@ -17,8 +17,8 @@ pub struct Points<M: Dae> {
 }
 
 impl<M: Dae> Points<M> {
-    /// As many random points, every variable in its range of the model, [`Dae::RANGES`], or in `[-1, 1]` if there is none, unless
-    /// another one is set for it.
+    /// As many random points, every variable in its range of the model, [`Dae::RANGES`], or in
+    /// `[-1, 1]` if there is none, unless another one is set for it.
     #[must_use]
     pub fn random(count: usize) -> Self {
         let range = |variable: usize| {

@@ -7,7 +7,8 @@ use std::vec::Vec;
 /// How many wrong entries are listed by name.
 const LISTED: usize = 12;
 
-/// What a check found. It prints as a table; [`Report::assert`] panics with the table if anything is wrong.
+/// What a check found. It prints as a table; [`Report::assert`] panics with the table if anything
+/// is wrong.
 #[derive(Clone, Debug)]
 #[must_use = "a report says whether the check has passed: call `assert` or look at `passed`"]
 pub struct Report {
@@ -30,8 +31,8 @@ pub struct Row {
     pub reference: &'static str,
     /// Entries compared.
     pub entries: usize,
-    /// Entries about which the comparison says nothing: neither side is finite, or there is no bound of the error, or
-    /// it is larger than a thousandth of the largest entry.
+    /// Entries about which the comparison says nothing: neither side is finite, or there is no
+    /// bound of the error, or it is larger than a thousandth of the largest entry.
     pub inconclusive: usize,
     /// Entries that are wrong.
     pub wrong: usize,

@@ -1,9 +1,10 @@
-//! The sensitivities of an integrator against each other, against differences, and against an exact solution.
+//! The sensitivities of an integrator against each other, against differences, and against an exact
+//! solution.
 //!
-//! What rounding does to a result is sampled: the interval is run again with every input changed by a few
-//! units in the last place, which draws all roundings anew (stochastic arithmetic: Vignes, "A stochastic
-//! arithmetic for reliable scientific computation", 1993). The largest deviation among the samples stands for condition
-//! times epsilon of that very entry.
+//! What rounding does to a result is sampled: the interval is run again with every input changed by
+//! a few units in the last place, which draws all roundings anew (stochastic arithmetic: Vignes, "A
+//! stochastic arithmetic for reliable scientific computation", 1993). The largest deviation among
+//! the samples stands for condition times epsilon of that very entry.
 
 use super::bounded::Bounded;
 use super::differences;
@@ -22,9 +23,9 @@ use std::vec::Vec;
 /// Runs with changed inputs.
 const SAMPLES: usize = 8;
 
-/// Deviations that a difference of two results may have. The largest of eight samples is below one standard
-/// deviation once in twenty entries and below a quarter once in four hundred thousand: 32 of it are at least eight
-/// standard deviations.
+/// Deviations that a difference of two results may have. The largest of eight samples is below one
+/// standard deviation once in twenty entries and below a quarter once in four hundred thousand: 32
+/// of it are at least eight standard deviations.
 const DEVIATIONS: f64 = 32.0;
 
 /// Checks one interval of an integrator:
@@ -33,8 +34,9 @@ const DEVIATIONS: f64 = 32.0;
 ///   (`λᵀ (S v) = (Sᵀ λ)ᵀ v` for all `v`);
 /// - the Hessian is symmetric, and agrees with differences of the gradient.
 ///
-/// The report warns where a state, differential or algebraic, is outside of its `range(..)` of the model: of several roots of the
-/// equations the integrator may have taken another one than is meant.
+/// The report warns where a state, differential or algebraic, is outside of its `range(..)` of the
+/// model: of several roots of the equations the integrator may have taken another one than is
+/// meant.
 ///
 /// Errors are those of the integrator at the given inputs.
 pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
@@ -138,7 +140,8 @@ pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
     Ok(report)
 }
 
-/// An exact solution: the end state and, as far as they are known, its derivatives by `w = (x₀, u, p)`.
+/// An exact solution: the end state and, as far as they are known, its derivatives by
+/// `w = (x₀, u, p)`.
 #[derive(Clone, Debug, Default)]
 pub struct Exact {
     /// `x` at the end of the interval, and after it `z` if that is known.
@@ -166,9 +169,10 @@ pub fn check_exact<M: Dae, I: Integrator<M>>(
     let interval = Interval::new::<M>(x0, u, p, h);
     let (nx, nw) = (M::Shape::NX, M::Shape::NW);
     let mut report = Report::new(format!("{} against the exact solution", type_name::<I>()));
-    // Elimination is stable in norm only: of a small entry beside large ones no more can be asked than some ε of
-    // the largest. Samples do not show this where a model is linear, since its matrices stay the same. Rounding errors of
-    // ε/2 in each of n steps add up to about √n ε/2: 3ε after 32 steps, and as in the other comparisons 4ε are granted.
+    // Elimination is stable in norm only: of a small entry beside large ones no more can be asked
+    // than some ε of the largest. Samples do not show this where a model is linear, since its
+    // matrices stay the same. Rounding errors of ε/2 in each of n steps add up to about √n ε/2: 3ε
+    // after 32 steps, and as in the other comparisons 4ε are granted.
     let largest_first = exact.first.iter().map(|row| largest(row)).fold(0.0, f64::max);
     let largest_second = exact.second.iter().flatten().map(|row| largest(row)).fold(0.0, f64::max);
     for i in 0..nx {
@@ -256,7 +260,8 @@ struct Direction {
     seed: Vec<f64>,
 }
 
-/// The unit vectors, if they are few; for large models random directions, in which every entry takes part.
+/// The unit vectors, if they are few; for large models random directions, in which every entry
+/// takes part.
 fn directions<M: Dae>(interval: &Interval) -> Vec<Direction> {
     const UNITS: usize = 12;
     const RANDOM: usize = 4;

@@ -32,7 +32,8 @@ pub fn adjoint_of_jacobian<M: Dae, S: Lanes>(
     }
 }
 
-/// `μᵀ f` is differentiated by `adjoint_of_jacobian`, for a model with `[S; $k]` equations and `[S; $j]` entries.
+/// `μᵀ f` is differentiated by `adjoint_of_jacobian`, for a model with `[S; $k]` equations and
+/// `[S; $j]` entries.
 macro_rules! adjoint {
     ($j:literal, $k:literal) => {
         fn adjoint<S: Lanes>(

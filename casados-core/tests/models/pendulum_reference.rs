@@ -1,6 +1,6 @@
-//! Pendulum on a cart: one interval computed with acados (IRK, full Newton, tolerance 1e-14), see the JSON files
-//! of the same name in `tests/data/pendulum` of the workspace. Matrices column-major; the Hessian is that of
-//! `λᵀx₊` over `(x₀, u)`.
+//! Pendulum on a cart: one interval computed with acados (IRK, full Newton, tolerance 1e-14), see
+//! the JSON files of the same name in `tests/data/pendulum` of the workspace. Matrices
+//! column-major; the Hessian is that of `λᵀx₊` over `(x₀, u)`.
 
 pub struct Reference {
     pub x0: [f64; 4],

@@ -1,4 +1,5 @@
-//! What the implementations for a model and for a function have in common: a module with the functions that compute.
+//! What the implementations for a model and for a function have in common: a module with the
+//! functions that compute.
 
 use super::routine::Routine;
 use crate::graph::Node;
@@ -65,7 +66,8 @@ pub fn module(
     })
 }
 
-/// The implementations where no name of theirs meets one of the user's; constants from outside are `C`.
+/// The implementations where no name of theirs meets one of the user's; constants from outside are
+/// `C`.
 pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
     let Model { opaque, uses, instance, .. } = model;
     if opaque.is_empty() {
@@ -95,7 +97,8 @@ pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
     }
 }
 
-/// The functions that compute, as text: they are long and simple, and a parser is faster than a quote.
+/// The functions that compute, as text: they are long and simple, and a parser is faster than a
+/// quote.
 fn text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
     let Derivatives { jacobian, constant, gradient, hessian, .. } = derivatives;
     let Model { variables, graph, residual, opaque, .. } = model;

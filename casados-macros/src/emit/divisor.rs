@@ -1,16 +1,18 @@
 //! Division by a constant in two operations, with the bits of a quotient.
 //!
-//! A division takes a processor as long as ten products. With `1/c ≈ h + l`, `h` not beyond `1/c`, so that both have one sign and
-//! infinities and zeros stay what they are,
+//! A division takes a processor as long as ten products. With `1/c ≈ h + l`, `h` not beyond `1/c`,
+//! so that both have one sign and infinities and zeros stay what they are,
 //!
 //! ```text
 //! x/c = RN(h x + RN(l x))
 //! ```
 //!
-//! by a fused product, for all `x` (but for results next to the least and the largest numbers), if it holds for the few whose quotient is
-//! so close to the middle of two doubles that the error of the sum before it is rounded may carry it over. These are found and tried, and if
-//! one of them fails, with the next `h` and `l`. N. Brisebarre, J.-M. Muller, S. K. Raina, "Accelerating correctly rounded floating-point
-//! division when the divisor is known in advance", IEEE Transactions on Computers 53 (2004).
+//! by a fused product, for all `x` (but for results next to the least and the largest numbers), if
+//! it holds for the few whose quotient is so close to the middle of two doubles that the error of
+//! the sum before it is rounded may carry it over. These are found and tried, and if one of them
+//! fails, with the next `h` and `l`. N. Brisebarre, J.-M. Muller, S. K. Raina, "Accelerating
+//! correctly rounded floating-point division when the divisor is known in advance", IEEE
+//! Transactions on Computers 53 (2004).
 
 /// Significant bits of a double.
 const DIGITS: u32 = f64::MANTISSA_DIGITS;
@@ -38,14 +40,16 @@ pub fn reciprocal(c: f64) -> Option<[f64; 2]> {
     })
 }
 
-/// All `x` of `2⁵² .. 2⁵³` whose quotient by `c` is within 2⁻¹⁰¹ of itself of the middle between two doubles, and some more.
+/// All `x` of `2⁵² .. 2⁵³` whose quotient by `c` is within 2⁻¹⁰¹ of itself of the middle between
+/// two doubles, and some more.
 ///
-/// (Where `h` is up to three units in the last place, 3 · 2⁻⁵² of itself, below `1/c`, and `l` one and a half of its own away from what is left,
-/// the sum lacks 4.5 · 2⁻¹⁰⁴ of itself, and rounding `l x` changes it by 1.5 · 2⁻¹⁰⁴.)
+/// (Where `h` is up to three units in the last place, 3 · 2⁻⁵² of itself, below `1/c`, and `l` one
+/// and a half of its own away from what is left, the sum lacks 4.5 · 2⁻¹⁰⁴ of itself, and rounding
+/// `l x` changes it by 1.5 · 2⁻¹⁰⁴.)
 ///
-/// With the integers `X = x` and `C` of the significant digits such a middle is `M/2ᵏ`, `k = 53` if `X ≥ C` and else `k = 54`, and
-/// `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`: `2ᵏ X = d` modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a
-/// multiple of `2ᵏ`.)
+/// With the integers `X = x` and `C` of the significant digits such a middle is `M/2ᵏ`, `k = 53` if
+/// `X ≥ C` and else `k = 54`, and `X/C = M/2ᵏ + d/(2ᵏ C)` with an integer `|d| ≤ 64`: `2ᵏ X = d`
+/// modulo `C`. (`d = 0` does not occur: `M` is odd, so that `C` would be a multiple of `2ᵏ`.)
 fn hard_cases(c: f64) -> impl Iterator<Item = f64> {
     let digits = u128::from(c.to_bits() & ((1 << (DIGITS - 1)) - 1) | 1 << (DIGITS - 1));
     let twos = digits.trailing_zeros();

@@ -4,8 +4,8 @@ use crate::language::{Sampling, Variables};
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute says anything. `is_curved` tells whether
-/// equations may be nonlinear in an unknown `(ẋ, z)`.
+/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute says anything. `is_curved`
+/// tells whether equations may be nonlinear in an unknown `(ẋ, z)`.
 pub fn write(
     krate: &syn::Path,
     variables: &Variables,
@@ -14,7 +14,8 @@ pub fn write(
 ) -> TokenStream {
     let (nx, nz) = (variables.x.len(), variables.z.len());
     let sampling = |variable: usize| samplings.get(variable).copied().unwrap_or_default();
-    // Of a derivative zero is as good as any value, unless it chooses between roots: states are then `x₀` at all stages.
+    // Of a derivative zero is as good as any value, unless it chooses between roots: states are
+    // then `x₀` at all stages.
     let starts: Vec<f64> = (0..nx + nz)
         .map(|unknown| match unknown {
             derivative if derivative < nx && !is_curved(derivative) => 0.0,
@@ -36,7 +37,8 @@ pub fn write(
     quote!(#starts #ranges)
 }
 
-/// The nominal value; without one zero, or, where a range does not contain it, the range's geometric mean.
+/// The nominal value; without one zero, or, where a range does not contain it, the range's
+/// geometric mean.
 fn start(Sampling { nominal, range }: Sampling) -> f64 {
     match (nominal, range) {
         (Some(nominal), _) => nominal,

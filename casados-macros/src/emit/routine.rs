@@ -9,10 +9,11 @@ use crate::language::Variables;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// The most statements of one function. The pieces of a longer routine are not inlined: a compiler takes
-/// longer over all of them in one, and spills more registers there than the calls cost. Measured with 4687
-/// operations in `f64`, `rustc -O`, compile time and time of one evaluation: `inline(never)` 4.5 s and 1270 ns;
-/// no attribute 5.8 to 7.6 s and 1345 to 1702 ns; `inline(always)` 9.6 to 16.8 s and 1720 to 2466 ns.
+/// The most statements of one function. The pieces of a longer routine are not inlined: a compiler
+/// takes longer over all of them in one, and spills more registers there than the calls cost.
+/// Measured with 4687 operations in `f64`, `rustc -O`, compile time and time of one evaluation:
+/// `inline(never)` 4.5 s and 1270 ns; no attribute 5.8 to 7.6 s and 1345 to 1702 ns;
+/// `inline(always)` 9.6 to 16.8 s and 1720 to 2466 ns.
 const LIMIT: usize = 500;
 
 /// A function to be written.

@@ -1,5 +1,5 @@
-//! The order in which a function computes: depth first from its outputs, so that values are used soon
-//! after they are there and a compiler can keep them in registers.
+//! The order in which a function computes: depth first from its outputs, so that values are used
+//! soon after they are there and a compiler can keep them in registers.
 
 use crate::graph::{Graph, Node, Op, Unary};
 use std::collections::HashMap;
@@ -17,7 +17,8 @@ pub enum Step {
     Store(usize),
 }
 
-/// The values of an elementary function of one argument: of most one node, of sine and cosine together two.
+/// The values of an elementary function of one argument: of most one node, of sine and cosine
+/// together two.
 pub type Values = (Node, Option<Node>);
 
 /// Whether a node is there before anything is computed.

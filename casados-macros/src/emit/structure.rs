@@ -118,7 +118,8 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
     }
 }
 
-/// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that is its pivot.
+/// The tables by which the Newton matrix is eliminated. A slot is an unknown and the equation that
+/// is its pivot.
 fn elimination(analysis: &Analysis) -> TokenStream {
     let Analysis { model, elimination: Elimination { plan, positions, kinematic, .. }, .. } = analysis;
     let krate = &model.krate;
@@ -218,7 +219,8 @@ fn pivots(elimination: &Elimination, slots: &[u32]) -> [Vec<TokenStream>; 3] {
     [pivots, left, supernodes]
 }
 
-/// What blocks are made of, those of a kind one after the other, fill first: what is done to them then has no branches that nobody can foresee.
+/// What blocks are made of, those of a kind one after the other, fill first: what is done to them
+/// then has no branches that nobody can foresee.
 fn assembly(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<TokenStream> {
     let mut rows = Vec::new();
     for (place, block) in plan.blocks.iter().zip(0u32..) {

@@ -92,7 +92,8 @@ fn pendulum() -> Model {
     model("Pendulum", [4, 0, 1, 0], b.0, residual.to_vec())
 }
 
-/// `x' z = p max(x, 0)`, `z + t = RATE`: a selection, a constant from outside, time; implicit, no control.
+/// `x' z = p max(x, 0)`, `z + t = RATE`: a selection, a constant from outside, time; implicit, no
+/// control.
 fn valve() -> Model {
     let mut b = Builder(Graph::default());
     let [xdot, x, z, p, t] = [0, 1, 2, 3, 4].map(|i| b.v(i));

@@ -1,13 +1,14 @@
-//! Elementary functions together: two arguments at once take hardly longer than one in registers that have room for both, and of four
-//! the processor works on some while others wait for themselves.
+//! Elementary functions together: two arguments at once take hardly longer than one in registers
+//! that have room for both, and of four the processor works on some while others wait for
+//! themselves.
 
 use super::chunk::computed;
 use super::schedule::{Step, Values};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
-/// So many statements a function may come earlier than it would, to be computed with another: what waits for its use in the
-/// meantime takes registers.
+/// So many statements a function may come earlier than it would, to be computed with another: what
+/// waits for its use in the meantime takes registers.
 const REACH: usize = 500;
 
 /// An elementary function that is worth being computed with others.
@@ -46,9 +47,9 @@ pub fn function_of(graph: &Graph, (node, other): Values) -> Option<Function> {
     function(graph, step).map(|(function, _)| function)
 }
 
-/// The same statements, elementary functions with the next one or the next three of their kind and level: what these wait for comes
-/// before all. The level of a value is the most elementary functions that are one within the other in it, so that none of a level waits
-/// for another.
+/// The same statements, elementary functions with the next one or the next three of their kind and
+/// level: what these wait for comes before all. The level of a value is the most elementary
+/// functions that are one within the other in it, so that none of a level waits for another.
 pub fn together(graph: &Graph, steps: &[Step]) -> Vec<Step> {
     let mut position = HashMap::new();
     let mut levels = vec![0u32; steps.len()];

@@ -1,9 +1,9 @@
-//! Arithmetic for derivative code: simplifications that save operations but may round differently, and
-//! selections kept outside of products.
+//! Arithmetic for derivative code: simplifications that save operations but may round differently,
+//! and selections kept outside of products.
 //!
 //! The derivative of `if c { √x } else { 0 }` is `if c { w / (2 √x) } else { 0 }`, never
-//! `(if c { w } else { 0 }) / (2 √x)`: at `x = 0` that would be `0 · ∞`. So what is zero in one branch
-//! stays a selection, and products go inside.
+//! `(if c { w } else { 0 }) / (2 √x)`: at `x = 0` that would be `0 · ∞`. So what is zero in one
+//! branch stays a selection, and products go inside.
 
 use super::{Binary, Graph, Node, Op, Unary};
 

@@ -1,11 +1,11 @@
 //! Elimination of the intermediate vertices of a linearised graph, symbolically.
 //!
-//! Edges `p → s` carry `∂s/∂p`. Eliminating a vertex `v` replaces every path `p → v → s` by an edge:
-//! `∂s/∂p += ∂s/∂v · ∂v/∂p`. What remains between variables and outputs is the Jacobian (Griewank and
-//! Walther, "Evaluating Derivatives", chapter 10).
+//! Edges `p → s` carry `∂s/∂p`. Eliminating a vertex `v` replaces every path `p → v → s` by an
+//! edge: `∂s/∂p += ∂s/∂v · ∂v/∂p`. What remains between variables and outputs is the Jacobian
+//! (Griewank and Walther, "Evaluating Derivatives", chapter 10).
 //!
-//! For second derivatives there are also arcs `{v, n}`, the entries of a symmetric matrix `W` of second
-//! derivatives with respect to vertices; eliminating `v` pushes them to the operands of `v`:
+//! For second derivatives there are also arcs `{v, n}`, the entries of a symmetric matrix `W` of
+//! second derivatives with respect to vertices; eliminating `v` pushes them to the operands of `v`:
 //! `W ← Eᵀ W E`. In reverse order this is edge pushing (Gower and Mello, "A new framework for the
 //! computation of Hessians", 2012); other orders can be cheaper.
 

@@ -4,8 +4,8 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 pub type BuildHasher = BuildHasherDefault<Multiply>;
 
-/// Multiplies word by word and folds the upper half of the product onto the lower: constants such as small
-/// integers differ in their upper bits only.
+/// Multiplies word by word and folds the upper half of the product onto the lower: constants such
+/// as small integers differ in their upper bits only.
 #[derive(Clone, Default)]
 pub struct Multiply(u64);
 

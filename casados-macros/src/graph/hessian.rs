@@ -5,19 +5,20 @@ use super::jacobian::{Vertices, best};
 use super::reverse::adjoints;
 use super::{Entry, Graph, Node};
 
-/// The structural non-zeros `(j, k, value)`, `j ≥ k`, of the Hessian of `Σ seed · output` with respect to
-/// the variables `0..variables`, by row, then column. Of two elimination orders the one with fewer
-/// operations.
+/// The structural non-zeros `(j, k, value)`, `j ≥ k`, of the Hessian of `Σ seed · output` with
+/// respect to the variables `0..variables`, by row, then column. Of two elimination orders the one
+/// with fewer operations.
 pub fn hessian(graph: &mut Graph, outputs: &[(Node, Node)], variables: u32) -> Vec<Entry> {
     best(graph, &[Order::Reverse, Order::Markowitz], &[], |graph, order, budget| {
         hessian_in_order(graph, outputs, variables, order, budget)
     })
 }
 
-/// The Hessian by one elimination order, and the products it took; `None` if they are more than `budget`.
+/// The Hessian by one elimination order, and the products it took; `None` if they are more than
+/// `budget`.
 ///
-/// Second derivatives arise at the operands of nonlinear nodes, weighted with the adjoints of these nodes,
-/// and are pushed from there to the variables.
+/// Second derivatives arise at the operands of nonlinear nodes, weighted with the adjoints of these
+/// nodes, and are pushed from there to the variables.
 pub fn hessian_in_order(
     graph: &mut Graph,
     outputs: &[(Node, Node)],

@@ -3,9 +3,9 @@
 use super::elimination::{Linearised, Order};
 use super::{Entry, Graph, Node, Op};
 
-/// The structural non-zeros `(output, variable, value)` of the Jacobian of outputs with respect to the
-/// variables `0..variables`, by output, then variable. Of several elimination orders the one with the
-/// fewest operations for outputs and Jacobian together.
+/// The structural non-zeros `(output, variable, value)` of the Jacobian of outputs with respect to
+/// the variables `0..variables`, by output, then variable. Of several elimination orders the one
+/// with the fewest operations for outputs and Jacobian together.
 pub fn jacobian(graph: &mut Graph, outputs: &[Node], variables: u32) -> Vec<Entry> {
     best(graph, &[Order::Reverse, Order::Markowitz, Order::Forward], outputs, |graph, order, budget| {
         jacobian_in_order(graph, outputs, variables, order, budget)
@@ -37,7 +37,8 @@ pub fn best(
     entries
 }
 
-/// The Jacobian by one elimination order, and the products it took; `None` if they are more than `budget`.
+/// The Jacobian by one elimination order, and the products it took; `None` if they are more than
+/// `budget`.
 pub fn jacobian_in_order(
     graph: &mut Graph,
     outputs: &[Node],

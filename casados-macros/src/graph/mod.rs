@@ -1,10 +1,10 @@
 //! A hash-consed expression graph: equal expressions are one node.
 //!
-//! Nodes are created in topological order: the operands of a node have smaller indices than the node.
-//! Constructors simplify in ways that keep the bits of the result, the sign of a zero apart (constant
-//! folding, `a + 0`, `a · 1`, `−(−a)`), and take structural zeros as zeros (`0 · a = 0`, `a − a = 0`,
-//! whatever `a` is at run time). Derivative code is written with the operations of `algebra`, which may
-//! also round differently.
+//! Nodes are created in topological order: the operands of a node have smaller indices than the
+//! node. Constructors simplify in ways that keep the bits of the result, the sign of a zero apart
+//! (constant folding, `a + 0`, `a · 1`, `−(−a)`), and take structural zeros as zeros (`0 · a = 0`,
+//! `a − a = 0`, whatever `a` is at run time). Derivative code is written with the operations of
+//! `algebra`, which may also round differently.
 //!
 //! Nothing here recurses along the graph: it may be deeper than a stack.
 

@@ -7,8 +7,8 @@ use std::f64::consts::{LN_2, LOG2_E, LOG10_E};
 pub type PerOperand = [Option<(Node, Node)>; 2];
 
 impl Graph {
-    /// `∂c/∂a` of a function `c` of one argument `a`, in forms that neither cancel nor overflow where
-    /// that is cheap.
+    /// `∂c/∂a` of a function `c` of one argument `a`, in forms that neither cancel nor overflow
+    /// where that is cheap.
     fn unary_partial(&mut self, function: Unary, a: Node, c: Node) -> Node {
         let one = self.constant(1.0);
         match function {
@@ -145,8 +145,8 @@ impl Graph {
         }
     }
 
-    /// `n aⁿ⁻¹` as `n c / a` with `c = aⁿ`: a division instead of another power, which costs ten times as
-    /// much. Not a number at `a = 0`, where the limit is zero or infinite.
+    /// `n aⁿ⁻¹` as `n c / a` with `c = aⁿ`: a division instead of another power, which costs ten
+    /// times as much. Not a number at `a = 0`, where the limit is zero or infinite.
     fn power_ratio(&mut self, n: f64, a: Node, c: Node) -> Node {
         let (n, ratio) = (self.constant(n), self.over(c, a));
         self.times(n, ratio)
@@ -205,8 +205,8 @@ impl Graph {
         }
     }
 
-    /// `w` times the second partial derivatives of a node with respect to the operands that satisfy a
-    /// predicate: `(j, k, value)`, pairs of different operands once.
+    /// `w` times the second partial derivatives of a node with respect to the operands that satisfy
+    /// a predicate: `(j, k, value)`, pairs of different operands once.
     pub(super) fn second(
         &mut self,
         node: Node,
@@ -269,8 +269,8 @@ impl Graph {
         self.zero_at_zero(n > 2.0, a, second)
     }
 
-    /// The rules applied to the partial derivatives, on a graph of their own in which the operands are
-    /// variables: what operands are made of must not be differentiated.
+    /// The rules applied to the partial derivatives, on a graph of their own in which the operands
+    /// are variables: what operands are made of must not be differentiated.
     fn second_by_rules(&mut self, op: Op, w: Node, active: impl Fn(Node) -> bool) -> Vec<(Node, Node, Node)> {
         let operands: Vec<Node> = op.operands().collect();
         let mut scratch = Graph::default();

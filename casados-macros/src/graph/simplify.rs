@@ -244,8 +244,8 @@ impl Graph {
     }
 }
 
-/// `1 / a`, if division by `a` and multiplication by it are the same: `a` is a power of two, and neither
-/// is subnormal.
+/// `1 / a`, if division by `a` and multiplication by it are the same: `a` is a power of two, and
+/// neither is subnormal.
 fn exact_reciprocal(a: f64) -> Option<f64> {
     const MANTISSA: u64 = (1 << 52) - 1;
     let reciprocal = 1.0 / a;

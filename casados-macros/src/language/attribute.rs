@@ -90,7 +90,8 @@ impl Arguments {
         sampling::resolve(&self.settings, variables)
     }
 
-    /// Functions have no unknowns and no plan: there is nothing that nominal values and ranges could say.
+    /// Functions have no unknowns and no plan: there is nothing that nominal values and ranges
+    /// could say.
     pub fn without_settings(&self, what: &str) -> Result<()> {
         let message =
             format!("{what} has no elimination plan: nominal values and ranges would change nothing");

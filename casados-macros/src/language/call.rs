@@ -192,8 +192,8 @@ impl Evaluator {
         Ok(methods::method(self, receiver, &call)?)
     }
 
-    /// Calls a function with arguments as they are written; of several that only differ in their arguments the
-    /// one that these fit.
+    /// Calls a function with arguments as they are written; of several that only differ in their
+    /// arguments the one that these fit.
     fn call_written(
         &mut self,
         function: &Function,

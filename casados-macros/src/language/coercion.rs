@@ -1,4 +1,5 @@
-//! Values become values of a type: integers get their width, constants from outside are taken apart.
+//! Values become values of a type: integers get their width, constants from outside are taken
+//! apart.
 
 use super::evaluator::{At, Evaluator, error};
 use super::types::Type;
@@ -8,8 +9,8 @@ use std::rc::Rc;
 use syn::Result;
 
 impl Evaluator {
-    /// The value as one of the type: opaque constants are taken apart, integers get their type, `&mut`
-    /// stays what it is. An error if the shapes do not fit.
+    /// The value as one of the type: opaque constants are taken apart, integers get their type,
+    /// `&mut` stays what it is. An error if the shapes do not fit.
     pub fn coerce(&mut self, value: Value, ty: &Type, at: At) -> Result<Value> {
         Ok(match (ty, &value) {
             (Type::Unknown, _) | (_, Value::Reference(_)) => value,

@@ -1,4 +1,5 @@
-//! Dual models: functions that are generic over `DualNum`. Their bodies are not read, only their signatures.
+//! Dual models: functions that are generic over `DualNum`. Their bodies are not read, only their
+//! signatures.
 
 use super::attribute::Arguments;
 use super::signature::{self, Role};

@@ -37,8 +37,8 @@ pub const STEPS: usize = 10_000_000;
 pub const NODES: usize = 4_000_000;
 /// Nested expressions and calls.
 pub const DEPTH: usize = 200;
-/// Bytes of the stack that the evaluation may use. An unoptimised macro needs 4 to 20 kB for a level, and
-/// the smallest threads that macros run in have 2 MiB.
+/// Bytes of the stack that the evaluation may use. An unoptimised macro needs 4 to 20 kB for a
+/// level, and the smallest threads that macros run in have 2 MiB.
 const STACK: usize = 5 << 18;
 
 /// Why the evaluation of an expression did not end with its value.

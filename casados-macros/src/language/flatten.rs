@@ -1,5 +1,5 @@
-//! Values as flat lists of numbers, in the order of declaration: elements of arrays by index, fields of
-//! structs as they are declared, matrices column after column.
+//! Values as flat lists of numbers, in the order of declaration: elements of arrays by index,
+//! fields of structs as they are declared, matrices column after column.
 
 use super::evaluator::{At, Evaluator, error};
 use super::value::Value;

@@ -1,4 +1,5 @@
-//! Generic parameters: declared in a scope, bound to their arguments, found from the types of values.
+//! Generic parameters: declared in a scope, bound to their arguments, found from the types of
+//! values.
 
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluator, Flow, error};
@@ -96,8 +97,8 @@ impl Evaluator {
         arguments
     }
 
-    /// Whether the type can be written like this; generic parameters declared in the scope are bound
-    /// on the way. What is not known fits everything.
+    /// Whether the type can be written like this; generic parameters declared in the scope are
+    /// bound on the way. What is not known fits everything.
     pub fn unify(&mut self, pattern: &syn::Type, ty: &Type, scope: &Rc<Scope>) -> bool {
         match (pattern, ty) {
             (syn::Type::Reference(inner), _) => self.unify(&inner.elem, ty, scope),

@@ -1,8 +1,9 @@
 //! Names that `macro_rules!` keeps apart.
 //!
-//! A variable that a macro declares is another one than a variable of the same name in what the macro was
-//! given. Identifiers compare by their text, so that variables of different contexts get different texts
-//! before a model is executed. Only variables have contexts; items, fields and methods are found by text.
+//! A variable that a macro declares is another one than a variable of the same name in what the
+//! macro was given. Identifiers compare by their text, so that variables of different contexts get
+//! different texts before a model is executed. Only variables have contexts; items, fields and
+//! methods are found by text.
 
 use proc_macro2::{Group, Ident, TokenStream, TokenTree};
 use std::collections::{HashMap, HashSet};

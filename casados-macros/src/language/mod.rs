@@ -1,4 +1,5 @@
-//! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes its body.
+//! From Rust tokens to a graph: the signature of a model, and the partial evaluator that executes
+//! its body.
 
 mod access;
 mod arithmetic;
@@ -103,7 +104,8 @@ pub struct Model {
     pub residual: Vec<Node>,
     /// Where each equation was written: what errors about it point at.
     pub spans: Vec<Span>,
-    /// Constants from outside, as Rust expressions of type `f64`; `Op::Opaque` is an index into this.
+    /// Constants from outside, as Rust expressions of type `f64`; `Op::Opaque` is an index into
+    /// this.
     pub opaque: Vec<TokenStream>,
     /// `use` items in the body, which the opaque constants may need.
     pub uses: Vec<syn::ItemUse>,
@@ -123,7 +125,8 @@ pub struct Instance {
 }
 
 /// Names of the variables, flattened: `x[3]`, `cart.position`. Their numbers are the dimensions.
-/// Index in the graph: `ẋ`, `x`, `z`, `u`, `p`, `t`, one after the other; `t` is always the last, used or not.
+/// Index in the graph: `ẋ`, `x`, `z`, `u`, `p`, `t`, one after the other; `t` is always the last,
+/// used or not.
 #[derive(Clone, Debug, Default)]
 pub struct Variables {
     /// Differential states (and their derivatives).

@@ -1,5 +1,5 @@
-//! From a model function, and the items around it, to a graph: the variables are made, the function is
-//! called with them, and the numbers that it returns are the residual.
+//! From a model function, and the items around it, to a graph: the variables are made, the function
+//! is called with them, and the numbers that it returns are the residual.
 
 use super::environment::{Names, Scope};
 use super::evaluator::{Evaluator, error};

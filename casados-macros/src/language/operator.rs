@@ -69,7 +69,8 @@ impl Evaluator {
                 Ok(self.load(right, &binary.right)?)
             }
             Truth::When(node) => {
-                // The right side is executed only if the left one says so; what it changes depends on that.
+                // The right side is executed only if the left one says so; what it changes depends
+                // on that.
                 let saved = self.scope.clone();
                 let result = self.branch(|evaluator| evaluator.expression(&binary.right, &Type::Bool));
                 self.scope = saved;

@@ -250,7 +250,8 @@ impl Evaluator {
         }
     }
 
-    /// The function of a name that is implemented for a type: inherent ones first, then those of traits.
+    /// The function of a name that is implemented for a type: inherent ones first, then those of
+    /// traits.
     pub(super) fn find_function(
         &mut self,
         name: Symbol,
@@ -305,7 +306,8 @@ impl Evaluator {
         }
         match builtin.path.last() {
             Some(name) if name == "None" => Value::Option(None),
-            // A name of the surrounding module: as a value it is more often a constant than a function.
+            // A name of the surrounding module: as a value it is more often a constant than a
+            // function.
             Some(_)
                 if builtin.owner.is_none()
                     && (builtin.path.len() == 1

@@ -166,7 +166,8 @@ impl Evaluator {
         Ok(value)
     }
 
-    /// A part of a place; its bounds are checked. Slices of slices, and elements of slices and blocks, are resolved.
+    /// A part of a place; its bounds are checked. Slices of slices, and elements of slices and
+    /// blocks, are resolved.
     pub fn project(&mut self, place: &Place, projection: Projection, at: At) -> Result<Place> {
         let mut place = self.follow(place.clone(), at)?;
         let value = match place.path.last() {

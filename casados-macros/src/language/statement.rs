@@ -298,7 +298,8 @@ impl Evaluator {
     }
 }
 
-/// What the end of a block tells about a variable: `let mut r = zeros(); ...; r` has the type of the block.
+/// What the end of a block tells about a variable: `let mut r = zeros(); ...; r` has the type of
+/// the block.
 fn hint(block: &syn::Block, local: &syn::Local, expected: &Type) -> Type {
     let (syn::Pat::Ident(name), Some(Stmt::Expr(Expr::Path(tail), None))) = (&local.pat, block.stmts.last())
     else {

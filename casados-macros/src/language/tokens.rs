@@ -1,16 +1,16 @@
 //! Items as tokens: what is refused before a parser sees them, and what is changed without one.
 //!
-//! The user's own tokens are emitted. In groups without delimiters, as `macro_rules!` puts them around
-//! what it was given, the compiler looks no more once a macro has had them in its hands: `x * $e` would
-//! be `x * 1.0 + 2.0`. So those that hold an operation get parentheses.
+//! The user's own tokens are emitted. In groups without delimiters, as `macro_rules!` puts them
+//! around what it was given, the compiler looks no more once a macro has had them in its hands:
+//! `x * $e` would be `x * 1.0 + 2.0`. So those that hold an operation get parentheses.
 
 use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
 /// Deeper than any model.
 const DEPTH: usize = 256;
 
-/// Tokens of one statement or element side by side; each may be a level of the syntax tree (prefix signs,
-/// `else if`, calls of methods).
+/// Tokens of one statement or element side by side; each may be a level of the syntax tree (prefix
+/// signs, `else if`, calls of methods).
 const LENGTH: usize = 20_000;
 
 /// Terms of one sum without brackets. The compiler bears twice as many.
@@ -121,7 +121,8 @@ fn no_condition(attribute: &Group) -> syn::Result<()> {
     }
 }
 
-/// How many of the tokens make a module, with further attributes and visibility, if they begin with one.
+/// How many of the tokens make a module, with further attributes and visibility, if they begin with
+/// one.
 fn module_end(tokens: &[TokenTree]) -> Option<usize> {
     let mut index = 0;
     loop {

@@ -208,7 +208,8 @@ impl Evaluator {
         })
     }
 
-    /// The length of an array type; `None` where it is `_` or a parameter that nothing has fixed yet.
+    /// The length of an array type; `None` where it is `_` or a parameter that nothing has fixed
+    /// yet.
     pub(super) fn length(&mut self, length: &syn::Expr, scope: &Rc<Scope>) -> Result<Option<usize>> {
         if matches!(length, syn::Expr::Infer(_)) {
             return Ok(None);

@@ -46,8 +46,9 @@ impl Evaluator {
         Ok(Some((function, first)))
     }
 
-    /// The implementations of a generic trait for one type, of which the arguments of a call choose one:
-    /// `impl From<A> for X` and `impl From<B> for X`. Only the function itself if it is not of such a trait.
+    /// The implementations of a generic trait for one type, of which the arguments of a call choose
+    /// one: `impl From<A> for X` and `impl From<B> for X`. Only the function itself if it is not of
+    /// such a trait.
     pub(super) fn overloads(&mut self, function: &Function) -> Vec<Function> {
         let Some((implementation, ty)) = &function.owner else { return Vec::new() };
         let generic = |implementation: &Implementation| {
@@ -106,7 +107,8 @@ impl Evaluator {
             })
     }
 
-    /// What `into` makes by the user's `From`, if there is one for the value and the type that is expected.
+    /// What `into` makes by the user's `From`, if there is one for the value and the type that is
+    /// expected.
     pub(super) fn user_conversion(
         &mut self,
         receiver: &Receiver,
@@ -157,8 +159,9 @@ impl Evaluator {
         self.user_method(of, method, a, vec![b.clone()], at)
     }
 
-    /// A method of a trait (or an inherent one of the same name) that the user implemented for `a`; of
-    /// several implementations the one whose generic argument fits the first of the other arguments.
+    /// A method of a trait (or an inherent one of the same name) that the user implemented for `a`;
+    /// of several implementations the one whose generic argument fits the first of the other
+    /// arguments.
     pub(super) fn user_method(
         &mut self,
         of: &str,

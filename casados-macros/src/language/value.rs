@@ -1,7 +1,8 @@
 //! What expressions evaluate to while the body of a model is executed symbolically.
 //!
-//! Values are cheap to clone: aggregates are shared and copied when one of the owners writes to them.
-//! Shared references are transparent: `&a` is the value of `a`. Only `&mut` is a value of its own.
+//! Values are cheap to clone: aggregates are shared and copied when one of the owners writes to
+//! them. Shared references are transparent: `&a` is the value of `a`. Only `&mut` is a value of its
+//! own.
 
 use super::environment::Scope;
 use super::items::Implementation;
@@ -50,7 +51,8 @@ pub enum Value {
     Matrix(Rc<Matrix>),
     /// An `Option`, known to be there or not.
     Option(Option<Box<Value>>),
-    /// A constant that is defined where the macro does not see it. It becomes a number when it is used as one.
+    /// A constant that is defined where the macro does not see it. It becomes a number when it is
+    /// used as one.
     Opaque(Rc<TokenStream>),
 }
 

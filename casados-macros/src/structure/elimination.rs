@@ -1,10 +1,11 @@
 //! The elimination order of the Newton matrix, found before the program runs.
 //!
-//! Ordered by variable, the Newton matrix of any Runge-Kutta method has the pattern of `f_ẋ ∪ f_x ∪ f_z`, with
-//! s×s blocks as entries. Where the stages share one Jacobian, block elimination decouples in the eigenbasis of A:
-//! it is the scalar elimination of `f_ẋ + hμ f_x` for every eigenvalue `μ` of A. So pivots are judged on such
-//! complex matrices, at many points of the model and many `hμ` at once: a pivot is taken only if it is
-//! acceptable at all of them. Among the acceptable ones the Markowitz cost decides.
+//! Ordered by variable, the Newton matrix of any Runge-Kutta method has the pattern of
+//! `f_ẋ ∪ f_x ∪ f_z`, with s×s blocks as entries. Where the stages share one Jacobian, block
+//! elimination decouples in the eigenbasis of A: it is the scalar elimination of `f_ẋ + hμ f_x` for
+//! every eigenvalue `μ` of A. So pivots are judged on such complex matrices, at many points of the
+//! model and many `hμ` at once: a pivot is taken only if it is acceptable at all of them. Among the
+//! acceptable ones the Markowitz cost decides.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
@@ -55,8 +56,8 @@ impl Complex {
     }
 }
 
-/// A pivot is acceptable if at every sample it is at least this fraction of the largest entry of its column
-/// (rows scaled to a largest entry of one).
+/// A pivot is acceptable if at every sample it is at least this fraction of the largest entry of
+/// its column (rows scaled to a largest entry of one).
 const THRESHOLDS: [f64; 4] = [0.1, 1e-2, 1e-4, 0.0];
 
 /// The matrix during elimination.
@@ -117,8 +118,9 @@ impl Active {
         worst
     }
 
-    /// Cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the one that waits for the fewest
-    /// others (pivots that do not depend on each other overlap in the processor), then the first in order.
+    /// Cheapest acceptable pivot: smallest Markowitz cost, trivial blocks first, then the one that
+    /// waits for the fewest others (pivots that do not depend on each other overlap in the
+    /// processor), then the first in order.
     fn choose(&self) -> Option<(u32, u32)> {
         let mut candidates: Vec<(u64, bool, u32, u32, u32)> = Vec::new();
         for (row, entries) in self.rows.iter().enumerate().filter(|(row, _)| !self.done_rows[*row]) {
@@ -180,8 +182,9 @@ impl Active {
     }
 }
 
-/// A plan has no more updates than this; each is an element of a table. A full matrix of 66 equations has as
-/// many. Beyond it there is none, and the engine eliminates the whole matrix with pivots that it looks for.
+/// A plan has no more updates than this; each is an element of a table. A full matrix of 66
+/// equations has as many. Beyond it there is none, and the engine eliminates the whole matrix with
+/// pivots that it looks for.
 const UPDATES: usize = 100_000;
 
 /// The plan for a matrix of `size` equations and unknowns; an empty one where it would be too long.
@@ -204,8 +207,9 @@ pub fn plan(size: usize, entries: &[Entry]) -> Plan {
 
 type Step = (u32, u32, Vec<u32>, Vec<u32>);
 
-/// Rows of every step in the order in which they are eliminated: what the next pivot waits for is updated first. Columns in
-/// the opposite order: on the way back what was found last is met last, and the rest of the sum does not wait for it.
+/// Rows of every step in the order in which they are eliminated: what the next pivot waits for is
+/// updated first. Columns in the opposite order: on the way back what was found last is met last,
+/// and the rest of the sum does not wait for it.
 fn in_order(steps: &mut [Step]) {
     let rows: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.0, k)).collect();
     let columns: HashMap<u32, usize> = steps.iter().enumerate().map(|(k, step)| (step.1, k)).collect();
@@ -288,7 +292,8 @@ mod tests {
 
     #[test]
     fn factors_by_the_plan_solve_the_system() {
-        // A band of width five with a full last row and column, diagonally dominant: of condition about ten.
+        // A band of width five with a full last row and column, diagonally dominant: of condition
+        // about ten.
         let n = 30u32;
         let mut entries = Vec::new();
         for r in 0..n {

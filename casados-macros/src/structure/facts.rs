@@ -1,4 +1,5 @@
-//! Facts that let the engine leave work out: what influences nobody, what never changes, what is straight.
+//! Facts that let the engine leave work out: what influences nobody, what never changes, what is
+//! straight.
 
 use crate::graph::{Degree, Entry, Graph, Node};
 use std::collections::BTreeSet;
@@ -22,7 +23,8 @@ pub struct Facts {
     pub directions: Vec<u32>,
     /// Variables that occur in the Hessian, but for those of the next.
     pub curved: Vec<u32>,
-    /// Diagonal entries that belong to a control or a parameter alone: the entry, and the direction.
+    /// Diagonal entries that belong to a control or a parameter alone: the entry, and the
+    /// direction.
     pub lone: Vec<(u32, u32)>,
 }
 

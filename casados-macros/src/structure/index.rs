@@ -4,8 +4,8 @@ use crate::graph::Entry;
 use crate::language::Model;
 
 /// An error if no matching of equations to unknowns exists in the pattern of `(f_ẋ, f_z)`: then
-/// `∂f/∂(ẋ, z)` is singular whatever the values, and the model is not of index 1. Names what is over- and
-/// underdetermined (the Dulmage-Mendelsohn decomposition).
+/// `∂f/∂(ẋ, z)` is singular whatever the values, and the model is not of index 1. Names what is
+/// over- and underdetermined (the Dulmage-Mendelsohn decomposition).
 pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<()> {
     let nx = ends[0];
     let count = model.residual.len();
@@ -81,7 +81,8 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
     Err(error.unwrap_or_else(|| syn::Error::new(model.name.span(), &message)))
 }
 
-/// For each column the row that it is matched with: a matching of maximum size, by augmenting paths.
+/// For each column the row that it is matched with: a matching of maximum size, by augmenting
+/// paths.
 fn match_rows(rows: &[Vec<usize>], columns: usize) -> Vec<Option<usize>> {
     let mut matching: Vec<Option<usize>> = vec![None; columns];
     for start in 0..rows.len() {
@@ -132,8 +133,8 @@ fn unmatched(map: &[Option<usize>]) -> Vec<usize> {
     (0..map.len()).filter(|&index| map[index].is_none()).collect()
 }
 
-/// What is reached from unmatched vertices along alternating paths, as connected components: the vertices
-/// of their side and those of the other side, ascending.
+/// What is reached from unmatched vertices along alternating paths, as connected components: the
+/// vertices of their side and those of the other side, ascending.
 fn components(
     neighbours: &[Vec<usize>],
     matching: &[Option<usize>],

@@ -1,5 +1,5 @@
-//! What can be known about a model before it runs: structural index, explicit form, linear rows, and the
-//! derivatives that the engine will ask for, as graphs.
+//! What can be known about a model before it runs: structural index, explicit form, linear rows,
+//! and the derivatives that the engine will ask for, as graphs.
 
 mod elimination;
 mod facts;
@@ -20,7 +20,8 @@ use std::collections::HashSet;
 
 /// The derivatives of a model or of a function of its variables.
 pub struct Derivatives {
-    /// Non-zeros of the Jacobian `(equation, variable, value)`, by block (ẋ, x, z, u, p), row, column.
+    /// Non-zeros of the Jacobian `(equation, variable, value)`, by block (ẋ, x, z, u, p), row,
+    /// column.
     pub jacobian: Vec<Entry>,
     /// Where each block begins in `jacobian`, and its end.
     pub blocks: [usize; 6],
@@ -201,8 +202,8 @@ fn check_length(model: &Model) -> syn::Result<()> {
     Err(syn::Error::new(span, message))
 }
 
-/// For each state its row and the constant coefficient of its derivative, if every row has exactly one
-/// derivative and there are no algebraic states.
+/// For each state its row and the constant coefficient of its derivative, if every row has exactly
+/// one derivative and there are no algebraic states.
 fn explicit(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> Option<Vec<(u32, f64)>> {
     let nx = ends[0];
     if ends[2] != ends[1] {

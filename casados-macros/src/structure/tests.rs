@@ -66,7 +66,8 @@ fn explicit_model() {
     assert_eq!(analysis.derivatives.operations.residual, 5);
 }
 
-/// What is not explicit: a derivative twice, one with a varying or an unknown coefficient, an algebraic state.
+/// What is not explicit: a derivative twice, one with a varying or an unknown coefficient, an
+/// algebraic state.
 #[test]
 fn implicit_models() {
     let coefficient = |coefficient: fn(&mut Graph, &[Node]) -> Node| {
@@ -105,7 +106,8 @@ fn linear_equations() {
     assert!(analysis.derivatives.jacobian.iter().all(|entry| entry.1 < 5));
 }
 
-/// `ẋ₀ − 2 x₁`, `c ẋ₁ − sin(t) x₁ − u`, `ẋ₂ − p x₀²`, `z − x₀ − 1`: what varies with the state, with time, not at all.
+/// `ẋ₀ − 2 x₁`, `c ẋ₁ − sin(t) x₁ − u`, `ẋ₂ − p x₀²`, `z − x₀ − 1`: what varies with the state,
+/// with time, not at all.
 #[test]
 fn facts() {
     let build = |square: bool, time: bool| {
@@ -146,7 +148,8 @@ fn facts() {
     assert_eq!(build(false, false), constant);
 }
 
-/// One variable or a function of time at the right is trivial; two variables or a varying coefficient are not.
+/// One variable or a function of time at the right is trivial; two variables or a varying
+/// coefficient are not.
 #[test]
 fn trivial_rows() {
     let trivial = |row: fn(&mut Graph, &[Node]) -> Node| {
@@ -166,7 +169,8 @@ fn trivial_rows() {
     assert!(trivial(|g, v| mul(g, v[4], v[1])).is_empty());
 }
 
-/// `ẋ₀ = 2 x₁`, `ẋ₁ = u`, and squares of all of them in `z`: that of `u` does not need its row of `D`.
+/// `ẋ₀ = 2 x₁`, `ẋ₁ = u`, and squares of all of them in `z`: that of `u` does not need its row of
+/// `D`.
 #[test]
 fn squares_of_what_is_a_multiple_of_others() {
     let facts = |product: bool| {
@@ -193,7 +197,8 @@ fn squares_of_what_is_a_multiple_of_others() {
     assert_eq!((together.curved, together.lone), (vec![0, 1, 2, 3, 5], Vec::new()));
 }
 
-/// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial as well.
+/// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial
+/// as well.
 #[test]
 fn kinematic_states() {
     type Row = fn(&mut Graph, &[Node]) -> Node;
@@ -257,7 +262,8 @@ fn kinematic_states() {
     assert_eq!(terms, Some(vec![own, through]));
 }
 
-/// Of a row of four that follow one another, the last of them a control, every other one: as many as there can be.
+/// Of a row of four that follow one another, the last of them a control, every other one: as many
+/// as there can be.
 #[test]
 fn no_velocity_is_kinematic() {
     let analysis = accepted(model([4, 0, 1, 0], |g, v| {
@@ -287,8 +293,8 @@ fn reason(model: Model) -> String {
     message.split(END).next().unwrap_or_default().to_string()
 }
 
-/// `ẋ − x z₀ − z₁ = 0`, `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`: at `u = 30` the coefficient of `z₀` vanishes, which nobody
-/// can know without a word about `u`.
+/// `ẋ − x z₀ − z₁ = 0`, `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`: at `u = 30` the coefficient of
+/// `z₀` vanishes, which nobody can know without a word about `u`.
 #[test]
 fn nominal_values_and_ranges_decide_about_pivots() {
     let pivots = |sampling: Sampling| {
@@ -317,7 +323,8 @@ fn nominal_values_and_ranges_decide_about_pivots() {
     assert!(at(1, 1, &known(Some(-5.0), Some((-6.0, 6.0)))));
 }
 
-/// The pendulum in Cartesian coordinates: the multiplier is in no equation that it could be determined from.
+/// The pendulum in Cartesian coordinates: the multiplier is in no equation that it could be
+/// determined from.
 #[test]
 fn index_three() {
     let pendulum = |g: &mut Graph, v: &[Node]| {
@@ -367,8 +374,8 @@ fn over_and_underdetermined() {
     );
 }
 
-/// The matching needs an augmenting path along all equations: equation i has ẋᵢ and ẋᵢ₋₁, the last one only
-/// the last but one.
+/// The matching needs an augmenting path along all equations: equation i has ẋᵢ and ẋᵢ₋₁, the last
+/// one only the last but one.
 #[test]
 fn long_augmenting_path() {
     let n = 300;

@@ -1,4 +1,5 @@
-//! The integrator of a pendulum for firmware in C: plain pointers, status codes, memory that the caller gives.
+//! The integrator of a pendulum for firmware in C: plain pointers, status codes, memory that the
+//! caller gives.
 #![no_std]
 #![deny(unsafe_op_in_unsafe_fn)]
 
@@ -48,14 +49,16 @@ use CasadosStatus::{
     CasadosTooSmall,
 };
 
-/// An integrator: two Gauss stages, and as many Newton iterations in every step as it was made with.
+/// An integrator: two Gauss stages, and as many Newton iterations in every step as it was made
+/// with.
 pub struct CasadosPendulum(Integrator);
 
-/// Makes an integrator in `size` bytes of memory, which is to live as long as it, with so many iterations, at least one.
-/// After an error `*integrator` is null.
+/// Makes an integrator in `size` bytes of memory, which is to live as long as it, with so many
+/// iterations, at least one. After an error `*integrator` is null.
 ///
 /// # Safety
-/// `memory` is null, or points to `size` bytes that nothing else uses; `integrator` is null, or points to a pointer.
+/// `memory` is null, or points to `size` bytes that nothing else uses; `integrator` is null, or
+/// points to a pointer.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn casados_new(
     memory: *mut u8,
@@ -85,12 +88,14 @@ pub unsafe extern "C" fn casados_new(
     CasadosOk
 }
 
-/// One step of length `h`: from the state `x` and the control `u` to the state at its end, and its derivatives, column
-/// after column. `dx_dx` and `dx_du` may be null: then they are not computed. After an error nothing is written.
+/// One step of length `h`: from the state `x` and the control `u` to the state at its end, and its
+/// derivatives, column after column. `dx_dx` and `dx_du` may be null: then they are not computed.
+/// After an error nothing is written.
 ///
 /// # Safety
-/// `integrator` is from `casados_new`, and in no other call; the others are null or point to as many numbers as they
-/// have: `x` and `x_next` to `CASADOS_STATES`, `u` to `CASADOS_CONTROLS`, the derivatives to their products.
+/// `integrator` is from `casados_new`, and in no other call; the others are null or point to as
+/// many numbers as they have: `x` and `x_next` to `CASADOS_STATES`, `u` to `CASADOS_CONTROLS`, the
+/// derivatives to their products.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn casados_step(
     integrator: *mut CasadosPendulum,

@@ -1,5 +1,5 @@
-//! A pendulum on a cart is held upright. What a controller needs of the model it asks the integrator for: where the
-//! state will be after a sample, and the derivatives of that.
+//! A pendulum on a cart is held upright. What a controller needs of the model it asks the
+//! integrator for: where the state will be after a sample, and the derivatives of that.
 
 use crate::pendulum::Pendulum;
 use crate::{board, memory::Static, options, report};
@@ -7,14 +7,16 @@ use casados::memory::fallback::Refusing;
 use casados::{Error, Gauss, Inline, Irk, Real, mode};
 use nalgebra::{Vector1, Vector4};
 
-/// Two stages: fourth order. Where the planned elimination is not good enough, it is an error: nothing takes longer than usual.
+/// Two stages: fourth order. Where the planned elimination is not good enough, it is an error:
+/// nothing takes longer than usual.
 pub type Predictor<T> = Irk<Pendulum, Gauss<2>, T, Inline<mode::Forward, 1, Refusing>>;
 
 /// The time between two samples.
 const SAMPLE: f64 = 0.02;
 const SAMPLES: usize = 250;
 
-/// The gain of a linear quadratic regulator: weights 1, 10, 0.1, 0.1 of the state, 0.01 of the force.
+/// The gain of a linear quadratic regulator: weights 1, 10, 0.1, 0.1 of the state, 0.01 of the
+/// force.
 const GAIN: [f64; 4] = [-8.65, 73.7, -10.88, 19.44];
 
 /// Bytes of the predictor in `f32`: `cargo doc` prints the number.

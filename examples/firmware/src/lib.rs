@@ -21,7 +21,8 @@ pub mod quadrotor;
 
 use casados::prelude::*;
 
-/// Every step takes the same time: so many Newton iterations, and nothing depends on whether they were enough.
+/// Every step takes the same time: so many Newton iterations, and nothing depends on whether they
+/// were enough.
 pub fn options(iterations: usize) -> Options {
     Options {
         newton: Newton { fixed_iterations: Some(iterations), ..Default::default() },

@@ -1,5 +1,5 @@
-//! A model whose plan of elimination is good for nothing: what a call takes at most, when the whole matrix is pivoted in
-//! every iteration and for the derivatives too.
+//! A model whose plan of elimination is good for nothing: what a call takes at most, when the whole
+//! matrix is pivoted in every iteration and for the derivatives too.
 
 use casados::Dae;
 use casados::model::{ArrayK, ArrayV, Elimination, Structure};

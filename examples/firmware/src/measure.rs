@@ -1,5 +1,5 @@
-//! How large the integrator of one model is, how many instructions its calls take, and how much that depends on the
-//! numbers.
+//! How large the integrator of one model is, how many instructions its calls take, and how much
+//! that depends on the numbers.
 
 /// The program for a model, a number of stages, a type of numbers and a memory.
 #[macro_export]

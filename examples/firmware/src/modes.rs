@@ -1,5 +1,5 @@
-//! How many instructions every kind of call takes, of implicit and explicit integrators, and how much that depends on the
-//! numbers.
+//! How many instructions every kind of call takes, of implicit and explicit integrators, and how
+//! much that depends on the numbers.
 
 use crate::report;
 use casados::{Error, Real};
@@ -29,7 +29,8 @@ pub fn sample<T: Real>(name: &str, values: &[T]) {
     report::reals(name, &[first, last, sum]);
 }
 
-/// The program for some integrators: a name, `Irk` or `Erk`, a model and a method each, and how far states are from zero.
+/// The program for some integrators: a name, `Irk` or `Erk`, a model and a method each, and how far
+/// states are from zero.
 #[macro_export]
 macro_rules! modes {
     ($number:ty; $($name:literal: $integrator:ident<$model:ty, $method:ty>, $far:literal;)*) => {

@@ -1,5 +1,5 @@
-//! Model predictive control: a pendulum on a cart hangs down, is swung up and kept there in spite of a kick, with force and
-//! rail bounded. One real-time iteration in each sample.
+//! Model predictive control: a pendulum on a cart hangs down, is swung up and kept there in spite
+//! of a kick, with force and rail bounded. One real-time iteration in each sample.
 
 use crate::memory::Parts;
 use crate::pendulum::Pendulum;

@@ -57,8 +57,8 @@ pub fn e5(x: [f64; 4]) -> [f64; 4] {
     [-first - second, first - third, first - second - third + C * y4, second - C * y4]
 }
 
-/// The same with its invariant y2 − y3 − y4 = 0 as an equation: rounding errors of the rates, far above y4, do not add up
-/// in it. x = [y1, y2, y4], z = y3.
+/// The same with its invariant y2 − y3 − y4 = 0 as an equation: rounding errors of the rates, far
+/// above y4, do not add up in it. x = [y1, y2, y4], z = y3.
 #[dae]
 pub fn e5_conserved(xdot: [f64; 3], x: [f64; 3], z: f64) -> [f64; 4] {
     const A: f64 = 7.89e-10;
@@ -70,8 +70,9 @@ pub fn e5_conserved(xdot: [f64; 3], x: [f64; 3], z: f64) -> [f64; 4] {
     [xdot[0] + first + second, xdot[1] - (first - third), xdot[2] - (second - C * y4), y2 - z - y4]
 }
 
-/// Two species that react while carbon dioxide is added. x = the first five concentrations, z = the sixth;
-/// p = [k1, k2, k3, k4, K, klA, Ks, pCO2, H], nominally [18.7, 0.58, 0.09, 0.42, 34.4, 3.3, 115.83, 0.9, 737].
+/// Two species that react while carbon dioxide is added. x = the first five concentrations, z = the
+/// sixth; p = [k1, k2, k3, k4, K, klA, Ks, pCO2, H], nominally [18.7, 0.58, 0.09, 0.42, 34.4, 3.3,
+/// 115.83, 0.9, 737].
 #[dae]
 pub fn akzo_nobel(xdot: [f64; 5], x: [f64; 5], z: f64, p: [f64; 9]) -> [f64; 6] {
     let [y1, y2, y3, y4, y5] = x;

@@ -50,8 +50,8 @@ pub fn ring_modulator(x: [f64; 15], t: f64) -> [f64; 15] {
     ]
 }
 
-/// An amplifier with two transistors, by the voltages of its eight nodes. Five capacitors: the matrix of `ẋ` has
-/// rank 5, and three equations are algebraic without any state being so.
+/// An amplifier with two transistors, by the voltages of its eight nodes. Five capacitors: the
+/// matrix of `ẋ` has rank 5, and three equations are algebraic without any state being so.
 #[dae]
 pub fn transistor_amplifier(xdot: [f64; 8], x: [f64; 8], t: f64) -> [f64; 8] {
     const UB: f64 = 6.0;
@@ -82,8 +82,8 @@ pub fn transistor_amplifier(xdot: [f64; 8], x: [f64; 8], t: f64) -> [f64; 8] {
     ]
 }
 
-/// The same amplifier as an equation of index 1 with algebraic states: x = the voltages of the five capacitors,
-/// [y2 − y1, y3, y5 − y4, y6, y8 − y7], z = the nodes [y1, y4, y7].
+/// The same amplifier as an equation of index 1 with algebraic states: x = the voltages of the five
+/// capacitors, [y2 − y1, y3, y5 − y4, y6, y8 − y7], z = the nodes [y1, y4, y7].
 #[dae]
 pub fn transistor_capacitors(xdot: [f64; 5], x: [f64; 5], z: [f64; 3], t: f64) -> [f64; 8] {
     const UB: f64 = 6.0;

@@ -3,8 +3,8 @@
 
 use casados::{dae, ode};
 
-/// Seven stars in a plane attract each other: close encounters. x = [x, y, ẋ, ẏ], seven of each; the mass of star `j`
-/// is its number.
+/// Seven stars in a plane attract each other: close encounters. x = [x, y, ẋ, ẏ], seven of each;
+/// the mass of star `j` is its number.
 #[ode]
 pub fn pleiades(x: [f64; 28]) -> [f64; 28] {
     let mut derivative: [f64; 28] = core::array::from_fn(|i| if i < 14 { x[14 + i] } else { 0.0 });
@@ -23,8 +23,8 @@ pub fn pleiades(x: [f64; 28]) -> [f64; 28] {
     derivative
 }
 
-/// Andrews' squeezing mechanism, seven bodies in a plane, with its constraints differentiated twice.
-/// x = [angles β Θ γ Φ δ Ω ε, their rates], z = [their accelerations, the six multipliers].
+/// Andrews' squeezing mechanism, seven bodies in a plane, with its constraints differentiated
+/// twice. x = [angles β Θ γ Φ δ Ω ε, their rates], z = [their accelerations, the six multipliers].
 ///
 /// E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section VII.7.
 #[dae]
@@ -105,8 +105,8 @@ pub fn squeezer(xdot: [f64; 14], x: [f64; 14], z: [f64; 13]) -> [f64; 27] {
         M[5] * U * (ZF - FA) * vo * (vo + 2.0 * ve) * co,
     ];
 
-    // The constraints are three times the point of the crank minus that of another chain: their Jacobian, and
-    // their second derivatives along the motion.
+    // The constraints are three times the point of the crank minus that of another chain: their
+    // Jacobian, and their second derivatives along the motion.
     let (crank_x, crank_y) = (-RR * sb + D * sbt, RR * cb - D * cbt);
     let (vbt, vpd, voe) = (vb + vt, vp + vd, vo + ve);
     let curve_x = -RR * cb * vb * vb + D * cbt * vbt * vbt;

@@ -2,11 +2,11 @@
 
 use casados::{dae, ode};
 
-/// An elastic beam, clamped at one end, that is pulled at the other until `t = π`: pieces of constant length turn by the angles
-/// `θ`. x = [θ, θ̇], z = [u], with `NZ` pieces, `NX = 2 NZ`.
+/// An elastic beam, clamped at one end, that is pulled at the other until `t = π`: pieces of
+/// constant length turn by the angles `θ`. x = [θ, θ̇], z = [u], with `NZ` pieces, `NX = 2 NZ`.
 ///
-/// E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.1, equations (1.10) to (1.18); "beam" of the Test Set
-/// for IVP Solvers.
+/// E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.1, equations (1.10)
+/// to (1.18); "beam" of the Test Set for IVP Solvers.
 #[dae((NX, NZ, NK) = [(20, 10, 30)])]
 pub fn beam<const NX: usize, const NZ: usize, const NK: usize>(
     xdot: [f64; NX],
@@ -32,7 +32,8 @@ pub fn beam<const NX: usize, const NZ: usize, const NK: usize>(
             2.0
         }
     };
-    // θ̈ = C v + D u, C u = D v + θ̇², with C and D real and imaginary part of one Hermitian matrix of three diagonals.
+    // θ̈ = C v + D u, C u = D v + θ̇², with C and D real and imaginary part of one Hermitian matrix
+    // of three diagonals.
     let mut residual = [0.0; NK];
     for i in 0..n {
         let mut acceleration = diagonal(i) * moment(i);
@@ -119,8 +120,8 @@ pub fn explicit_beam<const N: usize>(x: [f64; N], t: f64) -> [f64; N] {
     derivative
 }
 
-/// Six oscillators with `ω = 1, 4, 16, 64, 256, 1024` around `sin t`, damped by `2ζω`, seen from a basis in which all are mixed.
-/// x = [positions, velocities], p = [ζ].
+/// Six oscillators with `ω = 1, 4, 16, 64, 256, 1024` around `sin t`, damped by `2ζω`, seen from a
+/// basis in which all are mixed. x = [positions, velocities], p = [ζ].
 #[ode]
 pub fn modes(x: [f64; 12], p: f64, t: f64) -> [f64; 12] {
     // I − 2vvᵀ
@@ -143,7 +144,8 @@ pub fn modes(x: [f64; 12], p: f64, t: f64) -> [f64; 12] {
     core::array::from_fn(|i| if i < 6 { x[6 + i] } else { force[i - 6] - 2.0 * V[i - 6] * along })
 }
 
-/// Masses on stiff springs in a plane swing as a rope, from the horizontal. x = [x, y, ẋ, ẏ] of five, p = [stiffness].
+/// Masses on stiff springs in a plane swing as a rope, from the horizontal. x = [x, y, ẋ, ẏ] of
+/// five, p = [stiffness].
 #[ode]
 pub fn rope(x: [f64; 20], p: f64) -> [f64; 20] {
     let mut force = [[0.0; 2]; 6];

@@ -7,11 +7,12 @@ use casados_benches::time::Summary;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// What acados generates for GNSF of larger models takes the C compiler minutes: six for a chain of 33 masses.
+/// What acados generates for GNSF of larger models takes the C compiler minutes: six for a chain of
+/// 33 masses.
 const LARGEST_GNSF: usize = 69;
 
-/// Who is farther from the reference than this, in units of its largest element, computes something else: the tolerance of Newton's
-/// method is 1e-8 / steps.
+/// Who is farther from the reference than this, in units of its largest element, computes something
+/// else: the tolerance of Newton's method is 1e-8 / steps.
 const FAR: f64 = 1e-6;
 
 /// An installation.
@@ -65,7 +66,8 @@ pub fn integrators(case: &Case, mode: Mode) -> [Option<&'static str>; 2] {
     if case.family == Family::Rk4 {
         return [Some("ERK"), None];
     }
-    // GNSF has no Hessian, and acados' search for its structure ends with an error for the aircraft.
+    // GNSF has no Hessian, and acados' search for its structure ends with an error for the
+    // aircraft.
     let structured = mode != Mode::Hessian && case.model != "awe" && case.nx <= LARGEST_GNSF;
     [Some("IRK"), structured.then_some("GNSF")]
 }

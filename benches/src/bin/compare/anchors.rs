@@ -1,7 +1,8 @@
 //! Times of acados, carried over from the machine where they were measured beside CasADi.
 //!
-//! acados here = acados there × CasADi here / CasADi there, of the simulation of the same case. Where CasADi was not
-//! measured there, and where the ratio of the case would favour casados, the median ratio of all cases counts.
+//! acados here = acados there × CasADi here / CasADi there, of the simulation of the same case.
+//! Where CasADi was not measured there, and where the ratio of the case would favour casados, the
+//! median ratio of all cases counts.
 
 use super::rows::Row;
 use casados_benches::case::Mode;

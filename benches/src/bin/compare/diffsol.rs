@@ -20,7 +20,8 @@ struct Model {
     derivative: fn(x: &[f64], u: &[f64], vx: &[f64], vu: &[f64], dv: &mut [f64]),
 }
 
-/// Times and errors of simulation and forward sensitivities; empty for a model that is not explicit.
+/// Times and errors of simulation and forward sensitivities; empty for a model that is not
+/// explicit.
 pub fn measure(
     case: &Case,
     flow: &Values,

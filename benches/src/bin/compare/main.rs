@@ -1,8 +1,9 @@
-//! casados beside its peers, in one run: times and errors of simulation, forward and adjoint sensitivities and Hessians
-//! of a pendulum, of chains of masses and of an aircraft on a tether.
+//! casados beside its peers, in one run: times and errors of simulation, forward and adjoint
+//! sensitivities and Hessians of a pendulum, of chains of masses and of an aircraft on a tether.
 //!
-//! CasADi takes part where `python3`, or the interpreter that `CASADOS_PYTHON` names, has it; acados where that has
-//! `acados_template` and `ACADOS_SOURCE_DIR` lists installations; diffsol with the feature of that name. Nothing is installed.
+//! CasADi takes part where `python3`, or the interpreter that `CASADOS_PYTHON` names, has it;
+//! acados where that has `acados_template` and `ACADOS_SOURCE_DIR` lists installations; diffsol
+//! with the feature of that name. Nothing is installed.
 
 mod acados;
 mod adaptive;

@@ -120,7 +120,8 @@ struct PeerTimer<'a> {
 }
 
 impl<'a> PeerTimer<'a> {
-    /// Builds what is asked and calls it once before the clock runs; what the peer cannot do is left out.
+    /// Builds what is asked and calls it once before the clock runs; what the peer cannot do is
+    /// left out.
     fn new(column: usize, mut ask: Ask<'a>) -> Option<Self> {
         let first = ask(0.0).inspect_err(|why| eprintln!("    without a peer: {why}")).ok()?;
         Some(Self { column, ask, first, rounds: Vec::new() })
@@ -200,7 +201,8 @@ fn measure_row(case: &Case, mode: Mode, peers: &mut Peers, effort: Effort) -> Re
     })
 }
 
-/// Measurements that are compared are taken in turn, this often: what else the machine does comes and goes in seconds.
+/// Measurements that are compared are taken in turn, this often: what else the machine does comes
+/// and goes in seconds.
 const ROUNDS: usize = 5;
 
 /// The median round, the least, and the greatest.

@@ -30,7 +30,8 @@ impl Crossing {
     }
 }
 
-/// A zero crossing of a function `g(x, u, p, t)`, where an integration ends or the state jumps to `j(x, u, p, t)`.
+/// A zero crossing of a function `g(x, u, p, t)`, where an integration ends or the state jumps to
+/// `j(x, u, p, t)`.
 pub struct Event<M: Dae, T: Real = f64> {
     pub(super) crossing: Crossing,
     pub(super) guard: Map<M, T>,
@@ -47,10 +48,11 @@ impl<M: Dae, T: Real> Event<M, T> {
         Self { crossing, guard: Map::of::<G>(), jump: None }
     }
 
-    /// Where the only output of `G` crosses zero, the state becomes what `J` returns of the state before.
+    /// Where the only output of `G` crosses zero, the state becomes what `J` returns of the state
+    /// before.
     ///
-    /// That `G` has one output and `J` one for each state, and that neither depends on `z`, is checked when the program is
-    /// compiled.
+    /// That `G` has one output and `J` one for each state, and that neither depends on `z`, is
+    /// checked when the program is compiled.
     #[must_use]
     pub fn jump<G: Function<Shape = M::Shape>, J: Function<Shape = M::Shape>>(crossing: Crossing) -> Self {
         const { assert!(J::Outputs::NY == <M::Shape as Shape>::NX, "a jump has one output for each state") };

@@ -1,5 +1,5 @@
-//! Steps and events that are kept: each part between two events has the same steps, relative to its length, and ends where
-//! its event happens now.
+//! Steps and events that are kept: each part between two events has the same steps, relative to its
+//! length, and ends where its event happens now.
 
 use super::super::run::Span;
 use super::super::sealed::Engine;
@@ -12,15 +12,18 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Following calls keep the steps and the events of the last successful one, whatever they are given: one smooth function of `x₀`,
-    /// `u` and `p`, solved to rounding. Their interval has to be the same, unless an event ends it before.
+    /// Following calls keep the steps and the events of the last successful one, whatever they are
+    /// given: one smooth function of `x₀`, `u` and `p`, solved to rounding. Their interval has to
+    /// be the same, unless an event ends it before.
     ///
-    /// Times of events still depend on everything, and the steps between two events are stretched with the time between them.
-    /// That events happen in this order, once each, and others do not, is not looked at again. Derivatives at events are
-    /// those of the solution, as without it: they belong to this function up to the errors of its steps.
+    /// Times of events still depend on everything, and the steps between two events are stretched
+    /// with the time between them. That events happen in this order, once each, and others do not,
+    /// is not looked at again. Derivatives at events are those of the solution, as without it: they
+    /// belong to this function up to the errors of its steps.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Of following calls [`Error::OutsideInterval`], if they ask for another interval, and
+    /// [`Error::NoResult`], also if the last call failed; [`Error::OutOfMemory`]. Of following
+    /// calls [`Error::OutsideInterval`], if they ask for another interval, and
     /// [`Error::StepSizeUnderflow`], if an event cannot be found anymore.
     pub fn freeze(&mut self) -> Result<(), Error> {
         let asked = self.asked.ok_or(Error::NoResult)?;
@@ -111,7 +114,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// The time of the event that ends a part: by Newton's method for its length, from the one that is kept.
+    /// The time of the event that ends a part: by Newton's method for its length, from the one that
+    /// is kept.
     fn arrive(&mut self, k: usize, event: &Event<M, T>, start: T) -> Result<T, Error> {
         let nx = M::Shape::NX;
         let Some((kept, u)) = self.segments.get(k).map(|segment| (segment.kept, segment.u)) else {

@@ -1,5 +1,5 @@
-//! Integration with events: zero crossings of functions, located by dense output and then to rounding, where the
-//! integration ends or the state jumps, with the jump of the sensitivities.
+//! Integration with events: zero crossings of functions, located by dense output and then to
+//! rounding, where the integration ends or the state jumps, with the jump of the sensitivities.
 //!
 //! At the time `t*(w)` of an event, with `f⁻` and `f⁺` the derivatives of the state on both sides:
 //!
@@ -9,8 +9,9 @@
 //! λ⁻ = j_xᵀ λ⁺ − (σ/ġ) g_x        λ_w += j_wᵀ λ⁺ − (σ/ġ) g_w        σ = λ⁺ᵀ (j_x f⁻ + j_t − f⁺)
 //! ```
 //!
-//! `second` differentiates them once more, `frozen` keeps steps and events. Between events derivatives are those of the steps that were taken. At events they are those of the solution: a step's
-//! derivative by its length is `ẋ`, but for the error of the step.
+//! `second` differentiates them once more, `frozen` keeps steps and events. Between events
+//! derivatives are those of the steps that were taken. At events they are those of the solution: a
+//! step's derivative by its length is `ẋ`, but for the error of the step.
 
 mod event;
 mod frozen;
@@ -49,15 +50,15 @@ use bytemuck::allocation::try_zeroed_box;
 /// let end = ball.forward(&x0, &u, 3.0)?;      // end.x, end.dx_dx0, end.occurrences[0].t
 /// ```
 ///
-/// All calls take the length `h` of the interval, as those of the integrator. Times of events are times as the model sees them, and so
-/// is that of [`dense`](Self::dense).
+/// All calls take the length `h` of the interval, as those of the integrator. Times of events are
+/// times as the model sees them, and so is that of [`dense`](Self::dense).
 ///
 /// Later calls of a kind do not allocate, but for the lists that results of derivatives own.
 ///
 /// # Errors
-/// Of every call: those of [`Integrator`]; [`Error::InconsistentStart`] after a jump too; [`Error::TooManyEvents`];
-/// [`Error::NonFiniteFunction`] of an event or a jump. Of calls with derivatives [`Error::Grazing`]: the time of the
-/// event has no derivative.
+/// Of every call: those of [`Integrator`]; [`Error::InconsistentStart`] after a jump too;
+/// [`Error::TooManyEvents`]; [`Error::NonFiniteFunction`] of an event or a jump. Of calls with
+/// derivatives [`Error::Grazing`]: the time of the event has no derivative.
 pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     events: Box<[Event<M, T>]>,
@@ -66,7 +67,8 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
     segments: Vec<Segment<M, T>>,
     /// How many of them belong to the last successful call.
     count: usize,
-    /// The interval that the last call was asked for, if it succeeded, and that of steps and events that are kept.
+    /// The interval that the last call was asked for, if it succeeded, and that of steps and events
+    /// that are kept.
     asked: Option<Span<T>>,
     frozen: Option<Span<T>>,
     statistics: AdaptiveStatistics,
@@ -104,7 +106,8 @@ pub struct Occurrence<M: Dae, T: Real = f64> {
 pub struct Solution<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
-    /// The time at the end: that of the interval, or the time of the event that ended the integration.
+    /// The time at the end: that of the interval, or the time of the event that ended the
+    /// integration.
     pub t: T,
     /// Whether an event ended it: the last of the occurrences.
     pub terminal: bool,
@@ -112,7 +115,8 @@ pub struct Solution<M: Dae, T: Real = f64> {
     pub occurrences: Vec<Occurrence<M, T>>,
 }
 
-/// The solution at the end and its derivatives; if an event ended the integration, with the change of its time.
+/// The solution at the end and its derivatives; if an event ended the integration, with the change
+/// of its time.
 pub struct HybridForward<M: Dae, T: Real = f64> {
     /// The solution.
     pub solution: Solution<M, T>,
@@ -165,8 +169,8 @@ struct Moment<M: Dae, T: Real> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Of an integrator, which keeps its options, tolerances, parameters and start time; at most a thousand events may
-    /// happen in a call.
+    /// Of an integrator, which keeps its options, tolerances, parameters and start time; at most a
+    /// thousand events may happen in a call.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
@@ -217,10 +221,12 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(&self.solution)
     }
 
-    /// The solution at the time `t`, as the model sees it, inside the interval of the last call; where it jumps, that before.
+    /// The solution at the time `t`, as the model sees it, inside the interval of the last call;
+    /// where it jumps, that before.
     ///
     /// # Errors
-    /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`], [`Error::NonFiniteInput`].
+    /// [`Error::NoResult`], also if that call failed; [`Error::OutsideInterval`],
+    /// [`Error::NonFiniteInput`].
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         let Self { integrator, segments, count, solution, asked, .. } = self;
         asked.ok_or(Error::NoResult)?;
@@ -254,8 +260,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(result)
     }
 
-    /// Derivatives of all steps and over all events, and what is known about the moments of these; for `second` derivatives, what
-    /// these need.
+    /// Derivatives of all steps and over all events, and what is known about the moments of these;
+    /// for `second` derivatives, what these need.
     #[allow(clippy::type_complexity)]
     fn sweep(
         &mut self,
@@ -503,7 +509,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(time)
     }
 
-    /// Shows an integrand what is before an event, and with the sign of a lower limit what is after it.
+    /// Shows an integrand what is before an event, and with the sign of a lower limit what is after
+    /// it.
     fn beside(
         &mut self,
         k: usize,
@@ -527,7 +534,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(())
     }
 
-    /// `λ⁺` becomes `λ⁻`; `κ = −σ/ġ`. `density` is what an integrand gains where the event is later.
+    /// `λ⁺` becomes `λ⁻`; `κ = −σ/ġ`. `density` is what an integrand gains where the event is
+    /// later.
     fn adjoint_jump(
         &mut self,
         k: usize,

@@ -1,7 +1,8 @@
 //! Second derivatives over events: the jump of the sensitivities, differentiated once more.
 //!
-//! An event is the map `S(x⁻, w) = F⁺(−τ, j(F⁻(τ, x⁻)))`: along the flow to where `g = 0`, then the jump, and the flow behind it
-//! back to the same time. With `κ = −σ/ġ` and `λ⁻ = j_xᵀ λ⁺ + κ g_x` of the adjoint, all at the event:
+//! An event is the map `S(x⁻, w) = F⁺(−τ, j(F⁻(τ, x⁻)))`: along the flow to where `g = 0`, then the
+//! jump, and the flow behind it back to the same time. With `κ = −σ/ġ` and `λ⁻ = j_xᵀ λ⁺ + κ g_x`
+//! of the adjoint, all at the event:
 //!
 //! ```text
 //! τ' = −(g_x, g_w)/ġ      Y = (I, 0) + f⁻ τ'      S' = j_x Y + (0, j_w) − f⁺ τ'      D = (S'; 0 I)      E = (Y; 0 I)
@@ -74,11 +75,12 @@ fn dot<T: Real>(a: &[T], b: &[T]) -> T {
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
     /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
     ///
-    /// Between events second derivatives are those of the steps that were taken, at events those of the solution.
+    /// Between events second derivatives are those of the steps that were taken, at events those of
+    /// the solution.
     ///
     /// # Errors
-    /// See [`Hybrid`]; [`Error::DependsOnTime`] if at an event the model, its function or its jump does: a clock that is a state
-    /// (`ẋ = 1`) says the same.
+    /// See [`Hybrid`]; [`Error::DependsOnTime`] if at an event the model, its function or its jump
+    /// does: a clock that is a state (`ẋ = 1`) says the same.
     pub fn hessian(
         &mut self,
         x0: &VectorX<M, T>,

@@ -14,9 +14,11 @@ use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 
-/// Each step is looked at in so many pieces: a function that crosses zero twice in one of them is not seen.
+/// Each step is looked at in so many pieces: a function that crosses zero twice in one of them is
+/// not seen.
 const PIECES: usize = 4;
-/// A crossing is enclosed by so many bisections, to a millionth of a piece; then the step itself is made to end there.
+/// A crossing is enclosed by so many bisections, to a millionth of a piece; then the step itself is
+/// made to end there.
 const BISECTIONS: usize = 20;
 /// By so many iterations of Newton's method at most.
 pub(super) const ITERATIONS: usize = 20;
@@ -30,7 +32,8 @@ const GRAZING: f64 = 1e-8;
 type Found<T> = Option<(usize, T)>;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// Integrates an interval of length `h`, from event to event. There is a result as soon as the caller says so.
+    /// Integrates an interval of length `h`, from event to event. There is a result as soon as the
+    /// caller says so.
     pub(super) fn trace(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<Span<T>, Error> {
         self.asked = None;
         self.statistics = AdaptiveStatistics::default();
@@ -166,7 +169,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         Ok(found)
     }
 
-    /// On which side of zero each function begins. Where it is zero to rounding, it is on the side that it goes to.
+    /// On which side of zero each function begins. Where it is zero to rounding, it is on the side
+    /// that it goes to.
     fn find_signs(&mut self, k: usize, x: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<(), Error> {
         let (nx, start) = (M::Shape::NX, self.integrator.start);
         let forward = if t_end < start { -1.0 } else { 1.0 };
@@ -221,7 +225,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
             let change = -value / products.fold(rate, |sum, (g, f)| sum + *g * *f);
             let next = h + change;
-            // Within the step, as far as the polynomial was right; a crossing without slope stays where it was found.
+            // Within the step, as far as the polynomial was right; a crossing without slope stays
+            // where it was found.
             let slack = T::from_f64(1e-3) * entry.h.abs();
             let inside =
                 (next - h).abs() <= entry.h.abs() && (next - (t - entry.t)).abs() <= entry.h.abs() + slack;
@@ -299,7 +304,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         place::<M, T>(&mut self.v, &at.before, at.t);
     }
 
-    /// What is known about the moment of the event that ends a segment, whose steps were just taken again.
+    /// What is known about the moment of the event that ends a segment, whose steps were just taken
+    /// again.
     ///
     /// # Errors
     /// [`Error::Grazing`]; no consistent derivative; a jump that is not finite.
@@ -335,7 +341,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
 }
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
-    /// The slope at an event is one to divide by, beside the mean slope over the step that ends there.
+    /// The slope at an event is one to divide by, beside the mean slope over the step that ends
+    /// there.
     ///
     /// # Errors
     /// [`Error::Grazing`]

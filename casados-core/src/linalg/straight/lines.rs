@@ -1,7 +1,7 @@
 //! The lines themselves: an expression for each row or pivot.
 //!
-//! The compiler looks at all of them for each function that goes this way, short or not, and finds their constants: without optimisation
-//! that took most of its time.
+//! The compiler looks at all of them for each function that goes this way, short or not, and finds
+//! their constants: without optimisation that took most of its time.
 #![cfg_attr(any(debug_assertions, not(feature = "std")), allow(dead_code))] // Tests only.
 
 use super::super::fused::Arithmetic;
@@ -52,7 +52,8 @@ macro_rules! pivot {
     };
 }
 
-/// A pivot of a plan by its number: found once for each model, and not once more for each function that goes through its pivots.
+/// A pivot of a plan by its number: found once for each model, and not once more for each function
+/// that goes through its pivots.
 struct Nth<M, const N: usize>(PhantomData<M>);
 
 impl<M: Dae, const N: usize> Nth<M, N> {

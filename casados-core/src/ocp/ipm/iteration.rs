@@ -114,7 +114,8 @@ where
         Ok(())
     }
 
-    /// Residuals and barrier parameter at the iterate, the pair of the filter, and the best iterate.
+    /// Residuals and barrier parameter at the iterate, the pair of the filter, and the best
+    /// iterate.
     fn assess<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
@@ -265,8 +266,8 @@ fn shrink_barrier<T: Real>(
     }
 }
 
-/// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side what its
-/// violation costs.
+/// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
+/// what its violation costs.
 fn centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
     let count = sides.counts.sides();
     for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {

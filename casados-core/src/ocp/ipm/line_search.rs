@@ -166,8 +166,8 @@ where
         Some(Pair { theta, phi: objective + penalties + mu * barrier })
     }
 
-    /// Second-order corrections: constraints take their values at the point that was tried. Afterwards
-    /// the step is what was accepted, or what it was before.
+    /// Second-order corrections: constraints take their values at the point that was tried.
+    /// Afterwards the step is what was accepted, or what it was before.
     fn correct<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

@@ -13,9 +13,9 @@
 //! | `barrier` | how `μ` shrinks |
 //! | `elastic` | penalties where no step makes progress |
 //!
-//! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the Riccati
-//! recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has a factor of
-//! Cholesky.
+//! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the
+//! Riccati recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has
+//! a factor of Cholesky.
 
 mod barrier;
 mod direction;
@@ -53,14 +53,15 @@ use alloc::vec::Vec;
 /// min  f(v) − μ Σ log s        x_{k+1} = φ(x_k, u_k),  σ (g(v) − bound) = s,  x₀[i] = x_N[i] where asked
 /// ```
 ///
-/// It needs dynamics with second derivatives ([`SecondOrder`](super::SecondOrder)). Bounds that are equal
-/// are equations; soft ones have their penalties. An iteration costs one evaluation with Hessians, one
-/// Riccati factorisation, and one simulation for each point that the line search tries. Where no step makes
-/// progress, hard bounds of states and constraints get penalties, and the bound that stays violated most is
-/// named. The iterate of the problem is the best one afterwards, whatever the status.
+/// It needs dynamics with second derivatives ([`SecondOrder`](super::SecondOrder)). Bounds that are
+/// equal are equations; soft ones have their penalties. An iteration costs one evaluation with
+/// Hessians, one Riccati factorisation, and one simulation for each point that the line search
+/// tries. Where no step makes progress, hard bounds of states and constraints get penalties, and
+/// the bound that stays violated most is named. The iterate of the problem is the best one
+/// afterwards, whatever the status.
 ///
-/// A. Wächter, L. T. Biegler, Math. Program. 106 (2006); periodic states by parametric recursion, inertia by
-/// J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977).
+/// A. Wächter, L. T. Biegler, Math. Program. 106 (2006); periodic states by parametric recursion,
+/// inertia by J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977).
 #[derive(Clone, Debug)]
 pub struct Ipm<T, D, M, I> {
     /// Options, which may be changed between calls.

@@ -136,7 +136,8 @@ where
         result.map(|()| outcome)
     }
 
-    /// Memory for all that may come, a point inside of the bounds, and what is remembered of the problem.
+    /// Memory for all that may come, a point inside of the bounds, and what is remembered of the
+    /// problem.
     fn prepare<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

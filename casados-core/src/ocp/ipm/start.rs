@@ -5,8 +5,8 @@ use crate::qp::interior::{Iterate, set};
 use crate::qp::{Bounds, Places, QpView, SolutionView, StageDims, part_mut};
 use crate::scalar::Real;
 
-/// Moves states and controls that have hard bounds away from these by `κ max(1, |bound|)`, and by no
-/// more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
+/// Moves states and controls that have hard bounds away from these by `κ max(1, |bound|)`, and by
+/// no more than `κ` of the room between two bounds (Wächter and Biegler, section 3.6).
 pub(super) fn push_inside<T: Real>(
     qp: QpView<'_, T>,
     fixed: bool,
@@ -58,8 +58,8 @@ impl<T: Real> MinOf for T {
     }
 }
 
-/// Slacks at the distances from the bounds, and no less than `push`; multipliers of a warm start, or
-/// one. `values` are evaluated already, so that distances are in `scratch`.
+/// Slacks at the distances from the bounds, and no less than `push`; multipliers of a warm start,
+/// or one. `values` are evaluated already, so that distances are in `scratch`.
 pub(super) fn begin_sides<T: Real>(
     iterate: &mut Iterate<'_, T>,
     options: &IpmOptions,
@@ -70,7 +70,8 @@ pub(super) fn begin_sides<T: Real>(
     let push = T::from_f64(if warm { options.warm_push } else { options.bound_push });
     let sides = &mut iterate.sides;
     let count = sides.counts.sides();
-    // Variables are inside of their hard bounds; their slacks are exact and stay so. Others are pushed.
+    // Variables are inside of their hard bounds; their slacks are exact and stay so. Others are
+    // pushed.
     let general = super::newton::is_general::<T>(iterate.qp, sides.rows);
     for (((slack, &distance), &bound), general) in
         sides.slack.iter_mut().zip(&*sides.scratch).zip(&*sides.bound).zip(general)

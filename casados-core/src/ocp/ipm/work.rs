@@ -21,8 +21,8 @@ pub(super) struct Work<'a, T> {
     pub multiplier_step: &'a mut [T],
     /// Multipliers `π` after the full step.
     pub pi: &'a mut [T],
-    /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those of
-    /// the barrier go as far as they stay positive.
+    /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those
+    /// of the barrier go as far as they stay positive.
     pub curving: &'a mut [T],
     /// Over the variables of a stage.
     pub scratch: &'a mut [T],

@@ -4,13 +4,14 @@ use super::get;
 use crate::qp::Bounds;
 use crate::scalar::Real;
 
-/// Active bounds weigh this much, relative to the largest element of the Hessians: what they miss is its inverse.
+/// Active bounds weigh this much, relative to the largest element of the Hessians: what they miss
+/// is its inverse.
 pub(super) fn weight<T: Real>() -> T {
     T::ONE / T::from_f64(T::EPSILON).sqrt()
 }
 
-/// What a bound adds to the Hessian, from its slack, multiplier and penalties: much where it is active, its quadratic penalty where
-/// it is violated softly.
+/// What a bound adds to the Hessian, from its slack, multiplier and penalties: much where it is
+/// active, its quadratic penalty where it is violated softly.
 fn stiffness<T: Real>(slack: T, multiplier: T, linear: T, quadratic: T, active: T) -> T {
     if !slack.is_finite() {
         T::ZERO

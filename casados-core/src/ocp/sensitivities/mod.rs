@@ -14,7 +14,8 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
 
-/// `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp` of a solution, and the gains of the feedback `u_k + K_k (x − x_k)`.
+/// `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp` of a solution, and the gains of the feedback
+/// `u_k + K_k (x − x_k)`.
 ///
 /// Derivatives with respect to `p` are those where the parameters of all stages change together.
 #[derive(Clone, Debug)]
@@ -30,7 +31,8 @@ pub struct Sensitivities<T> {
     x_p: Vec<T>,
     u_p: Vec<T>,
     problem: parameters::Parameters<T>,
-    /// `P` of the next stage, `P [A B]`, `M`, its factors, and for the parameters the gradients of stage and next stage.
+    /// `P` of the next stage, `P [A B]`, `M`, its factors, and for the parameters the gradients of
+    /// stage and next stage.
     work: Vec<T>,
 }
 
@@ -98,17 +100,18 @@ fn zeros<T: Real>(length: usize) -> Result<Vec<T>, OcpError> {
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// How the solution changes with its initial state and with parameters, where the bounds that are active stay so: the iterate must
-    /// be a solution, with a fixed initial state.
+    /// How the solution changes with its initial state and with parameters, where the bounds that
+    /// are active stay so: the iterate must be a solution, with a fixed initial state.
     ///
-    /// With [`Exact`](super::Exact) Hessians that are not made convex these are derivatives of the solution; with those of Gauss and
-    /// Newton, which leave second derivatives of dynamics, constraints and least squares out of what parameters change, too, they are
-    /// approximations of the same quality. One Riccati recursion: [`OcpError::Qp`] if the reduced
-    /// Hessian is not positive definite.
+    /// With [`Exact`](super::Exact) Hessians that are not made convex these are derivatives of the
+    /// solution; with those of Gauss and Newton, which leave second derivatives of dynamics,
+    /// constraints and least squares out of what parameters change, too, they are approximations of
+    /// the same quality. One Riccati recursion: [`OcpError::Qp`] if the reduced Hessian is not
+    /// positive definite.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory is of
-    /// another problem.
+    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is not fixed;
+    /// [`OcpError::Length`] if the memory is of another problem.
     pub fn differentiate<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -123,12 +126,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(())
     }
 
-    /// The gains `K_k` of the last QP at its solution, which is the iterate: after a feedback of [`RealTime`](super::RealTime) those of the feedback
-    /// that was given, to be used until the next one. Nothing is linearised for it, and nothing else than gains is in the result.
+    /// The gains `K_k` of the last QP at its solution, which is the iterate: after a feedback of
+    /// [`RealTime`](super::RealTime) those of the feedback that was given, to be used until the
+    /// next one. Nothing is linearised for it, and nothing else than gains is in the result.
     ///
     /// # Errors
-    /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory is of another problem; [`OcpError::Qp`] if
-    /// the reduced Hessian is not positive definite.
+    /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory
+    /// is of another problem; [`OcpError::Qp`] if the reduced Hessian is not positive definite.
     pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
         self.check_memory(result)?;
         recursion::backward(self.qp.view(), &self.iterate, result)?;

@@ -1,4 +1,5 @@
-//! The Riccati recursion of derivatives: `K_k` and what parameters do, backwards; `dx_k` and `du_k`, forwards.
+//! The Riccati recursion of derivatives: `K_k` and what parameters do, backwards; `dx_k` and
+//! `du_k`, forwards.
 
 use super::active::{both, weight};
 use super::{Sensitivities, add, get, set};

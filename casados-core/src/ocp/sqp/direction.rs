@@ -1,4 +1,5 @@
-//! The direction of a step: the QP at the iterate, regularised where it is not convex, with penalties where it is infeasible.
+//! The direction of a step: the QP at the iterate, regularised where it is not convex, with
+//! penalties where it is infeasible.
 
 use super::Sqp;
 use super::elastic::Worst;

@@ -1,4 +1,5 @@
-//! Elastic mode: bounds of states and constraints get linear penalties, so that a QP has a solution.
+//! Elastic mode: bounds of states and constraints get linear penalties, so that a QP has a
+//! solution.
 
 use crate::ocp::instance::{Initial, Ocp};
 use crate::ocp::problem::Formulation;
@@ -43,8 +44,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// Writes them as they were, or with a number in place of infinite ones: of states but those at the start, and of
-    /// constraints.
+    /// Writes them as they were, or with a number in place of infinite ones: of states but those at
+    /// the start, and of constraints.
     pub(in crate::ocp) fn set_penalties(&mut self, memory: &[T], elastic: Option<T>) {
         let mut begin = 0;
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
@@ -69,7 +70,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
     }
 
-    /// The largest violation of a bound that is hard, by the penalties that are remembered, and the sum of all of them.
+    /// The largest violation of a bound that is hard, by the penalties that are remembered, and the
+    /// sum of all of them.
     pub(in crate::ocp) fn worst(&self, memory: &[T]) -> (Option<Worst>, f64) {
         let (mut worst, mut sum): (Option<Worst>, f64) = (None, 0.0);
         let mut begin = 0;

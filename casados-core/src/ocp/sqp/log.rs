@@ -36,7 +36,8 @@ pub struct Iteration {
     pub step: f64,
     /// Iterations of QPs.
     pub qp_iterations: usize,
-    /// What was added to the diagonal of the Hessian because the QP was not convex ([`Convexification::Reduced`](super::super::Convexification)).
+    /// What was added to the diagonal of the Hessian because the QP was not convex
+    /// ([`Convexification::Reduced`](super::super::Convexification)).
     pub regularisation: f64,
     /// Whether bounds had penalties because the QP was infeasible.
     pub elastic: bool,
@@ -54,14 +55,16 @@ pub struct Iteration {
 pub enum Status {
     /// The conditions of optimality hold.
     Converged,
-    /// The conditions of optimality hold to the acceptable tolerance, and no better point was found.
+    /// The conditions of optimality hold to the acceptable tolerance, and no better point was
+    /// found.
     Acceptable,
     /// The iterations were used up.
     MaxIterations,
     /// The observer stopped it.
     Stopped,
-    /// Near the iterate no point satisfies all constraints: no direction makes the sum of its gaps and violations smaller by a
-    /// thousandth, to first order. This is the constraint that the iterate violates most.
+    /// Near the iterate no point satisfies all constraints: no direction makes the sum of its gaps
+    /// and violations smaller by a thousandth, to first order. This is the constraint that the
+    /// iterate violates most.
     Infeasible {
         /// The constraint.
         constraint: ConstraintName,

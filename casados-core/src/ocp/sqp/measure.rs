@@ -9,7 +9,8 @@ use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, assig
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// Objective with penalties of soft bounds, and the sum of all violations of what is hard, each times its weight.
+/// Objective with penalties of soft bounds, and the sum of all violations of what is hard, each
+/// times its weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Measure {
     pub objective: f64,

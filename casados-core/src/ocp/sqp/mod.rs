@@ -35,7 +35,8 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`GaussNewton`] or [`Exact`].
+/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`GaussNewton`]
+/// or [`Exact`].
 ///
 /// Memory is made for one problem, of whose dimensions all others are to be.
 pub struct Sqp<S, C, T, D, M> {
@@ -53,7 +54,8 @@ pub struct Sqp<S, C, T, D, M> {
     best: Solution<T, D, M>,
     /// The weights of constraints in the merit function, in the places of their multipliers.
     weights: Solution<T, D, M>,
-    /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode exchanges.
+    /// Ends of intervals and constraints at points that are tried, then penalties that elastic mode
+    /// exchanges.
     work: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,

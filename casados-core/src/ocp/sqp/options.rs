@@ -7,20 +7,24 @@ use crate::ocp::error::OcpError;
 pub enum Globalisation {
     /// All the way, always.
     FullStep,
-    /// As far as the merit function `f + Σ ν_i |c_i|` shrinks as it should, with second-order correction. Each constraint has a
-    /// weight of its own, which follows its multiplier: `ν ← max(|λ|, ½ (ν + |λ|))` (M. J. D. Powell, "A fast algorithm for
-    /// nonlinearly constrained optimization calculations", 1978). It does not depend on the units of constraints, and near a
-    /// solution full steps are what it accepts: the linearisation there is that of the next iteration.
+    /// As far as the merit function `f + Σ ν_i |c_i|` shrinks as it should, with second-order
+    /// correction. Each constraint has a weight of its own, which follows its multiplier:
+    /// `ν ← max(|λ|, ½ (ν + |λ|))` (M. J. D. Powell, "A fast algorithm for nonlinearly constrained
+    /// optimization calculations", 1978). It does not depend on the units of constraints, and near
+    /// a solution full steps are what it accepts: the linearisation there is that of the next
+    /// iteration.
     #[default]
     Merit,
-    /// As far as objective or violation shrink compared to all iterates before, with second-order correction.
+    /// As far as objective or violation shrink compared to all iterates before, with second-order
+    /// correction.
     Filter,
 }
 
 /// Options of [`Sqp`](super::Sqp).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SqpOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Default 1e-6; of single precision 1e-3.
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Default
+    /// 1e-6; of single precision 1e-3.
     pub tolerance: f64,
     /// Default 200.
     pub max_iterations: usize,
@@ -28,10 +32,11 @@ pub struct SqpOptions {
     pub globalisation: Globalisation,
     /// Whether QPs begin at the solution of the one before. Default true.
     pub warm_start: bool,
-    /// QPs are solved to this part of the largest residual, if that is more than the solver's own tolerance: what the
-    /// linearisation is off by is more. From 0 to 1, default 1e-4.
+    /// QPs are solved to this part of the largest residual, if that is more than the solver's own
+    /// tolerance: what the linearisation is off by is more. From 0 to 1, default 1e-4.
     pub qp_accuracy: f64,
-    /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default true.
+    /// Whether bounds of states and constraints get penalties while a QP is infeasible. Default
+    /// true.
     pub elastic: bool,
     /// These penalties, linear; positive. Default 1e3.
     pub elastic_penalty: f64,

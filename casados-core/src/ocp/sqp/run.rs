@@ -19,7 +19,8 @@ use core::ops::ControlFlow;
 #[cfg(feature = "alloc")]
 const ROOM: usize = 64;
 
-/// After so many steps with penalties in a row it is the sum of violations that is made small, and its curvature counts.
+/// After so many steps with penalties in a row it is the sum of violations that is made small, and
+/// its curvature counts.
 const PASSING: usize = 4;
 
 /// What a run remembers from one iteration to the next.
@@ -50,8 +51,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
     ///
     /// # Errors
-    /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where full steps went to a point at
-    /// which something has no value: then the iterate is the best one, too.
+    /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
+    /// full steps went to a point at which something has no value: then the iterate is the best
+    /// one, too.
     pub fn solve<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
@@ -203,7 +205,8 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         (row.step, row.corrected) = (taken.length, taken.corrected);
         state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
         if row.elastic && C::EXACT && state.elastic_steps <= PASSING {
-            // On the way to a feasible point forces of penalties are no multipliers: curvatures would be far too large.
+            // On the way to a feasible point forces of penalties are no multipliers: curvatures
+            // would be far too large.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
             state.search.linearised = None;
             self.weights.multipliers_mut().fill(T::ZERO);

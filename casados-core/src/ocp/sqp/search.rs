@@ -24,7 +24,8 @@ const ARMIJO: f64 = 1e-4;
 pub(super) struct Search {
     entries: [Measure; ENTRIES],
     count: usize,
-    /// Whether the last step was a full one: then the next full step is tried by linearising there, which is not to be done again.
+    /// Whether the last step was a full one: then the next full step is tried by linearising there,
+    /// which is not to be done again.
     full: bool,
     /// Seconds of the linearisation at the iterate, if there is one.
     pub linearised: Option<f64>,
@@ -68,7 +69,8 @@ impl Search {
                 if dominated.next().is_some() {
                     return false;
                 }
-                // Where the objective is expected to shrink far more than there is violation, it must (Wächter and Biegler, (19)).
+                // Where the objective is expected to shrink far more than there is violation, it
+                // must (Wächter and Biegler, (19)).
                 let descends = model.slope < 0.0
                     && length * Scalar::powf(-model.slope, 2.3) > Scalar::powf(here.violation, 1.1);
                 if descends {
@@ -93,7 +95,8 @@ fn better(a: &Measure, b: &Measure, noise: f64) -> bool {
 }
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
-    /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short enough.
+    /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short
+    /// enough.
     ///
     /// # Errors
     /// [`OcpError`] of the linearisation at the iterate, if that has to be repeated.

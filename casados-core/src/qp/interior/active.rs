@@ -1,12 +1,15 @@
-//! Warm starts by active sets: Newton's method on `min(s, λ) = 0` instead of `s λ = μ` (M. Hintermüller, K. Ito, K. Kunisch,
-//! "The primal-dual active set strategy as a semismooth Newton method", SIAM J. Optim. 13, 2002).
+//! Warm starts by active sets: Newton's method on `min(s, λ) = 0` instead of `s λ = μ` (M.
+//! Hintermüller, K. Ito, K. Kunisch, "The primal-dual active set strategy as a semismooth Newton
+//! method", SIAM J. Optim. 13, 2002).
 //!
-//! Of a QP that resembles the last one mostly the same bounds are active, and the multipliers tell which. With these as
-//! equations one factorisation solves it; then bounds that are violated become active, and those that pull cease to be.
-//! An interior point, which has to leave the boundary first, needs several times as many. Where the sets do not settle it is
-//! asked all the same, so that nothing depends on whether they do.
+//! Of a QP that resembles the last one mostly the same bounds are active, and the multipliers tell
+//! which. With these as equations one factorisation solves it; then bounds that are violated become
+//! active, and those that pull cease to be. An interior point, which has to leave the boundary
+//! first, needs several times as many. Where the sets do not settle it is asked all the same, so
+//! that nothing depends on whether they do.
 //!
-//! With the distance `d = σ (c v − bound)`, a weight `W`, and penalties `l e + ½ q e²` of a violation `e`:
+//! With the distance `d = σ (c v − bound)`, a weight `W`, and penalties `l e + ½ q e²` of a
+//! violation `e`:
 //!
 //! ```text
 //! inactive   λ = 0           until d < 0
@@ -31,8 +34,8 @@ const VIOLATED: u32 = 2;
 const REFINEMENTS: usize = 3;
 
 impl<T: Real> Iterate<'_, T> {
-    /// The solution from a point and its multipliers, if not more than some active sets are between them and no pivot
-    /// vanishes; otherwise what it took to see that.
+    /// The solution from a point and its multipliers, if not more than some active sets are between
+    /// them and no pivot vanishes; otherwise what it took to see that.
     #[inline(always)]
     pub fn by_active_sets<E: Packed<T>>(
         &mut self,
@@ -116,7 +119,8 @@ impl<T: Real> Iterate<'_, T> {
     }
 }
 
-/// Here `slack` is the distance `d`, which may be negative, and `target` the force that the gradient knows of.
+/// Here `slack` is the distance `d`, which may be negative, and `target` the force that the
+/// gradient knows of.
 impl<T: Real> Sides<'_, T> {
     /// `l − q d`, the force of a violated side.
     #[inline(always)]

@@ -6,10 +6,10 @@
 //!                         [ ·    S   ] [θ ] = − [s + c]            c = x₀ − x_N
 //! ```
 //!
-//! The multipliers `θ` are parameters of the recursion: each is a further right-hand side on the way
-//! back, and the way forth is gone once. `E` has a column for each state that is tied. Inertia adds up
-//! (Haynsworth): the step is one of a minimum where pivots of controls and of the border together have
-//! as many negative signs as there are conditions.
+//! The multipliers `θ` are parameters of the recursion: each is a further right-hand side on the
+//! way back, and the way forth is gone once. `E` has a column for each state that is tied. Inertia
+//! adds up (Haynsworth): the step is one of a minimum where pivots of controls and of the border
+//! together have as many negative signs as there are conditions.
 
 use super::iterate::Iterate;
 use super::kernels::{Columns, subtract};

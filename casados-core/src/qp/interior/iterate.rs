@@ -11,10 +11,12 @@ use crate::qp::statistics::{Residuals, larger as larger_or_nan};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
-/// A point, its multipliers and residuals. Vectors over rows are `v` and the values of general constraints of each stage.
+/// A point, its multipliers and residuals. Vectors over rows are `v` and the values of general
+/// constraints of each stage.
 ///
-/// The residuals of linear conditions are not computed again in every iteration: a step of length `α` leaves `1 − α` of
-/// them. The multipliers of the dynamics are not needed for that, and come from a recursion at the end.
+/// The residuals of linear conditions are not computed again in every iteration: a step of length
+/// `α` leaves `1 − α` of them. The multipliers of the dynamics are not needed for that, and come
+/// from a recursion at the end.
 pub struct Iterate<'a, T> {
     pub qp: QpView<'a, T>,
     pub first: First,
@@ -79,15 +81,16 @@ impl<T: Real> From<Largest<T>> for Residuals {
 pub enum Costates<'c, 'm, T> {
     /// The adjoint recursion: the gradient in the states vanishes.
     Adjoint,
-    /// The adjoint recursion of the controlled system, with the last factors: where the gradient in the
-    /// controls vanishes both are the same, and errors decay where the adjoint recursion lets them grow.
-    /// With the changes of the multipliers of a coupling.
+    /// The adjoint recursion of the controlled system, with the last factors: where the gradient in
+    /// the controls vanishes both are the same, and errors decay where the adjoint recursion lets
+    /// them grow. With the changes of the multipliers of a coupling.
     Controlled(Option<&'c Coupling<'m, T>>),
     /// They are given.
     Given,
 }
 
-/// The residuals as a function of its own; the gradient only where there is room for multipliers and the objective.
+/// The residuals as a function of its own; the gradient only where there is room for multipliers
+/// and the objective.
 struct Evaluate<'s, 'a, T, E> {
     iterate: &'s mut Iterate<'a, T>,
     values: bool,
@@ -145,7 +148,8 @@ impl<'a, T: Real> Iterate<'a, T> {
         }
     }
 
-    /// What sides and equations give way to forces, and variables if they are to, in the units of the problem.
+    /// What sides and equations give way to forces, and variables if they are to, in the units of
+    /// the problem.
     pub fn regularise(&mut self, proximal: bool) {
         let Terms { forces, values } = self.terms;
         let (small, stiffness) = (T::from_f64(T::EPSILON).sqrt(), forces / values.max(T::ONE));
@@ -153,13 +157,15 @@ impl<'a, T: Real> Iterate<'a, T> {
         self.proximal = if proximal { small * stiffness.max(T::from_f64(1e-4)) } else { T::ZERO };
     }
 
-    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π` that make the gradient of the
-    /// Lagrangian in `x` zero, and the gradient in `u`. Returns the objective.
+    /// Computes all residuals from the point: general constraints, dynamics, the multipliers `π`
+    /// that make the gradient of the Lagrangian in `x` zero, and the gradient in `u`. Returns the
+    /// objective.
     pub fn evaluate<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> T {
         self.evaluate_parts::<E>(true, Some(multipliers), Costates::Adjoint)
     }
 
-    /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is what they leave.
+    /// As [`evaluate`](Self::evaluate) with given multipliers `π`: the gradient in the states is
+    /// what they leave.
     pub fn evaluate_at<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
         let _ = self.evaluate_parts::<E>(true, Some(multipliers), Costates::Given);
     }
@@ -173,12 +179,14 @@ impl<'a, T: Real> Iterate<'a, T> {
         let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled(coupling));
     }
 
-    /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are in `scratch` afterwards.
+    /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are
+    /// in `scratch` afterwards.
     pub fn evaluate_values<E: Packed<T>>(&mut self) {
         let _ = self.evaluate_parts::<E>(true, None, Costates::Adjoint);
     }
 
-    /// What is left of [`evaluate`](Self::evaluate) after [`evaluate_values`](Self::evaluate_values).
+    /// What is left of [`evaluate`](Self::evaluate) after
+    /// [`evaluate_values`](Self::evaluate_values).
     pub fn evaluate_gradient<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
         let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Adjoint);
     }
@@ -336,12 +344,14 @@ impl<'a, T: Real> Iterate<'a, T> {
         costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))
     }
 
-    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, after [`evaluate`](Self::evaluate).
+    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, after
+    /// [`evaluate`](Self::evaluate).
     #[inline(always)]
     pub fn judged<E: Packed<T>>(&mut self) -> Largest<T> {
         let Largest { stationarity, dynamics, .. } = self.residuals::<E>();
         let (inequalities, complementarity) = self.sides.judge();
-        // The multipliers of the dynamics make gradients zero but for rounding, which is a part of the terms.
+        // The multipliers of the dynamics make gradients zero but for rounding, which is a part of
+        // the terms.
         let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
         Largest {
             stationarity: larger_or_nan(stationarity, rounding),

@@ -1,17 +1,18 @@
 //! Products of small dense matrices, in tiles of registers.
 //!
-//! All matrices lie column after column, and columns are whole registers apart. Rows of a tile are registers of `X`,
-//! its columns are elements of `Y` in all lanes: two registers times six elements are twelve sums, and with what they are
-//! computed from they leave one of the sixteen registers of AVX2 free. Three times four leave none, and the compiler
-//! then keeps sums in memory, which takes twice as long. Everything is inlined into the function that was compiled for `E`.
+//! All matrices lie column after column, and columns are whole registers apart. Rows of a tile are
+//! registers of `X`, its columns are elements of `Y` in all lanes: two registers times six elements
+//! are twelve sums, and with what they are computed from they leave one of the sixteen registers of
+//! AVX2 free. Three times four leave none, and the compiler then keeps sums in memory, which takes
+//! twice as long. Everything is inlined into the function that was compiled for `E`.
 
 use crate::qp::layout::part;
 use crate::scalar::{Packed, Piece, Real, Registers};
 use core::marker::PhantomData;
 use core::ops::Range;
 
-/// Columns of tiles, which are even: what begins at an even column and is no longer than columns, whose length is even,
-/// does not end behind them.
+/// Columns of tiles, which are even: what begins at an even column and is no longer than columns,
+/// whose length is even, does not end behind them.
 const WIDE: usize = 6;
 const NARROW: usize = 4;
 const PAIR: usize = 2;
@@ -167,8 +168,9 @@ pub enum Part {
 
 /// `target = source − X Yᵀ` with `rows` × `columns` elements; the source is zero where it ends.
 ///
-/// Columns are taken in tiles from the first one on, which is even, and so is where `Y` begins in its columns. [`MORE`] columns
-/// than asked for are written if the target has them, and rows up to whole registers.
+/// Columns are taken in tiles from the first one on, which is even, and so is where `Y` begins in
+/// its columns. [`MORE`] columns than asked for are written if the target has them, and rows up to
+/// whole registers.
 #[inline(always)]
 pub fn product<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -302,7 +304,8 @@ fn subtract_rows<T: Real, E: Packed<T>, const R: usize>(
     }
 }
 
-/// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must be zero in one of them.
+/// `target + Xᵀ v`: `columns` products of columns of `X` with `v`, of `rows` elements. Padding must
+/// be zero in one of them.
 #[inline(always)]
 pub fn add_transposed<T: Real, E: Packed<T>>(
     target: &mut [T],
@@ -329,8 +332,8 @@ pub fn add_transposed<T: Real, E: Packed<T>>(
     }
 }
 
-/// `target + H v` with a symmetric matrix whose lower triangle is there; above it may be anything. Target and `v` are padded, `v` with
-/// zeros.
+/// `target + H v` with a symmetric matrix whose lower triangle is there; above it may be anything.
+/// Target and `v` are padded, `v` with zeros.
 #[inline(always)]
 pub fn symmetric<T: Real, E: Packed<T>>(target: &mut [T], h: &[T], ld: usize, v: &[T], n: usize) {
     let mut index = <E::Cell as bytemuck::Zeroable>::zeroed();

@@ -1,5 +1,5 @@
-//! The library's own solver: a primal-dual interior point with Mehrotra's predictor and corrector, whose linear systems
-//! are solved by a Riccati recursion.
+//! The library's own solver: a primal-dual interior point with Mehrotra's predictor and corrector,
+//! whose linear systems are solved by a Riccati recursion.
 
 mod active;
 mod coupling;
@@ -44,14 +44,15 @@ use run::{Attempt, Limits, Run};
 
 /// An interior point that exploits the structure of optimal control.
 ///
-/// Each iteration costs one Riccati factorisation, `O(N (nx + nu)³)`, and two solves. With the feature `alloc` its memory is
-/// on the heap, and is allocated by the first call and by calls with larger problems only. Elsewhere see
-/// [`InteriorPoint::in_memory`].
+/// Each iteration costs one Riccati factorisation, `O(N (nx + nu)³)`, and two solves. With the
+/// feature `alloc` its memory is on the heap, and is allocated by the first call and by calls with
+/// larger problems only. Elsewhere see [`InteriorPoint::in_memory`].
 ///
-/// A warm start first takes the bounds with multipliers for the active ones, and corrects this set by semismooth Newton steps
-/// (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as a semismooth Newton method", SIAM J. Optim. 13, 2002): for a
-/// problem like the last one a single factorisation is enough. Where
-/// [`active_sets`](InteriorPointOptions::active_sets) of them are not, the interior point follows.
+/// A warm start first takes the bounds with multipliers for the active ones, and corrects this set
+/// by semismooth Newton steps (Hintermüller, Ito, Kunisch, "The primal-dual active set strategy as
+/// a semismooth Newton method", SIAM J. Optim. 13, 2002): for a problem like the last one a single
+/// factorisation is enough. Where [`active_sets`](InteriorPointOptions::active_sets) of them are
+/// not, the interior point follows.
 ///
 /// Violated bounds of an infeasible problem are found by solving it once more with all bounds soft.
 #[derive(Clone, Debug)]
@@ -86,8 +87,9 @@ impl<T: Real> Default for HeapInteriorPoint<T> {
 }
 
 impl<T: Real, N, I> InteriorPoint<T, N, I> {
-    /// How many numbers and indices the solver takes for a problem with so many finite bounds (each side for itself), soft
-    /// ones among them, and equations (pairs of equal hard bounds) beside the state at the start.
+    /// How many numbers and indices the solver takes for a problem with so many finite bounds (each
+    /// side for itself), soft ones among them, and equations (pairs of equal hard bounds) beside
+    /// the state at the start.
     ///
     /// To locate what makes a problem infeasible it takes as much as if all were soft.
     #[must_use]
@@ -155,7 +157,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         Ok(())
     }
 
-    /// Other attempts at a problem that the first did not solve, and the reason if there is no solution.
+    /// Other attempts at a problem that the first did not solve, and the reason if there is no
+    /// solution.
     fn again(
         &mut self,
         qp: QpView<'_, T>,

@@ -8,7 +8,8 @@ use crate::qp::layout::{Places, assign, part, part_mut};
 use crate::scalar::{Packed, Real};
 
 impl<T: Real> Iterate<'_, T> {
-    /// Newton's step, with `s Δλ + λ Δs = s · target`. Changes of slacks and multipliers are those of pairs afterwards.
+    /// Newton's step, with `s Δλ + λ Δs = s · target`. Changes of slacks and multipliers are those
+    /// of pairs afterwards.
     #[inline(always)]
     pub fn newton<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
         self.sides.push(factor);
@@ -17,8 +18,8 @@ impl<T: Real> Iterate<'_, T> {
         Ok(())
     }
 
-    /// Newton's equations with the weights of the sides, and what they add to the gradient in `scratch`, where the changes of
-    /// their distances are afterwards.
+    /// Newton's equations with the weights of the sides, and what they add to the gradient in
+    /// `scratch`, where the changes of their distances are afterwards.
     #[inline(always)]
     pub fn solve<E: Packed<T>>(&mut self, factor: bool) -> Result<(), QpError> {
         self.assemble(factor);
@@ -66,8 +67,8 @@ impl<T: Real> Iterate<'_, T> {
         self.sides.gather(self.step, |value, _| value, |value, _| -value);
     }
 
-    /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals stay as
-    /// they were.
+    /// Goes a part of the step, and another part of that of the multipliers of sides. Residuals
+    /// stay as they were.
     pub fn go(&mut self, primal: T, dual: T) {
         add_scaled(self.v, primal, self.step);
         add_scaled(self.sides.slack, primal, self.sides.slack_step);

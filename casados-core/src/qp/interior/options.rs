@@ -6,29 +6,31 @@ use crate::scalar::Real;
 /// Options of the interior point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InteriorPointOptions {
-    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below this, or below `relative_tolerance`. Default
-    /// 1e-8; of single precision 1e-4.
+    /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below this, or below
+    /// `relative_tolerance`. Default 1e-8; of single precision 1e-4.
     pub tolerance: f64,
-    /// Residuals may be this part of the largest of the terms whose sums they are: stationarity and complementarity of
-    /// `H v`, `h`, forces of constraints and multipliers `π`; dynamics and inequalities of `v`, values of general constraints
-    /// and `b`. What is asked for is the larger one of this and `tolerance`. Default 0, absolute; of single precision, where
-    /// terms have no more than seven digits, 1e-5.
+    /// Residuals may be this part of the largest of the terms whose sums they are: stationarity and
+    /// complementarity of `H v`, `h`, forces of constraints and multipliers `π`; dynamics and
+    /// inequalities of `v`, values of general constraints and `b`. What is asked for is the larger
+    /// one of this and `tolerance`. Default 0, absolute; of single precision, where terms have no
+    /// more than seven digits, 1e-5.
     pub relative_tolerance: f64,
     /// Default 50.
     pub max_iterations: usize,
     /// Where the products of slacks and multipliers begin. Default 1.
     pub start_mu: f64,
-    /// How many sets of active bounds a warm start tries before slacks and multipliers are moved away from zero and the
-    /// interior point begins. Each costs less than one of its iterations, and counts as one. Default 4.
+    /// How many sets of active bounds a warm start tries before slacks and multipliers are moved
+    /// away from zero and the interior point begins. Each costs less than one of its iterations,
+    /// and counts as one. Default 4.
     pub active_sets: usize,
     /// Slacks and multipliers of a warm start are at least this. Default 1e-3.
     pub warm_distance: f64,
-    /// Whether a QP that was not solved is tried again, with as many iterations each time: from a cold start, with proximal terms,
-    /// and with all bounds soft, to see which of them cannot be satisfied. Otherwise it is tried again with the iterations that
-    /// are left. Default true.
+    /// Whether a QP that was not solved is tried again, with as many iterations each time: from a
+    /// cold start, with proximal terms, and with all bounds soft, to see which of them cannot be
+    /// satisfied. Otherwise it is tried again with the iterations that are left. Default true.
     pub locate: bool,
-    /// Lower bounds of minus this or less, and upper ones of this or more, mean that there is none. Default 1e15; of single
-    /// precision 1e7, where seven digits leave no unit.
+    /// Lower bounds of minus this or less, and upper ones of this or more, mean that there is none.
+    /// Default 1e15; of single precision 1e7, where seven digits leave no unit.
     pub no_bound: f64,
 }
 

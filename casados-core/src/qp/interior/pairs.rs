@@ -1,9 +1,11 @@
 //! Slacks and multipliers of all sides: their steps, products and distances.
 //!
-//! A side gives way to its multiplier: `σ (c v − bound) + e + δ (λ − λ₊) = s`, as the proximal method of multipliers has it
-//! (R. T. Rockafellar, "Augmented Lagrangians and applications of the proximal point algorithm", Math. Oper. Res. 1, 1976; S. Pougkakiotis,
-//! J. Gondzio, "An interior point-proximal method of multipliers for convex quadratic programming", Comput. Optim. Appl. 78, 2021). Its weight
-//! `λ / (s + δ λ)` stays below `1 / δ` then, however small its slack is, and leaves the digits of the Hessian beside it.
+//! A side gives way to its multiplier: `σ (c v − bound) + e + δ (λ − λ₊) = s`, as the proximal
+//! method of multipliers has it (R. T. Rockafellar, "Augmented Lagrangians and applications of the
+//! proximal point algorithm", Math. Oper. Res. 1, 1976; S. Pougkakiotis, J. Gondzio, "An interior
+//! point-proximal method of multipliers for convex quadratic programming", Comput. Optim. Appl. 78,
+//! 2021). Its weight `λ / (s + δ λ)` stays below `1 / δ` then, however small its slack is, and
+//! leaves the digits of the Hessian beside it.
 
 use super::iterate::at;
 use super::sides::{Sides, set};
@@ -50,8 +52,8 @@ impl<T: Real> Sides<'_, T> {
         }
     }
 
-    /// Slacks at least this far from zero, with multipliers from a solution or such that all products are equal.
-    /// `scratch` has the distances from the bounds.
+    /// Slacks at least this far from zero, with multipliers from a solution or such that all
+    /// products are equal. `scratch` has the distances from the bounds.
     pub fn begin(&mut self, start: Start, distance: T, solution: &SolutionView<'_, T>) {
         let sides = self.counts.sides();
         for (slack, &value) in self.slack.iter_mut().zip(&*self.scratch).take(sides) {
@@ -73,7 +75,8 @@ impl<T: Real> Sides<'_, T> {
             else {
                 break;
             };
-            // The gradient with respect to the violation vanishes from the start: λ + ν = linear + quadratic e.
+            // The gradient with respect to the violation vanishes from the start: λ + ν = linear +
+            // quadratic e.
             let violation = (slack - value).max(distance);
             let force = linear + quadratic * violation;
             // Both products are as large as those of the others, or as equal as the force allows.
@@ -174,8 +177,8 @@ impl<T: Real> Sides<'_, T> {
         for (j, &side) in self.soft.iter().enumerate() {
             let Some(soft) = self.soft_side(j, side as usize) else { break };
             let change = at(self.scratch, side) + at(self.residual, side);
-            // The change of `s − e`, and their sum written such that it keeps its digits where the slack is small and its
-            // weight large.
+            // The change of `s − e`, and their sum written such that it keeps its digits where the
+            // slack is small and its weight large.
             let change = change * soft.share + compliance * soft.target;
             let violation = (soft.sum - soft.stiffness * change) * soft.inverse;
             let step = (soft.sum + soft.compliance * change) * soft.inverse;
@@ -214,7 +217,8 @@ impl<T: Real> Sides<'_, T> {
         })
     }
 
-    /// How far the step can go, at most 1, such that slacks and multipliers keep some part of what they have.
+    /// How far the step can go, at most 1, such that slacks and multipliers keep some part of what
+    /// they have.
     #[inline(always)]
     pub fn longest<E: Packed<T>>(&self, keep: T) -> T {
         let most = T::ONE - keep;
@@ -222,8 +226,8 @@ impl<T: Real> Sides<'_, T> {
         most / largest_negative_ratio::<T, E>(ratio, self.multiplier_step, self.multiplier)
     }
 
-    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, of distances from them in `scratch`, whatever
-    /// slacks and violations are.
+    /// The residuals of bounds as [`qp::residuals`](crate::qp::residuals) has them, of distances
+    /// from them in `scratch`, whatever slacks and violations are.
     pub fn judge(&mut self) -> (T, T) {
         let (mut inequalities, mut products) = (T::ZERO, T::ZERO);
         for (j, &side) in self.soft.iter().enumerate() {

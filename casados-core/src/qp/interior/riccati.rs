@@ -6,8 +6,8 @@
 //! M_uu = L Lᵀ,   K = M_xu L⁻ᵀ,   P = M_xx − K Kᵀ
 //! ```
 //!
-//! `(K; L)` is what is kept of a stage: a panel with a column for each control. The controls of a stage are few, so that
-//! this classical form needs less than the one with the square root of `P`.
+//! `(K; L)` is what is kept of a stage: a panel with a column for each control. The controls of a
+//! stage are few, so that this classical form needs less than the one with the square root of `P`.
 
 use super::kernels::{
     Columns, MORE, Part, Source, add_transposed, mirror, product, scale, subtract, subtract_column, symmetric,
@@ -26,8 +26,8 @@ pub enum First {
     Fixed,
     /// It is eliminated like controls.
     Free,
-    /// It is tied to the state at the end, and is found with the multipliers of that. Controls may then
-    /// have pivots of either sign: what counts is the inertia of the whole.
+    /// It is tied to the state at the end, and is found with the multipliers of that. Controls may
+    /// then have pivots of either sign: what counts is the inertia of the whole.
     Tied,
 }
 
@@ -57,7 +57,8 @@ pub struct Riccati<'a, T> {
     pub regularised: usize,
     /// Negative pivots, where these are allowed.
     pub negative: usize,
-    /// The largest element of the diagonals so far: what elimination has subtracted was as large as that.
+    /// The largest element of the diagonals so far: what elimination has subtracted was as large as
+    /// that.
     largest: T,
     /// Behind the last stage.
     pub end: Place,
@@ -161,8 +162,8 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, T, E> {
 }
 
 impl<T: Real> Riccati<'_, T> {
-    /// Solves Newton's equations, for a new matrix or for that of the last time and its `r`. `step` is `Δ`, with the changes of the general
-    /// constraints.
+    /// Solves Newton's equations, for a new matrix or for that of the last time and its `r`. `step`
+    /// is `Δ`, with the changes of the general constraints.
     ///
     /// # Errors
     /// [`QpError::NotConvex`]
@@ -178,7 +179,8 @@ impl<T: Real> Riccati<'_, T> {
         result
     }
 
-    /// The next solve with the same matrix has other residuals of the dynamics: none, but for rounding.
+    /// The next solve with the same matrix has other residuals of the dynamics: none, but for
+    /// rounding.
     pub fn no_dynamics(&mut self) {
         self.offset.fill(T::ZERO);
     }
@@ -262,7 +264,8 @@ impl<T: Real> Riccati<'_, T> {
             }
         }
         let w = Columns { data: &*self.w, ld };
-        // Columns are computed four at a time. The first with a control among them are needed whole.
+        // Columns are computed four at a time. The first with a control among them are needed
+        // whole.
         let whole = nx / 4 * 4;
         if stage > 0 || first != First::Fixed {
             product::<T, E>(self.m, ld, source, matrix, w, (nx, 0..whole, next + ng), Part::Lower);
@@ -343,9 +346,10 @@ impl<T: Real> Riccati<'_, T> {
         }
     }
 
-    /// An error if the Hessian curves downwards along the direction in which a pivot is negative: that of one control (behind
-    /// the controls, of a state at the start), with which the ones before it and all that come later move such that the rest of
-    /// `dᵀ M d` vanishes. Otherwise the pivot is rounding.
+    /// An error if the Hessian curves downwards along the direction in which a pivot is negative:
+    /// that of one control (behind the controls, of a state at the start), with which the ones
+    /// before it and all that come later move such that the rest of `dᵀ M d` vanishes. Otherwise
+    /// the pivot is rounding.
     fn verify(
         &mut self,
         qp: QpView<'_, T>,
@@ -474,7 +478,8 @@ fn substitute<T: Real>(u: &mut [T], panel: &[T], ld: usize, row: usize, inverse:
     }
 }
 
-/// `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables before `index`.
+/// `d` with `d_index = 1` and `L₁₁ᵀ d₁ = −l` before it, for the factors of the variables before
+/// `index`.
 fn unit<T: Real>(d: &mut [T], panel: &[T], ld: usize, row: usize, inverse: &[T], index: usize) {
     if let Some(d) = d.get_mut(index) {
         *d = T::ONE;
@@ -498,9 +503,10 @@ struct Pivots<'a, T> {
     indefinite: bool,
 }
 
-/// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the other rows of the panel are
-/// multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were replaced by something large: the solution then does
-/// not move in their direction. And the first of them that is negative, which may be rounding, and its index.
+/// The Cholesky factor of a symmetric matrix, whose diagonal begins at some row of a panel; the
+/// other rows of the panel are multiplied by `L⁻ᵀ`. Returns how many pivots vanished, and were
+/// replaced by something large: the solution then does not move in their direction. And the first
+/// of them that is negative, which may be rounding, and its index.
 #[inline(always)]
 fn cholesky<T: Real, E: Packed<T>>(
     panel: &mut [T],

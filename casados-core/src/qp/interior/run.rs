@@ -175,7 +175,8 @@ impl<T: Real> Iterate<'_, T> {
             // Terms change on the way.
             let old = limits.relative > T::ZERO && self.mu < T::from_f64(OLD) * known;
             if small || old {
-                // What is known of the residuals is what steps should have left of them: now they are computed.
+                // What is known of the residuals is what steps should have left of them: now they
+                // are computed.
                 let objective = self.evaluate::<E>(solution.dynamics);
                 (residuals, known) = (self.judged::<E>(), self.mu);
                 if limits.hold(residuals, self.terms) {
@@ -185,7 +186,8 @@ impl<T: Real> Iterate<'_, T> {
                 let Terms { forces, values } = limits.of(self.terms);
                 let apart = residuals.inequalities > values || residuals.complementarity > forces;
                 if small && apart {
-                    // Between two pieces of a penalty multipliers are off by the root of their products.
+                    // Between two pieces of a penalty multipliers are off by the root of their
+                    // products.
                     share = share * T::from_f64(0.01);
                 } else if small && statistics.refinements > known_refinements + 3 {
                     break true;
@@ -195,7 +197,8 @@ impl<T: Real> Iterate<'_, T> {
                     statistics.refinements += usize::from(small);
                 }
             }
-            // Products far below the tolerance gain nothing, and make weights that swallow the digits of everything else.
+            // Products far below the tolerance gain nothing, and make weights that swallow the
+            // digits of everything else.
             let floor = share * limits.of(self.terms).forces;
             if statistics.iterations >= most {
                 break false;
@@ -224,7 +227,8 @@ impl<T: Real> Iterate<'_, T> {
                 self.newton::<E>(false)?;
                 alpha = self.sides.longest::<E>(keep);
                 if alpha < T::from_f64(SHORT) || idle > CYCLE {
-                    // Products are too different for the corrector to be right: first they are made equal.
+                    // Products are too different for the corrector to be right: first they are made
+                    // equal.
                     self.sides.aim(self.mu * T::from_f64(SHORT));
                     self.newton::<E>(false)?;
                     alpha = self.sides.longest::<E>(keep);
@@ -238,7 +242,8 @@ impl<T: Real> Iterate<'_, T> {
             self.advance::<E>(alpha);
             refine = false;
         };
-        // The multipliers of the dynamics, and what is said of it, belong to the point that is left.
+        // The multipliers of the dynamics, and what is said of it, belong to the point that is
+        // left.
         let _ = self.evaluate::<E>(solution.dynamics);
         let (residuals, iterations) = (self.judged::<E>().into(), statistics.iterations);
         Err(if stalled {

@@ -1,9 +1,10 @@
 //! The sides of constraints that exist, in one list over the whole horizon.
 //!
-//! A side is a row (a variable, or a general constraint) and a sign: `σ (c v − bound) + e = s ≥ 0` with a multiplier `λ ≥ 0`.
-//! Lower sides come first, then upper ones. A soft side has a violation `e ≥ 0` with a multiplier `ν ≥ 0` of its own; these
-//! pairs `(e, ν)` lie behind the pairs `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds
-//! that are hard are an equation, with a multiplier without sign.
+//! A side is a row (a variable, or a general constraint) and a sign: `σ (c v − bound) + e = s ≥ 0`
+//! with a multiplier `λ ≥ 0`. Lower sides come first, then upper ones. A soft side has a violation
+//! `e ≥ 0` with a multiplier `ν ≥ 0` of its own; these pairs `(e, ν)` lie behind the pairs
+//! `(s, λ)`, so that nothing that is done to all pairs knows of it. Two equal bounds that are hard
+//! are an equation, with a multiplier without sign.
 
 use crate::qp::layout::{Places, part, take_mut};
 use crate::qp::problem::{QpView, Row};
@@ -14,8 +15,9 @@ use crate::scalar::Real;
 pub enum Penalties {
     /// What the problem says.
     Given,
-    /// Nothing where the problem says what; one for each unit, linearly, where the bound is hard. Bounds of controls, which are more
-    /// often what nature gives than what somebody wants, cost ten times as much.
+    /// Nothing where the problem says what; one for each unit, linearly, where the bound is hard.
+    /// Bounds of controls, which are more often what nature gives than what somebody wants, cost
+    /// ten times as much.
     Hard,
 }
 
@@ -160,7 +162,8 @@ pub fn count<T: Real>(qp: QpView<'_, T>, reading: &Reading<T>) -> Counts {
 /// All sides, and what an interior point keeps of each.
 pub struct Sides<'a, T> {
     pub counts: Counts,
-    /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the regularisation of the dual.
+    /// How far a side or an equation gives way to a change of its multiplier in one step: `δ`, the
+    /// regularisation of the dual.
     pub compliance: T,
     /// Rows of sides.
     pub rows: &'a mut [u32],

@@ -2,8 +2,8 @@
 
 use crate::qp::error::{Field, QpError};
 
-/// Memory that a solver works in: an array or slice, or, with the feature `alloc`, a `Vec` that grows when a larger
-/// problem comes and never shrinks.
+/// Memory that a solver works in: an array or slice, or, with the feature `alloc`, a `Vec` that
+/// grows when a larger problem comes and never shrinks.
 pub trait Store<T> {
     /// At least so many elements.
     ///

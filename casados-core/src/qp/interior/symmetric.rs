@@ -1,4 +1,5 @@
-//! Symmetric indefinite systems of a few variables: `P A Pᵀ = L D Lᵀ` with blocks of one and two pivots.
+//! Symmetric indefinite systems of a few variables: `P A Pᵀ = L D Lᵀ` with blocks of one and two
+//! pivots.
 //!
 //! Bunch and Kaufman, "Some stable methods for calculating inertia and solving symmetric linear
 //! systems", Math. Comp. 31 (1977).
@@ -12,7 +13,8 @@ const ALPHA: f64 = 0.640_388_203_202_207_6;
 pub struct Symmetric<'a, T> {
     a: &'a mut [T],
     n: usize,
-    /// For every pivot the row that it was exchanged with, counted from one; of pairs with the sign minus.
+    /// For every pivot the row that it was exchanged with, counted from one; of pairs with the sign
+    /// minus.
     exchanged: &'a mut [T],
     /// Negative eigenvalues.
     pub negative: usize,
@@ -87,7 +89,8 @@ impl<'a, T: Real> Symmetric<'a, T> {
         2
     }
 
-    /// Exchanges two unknowns, of which the first is the smaller one, in the part that is left and in `L`.
+    /// Exchanges two unknowns, of which the first is the smaller one, in the part that is left and
+    /// in `L`.
     fn exchange(&mut self, k: usize, other: usize) {
         if k == other {
             return;
@@ -229,7 +232,8 @@ mod tests {
     use alloc::vec::Vec;
     use nalgebra::{DMatrix, DVector};
 
-    /// Random symmetric matrices, with zero diagonals among them: residual, and inertia by eigenvalues.
+    /// Random symmetric matrices, with zero diagonals among them: residual, and inertia by
+    /// eigenvalues.
     #[test]
     fn solves_and_counts() {
         let mut seed = 1u64;

@@ -13,10 +13,11 @@ use crate::scalar::{Packed, Real};
 const FINE: f64 = 1e-10;
 
 impl<T: Real> Iterate<'_, T> {
-    /// Whether the multipliers are a certificate (Farkas' lemma). Without objective the Lagrangian `L(v) = Σ π (A v + b − v₊) − Σ λ d(v)` is not
-    /// positive at any point that satisfies all constraints, and differs from what it is here by its gradient `g` times the
-    /// distance: where `g` vanishes and `L` is positive there is none. With a `g` that is small there is none but where numbers are 1e5 times
-    /// (of single precision a hundred times) as large as here.
+    /// Whether the multipliers are a certificate (Farkas' lemma). Without objective the Lagrangian
+    /// `L(v) = Σ π (A v + b − v₊) − Σ λ d(v)` is not positive at any point that satisfies all
+    /// constraints, and differs from what it is here by its gradient `g` times the distance: where
+    /// `g` vanishes and `L` is positive there is none. With a `g` that is small there is none but
+    /// where numbers are 1e5 times (of single precision a hundred times) as large as here.
     #[inline(always)]
     pub fn is_infeasible<E: Packed<T>>(&mut self, multipliers: &mut [T]) -> bool {
         let _ = self.evaluate::<E>(multipliers);

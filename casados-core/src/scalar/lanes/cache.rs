@@ -1,4 +1,5 @@
-//! The size of the second-level cache: how much may lie in it decides how many intervals are computed side by side.
+//! The size of the second-level cache: how much may lie in it decides how many intervals are
+//! computed side by side.
 
 #[cfg(target_arch = "x86_64")]
 use core::sync::atomic::{AtomicUsize, Ordering};
@@ -6,11 +7,13 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 /// What machines have that do not tell: half a megabyte or more.
 const USUAL: usize = 1 << 19;
 
-/// What the processor said: asking takes long, above all in a virtual machine. Zero until somebody does.
+/// What the processor said: asking takes long, above all in a virtual machine. Zero until somebody
+/// does.
 #[cfg(target_arch = "x86_64")]
 static BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// For tests: from now on the second-level cache has so many bytes, if machines of this kind are asked for it.
+/// For tests: from now on the second-level cache has so many bytes, if machines of this kind are
+/// asked for it.
 #[cfg(feature = "testing")]
 pub fn limit_cache(bytes: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -38,14 +41,16 @@ pub fn second_level_cache() -> usize {
     USUAL
 }
 
-/// What the processor says, in kilobytes in the upper half of a register: AMD64 Architecture Programmer's Manual 3, Intel 64 Software
-/// Developer's Manual 2A, both under CPUID, function 8000_0006h.
+/// What the processor says, in kilobytes in the upper half of a register: AMD64 Architecture
+/// Programmer's Manual 3, Intel 64 Software Developer's Manual 2A, both under CPUID, function
+/// 8000_0006h.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, unused_unsafe)]
 fn ask() -> Option<usize> {
     use core::arch::x86_64::__cpuid;
     const FUNCTION: u32 = 0x8000_0006;
-    // SAFETY: every processor of this architecture has the instruction, and functions that it does not know are not asked for.
+    // SAFETY: every processor of this architecture has the instruction, and functions that it does
+    // not know are not asked for.
     let kilobytes = unsafe {
         if __cpuid(0x8000_0000).eax < FUNCTION {
             return None;

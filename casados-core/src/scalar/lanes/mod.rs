@@ -1,7 +1,8 @@
 //! Registers of several numbers as scalars.
 //!
-//! `F64x4<3>` is a register of four `f64` of which three are used: in memory it is `[f64; 3]`. Lanes that are not
-//! used hold copies of one that is, so that they cost nothing: no special case is ever taken for their sake alone.
+//! `F64x4<3>` is a register of four `f64` of which three are used: in memory it is `[f64; 3]`.
+//! Lanes that are not used hold copies of one that is, so that they cost nothing: no special case
+//! is ever taken for their sake alone.
 //!
 //! | machine | registers |
 //! | --- | --- |
@@ -10,13 +11,13 @@
 //! | with AVX-512 F, DQ and VL | [`F64x8`], [`F32x16`] |
 //! | 64-bit Arm | [`F64x2`], [`F32x4`] (NEON) |
 //!
-//! **Who may use them.** Types of the second and third row may be computed with only where [`level`] says that the
-//! machine has them: the types are not reachable from outside of the crate, and its drivers ask first. All
-//! operations are inlined; they become single instructions inside
+//! **Who may use them.** Types of the second and third row may be computed with only where
+//! [`level`] says that the machine has them: the types are not reachable from outside of the crate,
+//! and its drivers ask first. All operations are inlined; they become single instructions inside
 //! [`Scalar::vectorize`](super::Scalar::vectorize), and are slow (but right) outside of it.
 //!
-//! **Bits.** `+ − × ÷ √`, comparisons and `powi` give in each lane the bits that `f64` (`f32`) gives. Elementary
-//! functions are those of [`functions`], with the bounds that are listed there.
+//! **Bits.** `+ − × ÷ √`, comparisons and `powi` give in each lane the bits that `f64` (`f32`)
+//! gives. Elementary functions are those of [`functions`], with the bounds that are listed there.
 #![allow(dead_code)]
 
 #[cfg(feature = "alloc")]
@@ -87,8 +88,8 @@ macro_rules! side_by_side {
             computation: C,
         ) -> Result<(), C> {
             use crate::scalar::lanes;
-            // Two numbers have a register of four where there is one: with fused products, elementary functions in it
-            // take half the time of those in a register of two.
+            // Two numbers have a register of four where there is one: with fused products,
+            // elementary functions in it take half the time of those in a register of two.
             #[cfg(target_arch = "x86_64")]
             if const { S > 1 && S <= $more } && lanes::level() >= lanes::Level::Avx2 {
                 computation.call::<lanes::$avx2<S>>();
@@ -200,8 +201,8 @@ impl<T, E: crate::scalar::Packed<T>, C: crate::scalar::Registers<T>> crate::scal
     }
 }
 
-/// Products of blocks with their columns in registers. Left to itself the compiler puts rows into registers, and
-/// transposes every block for it.
+/// Products of blocks with their columns in registers. Left to itself the compiler puts rows into
+/// registers, and transposes every block for it.
 #[cfg(target_arch = "x86_64")]
 macro_rules! blocks {
     ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
@@ -233,7 +234,8 @@ macro_rules! blocks {
             }
             if const { WIDE && S == 4 } {
                 use crate::scalar::lanes::$avx512 as Wide;
-                // Some columns are a register: in all places of each the numbers of its row on the right, one after the other.
+                // Some columns are a register: in all places of each the numbers of its row on the
+                // right, one after the other.
                 let mut columns = [Wide::<$most>::splat(0.0); S];
                 for (column, left) in columns.iter_mut().zip(left) {
                     if let Some(left) = left.first_chunk() {
@@ -407,8 +409,8 @@ pub(crate) use cache::second_level_cache;
 static LEVEL: AtomicU8 = AtomicU8::new(UNKNOWN);
 const UNKNOWN: u8 = u8::MAX;
 
-/// For tests: from now on no calculation of the process uses wider registers than these, nor such as the machine does
-/// not have.
+/// For tests: from now on no calculation of the process uses wider registers than these, nor such
+/// as the machine does not have.
 pub fn limit(limit: Level) {
     LEVEL.store(widest(limit) as u8, Ordering::Relaxed);
 }
@@ -432,8 +434,8 @@ pub fn level() -> Level {
     }
 }
 
-/// Whether a machine that runs this may have these registers: without `std` nobody asks it, and it has what the program
-/// was compiled for. What is for others is not in the program then.
+/// Whether a machine that runs this may have these registers: without `std` nobody asks it, and it
+/// has what the program was compiled for. What is for others is not in the program then.
 #[inline(always)]
 fn may_be(level: Level) -> bool {
     cfg!(feature = "std") || is_there(level)

@@ -123,8 +123,8 @@ macro_rules! in_half_a_register {
     };
 }
 
-/// A type of numbers: its documentation, its name, the type of one lane, the module of its instructions,
-/// the macro of its elementary functions, and that of its coarse numbers.
+/// A type of numbers: its documentation, its name, the type of one lane, the module of its
+/// instructions, the macro of its elementary functions, and that of its coarse numbers.
 macro_rules! register {
     ($(#[$attribute:meta])* $name:ident, $element:ident, $ops:ident, $functions:ident, $coarse:ident) => {
         $(#[$attribute])*
@@ -138,7 +138,8 @@ macro_rules! register {
 
         impl<const N: usize> $name<N> {
             /// The lanes that are used, one bit each.
-            // Types with more numbers than the register holds are named in code that is never reached.
+            // Types with more numbers than the register holds are named in code that is never
+            // reached.
             const USED: u32 = if N >= 1 && N <= $ops::WIDTH { ((1u64 << N) - 1) as u32 } else { 0 };
 
             /// A number in every lane.
@@ -411,7 +412,8 @@ macro_rules! single {
 macro_rules! complex {
     ($name:ident, $element:ident, $ops:ident) => {
         impl $name<{ $ops::WIDTH }> {
-            /// `target − a b` of the numbers at the beginning of arrays, half as many as the register has elements.
+            /// `target − a b` of the numbers at the beginning of arrays, half as many as the
+            /// register has elements.
             #[inline(always)]
             pub fn subtract_complex<const N: usize>(
                 target: &mut [$element; N],
@@ -466,7 +468,8 @@ macro_rules! fours {
             pub fn repeat_four(numbers: &[$element; 4]) -> Self {
                 Self($ops::repeat_four(numbers))
             }
-            /// Of each four numbers the first in all four places, the second, the third, the fourth.
+            /// Of each four numbers the first in all four places, the second, the third, the
+            /// fourth.
             #[inline(always)]
             pub fn each_of_four(self) -> [Self; 4] {
                 let [a, b, c, d] = $ops::each_of_four(self.0);

@@ -1,5 +1,5 @@
-//! Elementary functions of several arguments at once: in registers that have room for two, and abreast, so that the processor works
-//! on some while others wait for themselves.
+//! Elementary functions of several arguments at once: in registers that have room for two, and
+//! abreast, so that the processor works on some while others wait for themselves.
 
 use super::functions::{CallWithEight, CallWithFour, Double, Elementary, Two};
 use super::register::{F64x4, apart, join};
@@ -23,8 +23,9 @@ macro_rules! results {
     }};
 }
 
-/// The elementary functions of doubles, and two or four of them abreast: the processor works on each while others wait for themselves.
-/// Before that what is listed is looked at: a condition, and the results where it holds.
+/// The elementary functions of doubles, and two or four of them abreast: the processor works on
+/// each while others wait for themselves. Before that what is listed is looked at: a condition, and
+/// the results where it holds.
 macro_rules! abreast {
     ($name:ident, $ops:ident [$($functions:tt)*] |$a:ident| $($condition:expr => $first:expr),*) => {
         of_doubles!($name, $ops: $($functions)*);
@@ -59,7 +60,8 @@ macro_rules! of_eights {
     };
 }
 
-/// In registers of four: two in one register where each takes half of one, or where there are registers twice as wide.
+/// In registers of four: two in one register where each takes half of one, or where there are
+/// registers twice as wide.
 macro_rules! of_fours {
     ($name:ident, $ops:ident: $($functions:tt)*) => {
         abreast!($name, $ops [$($functions)*] |a|
@@ -125,7 +127,8 @@ impl<D: Double, F: Elementary<K, R>, const K: usize, const R: usize> CallWithEig
     }
 }
 
-/// Functions in registers that are twice as wide, two in each, given by their first and their last arguments.
+/// Functions in registers that are twice as wide, two in each, given by their first and their last
+/// arguments.
 pub struct Wider<F, const K: usize, const R: usize>(PhantomData<F>);
 
 impl<F: Elementary<K, R>, const K: usize, const R: usize> CallWithFour<F64x4<4>> for Wider<F, K, R> {

@@ -6,10 +6,11 @@
 use super::functions::{Call, CallWithEight, CallWithFour};
 use core::arch::x86_64::*;
 
-// SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the machine
-// has the instructions. SSE2 is part of x86-64. A register of AVX2 or AVX-512 is computed with only after
-// detection, as the head of `lanes` says. Loads and stores, which take pointers, are made on references to
-// arrays that are as large as what is read or written, and ask for no alignment.
+// SAFETY of every `unsafe` of this file: the one condition of calling these intrinsics is that the
+// machine has the instructions. SSE2 is part of x86-64. A register of AVX2 or AVX-512 is computed
+// with only after detection, as the head of `lanes` says. Loads and stores, which take pointers,
+// are made on references to arrays that are as large as what is read or written, and ask for no
+// alignment.
 
 /// Functions of one intrinsic each.
 macro_rules! wrap {
@@ -91,8 +92,9 @@ macro_rules! enter {
     };
 }
 
-/// Functions that are compiled for given instructions, of four and of eight arguments. Each has a place of its own: from an array
-/// registers would be loaded with parts of two of them, for which the processor waits until both are in the cache.
+/// Functions that are compiled for given instructions, of four and of eight arguments. Each has a
+/// place of its own: from an array registers would be loaded with parts of two of them, for which
+/// the processor waits until both are in the cache.
 macro_rules! enter_with_many {
     ($features:literal) => {
         enter_with_many!($features, enter_with_four, CallWithFour, 4: a b c d);
@@ -390,7 +392,8 @@ pub mod avx512_f64 {
     define! {
         transpose(rows: [Register; 8]) -> [Register; 8] {{
             let [a, b, c, d, e, f, g, h] = rows;
-            // Pairs of rows; of two of these the quarters that are even and those that are odd, twice.
+            // Pairs of rows; of two of these the quarters that are even and those that are odd,
+            // twice.
             let even = [
                 _mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d), _mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h),
             ];

@@ -1,8 +1,9 @@
 //! Sine, cosine, tangent, arcsine.
 //!
-//! `a = n π/2 + r` with `|r| ≤ π/4`: for `|a| < 3000` by π/2 in pieces of 12 bits (Cody and Waite), for larger arguments by the
-//! digits of 2/π (Payne and Hanek). The remainder is a sum of two numbers, so that its rounding error does not count.
-//! Polynomials are those of FreeBSD's `k_sinf.c`, `k_cosf.c` and `e_asinf.c`.
+//! `a = n π/2 + r` with `|r| ≤ π/4`: for `|a| < 3000` by π/2 in pieces of 12 bits (Cody and Waite),
+//! for larger arguments by the digits of 2/π (Payne and Hanek). The remainder is a sum of two
+//! numbers, so that its rounding error does not count. Polynomials are those of FreeBSD's
+//! `k_sinf.c`, `k_cosf.c` and `e_asinf.c`.
 
 use super::{ROUND, ordered_sum, polynomial, product, sqrt, sum};
 use core::f32::consts::{FRAC_2_PI, FRAC_PI_2, FRAC_PI_4};
@@ -41,8 +42,8 @@ fn reduce(a: f32) -> (u32, (f32, f32)) {
     (shifted.to_bits(), ordered_sum(third.0, (third.1 + second.1) - n * PI_2[3]))
 }
 
-/// The product of the 24 digits of `a` with those of 2/π that matter: quarter turns in the upper two bits of 64, and
-/// what is left of one below.
+/// The product of the 24 digits of `a` with those of 2/π that matter: quarter turns in the upper
+/// two bits of 64, and what is left of one below.
 #[cold]
 fn reduce_large(a: f32) -> (u32, (f32, f32)) {
     let bits = a.to_bits();

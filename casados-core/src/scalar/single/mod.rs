@@ -1,9 +1,11 @@
-//! Elementary functions of `f32` without the standard library, where `libm` computes them in `f64`: on a processor with
-//! an FPU for single precision that takes eight times as long; and `exp`, that of `libm` takes its own time for small arguments.
-//! These take no operation of double precision at all. The other functions of `libm` are single precision themselves.
+//! Elementary functions of `f32` without the standard library, where `libm` computes them in `f64`:
+//! on a processor with an FPU for single precision that takes eight times as long; and `exp`, that
+//! of `libm` takes its own time for small arguments. These take no operation of double precision at
+//! all. The other functions of `libm` are single precision themselves.
 //!
-//! Bounds of the error in units in the last place of the exact result, of these functions and of those of `libm`; tests
-//! compare with `f64` over all arguments that there are, one in ten thousand, or in thousand of an optimised build.
+//! Bounds of the error in units in the last place of the exact result, of these functions and of
+//! those of `libm`; tests compare with `f64` over all arguments that there are, one in ten
+//! thousand, or in thousand of an optimised build.
 //!
 //! | function | bound |
 //! | --- | --- |
@@ -29,16 +31,16 @@ pub fn sqrt(a: f32) -> f32 {
     libm::sqrtf(a)
 }
 
-/// `core` does not offer square roots, and the compiler does not recognise `libm`'s. It does not hand out registers of an
-/// FPU for single precision either.
+/// `core` does not offer square roots, and the compiler does not recognise `libm`'s. It does not
+/// hand out registers of an FPU for single precision either.
 #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
 #[allow(unsafe_code)]
 mod instruction {
     #[inline(always)]
     pub fn sqrt(a: f32) -> f32 {
         let mut bits = a.to_bits();
-        // SAFETY: it changes the two registers that it is given, and leaves `s0` as it was; every target with this binary
-        // interface has the instruction.
+        // SAFETY: it changes the two registers that it is given, and leaves `s0` as it was; every
+        // target with this binary interface has the instruction.
         unsafe {
             core::arch::asm!(
                 "vmov {kept}, s0",
@@ -63,7 +65,8 @@ fn times_power(a: f32, n: i32) -> f32 {
     a * power(half) * power(n - half)
 }
 
-/// `2ᵃ = 2ⁿ 2ʳ`, `|r| ≤ ½`, with the polynomial of S. Moshier's Cephes for `(2ʳ − 1)/r`, its largest term as a sum.
+/// `2ᵃ = 2ⁿ 2ʳ`, `|r| ≤ ½`, with the polynomial of S. Moshier's Cephes for `(2ʳ − 1)/r`, its
+/// largest term as a sum.
 pub fn exp2(a: f32) -> f32 {
     const P: [f32; 5] = [1.535_336_2e-4, 1.339_887_4e-3, 9.618_437e-3, 5.550_332_5e-2, 2.402_264_8e-1];
     // What ln 2 lacks as `f32`.
@@ -78,7 +81,8 @@ pub fn exp2(a: f32) -> f32 {
     times_power(one + (low + (rest + r * LN_2_LOW + r * r * polynomial(r, P))), n as i32)
 }
 
-/// `eᵃ = 2ⁿ eʳ`, `|r| ≤ ln 2 / 2`, with the polynomial of S. Moshier's Cephes for `(eʳ − 1 − r)/r²`, its largest terms as a sum.
+/// `eᵃ = 2ⁿ eʳ`, `|r| ≤ ln 2 / 2`, with the polynomial of S. Moshier's Cephes for
+/// `(eʳ − 1 − r)/r²`, its largest terms as a sum.
 pub fn exp(a: f32) -> f32 {
     const P: [f32; 6] = [1.987_569_2e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
     /// ln 2 as 355/512, whose products with `n` are exact, and what that is too large by.
@@ -92,8 +96,8 @@ pub fn exp(a: f32) -> f32 {
     times_power(one + (low + (rest + r * r * polynomial(r, P))), n as i32)
 }
 
-/// `∛a`: a guess from the exponent, as in FreeBSD's `s_cbrtf.c`, and three steps of Halley's method, the last one with the
-/// error of the cube.
+/// `∛a`: a guess from the exponent, as in FreeBSD's `s_cbrtf.c`, and three steps of Halley's
+/// method, the last one with the error of the cube.
 pub fn cbrt(a: f32) -> f32 {
     let magnitude = a.abs();
     if !(magnitude > 0.0 && magnitude <= f32::MAX) {
@@ -150,7 +154,8 @@ pub fn acosh(a: f32) -> f32 {
     if a < 1.0 { f32::NAN } else { libm::acoshf(a) }
 }
 
-/// `1.5 · 2²³`: added and subtracted, it rounds to an integer; added, it leaves the integer in the last bits.
+/// `1.5 · 2²³`: added and subtracted, it rounds to an integer; added, it leaves the integer in the
+/// last bits.
 const ROUND: f32 = 12_582_912.0;
 
 /// `a + b` and what rounding took, for `|a| ≥ |b|`.
@@ -167,7 +172,8 @@ fn sum(a: f32, b: f32) -> (f32, f32) {
     (high, low)
 }
 
-/// `a b` and what rounding took (Dekker), of numbers whose product neither overflows nor underflows.
+/// `a b` and what rounding took (Dekker), of numbers whose product neither overflows nor
+/// underflows.
 #[inline(always)]
 fn product(a: f32, b: f32) -> (f32, f32) {
     let halves = |a: f32| {

@@ -6,7 +6,8 @@ use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::testing::{Exact, Integrator, Report, check_exact, check_sensitivities, convergence};
 use nalgebra::SVector;
 
-/// An integrator whose answers are those of `x = x₀ e^{uh} + p x₀²`, `z = p x₀`, `z₀ = u x₀`, with a fault on request.
+/// An integrator whose answers are those of `x = x₀ e^{uh} + p x₀²`, `z = p x₀`, `z₀ = u x₀`, with
+/// a fault on request.
 struct Closed<const FAULT: u8> {
     p: f64,
     calls: f64,
@@ -292,7 +293,8 @@ mod logistic {
     const AT: [f64; 3] = [0.1, 1.5, 2.0];
     const T: f64 = 2.0;
 
-    /// `x = K x₀ e^{uT} / D` with `D = K + x₀ (e^{uT} − 1)`, and what can be written down of its derivatives.
+    /// `x = K x₀ e^{uT} / D` with `D = K + x₀ (e^{uT} − 1)`, and what can be written down of its
+    /// derivatives.
     fn exact() -> Exact {
         let [x0, u, k] = AT;
         let e = f64::exp(u * T);

@@ -54,14 +54,15 @@ fn functions<S: Scalar>(a: S, b: S) -> Vec<(&'static str, S)> {
     ]
 }
 
-/// Arguments in every quadrant and on both sides of every branch; outside of its domain a function is not finite in
-/// real arithmetic, and is not compared.
+/// Arguments in every quadrant and on both sides of every branch; outside of its domain a function
+/// is not finite in real arithmetic, and is not compared.
 fn arguments() -> impl Iterator<Item = (f64, f64)> {
     let values = [-2.5, -1.0, -0.8, -0.1, 1e-3, 0.3, 0.95, 1.7, 12.0];
     values.into_iter().flat_map(move |a| [-1.3, -0.4, 0.7, 2.2].into_iter().map(move |b| (a, b)))
 }
 
-/// Values and first derivatives by complex step, by dual numbers and by tangents, against [`Forward`] within its rounding bound.
+/// Values and first derivatives by complex step, by dual numbers and by tangents, against
+/// [`Forward`] within its rounding bound.
 #[test]
 fn first_derivatives_agree() {
     const H: f64 = 1e-200;
@@ -137,8 +138,9 @@ fn second_derivatives_agree() {
     assert!(compared > 2500, "{compared}");
 }
 
-/// Complex functions far from the real axis: inverse functions invert, and the derivative is that along the imaginary
-/// direction too (Cauchy-Riemann), which the dual over the real axis cannot tell.
+/// Complex functions far from the real axis: inverse functions invert, and the derivative is that
+/// along the imaginary direction too (Cauchy-Riemann), which the dual over the real axis cannot
+/// tell.
 #[test]
 fn complex_functions_are_analytic() {
     for (a, b) in [(0.3, 0.4), (0.7, -1.1), (1.5, 0.2), (0.2, 1.3)] {

@@ -23,7 +23,8 @@ fn costs((mut graph, f, variables): (Graph, Vec<Node>, u32)) -> ([u32; 4], [usiz
     (counts, [first.len(), second.len()])
 }
 
-/// The reference is CasADi 3.8.2 (SX, common subexpressions removed) on the same model, and its sparsity.
+/// The reference is CasADi 3.8.2 (SX, common subexpressions removed) on the same model, and its
+/// sparsity.
 #[test]
 fn aircraft_takes_fewer_operations_than_casadi() {
     let (counts, non_zeros) = costs(aircraft());
@@ -33,8 +34,9 @@ fn aircraft_takes_fewer_operations_than_casadi() {
     }
 }
 
-/// The order that is chosen is the best one, for a chain of masses (sparse rows) and for one long product
-/// (a tree: one output of many variables, where reverse mode is best and forward mode quadratic).
+/// The order that is chosen is the best one, for a chain of masses (sparse rows) and for one long
+/// product (a tree: one output of many variables, where reverse mode is best and forward mode
+/// quadratic).
 #[test]
 fn chosen_order_is_the_cheapest() {
     let tree = || {
@@ -69,8 +71,8 @@ fn chosen_order_is_the_cheapest() {
     }
 }
 
-/// Twice the masses take about twice the operations; 189 states are a matter of a second even without
-/// optimisation.
+/// Twice the masses take about twice the operations; 189 states are a matter of a second even
+/// without optimisation.
 #[test]
 fn large_chain() {
     let begin = Instant::now();

@@ -10,7 +10,8 @@ use std::cell::RefCell;
 
 const ORDERS: [Order; 3] = [Order::Reverse, Order::Forward, Order::Markowitz];
 
-/// Random functions that stay of moderate size: every node is within [-8, 8] for variables in [-1, 1].
+/// Random functions that stay of moderate size: every node is within [-8, 8] for variables in [-1,
+/// 1].
 fn random_graph(random: &mut Random, variables: u32, size: usize, outputs: usize) -> (Graph, Vec<Node>) {
     let graph = RefCell::new(Graph::default());
     let mut nodes = E::variables(&graph, variables);
@@ -70,9 +71,9 @@ fn assert_close(a: &[Vec<f64>], b: &[Vec<f64>], tolerance: f64, what: &str) {
     }
 }
 
-/// Everything there is about one function at one point, all ways. Rounding: the entries are sums over paths of
-/// products of partial derivatives; a few hundred operations without growth give some hundred ulps of the
-/// largest entry.
+/// Everything there is about one function at one point, all ways. Rounding: the entries are sums
+/// over paths of products of partial derivatives; a few hundred operations without growth give some
+/// hundred ulps of the largest entry.
 fn check_against_each_other(graph: &Graph, f: &[Node], variables: u32, point: Point) {
     const ROUNDING: f64 = 2048.0 * f64::EPSILON;
     let n = variables as usize;
@@ -162,8 +163,9 @@ fn models_all_ways() {
     check(aircraft(), &around);
 }
 
-/// Differences of the value and of the gradient, independent of every rule. The step is 1/64, the order 8; the
-/// functions are analytic in a strip of width of order one, and their depth makes it narrower.
+/// Differences of the value and of the gradient, independent of every rule. The step is 1/64, the
+/// order 8; the functions are analytic in a strip of width of order one, and their depth makes it
+/// narrower.
 #[test]
 fn random_graphs_against_differences() {
     let mut random = Random(11);

@@ -48,8 +48,8 @@ fn cross<'g>(a: V<'g>, b: V<'g>) -> V<'g> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The coefficients of one aerodynamic coefficient: polynomials in the angle of attack for each input
-/// (1, α, β, p, q, r, δa, δe, δr).
+/// The coefficients of one aerodynamic coefficient: polynomials in the angle of attack for each
+/// input (1, α, β, p, q, r, δa, δe, δr).
 type Table = [&'static [f64]; 9];
 const CX: Table =
     [&[-0.0293], &[0.4784, 2.5549], &[], &[], &[-0.6029, 4.4124], &[], &[], &[-0.0106, 0.1115], &[]];
@@ -109,8 +109,8 @@ const CN: Table = [
     &[-0.0404, -0.0117, 0.04089],
 ];
 
-/// The six-degree-of-freedom aircraft on a tether of the airborne-wind-energy benchmark (Malz et al. 2019).
-/// Variables `(ẋ, x, z, u)`.
+/// The six-degree-of-freedom aircraft on a tether of the airborne-wind-energy benchmark (Malz et
+/// al. 2019). Variables `(ẋ, x, z, u)`.
 #[allow(clippy::too_many_lines, clippy::many_single_char_names, clippy::similar_names)]
 pub fn aircraft() -> (Graph, Vec<Node>, u32) {
     let graph = RefCell::new(Graph::default());

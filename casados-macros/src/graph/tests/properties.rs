@@ -1,5 +1,5 @@
-//! Derivatives of random expressions against `num-dual` and the complex step, within bounds of the rounding errors of
-//! both sides; an expression that fails is shrunk to the smallest that does.
+//! Derivatives of random expressions against `num-dual` and the complex step, within bounds of the
+//! rounding errors of both sides; an expression that fails is shrunk to the smallest that does.
 
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary, gradient, hessian, jacobian};
 use casados_core::Scalar;

@@ -55,9 +55,9 @@ fn difference(f: impl Fn(f64) -> f64, at: f64, h: f64) -> (f64, f64) {
     (sum / h, 8.0 * f64::EPSILON * size / h)
 }
 
-/// All derivatives at a point against differences of the value and of the first derivatives. `h` is small
-/// beside the distance to the next singularity: with ratio 1/100 the truncation error of order 8 is
-/// below 1e-15 of the derivative times a factorial over 630, together below 1e-12.
+/// All derivatives at a point against differences of the value and of the first derivatives. `h` is
+/// small beside the distance to the next singularity: with ratio 1/100 the truncation error of
+/// order 8 is below 1e-15 of the derivative times a factorial over 630, together below 1e-12.
 fn check_differences(name: &str, function: &Function, a: f64, b: f64, h: f64) {
     let exact = function.at(a, b);
     let check = |what: &str, value: f64, (reference, rounding): (f64, f64)| {

@@ -5,8 +5,8 @@ use crate::graph::evaluate::{binary_value, unary_value};
 use crate::graph::{Binary, Compare, Graph, Point, Unary};
 use std::cell::RefCell;
 
-/// Random expressions full of zeros, ones, negations and powers of two against the same operations on
-/// numbers, bit by bit.
+/// Random expressions full of zeros, ones, negations and powers of two against the same operations
+/// on numbers, bit by bit.
 #[test]
 fn bits_are_kept() {
     let functions = [Unary::Neg, Unary::Neg, Unary::Neg, Unary::Abs, Unary::Sin, Unary::Tanh, Unary::Signum];
@@ -46,8 +46,8 @@ fn bits_are_kept() {
                     (expressions[i].binary(operator, expressions[j]), binary_value(operator, a, b))
                 }
             };
-            // Structural zeros differ where something is infinite or not a number; magnitudes are kept
-            // so that nothing overflows or is subnormal on the way.
+            // Structural zeros differ where something is infinite or not a number; magnitudes are
+            // kept so that nothing overflows or is subnormal on the way.
             if value == 0.0 || (1e-9..1e9).contains(&value.abs()) {
                 expressions.push(expression);
                 values.push(value);

@@ -1,8 +1,8 @@
 //! Algebra of small nalgebra matrices.
 //!
-//! Sums and products are in nalgebra's order, so that the bits are those of the plain function: `dot` of
-//! 2, 3 and 4 elements is unrolled there, of more than 7 it has eight accumulators; products of
-//! matrices sum over columns from the first to the last.
+//! Sums and products are in nalgebra's order, so that the bits are those of the plain function:
+//! `dot` of 2, 3 and 4 elements is unrolled there, of more than 7 it has eight accumulators;
+//! products of matrices sum over columns from the first to the last.
 
 use super::Call;
 use super::block::column;

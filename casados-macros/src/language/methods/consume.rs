@@ -38,7 +38,8 @@ pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result
             }
             Value::some(accumulated)
         }
-        // Sums begin with the first element: to add it to zero changes no bits but the sign of a zero.
+        // Sums begin with the first element: to add it to zero changes no bits but the sign of a
+        // zero.
         "sum" | "product" => {
             let operator = if call.name == "sum" { Operator::Add } else { Operator::Mul };
             let Some(first) = iter.next(evaluator, at)? else {
@@ -120,8 +121,8 @@ fn empty(evaluator: &mut Evaluator, call: &Call) -> Result<Value> {
     }
 }
 
-/// The smallest or largest element of those that are known: the last of several largest, the first of
-/// several smallest.
+/// The smallest or largest element of those that are known: the last of several largest, the first
+/// of several smallest.
 fn extreme(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value> {
     let at = call.at;
     let largest = call.name.starts_with("max");

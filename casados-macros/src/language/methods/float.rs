@@ -1,8 +1,8 @@
 //! Methods and constants of `f64`.
 //!
-//! Each is built from the graph's functions such that the bits are those of the method, with three exceptions:
-//! `mul_add` rounds twice, `max` and `min` of a NaN and a number may be NaN, and `powi` of a graph is that of
-//! the scalar it runs on.
+//! Each is built from the graph's functions such that the bits are those of the method, with three
+//! exceptions: `mul_add` rounds twice, `max` and `min` of a NaN and a number may be NaN, and `powi`
+//! of a graph is that of the scalar it runs on.
 
 use super::Call;
 use crate::graph::{Binary, Compare, Node, Unary};

@@ -1,4 +1,5 @@
-//! Methods and functions that belong to the language: those of `f64`, integers, arrays, iterators, nalgebra.
+//! Methods and functions that belong to the language: those of `f64`, integers, arrays, iterators,
+//! nalgebra.
 
 mod adapter;
 mod algebra;
@@ -152,7 +153,8 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
     function::call(evaluator, function, call)
 }
 
-/// A constant that is named by path: `core::f64::consts::PI`, `f64::EPSILON`. `None` if there is no such constant.
+/// A constant that is named by path: `core::f64::consts::PI`, `f64::EPSILON`. `None` if there is no
+/// such constant.
 pub fn constant(evaluator: &mut Evaluator, path: &Builtin) -> Option<Value> {
     function::constant(evaluator, path)
 }

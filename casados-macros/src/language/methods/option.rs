@@ -7,7 +7,8 @@ use crate::language::place::{Place, Projection};
 use crate::language::value::Value;
 use syn::Result;
 
-/// A method of an option, or of a result, of which only the value is kept. `None` if there is no such method.
+/// A method of an option, or of a result, of which only the value is kept. `None` if there is no
+/// such method.
 pub fn method(
     evaluator: &mut Evaluator,
     receiver: &Receiver,
@@ -83,7 +84,8 @@ pub fn bool_method(evaluator: &mut Evaluator, known: bool, call: &Call) -> Resul
     })
 }
 
-/// Something that can be read, changed and written back: what `next` of an iterator in a variable does.
+/// Something that can be read, changed and written back: what `next` of an iterator in a variable
+/// does.
 pub fn update(evaluator: &mut Evaluator, receiver: &Receiver, value: Value, call: &Call) -> Result<()> {
     match receiver {
         Receiver::Place(place) => evaluator.write(place, value, call.at),

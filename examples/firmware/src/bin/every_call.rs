@@ -1,4 +1,5 @@
-//! Every call of the integrators, for several methods and models: that this links says that none of them panics.
+//! Every call of the integrators, for several methods and models: that this links says that none of
+//! them panics.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use casados::prelude::*;

@@ -1,4 +1,5 @@
-//! A program that could panic: `run.py` sees to it that it does not link, for the proof is worth nothing otherwise.
+//! A program that could panic: `run.py` sees to it that it does not link, for the proof is worth
+//! nothing otherwise.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use firmware::board;

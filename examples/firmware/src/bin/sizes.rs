@@ -1,4 +1,5 @@
-//! Bytes of integrators: with forward sensitivities, with what they fall back on and without; and for every mode.
+//! Bytes of integrators: with forward sensitivities, with what they fall back on and without; and
+//! for every mode.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use casados::memory::fallback::{Pivoting, Refusing};

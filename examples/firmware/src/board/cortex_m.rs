@@ -25,7 +25,8 @@ pub fn exit(success: bool) -> ! {
     }
 }
 
-/// A panic that the optimiser cannot rule out leaves this name undefined: then the program does not link.
+/// A panic that the optimiser cannot rule out leaves this name undefined: then the program does not
+/// link.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe extern "C" {
@@ -74,7 +75,8 @@ fn ticks() -> u32 {
     unsafe { (0xE000_E018 as *const u32).read_volatile() }
 }
 
-/// The instructions that a call takes. Ticks are 40 ns, and the emulator is told that an instruction takes 128 ns.
+/// The instructions that a call takes. Ticks are 40 ns, and the emulator is told that an
+/// instruction takes 128 ns.
 pub fn count<R>(f: impl FnOnce() -> R) -> (u32, R) {
     // SAFETY: the registers of the system timer: reload, counter, start.
     unsafe {

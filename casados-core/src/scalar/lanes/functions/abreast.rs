@@ -1,8 +1,9 @@
 //! What elementary functions are computed with: a register of doubles, or two of them abreast.
 //!
-//! Nearly every operation of an elementary function waits for the one before. Of two registers, or two times two, each operation is
-//! made on both before the next, so that the processor has work meanwhile. Of functions one after the other it would have to find
-//! that among instructions that are further ahead than it looks.
+//! Nearly every operation of an elementary function waits for the one before. Of two registers, or
+//! two times two, each operation is made on both before the next, so that the processor has work
+//! meanwhile. Of functions one after the other it would have to find that among instructions that
+//! are further ahead than it looks.
 
 use super::{Doubles, each};
 use crate::scalar::{Field, Lanes, Scalar};

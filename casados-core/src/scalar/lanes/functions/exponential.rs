@@ -1,13 +1,14 @@
 //! `eᵃ` and what is made of it.
 //!
-//! `a = n ln 2 + r` with `|r| ≤ ln 2 / 2` (Cody and Waite), `eʳ = 1 + r + r² Q(r)` with a minimax polynomial, whose
-//! leading terms are added as a pair.
+//! `a = n ln 2 + r` with `|r| ≤ ln 2 / 2` (Cody and Waite), `eʳ = 1 + r + r² Q(r)` with a minimax
+//! polynomial, whose leading terms are added as a pair.
 
 use super::pair::{Pair, c, ordered_sum, polynomial, product, sum};
 use super::{Double, repair2};
 use crate::scalar::Scalar;
 
-/// `1.5 · 2⁵²`: added and subtracted, it rounds to an integer; added, it leaves the integer in the last bits.
+/// `1.5 · 2⁵²`: added and subtracted, it rounds to an integer; added, it leaves the integer in the
+/// last bits.
 pub const ROUND: f64 = 6_755_399_441_055_744.0;
 /// The first 42 bits of ln 2, and the next 53.
 pub const LN_2: [f64; 2] = [0.6931471805598903, 5.497923018708371e-14];
@@ -181,7 +182,8 @@ pub fn copy_sign<D: Double>(magnitude: D, a: D) -> D {
     magnitude.or_bits(a.and_bits(c(-0.0)))
 }
 
-/// `aᵇ = exp(b ln a)`, the logarithm to about 65 bits. Unusual arguments are left to the function of one number.
+/// `aᵇ = exp(b ln a)`, the logarithm to about 65 bits. Unusual arguments are left to the function
+/// of one number.
 #[inline(always)]
 pub fn powf<D: Double>((a, b): (D, D)) -> D {
     let usual = D::and(c::<D>(f64::MIN_POSITIVE).le(a), a.le(c(f64::MAX)));

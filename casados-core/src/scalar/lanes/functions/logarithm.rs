@@ -1,6 +1,7 @@
 //! Logarithms.
 //!
-//! `a = 2ᵏ m` with `√½ ≤ m < √2`, and `ln m = 2 artanh s` with `s = (m − 1)/(m + 1)`, a minimax polynomial in `s²`.
+//! `a = 2ᵏ m` with `√½ ≤ m < √2`, and `ln m = 2 artanh s` with `s = (m − 1)/(m + 1)`, a minimax
+//! polynomial in `s²`.
 
 use super::exponential::{LN_2, copy_sign};
 use super::pair::{Pair, c, ordered_sum, pattern, polynomial, product, sum};

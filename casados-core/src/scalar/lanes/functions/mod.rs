@@ -1,12 +1,13 @@
 //! Elementary functions of registers, written once for all kinds of them.
 //!
-//! No branch depends on the numbers, but for one: where a lane is *rare* (listed below), the function of one number
-//! is called for that lane, and only that lane takes its result and its accuracy. A zero keeps its sign, and
-//! infinities and NaN come out where they do for one number.
+//! No branch depends on the numbers, but for one: where a lane is *rare* (listed below), the
+//! function of one number is called for that lane, and only that lane takes its result and its
+//! accuracy. A zero keeps its sign, and infinities and NaN come out where they do for one number.
 //!
-//! Bounds of the error in units in the last place of the exact result, for all registers of `f64`, with fused
-//! products or without. They are measured, not proved: the largest error in 2 million arguments of each function and each kind of
-//! register, of all magnitudes, dense where the reductions change, was below them; the tests repeat it on fewer.
+//! Bounds of the error in units in the last place of the exact result, for all registers of `f64`,
+//! with fused products or without. They are measured, not proved: the largest error in 2 million
+//! arguments of each function and each kind of register, of all magnitudes, dense where the
+//! reductions change, was below them; the tests repeat it on fewer.
 //!
 //! | function | bound | rare |
 //! | --- | --- | --- |
@@ -44,8 +45,8 @@ use crate::scalar::{Field, Lanes, Piece, Scalar};
 pub use abreast::{Double, Two};
 use bytemuck::Zeroable;
 
-/// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are written as
-/// doubles.
+/// A register of doubles, with what elementary functions do to the bits of it. Bit patterns are
+/// written as doubles.
 pub trait Doubles: Lanes {
     /// Whether [`mul_add`](Self::mul_add) rounds once.
     const FUSED: bool;
@@ -80,7 +81,8 @@ pub trait Single: Lanes {
     fn narrow(low: Self::Double, high: Self::Double) -> Self;
 }
 
-/// The functions of one number that are called for rare lanes, where those of a scalar are the ones below.
+/// The functions of one number that are called for rare lanes, where those of a scalar are the ones
+/// below.
 mod one {
     macro_rules! one {
         ($($name:ident)*) => { $(
@@ -128,8 +130,8 @@ fn each<D: Doubles, F: Copy>(
     *result = D::load(&values);
 }
 
-/// A function, called with what it is applied to. (A trait, because what is called through a value of type `fn`
-/// is not certain to be inlined.)
+/// A function, called with what it is applied to. (A trait, because what is called through a value
+/// of type `fn` is not certain to be inlined.)
 pub trait Call<A> {
     /// Its result.
     type Output;
@@ -171,7 +173,8 @@ impl<P: Piece> Call<P> for Run {
     }
 }
 
-/// Elementary functions under the names of their methods, with how many arguments and results they have.
+/// Elementary functions under the names of their methods, with how many arguments and results they
+/// have.
 macro_rules! calls {
     ($($module:ident::$name:ident[$K:literal, $R:literal]($($argument:ident),*) -> ($($result:ident),*);)*) => { $(
         #[doc = concat!("[`Scalar::", stringify!($name), "`]")]

@@ -1,5 +1,6 @@
-//! Unevaluated sums `high + low` of two doubles, about 106 bits: Dekker, "A floating-point technique for extending
-//! the available precision" (1971); Ogita, Rump and Oishi, "Accurate sum and dot product" (2005).
+//! Unevaluated sums `high + low` of two doubles, about 106 bits: Dekker, "A floating-point
+//! technique for extending the available precision" (1971); Ogita, Rump and Oishi, "Accurate sum
+//! and dot product" (2005).
 
 use super::Double;
 

@@ -1,7 +1,7 @@
 //! Sine, cosine, tangent and their inverses.
 //!
-//! `a = n π/2 + r` with `|r| ≤ π/4` by constants of 152 bits (Cody and Waite); larger arguments go through the
-//! function of one number. Minimax polynomials, whose leading terms are added as pairs.
+//! `a = n π/2 + r` with `|r| ≤ π/4` by constants of 152 bits (Cody and Waite); larger arguments go
+//! through the function of one number. Minimax polynomials, whose leading terms are added as pairs.
 
 use super::exponential::{ROUND, clamp, copy_sign};
 use super::pair::{Pair, c, ordered_sum, pattern, polynomial, product, sum};
@@ -162,7 +162,8 @@ const TAN_PI_8: f64 = 0.41421356237309503;
 /// What π/4 lacks as a double.
 const PI_4_LOW: f64 = 3.061616997868383e-17;
 
-/// The angle of the point `(x, y)`, neither negative nor both zero; `x_is_negative` where the point is to be mirrored.
+/// The angle of the point `(x, y)`, neither negative nor both zero; `x_is_negative` where the point
+/// is to be mirrored.
 #[inline(always)]
 fn angle<D: Double>(y: Pair<D>, x: Pair<D>, x_is_negative: D::Mask) -> D {
     let steep = x.high.lt(y.high);

@@ -27,8 +27,8 @@ impl Random {
     }
 }
 
-/// An elementary function: its name, on registers, its reference, where it is tried, and the bound of its error
-/// (units in the last place) that is documented.
+/// An elementary function: its name, on registers, its reference, where it is tried, and the bound
+/// of its error (units in the last place) that is documented.
 struct Case<L> {
     name: &'static str,
     of_lanes: fn(L, L) -> L,
@@ -129,8 +129,8 @@ fn error(result: f64, (exact, n): (reference::Long, i32), bits: i32) -> f64 {
     (scaled(result, -n) - exact.high - exact.low).abs() / unit
 }
 
-/// Errors stay below the bounds for `f64`; `f32` is rounded from them: half a unit, and what an error of one unit
-/// of `f64` may add to that.
+/// Errors stay below the bounds for `f64`; `f32` is rounded from them: half a unit, and what an
+/// error of one unit of `f64` may add to that.
 fn accuracy<L: Lanes>(bits: i32) {
     let count = if cfg!(debug_assertions) { 1000 } else { 50_000 };
     for case in cases::<L>() {
@@ -222,8 +222,8 @@ fn numbers_as_registers_of_one() {
     }
 }
 
-/// Zeros keep their sign, infinities and NaN are where they are for one number, and all else is finite and close to
-/// what `f64` gives. How close, the other test says; here are all magnitudes.
+/// Zeros keep their sign, infinities and NaN are where they are for one number, and all else is
+/// finite and close to what `f64` gives. How close, the other test says; here are all magnitudes.
 fn special<L: Lanes>() {
     let values = specials();
     for case in cases::<L>() {

@@ -1,4 +1,5 @@
-//! Products of numbers side by side have the bits that one number after the other gives, in registers of any width.
+//! Products of numbers side by side have the bits that one number after the other gives, in
+//! registers of any width.
 
 use super::super::*;
 use super::inside;
@@ -12,7 +13,8 @@ fn number<T: Real>(seed: &mut u64) -> T {
     T::from_f64(fraction * [1e-3, 1.0, 30.0][(*seed >> 20) as usize % 3])
 }
 
-/// `target − left right` and `target = left`, of blocks that lie column after column, of columns, of rows, element by element.
+/// `target − left right` and `target = left`, of blocks that lie column after column, of columns,
+/// of rows, element by element.
 fn blocks<T: Real, const S: usize, const WIDE: bool>() {
     let seed = &mut (S as u64);
     let [target, left, right]: [[[T; S]; S]; 3] = from_fn(|_| from_fn(|_| from_fn(|_| number(seed))));

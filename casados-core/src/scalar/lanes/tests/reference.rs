@@ -1,5 +1,5 @@
-//! Elementary functions to about 100 bits: Taylor series in pairs of doubles, and Newton's method for inverses. Slow and
-//! plain; nothing is shared with what they are the reference of.
+//! Elementary functions to about 100 bits: Taylor series in pairs of doubles, and Newton's method
+//! for inverses. Slow and plain; nothing is shared with what they are the reference of.
 
 use core::f64::consts::LN_2;
 use core::ops::{Add, Div, Mul, Neg, Sub};
