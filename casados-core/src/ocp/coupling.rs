@@ -33,7 +33,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Which states are periodic, and the multipliers of that.
     pub(super) fn coupling(&mut self) -> (&[T], &mut [T]) {
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
-        (data.tied, data.theta)
+        (data.tied, data.coupling_multipliers)
     }
 
     /// Finds states that are periodic where nobody can solve that.
@@ -55,7 +55,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         for (stage, sign) in [(0, T::ONE), (intervals, -T::ONE)] {
             let Some(mut stage) = self.qp.stage_mut(stage) else { return };
             let gradient = stage.arrays().gradient;
-            for ((gradient, &tied), &theta) in gradient.iter_mut().zip(&*data.tied).zip(&*data.theta) {
+            for ((gradient, &tied), &theta) in
+                gradient.iter_mut().zip(&*data.tied).zip(&*data.coupling_multipliers)
+            {
                 *gradient = *gradient + sign * tied * theta;
             }
         }

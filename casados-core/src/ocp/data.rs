@@ -33,7 +33,7 @@ pub(super) struct Data<'a, T> {
     /// One for every state with `x₀ = x_N`, and zero.
     pub tied: &'a mut [T],
     /// The multipliers of these conditions.
-    pub theta: &'a mut [T],
+    pub coupling_multipliers: &'a mut [T],
 }
 
 /// `NX + NU`
@@ -80,13 +80,36 @@ pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usiz
 /// The parts.
 pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
     let mut rest = memory;
-    let [times, p, references, lower, upper, algebraic, weights, extended, scratch, tied, theta] =
-        lengths::<P, T>(intervals).map(|length| {
-            let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
-            rest = behind;
-            part
-        });
-    Data { times, p, references, lower, upper, algebraic, weights, extended, scratch, tied, theta }
+    let [
+        times,
+        p,
+        references,
+        lower,
+        upper,
+        algebraic,
+        weights,
+        extended,
+        scratch,
+        tied,
+        coupling_multipliers,
+    ] = lengths::<P, T>(intervals).map(|length| {
+        let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
+        rest = behind;
+        part
+    });
+    Data {
+        times,
+        p,
+        references,
+        lower,
+        upper,
+        algebraic,
+        weights,
+        extended,
+        scratch,
+        tied,
+        coupling_multipliers,
+    }
 }
 
 /// What is given at a node.

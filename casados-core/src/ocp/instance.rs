@@ -187,6 +187,26 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(Self { problem, initial: Initial::Unknown, qp, iterate, data, objective: T::ZERO })
     }
 
+    /// Finds out whether memory of a run has the dimensions of the problem.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`]
+    pub(super) fn fits(&self, dims: &[StageDims]) -> Result<(), OcpError> {
+        let part = Part::Dimensions;
+        let (expected, found) = (self.qp.dims().len(), dims.len());
+        if expected != found {
+            return Err(OcpError::Length { part, stage: 0, expected, found });
+        }
+        for (stage, (a, b)) in self.qp.dims().iter().zip(dims).enumerate() {
+            for (expected, found) in [(a.nx, b.nx), (a.nu, b.nu), (a.ng, b.ng)] {
+                if expected != found {
+                    return Err(OcpError::Length { part, stage, expected, found });
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// How many intervals the horizon has.
     #[must_use]
     pub fn intervals(&self) -> usize {

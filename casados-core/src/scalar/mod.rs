@@ -444,6 +444,13 @@ pub trait Real:
     /// As `f64`, exactly.
     fn to_f64(self) -> f64;
 
+    /// The smaller one; `self` if one of them is NaN.
+    #[inline(always)]
+    #[must_use]
+    fn min(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+
     /// Runs a computation on slices, compiled for the widest registers that this machine has.
     #[doc(hidden)]
     fn registers<C: Registers<Self>>(computation: C) {

@@ -4,9 +4,10 @@ use super::IpmOptions;
 use super::direction::Regularisation;
 use super::newton::Lengths;
 use super::run::State;
+use crate::ocp::elastic::Worst;
 use crate::ocp::instance::Ocp;
+use crate::ocp::log::Status;
 use crate::ocp::problem::Formulation;
-use crate::ocp::sqp::{Status, Worst, infeasible};
 use crate::qp::StageDims;
 use crate::scalar::Real;
 
@@ -26,7 +27,8 @@ pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<
     state.elastic.and_then(|_| ocp.worst(given).0)
 }
 
-/// What a stationary point is: the solution, or one of penalties, which grow as long as that helps.
+/// The end of a run at a stationary point; nothing where penalties stand for bounds and larger ones
+/// may help.
 pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
     state: &mut State,
@@ -35,11 +37,11 @@ pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRe
 ) -> Option<Status> {
     let worst = worst(ocp, state, given).filter(|worst| worst.violation > options.tolerance);
     let (Some(penalty), Some(worst)) = (state.elastic, worst) else { return Some(Status::Converged) };
-    let stays = worst.violation > STAYS * state.stationary;
+    let stays = worst.violation > STAYS * state.stationary_violation;
     if stays || penalty >= LARGEST * options.elastic_penalty {
-        return Some(infeasible(ocp, &worst));
+        return Some(ocp.status_of_worst(&worst));
     }
-    state.stationary = worst.violation;
+    state.stationary_violation = worst.violation;
     soften(ocp, state, given, 10.0 * penalty);
     None
 }
@@ -54,8 +56,8 @@ pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef
     ocp.set_penalties(given, Some(T::from_f64(penalty)));
     state.lengths = Lengths::of(ocp.qp());
     state.elastic = Some(penalty);
-    state.begun = false;
+    state.has_slacks = false;
     state.mu = BARRIER;
     state.regularisation = Regularisation::default();
-    state.measured = false;
+    state.has_filter = false;
 }

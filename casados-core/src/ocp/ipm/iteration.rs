@@ -1,30 +1,41 @@
 //! One iteration: residuals and barrier parameter, search direction, line search, step.
 
 use super::barrier;
-use super::filter::{Filter, Pair};
 use super::line_search::{Accepted, Expected, Room, longest};
 use super::measure;
 use super::newton::{Lengths, attach, dynamics_after, evaluate};
 use super::run::State;
-use super::start::MinOf;
 use super::work::Work;
 use super::{Ipm, elastic};
 use crate::ocp::convexify::Convexification;
 use crate::ocp::data::split;
 use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::{Filter, Measure};
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Exact;
+use crate::ocp::log::{Iteration, Status, Watch};
 use crate::ocp::problem::Formulation;
-use crate::ocp::sqp::{Iteration, Status, Watch, failed};
-use crate::qp::interior::{Iterate, Sides, set};
-use crate::qp::{Residuals, StageDims, Store};
+use crate::qp::interior::{Iterate, Sides, add_scaled, set};
+use crate::qp::{QpError, Residuals, StageDims, Store};
 use crate::scalar::Real;
 
+/// `γ_φ`
+pub(super) const MARGIN: f64 = 1e-8;
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.
 const MULTIPLIERS: f64 = 1e10;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
+
+/// What follows the residuals of an iteration.
+enum Next {
+    /// A search direction.
+    Direction,
+    /// Another iteration: bounds have other penalties.
+    NewPenalties,
+    /// The end of the run.
+    End(Status),
+}
 
 /// A search direction, and how far it may be gone.
 struct Direction {
@@ -47,7 +58,7 @@ where
     pub(super) fn iterate<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &mut State,
         row: &mut Iteration,
     ) -> Result<Option<Status>, OcpError>
@@ -55,19 +66,21 @@ where
         P::Dynamics: SecondOrder<T>,
     {
         let mut watch = Watch::start();
-        self.linearise(ocp, all, state)?;
-        let here = self.assess(ocp, all, state, row)?;
+        self.linearise(ocp, capacity, state)?;
+        let here = self.assess(ocp, capacity, state, row)?;
         row.times.linearise = watch.lap();
-        if let Some(status) = self.is_over(ocp, all, state, row) {
-            return Ok(status);
+        match self.next(ocp, capacity, state, row) {
+            Next::Direction => {}
+            Next::NewPenalties => return Ok(None),
+            Next::End(status) => return Ok(Some(status)),
         }
-        let direction = match self.direction(ocp, all, state, here, row)? {
+        let direction = match self.direction(ocp, capacity, state, here, row) {
             Ok(direction) => direction,
-            Err(status) => return Ok(Some(status)),
+            Err(error) => return Ok(Some(ocp.status_of_error(error))),
         };
         row.times.qp = watch.lap();
         let Self { options, trial, best, numbers, indices, work, .. } = self;
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, work.as_mut());
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
         let accepted = if direction.tiny {
             Some(Accepted { alpha: direction.primal, corrected: false })
         } else {
@@ -86,7 +99,7 @@ where
             return Ok(None);
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
-        self.accept(ocp, all, state, &direction, accepted)?;
+        self.accept(ocp, capacity, state, &direction, accepted)?;
         let ends = direction.tiny && state.mu <= self.options.tolerance;
         Ok(ends.then_some(Status::NoProgress))
     }
@@ -95,17 +108,17 @@ where
     fn linearise<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &mut State,
     ) -> Result<(), OcpError>
     where
         P::Dynamics: SecondOrder<T>,
     {
-        if !state.begun {
+        if !state.has_slacks {
             ocp.linearise(EXACT)?;
-            self.begin(ocp, all, state)?;
+            self.begin(ocp, capacity, state)?;
         }
-        self.curve(ocp, all, state)?;
+        self.curve(ocp, capacity, state)?;
         ocp.linearise(EXACT)?;
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
@@ -114,18 +127,18 @@ where
         Ok(())
     }
 
-    /// Residuals and barrier parameter at the iterate, the pair of the filter, and the best
+    /// Residuals and barrier parameter at the iterate, barrier function and violation, and the best
     /// iterate.
     fn assess<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &mut State,
         row: &mut Iteration,
-    ) -> Result<Pair, OcpError> {
+    ) -> Result<Measure, OcpError> {
         let (residuals, objective) = ocp.residuals();
         let plain = ocp.objective.to_f64();
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         evaluate(&mut iterate, &mut solution.view_mut());
@@ -133,19 +146,19 @@ where
         let mut here = measure::here(&iterate, plain, state.mu);
         if let Some(coupling) = &mut work.coupling {
             coupling.evaluate(iterate.qp, iterate.v);
-            here.theta += coupling.violation();
+            here.violation += coupling.violation();
         }
-        if !state.measured {
-            state.theta_min = 1e-4 * here.theta.max(1.0);
-            state.filter = Filter::new(1e4 * here.theta.max(1.0));
-            state.measured = true;
+        if !state.has_filter {
+            state.small_violation = 1e-4 * here.violation.max(1.0);
+            state.filter = Filter::new(MARGIN, 1e4 * here.violation.max(1.0));
+            state.has_filter = true;
         }
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
         let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
         let size = residuals.largest().max(violation);
-        if size < state.best || row.iteration == 0 {
-            (state.best, state.kept) = (size, *row);
+        if size < state.best_residual || row.iteration == 0 {
+            (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
         }
         let acceptable = size <= self.options.acceptable_tolerance;
@@ -153,72 +166,83 @@ where
         Ok(here)
     }
 
-    /// The status of a run that ends here; nothing for a run that goes on after other penalties.
-    fn is_over<P: Formulation<T>>(
+    /// What follows the residuals of an iteration.
+    fn next<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &mut State,
         row: &Iteration,
-    ) -> Option<Option<Status>> {
-        let work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+    ) -> Next {
+        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         if row.residuals.largest() <= self.options.tolerance {
-            return Some(elastic::verdict(ocp, state, work.penalties, &self.options));
+            let end = elastic::verdict(ocp, state, work.penalties, &self.options);
+            return end.map_or(Next::NewPenalties, Next::End);
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
-            return Some(Some(Status::Acceptable));
+            return Next::End(Status::Acceptable);
         }
-        (row.iteration >= self.options.max_iterations).then_some(Some(Status::MaxIterations))
+        if row.iteration >= self.options.max_iterations {
+            return Next::End(Status::MaxIterations);
+        }
+        Next::Direction
     }
 
-    /// The search direction; a status where there is none.
+    /// The search direction.
+    ///
+    /// # Errors
+    /// Those of the recursion, where no regularisation helps.
     fn direction<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &mut State,
-        here: Pair,
+        here: Measure,
         row: &mut Iteration,
-    ) -> Result<Result<Direction, Status>, OcpError> {
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+    ) -> Result<Direction, QpError> {
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let intervals = ocp.intervals();
-        let theta = &*split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let multipliers = &*split::<P, T>(ocp.data.as_mut(), intervals).coupling_multipliers;
         let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mu = T::from_f64(state.mu);
-        match state.regularisation.direction(&mut iterate, &mut work.coupling, mu) {
-            Ok(delta) => (state.delta, row.regularisation) = (delta, delta),
-            Err(error) => return Ok(Err(failed(ocp, error))),
-        }
+        state.delta = state.regularisation.direction(&mut iterate, &mut work.coupling, mu)?;
+        row.regularisation = state.delta;
         let mut slope = measure::slope(&iterate, state.mu, work.scratch);
         if let Some(coupling) = &work.coupling {
             // The gradients of the QP have these terms of the Lagrangian.
-            slope -= coupling.slope(iterate.qp, theta, iterate.step).to_f64();
+            slope -= coupling.slope(iterate.qp, multipliers, iterate.step).to_f64();
         }
-        let expected = Expected { here, slope, theta_min: state.theta_min, mu: state.mu, delta: state.delta };
+        let expected = Expected {
+            here,
+            slope,
+            small_violation: state.small_violation,
+            mu: state.mu,
+            delta: state.delta,
+        };
         let tau = barrier::fraction_to_boundary(state.mu);
         let sides = &iterate.sides;
         let mut primal = longest(sides.slack, sides.slack_step, tau);
         let mut dual = longest(sides.multiplier, sides.multiplier_step, tau);
-        if is_tied(sides) {
+        if needs_equal_steps(sides) {
             (primal, dual) = (primal.min(dual), primal.min(dual));
         }
         let is_tiny = |(&d, &v): (&T, &T)| d.abs().to_f64() <= 10.0 * T::EPSILON * (1.0 + v.abs().to_f64());
-        let tiny = here.theta <= 1e-4 && iterate.step.iter().zip(&*iterate.v).all(is_tiny);
-        Ok(Ok(Direction { expected, tau, primal, dual, tiny }))
+        let tiny = here.violation <= 1e-4 && iterate.step.iter().zip(&*iterate.v).all(is_tiny);
+        Ok(Direction { expected, tau, primal, dual, tiny })
     }
 
     /// Goes the step that was accepted.
     fn accept<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &State,
         direction: &Direction,
         accepted: Accepted,
     ) -> Result<(), OcpError> {
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), all, self.work.as_mut());
+        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let intervals = ocp.intervals();
-        let theta = split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let coupling_multipliers = split::<P, T>(ocp.data.as_mut(), intervals).coupling_multipliers;
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let Accepted { alpha, corrected } = accepted;
@@ -226,25 +250,23 @@ where
         if corrected {
             dual = longest(iterate.sides.multiplier, iterate.sides.multiplier_step, direction.tau);
         }
-        if is_tied(&iterate.sides) {
+        if needs_equal_steps(&iterate.sides) {
             dual = dual.min(alpha);
         }
         dynamics_after(&mut iterate, &mut work, T::from_f64(state.delta));
         let part = T::from_f64(alpha);
         if let Some(coupling) = &work.coupling {
-            for (theta, &step) in theta.iter_mut().zip(&*coupling.step) {
-                *theta = *theta + part * step;
-            }
+            add_scaled(coupling_multipliers, part, coupling.step);
         }
         for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
             *pi = *pi + part * (after - *pi);
         }
         let full = iterate.sides.multiplier.iter().zip(&*iterate.sides.multiplier_step);
-        for (curving, (&multiplier, &step)) in work.curving.iter_mut().zip(full) {
-            *curving = *curving + part * (multiplier + step - *curving);
+        for (of_hessian, (&multiplier, &step)) in work.hessian_multipliers.iter_mut().zip(full) {
+            *of_hessian = *of_hessian + part * (multiplier + step - *of_hessian);
         }
         iterate.go(part, T::from_f64(dual));
-        centre(&mut iterate.sides, state.mu);
+        keep_near_centre(&mut iterate.sides, state.mu);
         iterate.store(&mut view);
         Ok(())
     }
@@ -268,7 +290,7 @@ fn shrink_barrier<T: Real>(
 
 /// Keeps multipliers within a factor of `μ / s`, and the sum of both multipliers of a soft side
 /// what its violation costs.
-fn centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
+fn keep_near_centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
     let count = sides.counts.sides();
     for (multiplier, &slack) in sides.multiplier.iter_mut().zip(&*sides.slack).take(count) {
         let centre = mu / slack.to_f64();
@@ -283,14 +305,14 @@ fn centre<T: Real>(sides: &mut Sides<'_, T>, mu: f64) {
             return;
         };
         let force = linear + quadratic * violation;
-        let most = force - T::from_f64(1e-3) * force.min_of(T::from_f64(mu) / violation);
-        let multiplier = multiplier.min_of(most);
+        let most = force - T::from_f64(1e-3) * force.min(T::from_f64(mu) / violation);
+        let multiplier = multiplier.min(most);
         set(sides.multiplier, side, multiplier);
         set(sides.multiplier, other, force - multiplier);
     }
 }
 
 /// Violations with a quadratic cost tie the lengths of both steps: `λ + ν = linear + quadratic e`.
-fn is_tied<T: Real>(sides: &Sides<'_, T>) -> bool {
+fn needs_equal_steps<T: Real>(sides: &Sides<'_, T>) -> bool {
     sides.quadratic.iter().any(|&quadratic| quadratic > T::ZERO)
 }

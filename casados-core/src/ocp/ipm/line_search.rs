@@ -1,10 +1,10 @@
 //! How far a step goes: the filter line search with second-order corrections.
 
-use super::filter::{Filter, Pair, is_better, noise};
 use super::measure;
 use super::newton::{Lengths, attach, evaluate_values};
 use super::work::Work;
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::{Filter, MARGIN, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
 use crate::qp::interior::Iterate;
@@ -13,10 +13,6 @@ use crate::scalar::{Real, Scalar};
 
 /// `η_φ`
 const ARMIJO: f64 = 1e-8;
-/// `s_φ`
-const POWER_PHI: f64 = 2.3;
-/// `s_θ`
-const POWER_THETA: f64 = 1.1;
 /// `γ_α`
 const SAFETY: f64 = 0.05;
 /// Corrections of one step.
@@ -27,54 +23,50 @@ const CORRECTED: f64 = 0.99;
 /// What is known before a line search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expected {
-    pub here: Pair,
+    pub here: Measure,
     /// `∇φᵀ d`
     pub slope: f64,
-    /// Below this violation the barrier function may decide.
-    pub theta_min: f64,
+    /// `θ_min`: below this violation the barrier function may decide.
+    pub small_violation: f64,
     pub mu: f64,
     /// `δ_w`
     pub delta: f64,
 }
 
 impl Expected {
-    /// Whether the barrier function is expected to shrink far more than there is violation.
+    /// Whether the barrier function decides after a step of this length.
     fn decides(&self, alpha: f64) -> bool {
-        self.slope < 0.0
-            && self.here.theta <= self.theta_min
-            && alpha * Scalar::powf(-self.slope, POWER_PHI) > Scalar::powf(self.here.theta, POWER_THETA)
+        self.here.violation <= self.small_violation
+            && objective_decides(alpha, self.slope, self.here.violation)
     }
 
-    /// The shortest step that can be accepted.
+    /// The shortest step that can be accepted (equation (23)).
     fn shortest(&self) -> f64 {
-        let Pair { theta, .. } = self.here;
-        let mut least: f64 = 1e-5;
+        let Measure { violation, .. } = self.here;
+        let mut least: f64 = MARGIN;
         if self.slope < 0.0 {
-            least = least.min(1e-8 * theta / -self.slope);
-            if theta <= self.theta_min {
-                least = least.min(Scalar::powf(theta, POWER_THETA) / Scalar::powf(-self.slope, POWER_PHI));
+            least = least.min(super::iteration::MARGIN * violation / -self.slope);
+            if violation <= self.small_violation {
+                let powers =
+                    (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));
+                least = least.min(powers.0 / powers.1);
             }
         }
         (SAFETY * least).max(1e-14)
     }
 
-    /// Whether a point after a step of this length is good enough; entries of the filter grow.
-    pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Pair) -> bool {
-        if !there.is_finite() || !filter.admits(there) {
+    /// Whether a point after a step of this length is good enough; the filter grows where the
+    /// barrier function does not decide.
+    pub fn accepts(&self, filter: &mut Filter, alpha: f64, there: &Measure) -> bool {
+        // What rounding leaves of a difference of barrier functions.
+        let noise = 10.0 * f64::EPSILON * self.here.objective.abs();
+        if !there.is_finite() || !filter.admits(there, noise) {
             return false;
         }
-        let shrinks = there.phi <= self.here.phi + ARMIJO * alpha * self.slope + noise(&self.here);
         if self.decides(alpha) {
-            return shrinks;
+            return there.objective <= self.here.objective + ARMIJO * alpha * self.slope + noise;
         }
-        if !is_better(there, &self.here) {
-            return false;
-        }
-        if !shrinks || !self.decides(alpha) {
-            let Pair { theta, phi } = self.here;
-            filter.add(Pair { theta: (1.0 - 1e-5) * theta, phi: phi - 1e-8 * theta });
-        }
-        true
+        filter.improves(there, &self.here, noise)
     }
 }
 
@@ -117,11 +109,11 @@ where
         let mut alpha = longest;
         let shortest = expected.shortest();
         while alpha >= shortest {
-            let there = self.pair(ocp, expected.mu, alpha);
+            let there = self.measure(ocp, expected.mu, alpha);
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
                 return Ok(Some(Accepted { alpha, corrected: false }));
             }
-            let bends = there.is_some_and(|there| there.theta >= expected.here.theta);
+            let bends = there.is_some_and(|there| there.violation >= expected.here.violation);
             if alpha == longest
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
@@ -133,8 +125,13 @@ where
         Ok(None)
     }
 
-    /// The pair after a part of the step; nothing where a function has no value.
-    fn pair<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>, mu: f64, alpha: f64) -> Option<Pair> {
+    /// Barrier function and violation after a part of the step; nothing where a function has no value.
+    fn measure<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        mu: f64,
+        alpha: f64,
+    ) -> Option<Measure> {
         let part_of_step = T::from_f64(alpha);
         {
             let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
@@ -157,13 +154,13 @@ where
         let gaps = ocp.gaps_at(self.trial, self.work.ends);
         let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
-        let mut theta = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);
+        let mut violation = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);
         if let Some(coupling) = &mut self.work.coupling {
             coupling.evaluate(iterate.qp, self.work.rows);
-            theta += coupling.violation();
+            violation += coupling.violation();
         }
         let (penalties, barrier) = measure::penalties_and_barrier(&iterate.sides, slacks);
-        Some(Pair { theta, phi: objective + penalties + mu * barrier })
+        Some(Measure { objective: objective + penalties + mu * barrier, violation })
     }
 
     /// Second-order corrections: constraints take their values at the point that was tried.
@@ -181,7 +178,7 @@ where
             assign(self.work.slack_step, iterate.sides.slack_step);
             assign(self.work.multiplier_step, iterate.sides.multiplier_step);
         }
-        let mut violation = expected.here.theta;
+        let mut violation = expected.here.violation;
         let mut accepted = None;
         for _ in 0..CORRECTIONS {
             ocp.correct(self.trial, self.work.ends);
@@ -200,15 +197,15 @@ where
             if solved.is_err() {
                 break;
             }
-            let Some(there) = self.pair(ocp, expected.mu, alpha) else { break };
+            let Some(there) = self.measure(ocp, expected.mu, alpha) else { break };
             if expected.accepts(filter, alpha, &there) {
                 accepted = Some(alpha);
                 break;
             }
-            if there.theta > CORRECTED * violation {
+            if there.violation > CORRECTED * violation {
                 break;
             }
-            violation = there.theta;
+            violation = there.violation;
         }
         if accepted.is_none() {
             let iterate: Iterate<'_, T> = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;

@@ -1,7 +1,7 @@
 //! Barrier function and violation at a point, and how the barrier function changes along a step.
 
-use super::filter::Pair;
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::Measure;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
 use crate::qp::interior::{Iterate, Sides};
@@ -21,13 +21,13 @@ pub(super) fn penalties_and_barrier<T: Real>(sides: &Sides<'_, T>, slacks: &[T])
     (penalties, barrier)
 }
 
-/// The pair at the iterate itself, from residuals that are there.
-pub(super) fn here<T: Real>(iterate: &Iterate<'_, T>, objective: f64, mu: f64) -> Pair {
+/// Barrier function and violation at the iterate itself, from residuals that are there.
+pub(super) fn here<T: Real>(iterate: &Iterate<'_, T>, objective: f64, mu: f64) -> Measure {
     let sides = &iterate.sides;
     let size = |values: &[T]| values.iter().fold(0.0, |sum, r| sum + r.abs().to_f64());
-    let theta = size(iterate.dynamics) + size(sides.residual) + size(sides.equation_residual);
+    let violation = size(iterate.dynamics) + size(sides.residual) + size(sides.equation_residual);
     let (penalties, barrier) = penalties_and_barrier(sides, sides.slack);
-    Pair { theta, phi: objective + penalties + mu * barrier }
+    Measure { objective: objective + penalties + mu * barrier, violation }
 }
 
 /// `∇φᵀ d`

@@ -9,7 +9,7 @@
 //! | `run`, `iteration` | the iterations, and one of them |
 //! | `start`, `multipliers` | the first point and its multipliers |
 //! | `newton`, `direction` | Newton's equations by the Riccati recursion, and what makes them convex |
-//! | `measure`, `filter`, `line_search` | how far a step goes |
+//! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `barrier` | how `μ` shrinks |
 //! | `elastic` | penalties where no step makes progress |
 //!
@@ -20,7 +20,8 @@
 mod barrier;
 mod direction;
 mod elastic;
-mod filter;
+#[cfg(feature = "alloc")]
+mod heap;
 mod iteration;
 mod line_search;
 mod measure;
@@ -31,19 +32,13 @@ mod run;
 mod start;
 mod work;
 
+#[cfg(feature = "alloc")]
+pub use heap::HeapIpm;
 pub use options::IpmOptions;
 
 #[cfg(feature = "alloc")]
-use super::error::OcpError;
-#[cfg(feature = "alloc")]
-use super::problem::Formulation;
-#[cfg(feature = "alloc")]
-use super::sqp::Iteration;
-#[cfg(feature = "alloc")]
-use super::sqp::Log;
+use super::log::Iteration;
 use crate::qp::Solution;
-#[cfg(feature = "alloc")]
-use crate::{qp::StageDims, scalar::Real};
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
@@ -77,34 +72,4 @@ pub struct Ipm<T, D, M, I> {
     work: M,
     #[cfg(feature = "alloc")]
     log: Vec<Iteration>,
-}
-
-/// A nonlinear interior point with its memory on the heap.
-#[cfg(feature = "alloc")]
-pub type HeapIpm<T = f64> = Ipm<T, Vec<StageDims>, Vec<T>, Vec<u32>>;
-
-#[cfg(feature = "alloc")]
-impl<T: Real> HeapIpm<T> {
-    /// For a problem.
-    ///
-    /// # Errors
-    /// [`OcpError::OutOfMemory`]
-    pub fn new<P: Formulation<T>>(ocp: &super::HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let dims = ocp.qp().dims();
-        Ok(Self {
-            options: IpmOptions::new::<T>(),
-            trial: Solution::new(dims)?,
-            best: Solution::new(dims)?,
-            numbers: Vec::new(),
-            indices: Vec::new(),
-            work: Vec::new(),
-            log: Vec::new(),
-        })
-    }
-
-    /// The iterations of the last run, to be printed.
-    #[must_use]
-    pub fn log(&self) -> Log<'_> {
-        Log(&self.log)
-    }
 }

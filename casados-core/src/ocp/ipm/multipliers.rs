@@ -9,6 +9,7 @@ use crate::ocp::data::split;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
+use crate::qp::interior::add_scaled;
 use crate::qp::{StageDims, Store, assign};
 use crate::scalar::Real;
 
@@ -26,7 +27,7 @@ where
     pub(super) fn begin<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &mut State,
     ) -> Result<(), OcpError> {
         // Multipliers of hard bounds say nothing about penalties.
@@ -35,33 +36,31 @@ where
         self.numbers.as_mut().fill(T::ZERO);
         let ends = ocp.ends();
         let intervals = ocp.intervals();
-        let theta = split::<P, T>(ocp.data.as_mut(), intervals).theta;
+        let coupling_multipliers = split::<P, T>(ocp.data.as_mut(), intervals).coupling_multipliers;
         let (qp, solution) = (ocp.qp.view(), &mut ocp.iterate);
         let mut view = solution.view_mut();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let mut work = Work::new(qp.dims, ends, all, self.work.as_mut());
+        let mut work = Work::new(qp.dims, ends, capacity, self.work.as_mut());
         iterate.take_point(&view);
         iterate.give_initial_state();
         evaluate_values(&mut iterate);
         begin_sides(&mut iterate, &self.options, warm, T::from_f64(state.mu), &view);
         iterate.store(&mut view);
         if warm {
-            assign(work.curving, iterate.sides.multiplier);
+            assign(work.hessian_multipliers, iterate.sides.multiplier);
         } else if least_squares(&mut iterate, &mut work).is_ok() {
             let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST);
-            if work.pi.iter().chain(&*work.curving).all(is_small) {
+            if work.pi.iter().chain(&*work.hessian_multipliers).all(is_small) {
                 assign(view.dynamics, work.pi);
                 if let Some(coupling) = &work.coupling {
-                    for (theta, &step) in theta.iter_mut().zip(&*coupling.step) {
-                        *theta = *theta + step;
-                    }
+                    add_scaled(coupling_multipliers, T::ONE, coupling.step);
                 }
             } else {
                 view.dynamics.fill(T::ZERO);
-                work.curving.fill(T::ZERO);
+                work.hessian_multipliers.fill(T::ZERO);
             }
         }
-        state.begun = true;
+        state.has_slacks = true;
         Ok(())
     }
 
@@ -69,16 +68,16 @@ where
     pub(super) fn curve<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        all: &Lengths,
+        capacity: &Lengths,
         state: &State,
     ) -> Result<(), OcpError> {
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
-        let work = Work::new(qp.dims, ends, all, self.work.as_mut());
+        let work = Work::new(qp.dims, ends, capacity, self.work.as_mut());
         assign(work.slacks, iterate.sides.multiplier);
-        assign(iterate.sides.multiplier, work.curving);
+        assign(iterate.sides.multiplier, work.hessian_multipliers);
         iterate.take_point(&view);
         iterate.store(&mut view);
         assign(iterate.sides.multiplier, work.slacks);

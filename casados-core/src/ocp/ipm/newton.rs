@@ -161,7 +161,7 @@ impl<T: Real> Registers<T> for After<'_, '_, '_, '_, T> {
 const IDENTITY: f64 = 1e8;
 
 /// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
-/// constraints, into `work.pi` and `work.curving`; those of bounds of variables are given. These
+/// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are given. These
 /// are Newton's equations with a large multiple of the identity for a Hessian, and no residuals of
 /// the constraints (Wächter and Biegler, section 3.6).
 ///
@@ -179,9 +179,9 @@ pub(super) fn least_squares<T: Real>(
     T::registers(LeastSquares { iterate, coupling, pi: work.pi, result: &mut result });
     result?;
     let sides = &mut iterate.sides;
-    assign(work.curving, sides.multiplier_step);
+    assign(work.hessian_multipliers, sides.multiplier_step);
     sides.multiplier_step.fill(T::ZERO);
-    general_multipliers(iterate, |i| work.curving.get(i).copied().unwrap_or(T::ZERO));
+    general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
     assign(work.rows, iterate.v);
     iterate.proximal = identity;
     T::registers(After { iterate, coupling: work.coupling.as_ref(), pi: work.pi });

@@ -2,17 +2,20 @@
 
 use super::Ipm;
 use super::direction::Regularisation;
-use super::filter::Filter;
+use super::iteration::MARGIN;
 use super::newton::Lengths;
 use super::start::push_inside;
 use super::work::Work;
 use crate::ocp::convexify::Convexification;
 use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::Filter;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Exact;
+#[cfg(feature = "alloc")]
+use crate::ocp::log::reserve;
+use crate::ocp::log::{Iteration, Outcome, Status};
 use crate::ocp::problem::Formulation;
-use crate::ocp::sqp::{Iteration, Outcome, Status, Times};
 use crate::qp::{Field, StageDims, Store, assign};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
@@ -23,25 +26,25 @@ pub(super) struct State {
     /// The barrier parameter.
     pub mu: f64,
     pub filter: Filter,
-    /// Below this violation the barrier function may decide.
-    pub theta_min: f64,
+    /// `θ_min`: below this violation the barrier function may decide.
+    pub small_violation: f64,
     pub regularisation: Regularisation,
     /// `δ_w` of the step.
     pub delta: f64,
     /// The penalty, if bounds are soft.
     pub elastic: Option<f64>,
-    /// The violation where the last penalty led to.
-    pub stationary: f64,
+    /// The violation that the last penalty left.
+    pub stationary_violation: f64,
     /// Iterations one after the other whose residuals are acceptable.
     pub acceptable: usize,
-    /// Slacks are there.
-    pub begun: bool,
-    /// The filter knows the violation that the slacks began with.
-    pub measured: bool,
+    /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
+    pub has_slacks: bool,
+    /// Whether the filter has the bound of violations that belongs to these slacks.
+    pub has_filter: bool,
     /// The largest residual of the best iterate.
-    pub best: f64,
+    pub best_residual: f64,
     /// That iterate.
-    pub kept: Iteration,
+    pub best_iteration: Iteration,
 }
 
 impl<T, D, M, I> Ipm<T, D, M, I>
@@ -54,7 +57,8 @@ where
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
     ///
     /// # Errors
-    /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where a
+    /// [`OcpError::Length`] where the memory is that of another problem; [`OcpError::Missing`],
+    /// [`OcpError::InvalidOption`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where a
     /// function has no value at the start.
     pub fn solve<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
@@ -75,47 +79,43 @@ where
     where
         P::Dynamics: SecondOrder<T>,
     {
+        ocp.fits(self.trial.dims())?;
         self.options.check()?;
         // Bounds of constraints are in the QP once it is written.
         ocp.linearise(Exact { convexification: Convexification::None })?;
-        let (lengths, all) = self.prepare(ocp)?;
+        let (lengths, capacity) = self.prepare(ocp)?;
         let mut state = State {
             lengths,
             mu: self.options.start_mu,
-            filter: Filter::new(f64::INFINITY),
-            theta_min: f64::INFINITY,
+            filter: Filter::new(MARGIN, f64::INFINITY),
+            small_violation: f64::INFINITY,
             regularisation: Regularisation::default(),
             delta: 0.0,
             elastic: None,
-            stationary: f64::INFINITY,
+            stationary_violation: f64::INFINITY,
             acceptable: 0,
-            begun: false,
-            measured: false,
-            best: f64::INFINITY,
-            kept: Iteration::default(),
+            has_slacks: false,
+            has_filter: false,
+            best_residual: f64::INFINITY,
+            best_iteration: Iteration::default(),
         };
         #[cfg(feature = "alloc")]
         self.log.clear();
-        let mut outcome = Outcome {
-            status: Status::MaxIterations,
-            iterations: 0,
-            objective: 0.0,
-            residuals: Default::default(),
-            qp_iterations: 0,
-            times: Times::default(),
-        };
+        let mut outcome = Outcome::new();
         let result = loop {
             let mut row = Iteration { iteration: outcome.iterations, ..Iteration::default() };
-            let end = match self.iterate(ocp, &all, &mut state, &mut row) {
+            let end = match self.iterate(ocp, &capacity, &mut state, &mut row) {
                 Ok(end) => end,
                 Err(error) => break Err(error),
             };
-            outcome.qp_iterations += row.qp_iterations;
-            outcome.times.linearise += row.times.linearise;
-            outcome.times.qp += row.times.qp;
-            outcome.times.search += row.times.search;
+            outcome.count(&row);
             #[cfg(feature = "alloc")]
-            self.log.push(row);
+            {
+                if let Err(error) = reserve(&mut self.log, 1) {
+                    break Err(error);
+                }
+                self.log.push(row);
+            }
             if let Some(status) = end {
                 outcome.status = status;
                 break Ok(());
@@ -126,13 +126,13 @@ where
             }
             outcome.iterations += 1;
         };
-        let work = Work::new(ocp.qp().dims, ocp.ends(), &all, self.work.as_mut());
+        let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
         ocp.set_penalties(work.penalties, None);
-        if outcome.status != Status::Converged && state.best.is_finite() {
+        if outcome.status != Status::Converged && state.best_residual.is_finite() {
             ocp.iterate.copy_from(&self.best);
         }
-        outcome.objective = state.kept.objective;
-        outcome.residuals = state.kept.residuals;
+        outcome.objective = state.best_iteration.objective;
+        outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
     }
 
@@ -143,19 +143,19 @@ where
         ocp: &mut Ocp<P, T, D, M>,
     ) -> Result<(Lengths, Lengths), OcpError> {
         let lengths = Lengths::of(ocp.qp());
-        let all = lengths.all_soft(ocp.qp());
-        let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &all);
+        let capacity = lengths.all_soft(ocp.qp());
+        let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity);
         self.work.at_least(length, Field::Numbers)?.fill(T::ZERO);
-        self.numbers.at_least(all.numbers, Field::Numbers)?.fill(T::ZERO);
+        self.numbers.at_least(capacity.numbers, Field::Numbers)?.fill(T::ZERO);
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
         push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
         // Which states are tied lies behind the penalties.
-        let begin = Work::<T>::before_coupling(ocp.qp().dims, ocp.ends(), all.counts.pairs());
+        let begin = Work::<T>::before_coupling(ocp.qp().dims, ocp.ends(), capacity.counts.pairs());
         let (tied, _) = ocp.coupling();
         assign(self.work.as_mut().get_mut(begin..).unwrap_or_default(), tied);
-        let work = Work::new(ocp.qp().dims, ocp.ends(), &all, self.work.as_mut());
+        let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
         ocp.remember_penalties(work.penalties);
-        Ok((lengths, all))
+        Ok((lengths, capacity))
     }
 }

@@ -1,7 +1,7 @@
 //! The first point: inside of all bounds, with slacks and multipliers away from zero.
 
 use super::IpmOptions;
-use crate::qp::interior::{Iterate, set};
+use crate::qp::interior::{Iterate, at, set};
 use crate::qp::{Bounds, Places, QpView, SolutionView, StageDims, part_mut};
 use crate::scalar::Real;
 
@@ -36,25 +36,13 @@ fn push_part<T: Real>(bounds: &Bounds<'_, T>, push: T, v: &mut [T]) {
             continue;
         }
         let room = if below && above { push * (upper - lower) } else { T::from_f64(f64::INFINITY) };
-        let distance = |bound: T| (push * bound.abs().max(T::ONE)).min_of(room);
+        let distance = |bound: T| (push * bound.abs().max(T::ONE)).min(room);
         if below {
             *v = (*v).max(lower + distance(lower));
         }
         if above {
-            *v = (*v).min_of(upper - distance(upper));
+            *v = (*v).min(upper - distance(upper));
         }
-    }
-}
-
-/// The smaller one of two numbers.
-pub(super) trait MinOf {
-    /// The smaller one.
-    fn min_of(self, other: Self) -> Self;
-}
-
-impl<T: Real> MinOf for T {
-    fn min_of(self, other: T) -> T {
-        if other < self { other } else { self }
     }
 }
 
@@ -88,22 +76,17 @@ pub(super) fn begin_sides<T: Real>(
             *multiplier = (*multiplier).max(mu / slack);
         }
     }
-    for j in 0..sides.soft.len() {
-        let side = sides.soft.get(j).map_or(0, |&side| side as usize);
-        let (linear, quadratic) = (at(sides.linear, j), at(sides.quadratic, j));
+    for (j, &side) in sides.soft.iter().enumerate() {
+        let (linear, quadratic) = (at(sides.linear, j as u32), at(sides.quadratic, j as u32));
         // `λ + ν = linear + quadratic e`, from the start on.
         let violation = (at(sides.slack, side) - at(sides.scratch, side)).max(push);
         let force = linear + quadratic * violation;
         let half = T::from_f64(0.5) * force;
-        let multiplier = at(sides.multiplier, side).min_of(half);
-        set(sides.multiplier, side, multiplier);
+        let multiplier = at(sides.multiplier, side).min(half);
+        set(sides.multiplier, side as usize, multiplier);
         set(sides.slack, count + j, violation);
         set(sides.multiplier, count + j, force - multiplier);
     }
-}
-
-fn at<T: Real>(values: &[T], index: usize) -> T {
-    values.get(index).copied().unwrap_or(T::ZERO)
 }
 
 /// How many numbers the largest stage takes.

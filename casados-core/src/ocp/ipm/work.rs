@@ -2,7 +2,7 @@
 
 use super::newton::Lengths;
 use super::start::scratch;
-use crate::ocp::sqp::elastic;
+use crate::ocp::elastic;
 use crate::qp::interior::Coupling;
 use crate::qp::{StageDims, end, take_mut};
 use crate::scalar::Real;
@@ -23,7 +23,7 @@ pub(super) struct Work<'a, T> {
     pub pi: &'a mut [T],
     /// Multipliers of sides as the Hessian has them: they go as far as the point does, while those
     /// of the barrier go as far as they stay positive.
-    pub curving: &'a mut [T],
+    pub hessian_multipliers: &'a mut [T],
     /// Over the variables of a stage.
     pub scratch: &'a mut [T],
     /// Linear penalties as they were given.
@@ -34,8 +34,8 @@ pub(super) struct Work<'a, T> {
 
 impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
-    pub fn length(dims: &[StageDims], ends: usize, all: &Lengths) -> usize {
-        let pairs = all.counts.pairs();
+    pub fn length(dims: &[StageDims], ends: usize, capacity: &Lengths) -> usize {
+        let pairs = capacity.counts.pairs();
         Self::before_coupling(dims, ends, pairs)
             + first_nx(dims)
             + Coupling::<T>::memory(dims, first_nx(dims))
@@ -48,8 +48,8 @@ impl<'a, T: Real> Work<'a, T> {
     }
 
     /// In memory of that length, whose contents stay.
-    pub fn new(dims: &[StageDims], ends: usize, all: &Lengths, mut memory: &'a mut [T]) -> Self {
-        let pairs = all.counts.pairs();
+    pub fn new(dims: &[StageDims], ends: usize, capacity: &Lengths, mut memory: &'a mut [T]) -> Self {
+        let pairs = capacity.counts.pairs();
         let end = end::<T>(dims);
         let rest = &mut memory;
         Self {
@@ -60,7 +60,7 @@ impl<'a, T: Real> Work<'a, T> {
             slack_step: take_mut(rest, pairs),
             multiplier_step: take_mut(rest, pairs),
             pi: take_mut(rest, end.dynamics),
-            curving: take_mut(rest, pairs),
+            hessian_multipliers: take_mut(rest, pairs),
             scratch: take_mut(rest, scratch::<T>(dims)),
             penalties: take_mut(rest, elastic::memory(dims)),
             coupling: {

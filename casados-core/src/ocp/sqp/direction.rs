@@ -2,12 +2,12 @@
 //! penalties where it is infeasible.
 
 use super::Sqp;
-use super::elastic::Worst;
-use super::log::Iteration;
 use super::run::State;
 use crate::ocp::convexify::Convexification;
+use crate::ocp::elastic::Worst;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Curvature;
+use crate::ocp::log::Iteration;
 use crate::ocp::problem::Formulation;
 use crate::qp::{QpError, QpSolver, StageDims, Start, Statistics};
 use crate::scalar::Real;
@@ -57,7 +57,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.set_penalties(memory, Some(T::from_f64(penalty)));
         state.elastic = true;
         // Objectives with other penalties are not to be compared.
-        state.search.forget();
+        state.search.filter.clear();
     }
 
     /// Bounds as they were given.
@@ -69,7 +69,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if state.elastic {
             ocp.set_penalties(self.penalties(ocp), None);
             state.elastic = false;
-            state.search.forget();
+            state.search.filter.clear();
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::ocp::data::split;
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::Measure;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::dot;
 use crate::ocp::problem::Formulation;
@@ -9,31 +10,10 @@ use crate::qp::{Bounds, Solution, SolutionStage, StageDims, add_symmetric, assig
 use crate::scalar::Real;
 use crate::shape::Shape;
 
-/// Objective with penalties of soft bounds, and the sum of all violations of what is hard, each
-/// times its weight.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Measure {
-    pub objective: f64,
-    pub violation: f64,
-}
-
-impl core::ops::AddAssign for Measure {
-    fn add_assign(&mut self, other: Self) {
-        self.objective += other.objective;
-        self.violation += other.violation;
-    }
-}
-
-/// What is known of a step before it is taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Model {
-    /// `∇fᵀd`, with the change of penalties.
-    pub slope: f64,
-}
-
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// The slope of the objective from the iterate to the solution of its QP.
-    pub(super) fn model(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> Model {
+    /// `∇fᵀd`: the slope of the objective from the iterate to the solution of its QP, with the
+    /// change of `penalties`.
+    pub(super) fn slope(&mut self, solution: &Solution<T, D, M>, penalties: f64) -> f64 {
         let intervals = self.intervals();
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let (from, _) = self.iterate.vectors();
@@ -62,7 +42,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 + sides(&stage.u_bounds(), u, None).objective
                 + sides(&stage.g_bounds(), g, None).objective;
         }
-        Model { slope: slope.to_f64() + soft }
+        slope.to_f64() + soft
     }
 
     /// Objective and violations at some point, with the weights of violations or without.

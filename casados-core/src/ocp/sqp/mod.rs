@@ -6,27 +6,23 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible (`elastic`) |
+//! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `run` | the iterations, and how they end |
 
 mod direction;
-pub(super) mod elastic;
-mod log;
 mod measure;
 mod options;
 mod run;
 mod search;
 
-pub(super) use elastic::Worst;
-pub(super) use log::Watch;
-pub use log::{Iteration, Log, Outcome, Status, Times};
 pub use options::{Globalisation, SqpOptions};
-pub(super) use run::{failed, infeasible};
 
+use super::elastic;
 use super::error::{OcpError, Part};
-use super::instance::Ocp;
 use super::linearise::{Exact, GaussNewton};
+#[cfg(feature = "alloc")]
+use super::log::{Iteration, Log};
 use super::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::HeapInteriorPoint;
@@ -172,23 +168,4 @@ impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
             log: Vec::new(),
         })
     }
-}
-
-/// The memory of a run has the dimensions of its problem.
-fn fits<T: Real, P: Formulation<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-    ocp: &Ocp<P, T, D, M>,
-    dims: &[StageDims],
-) -> Result<(), OcpError> {
-    let (expected, found) = (ocp.qp().dims().len(), dims.len());
-    if expected != found {
-        return Err(OcpError::Length { part: Part::Dimensions, stage: 0, expected, found });
-    }
-    for (stage, (a, b)) in ocp.qp().dims().iter().zip(dims).enumerate() {
-        for (expected, found) in [(a.nx, b.nx), (a.nu, b.nu), (a.ng, b.ng)] {
-            if expected != found {
-                return Err(OcpError::Length { part: Part::Dimensions, stage, expected, found });
-            }
-        }
-    }
-    Ok(())
 }

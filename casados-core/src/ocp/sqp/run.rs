@@ -1,16 +1,17 @@
 //! The iterations.
 
+use super::Sqp;
 use super::direction::Direction;
-use super::elastic::Worst;
-use super::log::{Iteration, Outcome, Status, Times, Watch};
 use super::options::Globalisation;
 use super::search::Search;
-use super::{Sqp, fits};
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Curvature;
+#[cfg(feature = "alloc")]
+use crate::ocp::log::reserve;
+use crate::ocp::log::{Iteration, Outcome, Status, Watch};
 use crate::ocp::problem::Formulation;
-use crate::qp::{QpError, QpSolver, StageDims};
+use crate::qp::{QpSolver, StageDims};
 use crate::scalar::Real;
 use core::marker::PhantomData;
 use core::ops::ControlFlow;
@@ -35,9 +36,9 @@ pub(super) struct State<T> {
     /// The penalty that violations were found to need; zero at first.
     pub(super) penalty: f64,
     /// The largest residual of the best iterate.
-    best: f64,
+    best_residual: f64,
     /// That iterate.
-    kept: Iteration,
+    best_iteration: Iteration,
     number: PhantomData<T>,
 }
 
@@ -73,7 +74,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     where
         C: Curvature<P::Dynamics, T>,
     {
-        fits(ocp, self.solution.dims())?;
+        ocp.fits(self.solution.dims())?;
         ocp.is_uncoupled()?;
         self.options.check()?;
         let mut state = State {
@@ -82,24 +83,17 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             regularisation: 0.0,
             elastic_steps: 0,
             penalty: 0.0,
-            best: f64::INFINITY,
-            kept: Iteration::default(),
+            best_residual: f64::INFINITY,
+            best_iteration: Iteration::default(),
             number: PhantomData,
         };
         self.weights.multipliers_mut().fill(T::ZERO);
         #[cfg(feature = "alloc")]
         {
             self.log.clear();
-            self.reserve(self.options.max_iterations.saturating_add(1).min(ROOM))?;
+            reserve(&mut self.log, self.options.max_iterations.saturating_add(1).min(ROOM))?;
         }
-        let mut outcome = Outcome {
-            status: Status::MaxIterations,
-            iterations: 0,
-            objective: 0.0,
-            residuals: Default::default(),
-            qp_iterations: 0,
-            times: Times::default(),
-        };
+        let mut outcome = Outcome::new();
         let mut result = Ok(());
         loop {
             let mut row = Iteration { iteration: outcome.iterations, ..Iteration::default() };
@@ -110,13 +104,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     break;
                 }
             };
-            outcome.qp_iterations += row.qp_iterations;
-            outcome.times.linearise += row.times.linearise;
-            outcome.times.qp += row.times.qp;
-            outcome.times.search += row.times.search;
+            outcome.count(&row);
             #[cfg(feature = "alloc")]
             {
-                if let Err(error) = self.reserve(1) {
+                if let Err(error) = reserve(&mut self.log, 1) {
                     result = Err(error);
                     break;
                 }
@@ -136,19 +127,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // What is infeasible is said of the last iterate.
         let is_last =
             matches!(outcome.status, Status::Converged | Status::Infeasible { .. }) && result.is_ok();
-        if !is_last && state.best.is_finite() {
+        if !is_last && state.best_residual.is_finite() {
             ocp.iterate.copy_from(&self.best);
         }
-        outcome.objective = state.kept.objective;
-        outcome.residuals = state.kept.residuals;
+        outcome.objective = state.best_iteration.objective;
+        outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
-    }
-
-    /// Room for more rows of the log.
-    #[cfg(feature = "alloc")]
-    fn reserve(&mut self, more: usize) -> Result<(), OcpError> {
-        let bytes = more.saturating_mul(size_of::<Iteration>());
-        self.log.try_reserve(more).map_err(|_| OcpError::OutOfMemory { bytes })
     }
 
     /// One iteration; a status if it is the last one.
@@ -173,12 +157,12 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);
         let size = residuals.largest();
-        if size < state.best || row.iteration == 0 {
-            (state.best, state.kept) = (size, *row);
+        if size < state.best_residual || row.iteration == 0 {
+            (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
         }
         if size <= self.options.tolerance {
-            state.kept = *row;
+            state.best_iteration = *row;
             return Ok(Some(Status::Converged));
         }
         if row.iteration >= self.options.max_iterations {
@@ -189,10 +173,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         match direction {
             Ok(Direction::Step) => {}
             Ok(Direction::Infeasible(worst)) => {
-                state.kept = *row;
-                return Ok(Some(infeasible(ocp, &worst)));
+                state.best_iteration = *row;
+                return Ok(Some(ocp.status_of_worst(&worst)));
             }
-            Err(error) => return Ok(Some(failed(ocp, error))),
+            Err(error) => return Ok(Some(ocp.status_of_error(error))),
         }
         let taken = if self.options.globalisation == Globalisation::FullStep {
             core::mem::swap(&mut ocp.iterate, &mut self.solution);
@@ -212,35 +196,5 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.weights.multipliers_mut().fill(T::ZERO);
         }
         Ok(None)
-    }
-}
-
-pub(in crate::ocp) fn infeasible<
-    P: Formulation<T>,
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]>,
->(
-    ocp: &Ocp<P, T, D, M>,
-    worst: &Worst,
-) -> Status {
-    let Worst { field, stage, index, side, violation } = *worst;
-    Status::Infeasible { constraint: ocp.name(field, stage, index, side), violation }
-}
-
-pub(in crate::ocp) fn failed<
-    P: Formulation<T>,
-    T: Real,
-    D: AsRef<[StageDims]>,
-    M: AsRef<[T]> + AsMut<[T]>,
->(
-    ocp: &Ocp<P, T, D, M>,
-    error: QpError,
-) -> Status {
-    match (ocp.infeasible(&error), error) {
-        (Some(constraint), QpError::Infeasible { violation, .. }) => {
-            Status::InfeasibleQp { constraint, violation }
-        }
-        _ => Status::QpFailed(error),
     }
 }

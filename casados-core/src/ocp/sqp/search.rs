@@ -1,20 +1,18 @@
 //! How far a step goes: merit function and filter.
 
 use super::Sqp;
-use super::log::{Iteration, Watch};
-use super::measure::{Measure, Model};
 use super::options::{Globalisation, SqpOptions};
 use super::run::{State, Taken};
 use crate::ocp::error::OcpError;
+use crate::ocp::filter::{Filter, Measure, objective_decides};
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Curvature;
+use crate::ocp::log::{Iteration, Watch};
 use crate::ocp::problem::Formulation;
 use crate::qp::{QpSolver, Solution, StageDims, Start};
-use crate::scalar::{Real, Scalar};
+use crate::scalar::Real;
 
-/// Entries of the filter; the oldest one is forgotten when there are more.
-const ENTRIES: usize = 64;
-/// What a new iterate must be better by, as a part of the violation.
+/// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
 const MARGIN: f64 = 1e-5;
 /// The part of the expected decrease that is enough.
 const ARMIJO: f64 = 1e-4;
@@ -22,8 +20,7 @@ const ARMIJO: f64 = 1e-4;
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
-    entries: [Measure; ENTRIES],
-    count: usize,
+    pub filter: Filter,
     /// Whether the last step was a full one: then the next full step is tried by linearising there,
     /// which is not to be done again.
     full: bool,
@@ -35,23 +32,19 @@ pub(super) struct Search {
 #[derive(Clone, Copy)]
 struct Line {
     here: Measure,
-    model: Model,
+    /// Of the objective.
+    slope: f64,
 }
 
 impl Search {
     pub fn new() -> Self {
-        Self { entries: [Measure::default(); ENTRIES], count: 0, full: true, linearised: None }
-    }
-
-    /// Forgets all entries: their objectives had other penalties.
-    pub fn forget(&mut self) {
-        self.count = 0;
+        Self { filter: Filter::new(MARGIN, f64::INFINITY), full: true, linearised: None }
     }
 
     /// Whether a point is good enough after a step of this length.
     fn accepts(&mut self, options: &SqpOptions, length: f64, line: &Line, there: &Measure) -> bool {
-        let Line { here, model } = line;
-        if !(there.objective.is_finite() && there.violation.is_finite()) {
+        let Line { here, slope } = line;
+        if !there.is_finite() {
             return false;
         }
         // Near the solution, differences are roundings.
@@ -60,38 +53,20 @@ impl Search {
             Globalisation::FullStep => true,
             Globalisation::Merit => {
                 let merit = |m: &Measure| m.objective + m.violation;
-                let slope = model.slope - here.violation;
+                let slope = slope - here.violation;
                 merit(there) <= merit(here) + ARMIJO * length * slope.min(0.0) + noise
             }
             Globalisation::Filter => {
-                let entries = self.entries.iter().take(self.count.min(ENTRIES));
-                let mut dominated = entries.filter(|old| !better(there, old, noise));
-                if dominated.next().is_some() {
+                if !self.filter.admits(there, noise) {
                     return false;
                 }
-                // Where the objective is expected to shrink far more than there is violation, it
-                // must (Wächter and Biegler, (19)).
-                let descends = model.slope < 0.0
-                    && length * Scalar::powf(-model.slope, 2.3) > Scalar::powf(here.violation, 1.1);
-                if descends {
-                    return there.objective <= here.objective + ARMIJO * length * model.slope + noise;
+                if objective_decides(length, *slope, here.violation) {
+                    return there.objective <= here.objective + ARMIJO * length * slope + noise;
                 }
-                let good = better(there, here, noise);
-                if good {
-                    if let Some(entry) = self.entries.get_mut(self.count % ENTRIES) {
-                        *entry = *here;
-                    }
-                    self.count += 1;
-                }
-                good
+                self.filter.improves(there, here, noise)
             }
         }
     }
-}
-
-/// Whether one of both is smaller by a margin.
-fn better(a: &Measure, b: &Measure, noise: f64) -> bool {
-    a.violation <= (1.0 - MARGIN) * b.violation || a.objective <= b.objective - MARGIN * b.violation + noise
 }
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
@@ -120,7 +95,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let here = ocp.measure_here(weighted.then_some(&self.weights));
         let penalties = here.objective - ocp.objective.to_f64();
-        let line = Line { here, model: ocp.model(&self.solution, penalties) };
+        let line = Line { here, slope: ocp.slope(&self.solution, penalties) };
         let mut written = true;
         if state.search.full {
             if self.try_linearised(ocp, state, &line) {

@@ -17,7 +17,7 @@ mod vector;
 mod verdict;
 
 pub(crate) use coupling::Coupling;
-pub(crate) use iterate::Iterate;
+pub(crate) use iterate::{Iterate, at};
 pub(crate) use kernels::{
     Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
 };
@@ -27,7 +27,7 @@ pub use options::InteriorPointOptions;
 pub(crate) use riccati::First;
 pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
 pub use store::Store;
-pub(crate) use vector::dot;
+pub(crate) use vector::{add_scaled, dot};
 
 use super::check::check_all_bounds;
 use super::error::{Field, QpError};

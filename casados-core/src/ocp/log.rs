@@ -1,7 +1,15 @@
 //! What happened, as data.
 
-use crate::ocp::error::ConstraintName;
-use crate::qp::{QpError, Residuals};
+use super::elastic::Worst;
+use super::error::ConstraintName;
+#[cfg(feature = "alloc")]
+use super::error::OcpError;
+use super::instance::Ocp;
+use super::problem::Formulation;
+use crate::qp::{QpError, Residuals, StageDims};
+use crate::scalar::Real;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 use core::fmt;
 
 /// Seconds that an iteration took; zero without the feature `std`.
@@ -37,7 +45,7 @@ pub struct Iteration {
     /// Iterations of QPs.
     pub qp_iterations: usize,
     /// What was added to the diagonal of the Hessian because the QP was not convex
-    /// ([`Convexification::Reduced`](super::super::Convexification)).
+    /// ([`Convexification::Reduced`](super::Convexification)).
     pub regularisation: f64,
     /// Whether bounds had penalties because the QP was infeasible.
     pub elastic: bool,
@@ -102,6 +110,26 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Of a run that begins.
+    pub(super) fn new() -> Self {
+        Self {
+            status: Status::MaxIterations,
+            iterations: 0,
+            objective: 0.0,
+            residuals: Residuals::default(),
+            qp_iterations: 0,
+            times: Times::default(),
+        }
+    }
+
+    /// Counts what an iteration took.
+    pub(super) fn count(&mut self, row: &Iteration) {
+        self.qp_iterations += row.qp_iterations;
+        self.times.linearise += row.times.linearise;
+        self.times.qp += row.times.qp;
+        self.times.search += row.times.search;
+    }
+
     /// Whether the conditions of optimality hold.
     #[must_use]
     pub fn is_converged(&self) -> bool {
@@ -134,8 +162,8 @@ impl fmt::Display for Status {
             }
             Self::QpFailed(error) => write!(f, "the QP was not solved: {error}; another guess may help"),
             Self::NoProgress => f.write_str(
-                "no step of at least `options.shortest_step` makes progress; exact Hessians (`Sqp::exact`), another \
-                 `options.globalisation` or another guess may help",
+                "no step makes progress; another guess may help, in sequential quadratic programming also exact \
+                 Hessians (`Sqp::exact`), another `options.globalisation` or a smaller `options.shortest_step`",
             ),
         }
     }
@@ -149,6 +177,34 @@ impl fmt::Display for Outcome {
             self.status, self.iterations, self.objective, self.residuals
         )
     }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// The status of a run whose violations cannot be made smaller.
+    pub(super) fn status_of_worst(&self, worst: &Worst) -> Status {
+        let Worst { field, stage, index, side, violation } = *worst;
+        Status::Infeasible { constraint: self.name(field, stage, index, side), violation }
+    }
+
+    /// The status of a run whose QP or Newton's equations have no solution.
+    pub(super) fn status_of_error(&self, error: QpError) -> Status {
+        match (self.infeasible(&error), error) {
+            (Some(constraint), QpError::Infeasible { violation, .. }) => {
+                Status::InfeasibleQp { constraint, violation }
+            }
+            _ => Status::QpFailed(error),
+        }
+    }
+}
+
+/// Room for more rows.
+///
+/// # Errors
+/// [`OcpError::OutOfMemory`]
+#[cfg(feature = "alloc")]
+pub(super) fn reserve(log: &mut Vec<Iteration>, more: usize) -> Result<(), OcpError> {
+    let bytes = more.saturating_mul(size_of::<Iteration>());
+    log.try_reserve(more).map_err(|_| OcpError::OutOfMemory { bytes })
 }
 
 /// Iterations, to be printed as the familiar table.
@@ -190,7 +246,7 @@ impl fmt::Display for Log<'_> {
 }
 
 /// Time since it was last asked.
-pub(in crate::ocp) struct Watch {
+pub(super) struct Watch {
     #[cfg(feature = "std")]
     last: std::time::Instant,
 }

@@ -8,7 +8,7 @@ use crate::scalar::Real;
 
 /// The bound that is violated most, and by how much.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::ocp) struct Worst {
+pub(super) struct Worst {
     pub field: Field,
     pub stage: usize,
     pub index: usize,
@@ -17,7 +17,7 @@ pub(in crate::ocp) struct Worst {
 }
 
 /// How many numbers remember the linear penalties.
-pub(in crate::ocp) const fn memory(dims: &[StageDims]) -> usize {
+pub(super) const fn memory(dims: &[StageDims]) -> usize {
     let (mut length, mut rest) = (0, dims);
     while let Some((first, others)) = rest.split_first() {
         length += 2 * rows(*first);
@@ -32,7 +32,7 @@ const fn rows(dims: StageDims) -> usize {
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Remembers all linear penalties.
-    pub(in crate::ocp) fn remember_penalties(&self, memory: &mut [T]) {
+    pub(super) fn remember_penalties(&self, memory: &mut [T]) {
         let mut begin = 0;
         for stage in self.qp().stages() {
             for bounds in [stage.x_bounds(), stage.u_bounds(), stage.g_bounds()] {
@@ -46,7 +46,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// Writes them as they were, or with a number in place of infinite ones: of states but those at
     /// the start, and of constraints.
-    pub(in crate::ocp) fn set_penalties(&mut self, memory: &[T], elastic: Option<T>) {
+    pub(super) fn set_penalties(&mut self, memory: &[T], elastic: Option<T>) {
         let mut begin = 0;
         for (k, mut stage) in self.qp.stages_mut().enumerate() {
             for kind in 0..3 {
@@ -72,7 +72,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The largest violation of a bound that is hard, by the penalties that are remembered, and the
     /// sum of all of them.
-    pub(in crate::ocp) fn worst(&self, memory: &[T]) -> (Option<Worst>, f64) {
+    pub(super) fn worst(&self, memory: &[T]) -> (Option<Worst>, f64) {
         let (mut worst, mut sum): (Option<Worst>, f64) = (None, 0.0);
         let mut begin = 0;
         let fixed = self.initial == Initial::Fixed;
