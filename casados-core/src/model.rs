@@ -8,7 +8,7 @@ use crate::scalar::{Lanes, Scalar, Tangent};
 use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
-    Assembly, Cost, Elimination, Felt, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
+    Assembly, Cost, Dependent, Elimination, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
     Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;

@@ -7,12 +7,12 @@
 //! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of
 //! the last repeats the last stage.
 
+use super::defect_filter::DefectFilter;
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
 use super::stages::{
-    Convergence, FAST, Failure, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start, Transported,
+    Convergence, FAST, Failure, FilteredDefect, ITERATIONS, MORE_ITERATIONS, MOST, Stages, Start,
 };
-use super::transport::Transport;
 use crate::error::Error;
 use crate::irk::{dot, not_finite};
 use crate::linalg::{Complex, EigenFactors, Eigenbasis, PARTS, Rows, dispatch, slot};
@@ -70,7 +70,7 @@ pub struct Collocation<M: Dae, B, T: Real, const S: usize, const G: usize> {
     /// What they are multiples of: `1 / Π_{j≠i} (c_i − c_j)`.
     factors: [f64; S],
     basis: Eigenbasis<T, S, PARTS>,
-    transport: Transport,
+    defect_filter: DefectFilter,
     memory: Box<Memory<M, T, S, G>>,
     method: PhantomData<fn() -> B>,
 }
@@ -99,7 +99,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
             right: from_fn(|part| groups(S, |i| right[part][i])),
             lagrange: tableau.lagrange(0.0).map(T::from_f64),
             factors: from_fn(|i| (0..S).filter(|j| *j != i).fold(1.0, |product, j| product / (c[i] - c[j]))),
-            transport: Transport::new::<T, S>(basis.values()),
+            defect_filter: DefectFilter::new::<T, S>(basis.values()),
             basis,
             tableau,
             memory,
@@ -189,7 +189,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
     /// nothing is a stage it is how far the extrapolated derivative is from the solution at the
     /// state that was reached: of stiff components this is their error, which no method with
     /// `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the solve takes it out of
-    /// the estimate. The second, of the states, is that of [`Transport`].
+    /// the estimate. The second, of the states, is that of [`DefectFilter`].
     fn estimate(
         &mut self,
         start: &Start<'_, M, T>,
@@ -219,14 +219,14 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
 
     /// The larger one of an estimate and the second one, of the defect that was filtered last.
     fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
-        let [error, bent] = self.transported(start.h);
+        let [error, divided] = self.filtered_defect(start.h);
         let asked =
             start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
-        let relative = error.as_ref().iter().zip(bent.as_ref()).zip(asked);
-        self.transport.larger(
+        let relative = error.as_ref().iter().zip(divided.as_ref()).zip(asked);
+        self.defect_filter.larger(
             first,
             start.finer,
-            relative.map(|((error, bent), asked)| (*error * asked, *bent * asked)),
+            relative.map(|((error, divided), asked)| (*error * asked, *divided * asked)),
         )
     }
 
@@ -411,9 +411,9 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         }
     }
 
-    fn transported(&self, h: T) -> Transported<M, T> {
-        let mut errors = Transported::<M, T>::zeroed();
-        for (error, weights) in errors.iter_mut().zip(self.transport.weights()) {
+    fn filtered_defect(&self, h: T) -> FilteredDefect<M, T> {
+        let mut errors = FilteredDefect::<M, T>::zeroed();
+        for (error, weights) in errors.iter_mut().zip(self.defect_filter.weights()) {
             let weights = weights.map(T::from_f64);
             for (error, [[row]]) in error.as_mut().iter_mut().zip(self.memory.rows.as_ref()) {
                 *error = h * dot(&weights, &row.parts);
@@ -422,8 +422,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         errors
     }
 
-    fn transport(&self) -> &Transport {
-        &self.transport
+    fn defect_filter(&self) -> &DefectFilter {
+        &self.defect_filter
     }
 
     fn unknowns(&self, to: &mut Vec<T>) {

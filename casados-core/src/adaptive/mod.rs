@@ -12,7 +12,7 @@
 //! orders 5 and 8 ([`DormandPrince5`], [`DormandPrince8`]) for explicit models that are not stiff.
 //!
 //! One file for each thing: `stages` what a step is, `collocation` an implicit one and `kernels`
-//! its loops, `transport` the second estimate of its error, `levels` the methods of a family,
+//! its loops, `defect_filter` the second estimate of its error, `levels` the methods of a family,
 //! `control` the step size, `start` where a run begins and `consistent` at which derivatives, `run`
 //! the steps of an interval, `tape` what is remembered of them, `pairs`, `explicit_step` and
 //! `explicit` the explicit methods, `replay` and `sensitivities` derivatives of runs, `variational`
@@ -25,6 +25,7 @@ mod collocation;
 mod columns;
 mod consistent;
 mod control;
+mod defect_filter;
 mod events;
 mod explicit;
 mod explicit_step;
@@ -44,7 +45,6 @@ mod stages;
 mod start;
 mod statistics;
 mod tape;
-mod transport;
 mod variational;
 
 pub use events::{

@@ -2,13 +2,13 @@
 
 use super::consistent::{At, Consistent};
 use super::control::{IMPLICIT, Predictive};
+use super::defect_filter::LENIENT;
 use super::levels::{Levels, interpolate};
 use super::options::AdaptiveOptions;
 use super::sealed::Family;
 use super::stages::{Convergence, FAST, Failure, Start};
 use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
-use super::transport::LENIENT;
 use super::variational::{Tolerances, Variational};
 use crate::error::{Error, Place, Quantity, Refusal};
 use crate::irk::not_finite;

@@ -1,6 +1,6 @@
 //! What a run asks of a step with any number of stages.
 
-use super::transport::Transport;
+use super::defect_filter::DefectFilter;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::Real;
 use alloc::vec::Vec;
@@ -64,7 +64,7 @@ impl Default for Convergence {
 }
 
 /// An error of the states, and `(hJ)⁻²` times it.
-pub type Transported<M, T> = [ArrayX<M, T>; 2];
+pub type FilteredDefect<M, T> = [ArrayX<M, T>; 2];
 
 /// A step with any number of stages.
 pub trait Stages<M: Dae, T: Real> {
@@ -109,10 +109,11 @@ pub trait Stages<M: Dae, T: Real> {
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;
     /// From a residual there to the estimated error of `(x, z)`, in its place.
     fn filter(&mut self, h: T, residual: &mut ArrayK<M, T>);
-    /// What a step of length `h` makes of the residual that was filtered last: see [`Transport`].
-    fn transported(&self, h: T) -> Transported<M, T>;
-    /// How the size of what is transported is judged.
-    fn transport(&self) -> &Transport;
+    /// What a step of length `h` makes of the residual that was filtered last: see
+    /// [`DefectFilter`].
+    fn filtered_defect(&self, h: T) -> FilteredDefect<M, T>;
+    /// How the size of the filtered defect is judged.
+    fn defect_filter(&self) -> &DefectFilter;
     /// The unknowns of the step that was solved last, stages innermost, at the end of a list.
     fn unknowns(&self, to: &mut Vec<T>);
     /// The variables at the end of a step of length `h`; whether `ẋ` and `z` there are those of a

@@ -20,7 +20,7 @@ use super::norm::mean;
 use super::pairs::Pair;
 use super::replay::{Replay, Taken};
 use super::sealed::Engine;
-use super::stages::{Failure, MOST, Stages, Start, Transported};
+use super::stages::{Failure, FilteredDefect, MOST, Stages, Start};
 use crate::error::Error;
 use crate::linalg::axpy;
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Dae, Ode};
@@ -251,10 +251,10 @@ impl<M: Dae, T: Real> Variational<M, T> {
                 let first = measure(&error.as_ref()[..counted], states, tight, magnitude);
                 let asked = tolerances.rtol.as_ref().iter().zip(tolerances.atol.as_ref());
                 let scales = scales(states, asked.map(|(rtol, atol)| (*rtol, *atol)), magnitude);
-                let [transported, bent]: Transported<M, T> = stages.transported(start.h);
-                let pairs = transported.as_ref().iter().zip(bent.as_ref()).zip(scales);
-                let pairs = pairs.map(|((error, bent), scale)| (*error / scale, *bent / scale));
-                relative = stages.transport().larger(first, start.finer, pairs);
+                let [filtered, divided]: FilteredDefect<M, T> = stages.filtered_defect(start.h);
+                let pairs = filtered.as_ref().iter().zip(divided.as_ref()).zip(scales);
+                let pairs = pairs.map(|((error, divided), scale)| (*error / scale, *divided / scale));
+                relative = stages.defect_filter().larger(first, start.finer, pairs);
                 if at_end || look > 0 || !(again && relative >= 1.0) {
                     break;
                 }

@@ -14,11 +14,11 @@
 //!
 //! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its
 //! `progress`, and, where that does not arrive, `pivoted`, what errors say about where it
-//! `started`, and the `doubt` about linear equations, `step`, `forward` by `sweep` over panels of
-//! `directions` from their `right_side`, `adjoint`, `hessian` by products of panels (`curvature`)
-//! or by a `curved_adjoint` of large models, `along` an integrand, `verify` what was solved, states
-//! that are `kinematic`, `dense`; `record` is the memory, `run` what all calls share, `integrator`
-//! and its `sensitivities` what users see.
+//! `start_errors`, and `near_singular` about linear equations, `step`, `forward` by `sweep` over
+//! panels of `directions` from their `right_side`, `adjoint`, `hessian` by products of panels
+//! (`curvature`) or by a `curved_adjoint` of large models, `along` an integrand, `verify` what was
+//! solved, states that are `kinematic`, `dense`; `record` is the memory, `run` what all calls
+//! share, `integrator` and its `sensitivities` what users see.
 
 mod adjoint;
 mod along;
@@ -29,7 +29,6 @@ mod curved_advance;
 mod curved_rows;
 mod dense;
 mod directions;
-mod doubt;
 mod evaluate;
 mod forward;
 mod hessian;
@@ -39,6 +38,7 @@ mod kinematic;
 mod lone;
 mod measure;
 mod multiply;
+mod near_singular;
 mod newton;
 mod pivoted;
 mod progress;
@@ -48,7 +48,7 @@ mod right_side;
 mod run;
 mod sensitivities;
 mod stages;
-mod started;
+mod start_errors;
 mod step;
 mod sums;
 mod sweep;

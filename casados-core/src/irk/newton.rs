@@ -30,7 +30,7 @@
 //! Jacobian for each stage.
 //!
 //! Linear equations take one iteration; then their residual is looked at, and refined if digits
-//! were lost; and whether they [determine](super::doubt) a solution.
+//! were lost; and whether they [determine](super::near_singular) a solution.
 //!
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 

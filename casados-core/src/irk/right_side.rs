@@ -7,9 +7,9 @@
 
 use super::directions::{Directions, panel_of};
 use super::evaluate::entry;
-use super::kinematic::{Forward, felt, minus_c};
+use super::kinematic::{Forward, dependence, minus_c};
 use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
-use crate::model::{Dae, Felt};
+use crate::model::{Dae, Dependent};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
@@ -51,15 +51,17 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> Scatter<'_, M, E, D, S>
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M, E, D, S> {
-    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`, and those by which kinematic states are felt.
-    const ROWS: usize = M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] + M::STRUCTURE.elimination.felt.len();
+    /// The entries of `f_x`, `f_z`, `f_u` and `f_p`, and those by which other equations depend on
+    /// kinematic states.
+    const ROWS: usize =
+        M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] + M::STRUCTURE.elimination.dependents.len();
     const INSTRUCTIONS: usize = 3 * S;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, row: usize) {
         let entries = const { M::STRUCTURE.blocks[5] - M::STRUCTURE.blocks[1] };
         if row >= entries {
-            let Some(felt) = M::STRUCTURE.elimination.felt.get(row - entries) else { return };
-            let through = through::<M, E, S>(self.jacobian, self.nodes, felt);
+            let Some(dependent) = M::STRUCTURE.elimination.dependents.get(row - entries) else { return };
+            let through = through::<M, E, S>(self.jacobian, self.nodes, dependent);
             let Some((slot, velocity, products)) = through else { return };
             if let Some(column) = direction::<M, E, D>(velocity) {
                 self.subtract(slot, column, &products);
@@ -78,11 +80,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize> AtRow for Scatter<'_, M
 fn through<M: Dae, E: Lanes, const S: usize>(
     jacobian: &M::Jacobian<[E; S]>,
     nodes: &[E; S],
-    of: &Felt,
+    of: &Dependent,
 ) -> Option<(usize, usize, [E; S])> {
     let kinematic = kinematic::<M>(of.state as usize)?;
     let minus_c = minus_c::<M, E, S>(kinematic, jacobian)?;
-    let (slot, &(mut products), derivative) = felt::<M, E, S>(of, jacobian)?;
+    let (slot, &(mut products), derivative) = dependence::<M, E, S>(of, jacobian)?;
     for (product, &node) in products.iter_mut().zip(nodes) {
         let factor = if derivative { minus_c } else { node * minus_c };
         *product = -(*product * factor);
@@ -111,8 +113,10 @@ pub(super) fn place<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W:
             *packet = [[E::from_f64(0.0); W]; S];
         }
     }
-    for felt in M::STRUCTURE.elimination.felt {
-        let Some((slot, velocity, products)) = through::<M, E, S>(jacobian, nodes, felt) else { continue };
+    for dependent in M::STRUCTURE.elimination.dependents {
+        let Some((slot, velocity, products)) = through::<M, E, S>(jacobian, nodes, dependent) else {
+            continue;
+        };
         let column = direction::<M, E, D>(velocity).and_then(|column| column.checked_sub(begin));
         if let Some(column) = column.filter(|&column| column < W) {
             subtract_at(dy, slot, column, &products);

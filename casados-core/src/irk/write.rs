@@ -95,7 +95,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for WriteRows<'_, M, E, S> {
             let variable = variable as usize;
             let Some(row) = d.get_mut(variable) else { continue };
             row.as_mut().fill(zero);
-            // A state or an input that the model does not feel moves with itself.
+            // A state or an input on which the model does not depend moves with itself.
             let own = if variable < nx {
                 None
             } else if variable < 2 * nx {

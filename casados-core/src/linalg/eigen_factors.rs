@@ -114,8 +114,8 @@ impl<M: Dae, T: Real> EigenFactors<M, T> {
 
     /// `b_r ← b_r − (f_q̇ + hμ f_q) b_q` for each kinematic state `q`.
     fn eliminate(&self, rows: &mut Rows<M, T>) {
-        for felt in M::STRUCTURE.elimination.felt {
-            let (entry, [[own]]) = (felt.entry as usize, rows[felt.state as usize]);
+        for dependent in M::STRUCTURE.elimination.dependents {
+            let (entry, [[own]]) = (dependent.entry as usize, rows[dependent.state as usize]);
             let own = if entry < M::STRUCTURE.blocks[1] { own } else { self.scale * own };
             let [[to]] = &mut rows[slot::<M>(M::STRUCTURE.jacobian.at(entry).0)];
             *to = *to - own.scaled(self.jacobian[entry]);

@@ -123,7 +123,7 @@ impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> 
         let Self { jacobian, a, h, blocks } = self;
         let coupling = coupling(a, h);
         let mut square = [[E::from_f64(0.0); S]; S];
-        if const { !M::STRUCTURE.elimination.felt.is_empty() } {
+        if const { !M::STRUCTURE.elimination.dependents.is_empty() } {
             A::subtract_blocks(&mut square, &coupling, &coupling);
         }
         each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, coupling, square, blocks });

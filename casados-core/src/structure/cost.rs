@@ -34,7 +34,7 @@ pub struct Cost {
     /// and `2s nx` for each for the sum over the stages. The factors are those of Newton's method.
     pub forward: u64,
     /// An adjoint: the right-hand side, `s nx`; a solve; `4s²` for each kinematic state and `2s`
-    /// for each entry by which others feel it; and `2s` for each entry of `f_x`, `f_u`, `f_p`.
+    /// for each entry by which others depend on it; and `2s` for each entry of `f_x`, `f_u`, `f_p`.
     pub adjoint: u64,
     /// Second derivatives, beside forward and adjoint: `∇²(μᵀ f)` at all stages, `D` of the states
     /// that are curved, `2s²` for each in each direction, and the lower triangle of
@@ -65,7 +65,7 @@ impl Structure {
         let (of_x, of_w) = (entries(1), entries(3) + entries(4));
         let plan = &self.elimination;
         let kinematic = plan.kinematic.iter().filter(|of| of.equation != Kinematic::NONE).count() as u64;
-        let felt = plan.felt.len() as u64;
+        let dependents = plan.dependents.len() as u64;
         let (directions, curved) = (self.directions.len() as u64, self.curved.len() as u64);
         let (residual, residual_jacobian) =
             (s * u64::from(self.operations.residual), s * u64::from(self.operations.residual_jacobian));
@@ -86,7 +86,7 @@ impl Structure {
             iteration: 2 * s * s * nx + residual_jacobian + assembly + factorisation + solve + s * nk,
             forward: directions * (2 * s * of_x + solve + 2 * s * nx + kinematic * (2 * s * s + 3 * s))
                 + s * of_w,
-            adjoint: s * nx + solve + kinematic * 4 * s * s + 2 * s * (felt + of_x + of_w),
+            adjoint: s * nx + solve + kinematic * 4 * s * s + 2 * s * (dependents + of_x + of_w),
             hessian: s * u64::from(self.operations.hessian)
                 + directions * 2 * s * s * curved_states
                 + directions * 2 * s * self.symmetric.len() as u64

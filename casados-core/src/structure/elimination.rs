@@ -26,9 +26,9 @@ pub struct Elimination {
     pub supernodes: &'static [Supernode],
     /// For each state whether it is kinematic, and what it follows from; empty if none is.
     pub kinematic: &'static [Kinematic],
-    /// The entries of `f_ẋ` and `f_x` by which other equations feel kinematic states, state by
+    /// The entries of `f_ẋ` and `f_x` by which other equations depend on kinematic states, state by
     /// state.
-    pub felt: &'static [Felt],
+    pub dependents: &'static [Dependent],
 }
 
 impl Elimination {
@@ -42,7 +42,7 @@ impl Elimination {
         slot_of_equation: &[],
         supernodes: &[],
         kinematic: &[],
-        felt: &[],
+        dependents: &[],
     };
 
     /// How many blocks are fill.
@@ -116,10 +116,10 @@ impl Kinematic {
     pub const NONE: u32 = u32::MAX;
 }
 
-/// An entry of `f_ẋ` or `f_x` by which an equation feels a kinematic state that is not determined
-/// by it.
+/// An entry of `f_ẋ` or `f_x` by which an equation depends on a kinematic state that is not
+/// determined by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Felt {
+pub struct Dependent {
     /// The entry.
     pub entry: u32,
     /// The state.

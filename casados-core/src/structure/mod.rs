@@ -8,7 +8,7 @@ mod elimination;
 
 pub use cost::Cost;
 pub use curvature::{Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
-pub use elimination::{Assembly, Elimination, Felt, Kinematic, Left, Pivot, Supernode, Update};
+pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
 
 /// What is known about a model before it runs.
 #[derive(Clone, Copy, Debug)]

@@ -64,7 +64,7 @@ pub fn check_by_differences<M: Dae>(points: &Points<M>) -> Report {
 
 /// Checks by differences that entries outside of the declared patterns are zero, those of the
 /// Jacobian and those of the Hessian; and that what is declared constant does not change from point
-/// to point, and what is declared to be felt by nobody has no entries.
+/// to point, and what is declared to matter to nobody has no entries.
 pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
     let mut report = Report::new(format!("patterns of {}", type_name::<M>()));
     let n = variables::<M>();

@@ -64,7 +64,7 @@ pub(super) fn compare<M: Dae>(
     report.compare("entries by column", "pattern", number, 0.0, found, |i| format!("number {i}"));
 
     let diagonal = |entry: u32| structure.hessian.rows.get(entry as usize).copied();
-    // What is left out must not be felt: no entry in the columns of the others.
+    // What is left out must not matter: no entry in the columns of the others.
     let mut absent = |what: &'static str, count: usize, listed: &[u32], entries: &dyn Fn(usize) -> usize| {
         let others = (0..count).filter(|&i| !listed.contains(&(i as u32)));
         let found = others.map(|i| (i, Entry { value: entries(i) as f64, expected: 0.0, tolerance: 0.0 }));

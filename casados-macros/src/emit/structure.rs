@@ -142,10 +142,10 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         positions.iter().map(|position| ((position.row, position.column), position)).collect();
     let assembly = assembly(plan, &positions);
     let updates = updates(plan, &positions);
-    let [kinematic, felt] = self::kinematic(model.variables.x.len(), kinematic);
+    let [kinematic, dependents] = self::kinematic(model.variables.x.len(), kinematic);
     let [slots, slot_of_equation] = [&slots, &slot_of_equation].map(|table| numbers(table));
     quote! {{
-        use #krate::model::{Assembly, Felt, Kinematic, Left, Pivot, Supernode, Update};
+        use #krate::model::{Assembly, Dependent, Kinematic, Left, Pivot, Supernode, Update};
         const fn pivot(
             [slot, equation]: [u32; 2],
             [block, upper, end]: [u32; 3],
@@ -170,8 +170,8 @@ fn elimination(analysis: &Analysis) -> TokenStream {
         const fn kinematic(equation: u32, entry: u32, velocity: u32) -> Kinematic {
             Kinematic { equation, entry, velocity }
         }
-        const fn felt(entry: u32, state: u32, first: bool, last: bool) -> Felt {
-            Felt { entry, state, first, last }
+        const fn dependent(entry: u32, state: u32, first: bool, last: bool) -> Dependent {
+            Dependent { entry, state, first, last }
         }
         #krate::model::Elimination {
             pivots: &const { [#(#pivots),*] },
@@ -182,7 +182,7 @@ fn elimination(analysis: &Analysis) -> TokenStream {
             slot_of_equation: &[#(#slot_of_equation),*],
             supernodes: &const { [#(#supernodes),*] },
             kinematic: &const { [#(#kinematic),*] },
-            felt: &const { [#(#felt),*] },
+            dependents: &const { [#(#dependents),*] },
         }
     }}
 }
@@ -256,7 +256,8 @@ fn updates(plan: &Plan, positions: &HashMap<(u32, u32), &Position>) -> Vec<Token
     updates.collect()
 }
 
-/// A row for each state, none if no state is kinematic; and the entries by which others feel them.
+/// A row for each state, none if no state is kinematic; and the entries by which others depend on
+/// them.
 fn kinematic(nx: usize, kinematic: &[Kinematic]) -> [Vec<TokenStream>; 2] {
     let (mut rows, mut all) = (Vec::new(), Vec::new());
     for state in 0..if kinematic.is_empty() { 0 } else { nx as u32 } {
@@ -264,11 +265,11 @@ fn kinematic(nx: usize, kinematic: &[Kinematic]) -> [Vec<TokenStream>; 2] {
         let row = of.map_or([u32::MAX; 3], |of| [of.equation, of.entry, of.velocity]);
         let row = row.map(Literal::u32_unsuffixed);
         rows.push(quote!(kinematic(#(#row),*)));
-        let felt = of.map_or(&[][..], |of| &of.felt);
-        all.extend(felt.iter().enumerate().map(|(index, &entry)| {
+        let dependents = of.map_or(&[][..], |of| &of.dependents);
+        all.extend(dependents.iter().enumerate().map(|(index, &entry)| {
             let [entry, state] = [entry, state].map(Literal::u32_unsuffixed);
-            let [first, last] = [index == 0, index + 1 == felt.len()];
-            quote!(felt(#entry, #state, #first, #last))
+            let [first, last] = [index == 0, index + 1 == dependents.len()];
+            quote!(dependent(#entry, #state, #first, #last))
         }));
     }
     [rows, all]

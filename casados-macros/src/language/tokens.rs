@@ -148,42 +148,31 @@ fn module_end(tokens: &[TokenTree]) -> Option<usize> {
 
 /// The item without the modules of its tests, which a model cannot use.
 pub fn without_tests(item: TokenStream) -> TokenStream {
-    in_body(item, |tokens| {
-        let mut kept = Vec::new();
-        let mut index = 0;
-        while let Some(token) = tokens.get(index) {
-            if is_punct(Some(token), '#')
-                && let Some(TokenTree::Group(group)) = tokens.get(index + 1)
-                && is_test(group)
-                && let Some(end) = module_end(tokens.get(index + 2..).unwrap_or_default())
-            {
-                index += 2 + end;
-                continue;
-            }
-            kept.push(token.clone());
-            index += 1;
-        }
-        kept.into_iter().collect()
-    })
+    without(item, |attribute, rest| if is_test(attribute) { module_end(rest) } else { None })
 }
 
 /// A module without the marks `#[model]` on its functions.
 pub fn without_marks(item: TokenStream) -> TokenStream {
+    without(item, |attribute, _| (attribute.stream().to_string() == "model").then_some(0))
+}
+
+/// The item without attributes in its body, and as many tokens behind each as `removed` says; it is
+/// given an attribute and what follows.
+fn without(item: TokenStream, removed: impl Fn(&Group, &[TokenTree]) -> Option<usize>) -> TokenStream {
     in_body(item, |tokens| {
-        let mut kept = Vec::new();
-        let mut index = 0;
-        while let Some(token) = tokens.get(index) {
+        let (mut kept, mut rest) = (TokenStream::new(), tokens);
+        while let [token, behind @ ..] = rest {
             if is_punct(Some(token), '#')
-                && let Some(TokenTree::Group(group)) = tokens.get(index + 1)
-                && group.stream().to_string() == "model"
+                && let [TokenTree::Group(attribute), behind @ ..] = behind
+                && let Some(count) = removed(attribute, behind)
             {
-                index += 2;
+                rest = behind.get(count..).unwrap_or_default();
                 continue;
             }
-            kept.push(token.clone());
-            index += 1;
+            kept.extend([token.clone()]);
+            rest = behind;
         }
-        kept.into_iter().collect()
+        kept
     })
 }
 

@@ -18,8 +18,8 @@ pub struct Kinematic {
     pub entry: u32,
     /// The variable `v`.
     pub velocity: u32,
-    /// The entries of the Jacobian by which other equations feel `q̇` and `q`.
-    pub felt: Vec<u32>,
+    /// The entries of the Jacobian by which other equations depend on `q̇` and `q`.
+    pub dependents: Vec<u32>,
 }
 
 /// The kinematic states, ascending: as many as there can be.
@@ -39,8 +39,9 @@ pub fn find(model: &Model, (jacobian, blocks): (&[Entry], [usize; 6]), trivial: 
             let (other, variable, _) = jacobian[entry as usize];
             other != row && (variable == state || variable == nx + state)
         };
-        let felt = (0..blocks[2] as u32).filter(of_state).collect();
-        candidates.insert(state, Kinematic { state, equation: row, entry: entry as u32, velocity, felt });
+        let dependents = (0..blocks[2] as u32).filter(of_state).collect();
+        candidates
+            .insert(state, Kinematic { state, equation: row, entry: entry as u32, velocity, dependents });
     }
     independent(nx, candidates)
 }

@@ -220,7 +220,7 @@ fn kinematic_states() {
     };
     let kinematic = |own: Row, second: Option<Row>, other: Row| {
         let found = analysis(own, second, other).elimination.kinematic;
-        found.into_iter().map(|of| (of.state, of.entry, of.velocity, of.felt)).collect::<Vec<_>>()
+        found.into_iter().map(|of| (of.state, of.entry, of.velocity, of.dependents)).collect::<Vec<_>>()
     };
     let sine: Row = |g, v| g.unary(Unary::Sin, v[4]);
     // Behind four entries of f_ẋ (0, 5); three equations feel q.
@@ -246,8 +246,8 @@ fn kinematic_states() {
         let sine = g.unary(Unary::Sin, v[4]);
         sub(g, sine, v[0])
     };
-    let felt = vec![1, 3, 5, 8, 12, 16];
-    assert_eq!(kinematic(|_, v| v[5], None, with_derivative), [(0, 7, 5, felt)]);
+    let dependents = vec![1, 3, 5, 8, 12, 16];
+    assert_eq!(kinematic(|_, v| v[5], None, with_derivative), [(0, 7, 5, dependents)]);
     // One of two that follow each other, or of a row of them.
     for second in [(|_, v| v[4]) as Row, |_, v| v[6], |_, v| v[8]] {
         let found = kinematic(|_, v| v[5], Some(second), sine);

@@ -23,7 +23,7 @@ use crate::linalg::{
     subtract, subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
-use crate::model::{ArrayK, Dae, Felt, Kinematic};
+use crate::model::{ArrayK, Dae, Dependent, Kinematic};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 
@@ -54,11 +54,11 @@ pub(super) fn minus_c<M: Dae, E: Plain, const S: usize>(
     jacobian.as_ref().get(of.entry as usize)?.first().copied()
 }
 
-/// An entry by which an equation feels a kinematic state: its slot, its values, whether it
+/// An entry by which an equation depends on a kinematic state: its slot, its values, whether it
 /// multiplies the derivative.
 #[inline(always)]
-pub(super) fn felt<'a, M: Dae, E: Plain, const S: usize>(
-    of: &Felt,
+pub(super) fn dependence<'a, M: Dae, E: Plain, const S: usize>(
+    of: &Dependent,
     jacobian: &'a M::Jacobian<[E; S]>,
 ) -> Option<(usize, &'a [E; S], bool)> {
     let index = of.entry as usize;
@@ -161,7 +161,7 @@ pub(super) fn around<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: u
     let mut rows =
         Rows::<M, E, S, W, WHAT> { jacobian, minus_ha: *minus_ha, rows, sum: [[E::from_f64(0.0); W]; S] };
     if const { WHAT == ELIMINATE || WHAT == RECONSTRUCT_TRANSPOSED } {
-        each_row::<A, _>(&mut AtFelt(rows));
+        each_row::<A, _>(&mut AtDependent(rows));
     } else {
         each_row::<A, _>(&mut rows);
     }
@@ -171,7 +171,7 @@ struct Rows<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8
     jacobian: &'a M::Jacobian<[E; S]>,
     minus_ha: Block<E, S>,
     rows: &'a mut [Packet<E, S, W>],
-    /// What is known of a state between the first and the last entry by which it is felt.
+    /// What is known of a state between the first and the last entry by which others depend on it.
     sum: Packet<E, S, W>,
 }
 
@@ -205,21 +205,21 @@ impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow for
     }
 }
 
-/// Between a kinematic state and the equations that feel it.
-struct AtFelt<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8>(
+/// Between a kinematic state and the equations that depend on it.
+struct AtDependent<'a, M: Dae, E: Plain, const S: usize, const W: usize, const WHAT: u8>(
     Rows<'a, M, E, S, W, WHAT>,
 );
 
 impl<M: Dae, E: Lanes, const S: usize, const W: usize, const WHAT: u8> AtRow
-    for AtFelt<'_, M, E, S, W, WHAT>
+    for AtDependent<'_, M, E, S, W, WHAT>
 {
-    const ROWS: usize = M::STRUCTURE.elimination.felt.len();
+    const ROWS: usize = M::STRUCTURE.elimination.dependents.len();
     const INSTRUCTIONS: usize = 2 + product::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, index: usize) {
         let Rows { jacobian, minus_ha, rows, sum } = &mut self.0;
-        let Some(of) = M::STRUCTURE.elimination.felt.get(index) else { return };
-        let Some((slot, values, derivative)) = felt::<M, E, S>(of, jacobian) else { return };
+        let Some(of) = M::STRUCTURE.elimination.dependents.get(index) else { return };
+        let Some((slot, values, derivative)) = dependence::<M, E, S>(of, jacobian) else { return };
         let (Some(&own), Some(&row)) = (rows.get(of.state as usize), rows.get(slot)) else { return };
         let (mut own, mut row) = (own, row);
         if of.first {
@@ -296,15 +296,16 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
         }
     }
 
-    /// Subtracts `f_q̇ c V_v` from the equations that feel derivatives.
+    /// Subtracts `f_q̇ c V_v` from the equations that depend on derivatives.
     #[inline(always)]
     pub fn subtract_derivatives<A: Arithmetic>(&self, rows: &mut [Packet<E, S, W>]) {
-        if const { !feels_derivatives::<M>() } {
+        if const { !depend_on_derivatives::<M>() } {
             return;
         }
-        for felt_by in M::STRUCTURE.elimination.felt {
-            let of = kinematic::<M>(felt_by.state as usize);
-            if let (Some(of), Some((slot, values, true))) = (of, felt::<M, E, S>(felt_by, self.jacobian))
+        for dependent in M::STRUCTURE.elimination.dependents {
+            let of = kinematic::<M>(dependent.state as usize);
+            if let (Some(of), Some((slot, values, true))) =
+                (of, dependence::<M, E, S>(dependent, self.jacobian))
                 && let Some(row) = rows.get_mut(slot)
             {
                 let own = self.own::<A>(of);
@@ -362,11 +363,11 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, con
     }
 }
 
-/// Whether an equation feels the derivative of a kinematic state that is not its own.
-const fn feels_derivatives<M: Dae>() -> bool {
-    let (felt, mut index) = (M::STRUCTURE.elimination.felt, 0);
-    while index < felt.len() {
-        if (felt[index].entry as usize) < M::STRUCTURE.blocks[1] {
+/// Whether an equation depends on the derivative of a kinematic state that is not its own.
+const fn depend_on_derivatives<M: Dae>() -> bool {
+    let (dependents, mut index) = (M::STRUCTURE.elimination.dependents, 0);
+    while index < dependents.len() {
+        if (dependents[index].entry as usize) < M::STRUCTURE.blocks[1] {
             return true;
         }
         index += 1;

@@ -21,7 +21,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !is_any::<M>() } {
             return;
         }
-        dispatch(Follow::<M, E, S> {
+        dispatch(ReconstructStages::<M, E, S> {
             jacobian: &self.linear.jacobian,
             points: &mut self.points,
             x,
@@ -51,7 +51,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let Self { f, points, linear, inputs, .. } = self;
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        dispatch(Missing::<M, E, S> { jacobian, points, f, a, h });
+        dispatch(EliminateMissing::<M, E, S> { jacobian, points, f, a, h });
     }
 
     /// Writes what follows from sums that have been [compensated](crate::irk::compensated), to its
@@ -60,7 +60,11 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !is_any::<M>() } {
             return;
         }
-        dispatch(Round::<M, E, S> { jacobian: &self.linear.jacobian, points: &mut self.points, y });
+        dispatch(ReconstructCompensated::<M, E, S> {
+            jacobian: &self.linear.jacobian,
+            points: &mut self.points,
+            y,
+        });
     }
 
     /// Takes from the residual of the others what is missing in `k_q` beyond its digits.
@@ -70,7 +74,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let Self { f, linear, inputs, .. } = self;
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        dispatch(Rounded::<M, E, S> { jacobian, f, a, h });
+        dispatch(EliminateRounded::<M, E, S> { jacobian, f, a, h });
     }
 }
 
@@ -90,7 +94,7 @@ pub(in crate::irk) fn derivative<M: Dae, E: Lanes, const S: usize>(
 }
 
 /// See [`Work::reconstruct`].
-struct Follow<'a, M: Dae, E: Plain, const S: usize> {
+struct ReconstructStages<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     points: &'a mut ArrayV<M, [E; S]>,
     x: &'a ArrayX<M, E>,
@@ -101,7 +105,7 @@ struct Follow<'a, M: Dae, E: Plain, const S: usize> {
     h: E,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Follow<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructStages<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -128,7 +132,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Follow<'_, M, E, S> {
 }
 
 /// See [`Work::eliminate_missing`].
-struct Missing<'a, M: Dae, E: Plain, const S: usize> {
+struct EliminateMissing<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// Where `k_q` will be.
     points: &'a mut ArrayV<M, [E; S]>,
@@ -137,25 +141,25 @@ struct Missing<'a, M: Dae, E: Plain, const S: usize> {
     h: E,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Missing<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateMissing<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, points, f, a, h } = self;
         let nodes = nodes(a, h);
-        for felt in M::STRUCTURE.elimination.felt {
-            let of = kinematic::<M>(felt.state as usize);
+        for dependent in M::STRUCTURE.elimination.dependents {
+            let of = kinematic::<M>(dependent.state as usize);
             let missing = of.and_then(|of| f.as_ref().get(of.equation as usize)).map(|own| own[0]);
             let (Some(missing), Some((row, _, values))) =
-                (missing, entry::<M, _>(jacobian, felt.entry as usize))
+                (missing, entry::<M, _>(jacobian, dependent.entry as usize))
             else {
                 continue;
             };
             let Some(f) = f.as_mut().get_mut(row) else { continue };
             let share = values[0] * missing;
             for (f, &node) in f.iter_mut().zip(&nodes) {
-                let derivative = (felt.entry as usize) < M::STRUCTURE.blocks[1];
+                let derivative = (dependent.entry as usize) < M::STRUCTURE.blocks[1];
                 *f = A::subtract(*f, share, if derivative { E::from_f64(1.0) } else { node });
             }
         }
@@ -171,13 +175,13 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Missing<'_, M, E, S> {
 }
 
 /// See [`Work::reconstruct_compensated`].
-struct Round<'a, M: Dae, E: Plain, const S: usize> {
+struct ReconstructCompensated<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     points: &'a mut ArrayV<M, [E; S]>,
     y: &'a mut ArrayK<M, [E; S]>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Round<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructCompensated<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
@@ -195,29 +199,29 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Round<'_, M, E, S> {
 }
 
 /// See [`Work::eliminate_rounded`].
-struct Rounded<'a, M: Dae, E: Plain, const S: usize> {
+struct EliminateRounded<'a, M: Dae, E: Plain, const S: usize> {
     jacobian: &'a M::Jacobian<[E; S]>,
     f: &'a mut ArrayK<M, [E; S]>,
     a: &'a [[E; S]; S],
     h: E,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Rounded<'_, M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateRounded<'_, M, E, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
         let Self { jacobian, f, a, h } = self;
         let minus_ha = coupling(a, h);
-        for felt in M::STRUCTURE.elimination.felt {
-            let of = kinematic::<M>(felt.state as usize);
+        for dependent in M::STRUCTURE.elimination.dependents {
+            let of = kinematic::<M>(dependent.state as usize);
             let residual = of.and_then(|of| f.as_ref().get(of.equation as usize)).copied();
             let (Some(mut residual), Some((row, _, values))) =
-                (residual, entry::<M, _>(jacobian, felt.entry as usize))
+                (residual, entry::<M, _>(jacobian, dependent.entry as usize))
             else {
                 continue;
             };
-            if felt.entry as usize >= M::STRUCTURE.blocks[1] {
+            if dependent.entry as usize >= M::STRUCTURE.blocks[1] {
                 residual = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
             }
             if let Some(f) = f.as_mut().get_mut(row) {

@@ -125,7 +125,8 @@ where
         Ok(None)
     }
 
-    /// Barrier function and violation after a part of the step; nothing where a function has no value.
+    /// Barrier function and violation after a part of the step; nothing where a function has no
+    /// value.
     fn measure<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

@@ -161,9 +161,9 @@ impl<T: Real> Registers<T> for After<'_, '_, '_, '_, T> {
 const IDENTITY: f64 = 1e8;
 
 /// Multipliers for which the gradient of the Lagrangian is smallest: `π` and those of general
-/// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are given. These
-/// are Newton's equations with a large multiple of the identity for a Hessian, and no residuals of
-/// the constraints (Wächter and Biegler, section 3.6).
+/// constraints, into `work.pi` and `work.hessian_multipliers`; those of bounds of variables are
+/// given. These are Newton's equations with a large multiple of the identity for a Hessian, and no
+/// residuals of the constraints (Wächter and Biegler, section 3.6).
 ///
 /// # Errors
 /// Those of the recursion.

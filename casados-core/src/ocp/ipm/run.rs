@@ -58,8 +58,8 @@ where
     ///
     /// # Errors
     /// [`OcpError::Length`] where the memory is that of another problem; [`OcpError::Missing`],
-    /// [`OcpError::InvalidOption`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where a
-    /// function has no value at the start.
+    /// [`OcpError::InvalidOption`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`]
+    /// where a function has no value at the start.
     pub fn solve<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<Outcome, OcpError>
     where
         P::Dynamics: SecondOrder<T>,

@@ -109,6 +109,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
         self.set(other, other, a);
     }
 
+    /// Eliminates one pivot, that of `row`.
     fn single(&mut self, k: usize, row: usize, vanished: bool) {
         self.exchange(k, row);
         super::set(self.exchanged, k, T::from_whole(row + 1));
@@ -134,6 +135,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
         }
     }
 
+    /// Eliminates two pivots, `k` and `row`.
     fn pair(&mut self, k: usize, row: usize) {
         self.exchange(k + 1, row);
         super::set(self.exchanged, k, -T::from_whole(k + 1));
@@ -163,11 +165,12 @@ impl<'a, T: Real> Symmetric<'a, T> {
         [(c * x - y) / determinant, (a * y - x) / determinant]
     }
 
-    /// The pairs of indices that begin with each pivot.
+    /// Whether a pivot is one of two.
     fn is_pair(&self, k: usize) -> bool {
         self.exchanged.get(k).is_some_and(|&e| e < T::ZERO)
     }
 
+    /// The row that a pivot was exchanged with.
     fn partner(&self, k: usize) -> usize {
         self.exchanged.get(k).map_or(k, |e| (e.abs().to_f64() as usize).saturating_sub(1))
     }

@@ -44,14 +44,14 @@ type Number = Complex<f64, 2>;
 
 /// The filter of a method, and how what it lets pass is judged.
 #[derive(Clone, Copy, Debug)]
-pub struct Transport {
+pub struct DefectFilter {
     /// `c`, as factors of the parts of a solution; and those of `r(z)/z²`.
     weights: [[f64; PARTS]; 2],
     /// The estimate of lower order behaves like this power of what is estimated here.
     exponent: f64,
 }
 
-impl Transport {
+impl DefectFilter {
     /// From the eigenvalues of a method with `S` stages; of complex conjugate ones there is one,
     /// and a real one is the first.
     pub fn new<T: Real, const S: usize>(values: &Complex<T, PARTS>) -> Self {
@@ -79,8 +79,8 @@ impl Transport {
             let highest = (1..S).fold(coefficient, |product, _| product * z);
             let twice = if lane < real { 1.0 } else { 2.0 };
             // Of two stages there is no such: then everything is kept.
-            let bent = if S < 3 { highest.scaled(-1.0) } else { highest * own * own };
-            for (weights, number) in weights.iter_mut().zip([highest, bent]) {
+            let divided = if S < 3 { highest.scaled(-1.0) } else { highest * own * own };
+            for (weights, number) in weights.iter_mut().zip([highest, divided]) {
                 // The real part of a product.
                 (weights[lane], weights[PARTS / 2 + lane]) =
                     (twice * number.parts[0], -twice * number.parts[1]);
@@ -99,16 +99,16 @@ impl Transport {
     /// it: of errors relative to the tolerance that was asked for, which is `finer` than that of
     /// the first as a factor, and `(hJ)⁻²` times them.
     pub fn larger<T: Real>(&self, first: f64, finer: f64, relative: impl Iterator<Item = (T, T)>) -> f64 {
-        let (mut square, mut product, mut bent_square, mut count) = (0.0f64, 0.0f64, 0.0f64, 0usize);
-        for (error, bent) in relative {
-            let (error, bent) = (error.to_f64(), bent.to_f64());
+        let (mut square, mut product, mut divided_square, mut count) = (0.0f64, 0.0f64, 0.0f64, 0usize);
+        for (error, divided) in relative {
+            let (error, divided) = (error.to_f64(), divided.to_f64());
             square += error * error;
-            product += error * bent;
-            bent_square += bent * bent;
+            product += error * divided;
+            divided_square += divided * divided;
             count += 1;
         }
         // The square of the cosine between them, where they point against each other.
-        let against = if product < 0.0 { product / square * (product / bent_square) } else { 0.0 };
+        let against = if product < 0.0 { product / square * (product / divided_square) } else { 0.0 };
         let needed = Scalar::powi((finer / LENIENT).min(1.0), 4);
         let share = needed * (DAMPED + (KEPT - DAMPED) * against);
         let second = share * Scalar::sqrt(square / count.max(1) as f64);
