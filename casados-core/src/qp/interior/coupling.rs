@@ -11,9 +11,10 @@
 //! adds up (Haynsworth): the step is one of a minimum where pivots of controls and of the border
 //! together have as many negative signs as there are conditions.
 
+use super::cholesky::eliminate;
 use super::iterate::Iterate;
 use super::kernels::{Columns, subtract};
-use super::riccati::{Equations, First, Riccati, eliminate};
+use super::riccati::{Equations, First, Riccati};
 use super::symmetric::Symmetric;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, assign, end, pad, part, part_mut, take_mut};

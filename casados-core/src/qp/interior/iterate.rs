@@ -1,8 +1,9 @@
 //! One iterate of the interior point, and its residuals.
 
+use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
-use super::riccati::{First, Riccati, eliminate};
+use super::riccati::{First, Riccati};
 use super::sides::{Counts, Sides};
 use super::vector::{larger, largest_product, largest_size};
 use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};

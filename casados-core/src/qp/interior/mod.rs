@@ -2,6 +2,7 @@
 //! whose linear systems are solved by a Riccati recursion.
 
 mod active;
+mod cholesky;
 mod coupling;
 mod iterate;
 mod kernels;
