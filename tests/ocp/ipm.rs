@@ -66,6 +66,25 @@ fn cart_pole_swings_up_from_a_straight_line() -> Test {
     Ok(())
 }
 
+/// A solver has the memory of the problem that it was made for.
+#[test]
+fn another_problem_is_an_error() -> Test {
+    let on = |intervals| -> Result<_, Box<dyn std::error::Error>> {
+        let erk = Erk::<CartPole, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+        Ok(Problem::new(erk)
+            .stage_cost(GeneralCost::<Effort>::new())
+            .on(Horizon::uniform(intervals, 0.05))?)
+    };
+    let mut ipm = HeapIpm::new(&on(4)?)?;
+    let mut other = on(5)?;
+    other.fix_initial_state(&[0.0; 4])?;
+    let error = ipm.solve(&mut other).err();
+    let Some(OcpError::Length { part: Part::Dimensions, stage: 0, expected: 6, found: 5 }) = error else {
+        return Err(format!("{error:?}").into());
+    };
+    Ok(())
+}
+
 /// A car, x = [position, heading, speed, duration], u = [acceleration, curvature].
 #[ode]
 fn car(x: [f64; 5], u: [f64; 2]) -> [f64; 5] {
