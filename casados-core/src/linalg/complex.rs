@@ -1,6 +1,6 @@
 //! Complex numbers, several side by side.
 
-use crate::scalar::{Field, Lanes};
+use crate::scalar::{Field, Known, Lanes};
 use bytemuck::Zeroable;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -157,7 +157,8 @@ impl<T: Lanes, const N: usize> Field for Complex<T, N> {
 
     #[inline(always)]
     fn subtract_product(mut self, a: Self, b: Self) -> Self {
-        T::subtract_complex::<N, false>(&mut self.parts, &a.parts, &b.parts);
+        // Kernels alone have numbers of this type.
+        T::subtract_complex(&mut self.parts, &a.parts, &b.parts, Known::<false>::here());
         self
     }
 
@@ -166,10 +167,11 @@ impl<T: Lanes, const N: usize> Field for Complex<T, N> {
         target: &mut [Self; S],
         block: &[[Self; S]; S],
         x: &[Self; S],
+        known: Known<WIDE>,
     ) {
         for (column, x) in block.iter().zip(x) {
             for (target, element) in target.iter_mut().zip(column) {
-                T::subtract_complex::<N, WIDE>(&mut target.parts, &element.parts, &x.parts);
+                T::subtract_complex(&mut target.parts, &element.parts, &x.parts, known);
             }
         }
     }

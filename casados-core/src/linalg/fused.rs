@@ -6,6 +6,8 @@
 //! is compiled for the better machine if this is one. Results differ by rounding only.
 
 use super::block::Block;
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+use crate::scalar::Known;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::lanes::{Level, level};
 use crate::scalar::{Field, transposed};
@@ -80,8 +82,9 @@ impl Arithmetic for Separate {
     }
 }
 
-/// Rounded once, in one instruction; on numbers side by side in registers as `WIDE` as those of
-/// AVX-512 are, or half as wide.
+/// Rounded once, in one instruction. Kernels are run with it by [`dispatch`] alone, where the
+/// machine has the instructions; so it says that these are [`Known`]. On numbers side by side in
+/// registers as `WIDE` as those of AVX-512 are, or half as wide.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 pub struct Fused<const WIDE: bool>;
 
@@ -99,27 +102,27 @@ impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
         left: &Block<E, S>,
         right: &Block<E, S>,
     ) {
-        E::subtract_blocks::<_, WIDE>(target, left, right);
+        E::subtract_blocks(target, left, right, Known::<WIDE>::here());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
-        E::subtract_columns::<_, WIDE>(target, block, x);
+        E::subtract_columns(target, block, x, Known::<WIDE>::here());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
-        E::subtract_row::<_, WIDE>(target, factor, row);
+        E::subtract_row(target, factor, row, Known::<WIDE>::here());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
-        E::write_block(target, block);
+        E::write_block(target, block, Known::<WIDE>::here());
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
-        E::transposed(rows)
+        E::transposed(rows, Known::<WIDE>::here())
     }
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
-        E::subtract_products::<_, WIDE>(target, a, b);
+        E::subtract_products(target, a, b, Known::<WIDE>::here());
     }
 }
 
@@ -203,8 +206,10 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     let mut kernel = ManuallyDrop::new(kernel);
     if const { align_of::<K::Number>() > 32 } {
         // SAFETY: the other condition of calling a function with target features is that the
-        // machine has them. Numbers that are registers of AVX-512 are computed with only where it
-        // has; see the head of `lanes`.
+        // machine has them. Numbers are `Real`, registers, or made of such, and no type of a user's
+        // can be any of these (`Lanes` is sealed). So what is aligned like this is made of
+        // registers of AVX-512, with which drivers compute only after detection; see the head of
+        // `lanes`.
         unsafe { avx512::run(&mut kernel) }
     } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
         // SAFETY: the same of AVX2.

@@ -69,6 +69,24 @@ pub(crate) fn transposed<T: Copy, const N: usize>(rows: &[[T; N]; N]) -> [[T; N]
     columns
 }
 
+/// Who has one runs where the instructions of fused kernels are: AVX2 and FMA, and AVX-512 if it is
+/// `WIDE`.
+///
+/// Numbers are computed with in these registers without asking. The crate alone can make one, and
+/// does so in kernels that it entered after detection; so no safe program reaches instructions that
+/// the machine does not have.
+#[doc(hidden)]
+#[derive(Clone, Copy)]
+pub struct Known<const WIDE: bool>(());
+
+impl<const WIDE: bool> Known<WIDE> {
+    /// Only for code that runs inside of `linalg::dispatch`, or after detection.
+    #[inline(always)]
+    pub(crate) fn here() -> Self {
+        Self(())
+    }
+}
+
 /// What elimination is generic over: numbers that can be added, multiplied, divided, and compared
 /// in size.
 pub trait Field:
@@ -106,27 +124,27 @@ pub trait Field:
         self - a * b
     }
 
-    /// `target − left · right` of s×s blocks that lie column after column, fused. As
-    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine, and
-    /// whether it has the `WIDE` registers of AVX-512.
+    /// `target − left · right` of s×s blocks that lie column after column, fused: for
+    /// kernels, as all that asks for [`Known`] instructions.
     #[inline(always)]
     fn subtract_blocks<const S: usize, const WIDE: bool>(
         target: &mut [[Self; S]; S],
         left: &[[Self; S]; S],
         right: &[[Self; S]; S],
+        known: Known<WIDE>,
     ) {
         for (target, right) in target.iter_mut().zip(right) {
-            Self::subtract_columns::<S, WIDE>(target, left, right);
+            Self::subtract_columns(target, left, right, known);
         }
     }
 
-    /// `target − block · x` of an s×s block that lies column after column, fused. As
-    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// `target − block · x` of an s×s block that lies column after column, fused.
     #[inline(always)]
     fn subtract_columns<const S: usize, const WIDE: bool>(
         target: &mut [Self; S],
         block: &[[Self; S]; S],
         x: &[Self; S],
+        _: Known<WIDE>,
     ) {
         for (column, &x) in block.iter().zip(x) {
             for (target, &element) in target.iter_mut().zip(column) {
@@ -135,50 +153,56 @@ pub trait Field:
         }
     }
 
-    /// `target − a b`, element by element, fused. As [`subtract_product`](Field::subtract_product),
-    /// only for code that knows the machine.
+    /// `target − a b`, element by element, fused.
     #[inline(always)]
     fn subtract_products<const W: usize, const WIDE: bool>(
         target: &mut [Self; W],
         a: &[Self; W],
         b: &[Self; W],
+        _: Known<WIDE>,
     ) {
         for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
             *target = target.subtract_product(a, b);
         }
     }
 
-    /// `target = block`, a register at a time. As [`subtract_product`](Field::subtract_product),
-    /// only for code that knows the machine.
+    /// `target = block`, a register at a time.
     #[inline(always)]
-    fn write_block<const S: usize>(target: &mut [[Self; S]; S], block: &[[Self; S]; S]) {
+    fn write_block<const S: usize, const WIDE: bool>(
+        target: &mut [[Self; S]; S],
+        block: &[[Self; S]; S],
+        _: Known<WIDE>,
+    ) {
         *target = *block;
     }
 
-    /// Rows as columns. As [`subtract_product`](Field::subtract_product), only for code that knows
-    /// the machine.
+    /// Rows as columns.
     #[inline(always)]
-    fn transposed<const N: usize>(rows: &[[Self; N]; N]) -> [[Self; N]; N] {
+    fn transposed<const N: usize, const WIDE: bool>(rows: &[[Self; N]; N], _: Known<WIDE>) -> [[Self; N]; N] {
         transposed(rows)
     }
 
-    /// `target − factor · row`, fused. As [`subtract_product`](Field::subtract_product), only for
-    /// code that knows the machine.
+    /// `target − factor · row`, fused.
     #[inline(always)]
-    fn subtract_row<const W: usize, const WIDE: bool>(target: &mut [Self; W], factor: Self, row: &[Self; W]) {
+    fn subtract_row<const W: usize, const WIDE: bool>(
+        target: &mut [Self; W],
+        factor: Self,
+        row: &[Self; W],
+        _: Known<WIDE>,
+    ) {
         for (target, &element) in target.iter_mut().zip(row) {
             *target = target.subtract_product(factor, element);
         }
     }
 
     /// `target − a b` of `⌊N/2⌋` complex numbers side by side, their real parts, then their
-    /// imaginary ones, and of a real number if `N` is odd, fused. As
-    /// [`subtract_product`](Field::subtract_product), only for code that knows the machine.
+    /// imaginary ones, and of a real number if `N` is odd, fused.
     #[inline(always)]
     fn subtract_complex<const N: usize, const WIDE: bool>(
         target: &mut [Self; N],
         a: &[Self; N],
         b: &[Self; N],
+        _: Known<WIDE>,
     ) {
         let mut sum = *target;
         for l in 0..const { N / 2 } {
@@ -342,8 +366,23 @@ macro_rules! as_it_is {
 }
 pub(crate) use as_it_is;
 
-/// One or more real numbers side by side.
-pub trait Lanes: Scalar<Cell: Plain> + Plain {
+/// What nobody else can name.
+mod sealed {
+    /// Numbers whose alignment tells kernels which registers hold them.
+    #[diagnostic::on_unimplemented(
+        message = "`{Self}` is a number type of another crate, which kernels cannot compute with",
+        note = "integrators and solvers compute with `f64` or `f32`; models compute with every `Scalar`"
+    )]
+    pub trait Sealed {}
+}
+pub(crate) use sealed::Sealed;
+
+/// One or more real numbers side by side: `f32`, `f64`, and registers of them.
+///
+/// No other type can be one: kernels are entered by the alignment of their numbers, with
+/// instructions that a machine has for these. A number type of one's own is a [`Scalar`], which is
+/// all that models ask for.
+pub trait Lanes: Scalar<Cell: Plain> + Plain + Sealed {
     /// How many.
     const LANES: usize;
     /// The distance from one to the next larger number.
@@ -424,19 +463,8 @@ pub trait Widest<T> {
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
 }
 
-/// What nobody else can name.
-mod sealed {
-    /// Numbers whose alignment tells kernels which registers hold them.
-    pub trait Sealed {}
-    impl Sealed for f32 {}
-    impl Sealed for f64 {}
-}
-
-/// One real number: `f32` or `f64`. No other type can be one: kernels are entered by the alignment
-/// of their numbers, with instructions that a machine has for these.
-pub trait Real:
-    Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default + sealed::Sealed
-{
+/// One real number: `f32` or `f64`. No other type can be one, as no other can have [`Lanes`].
+pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default {
     /// Zero.
     const ZERO: Self;
     /// One.

@@ -1,7 +1,7 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
-use super::{Field, Lanes, Packed, Real, Scalar, own_cell};
+use super::{Field, Lanes, Packed, Real, Scalar, Sealed, own_cell};
 #[cfg(not(feature = "std"))]
 use super::{double, single};
 
@@ -131,6 +131,8 @@ macro_rules! real {
                 !a
             }
         }
+
+        impl Sealed for $t {}
 
         impl Lanes for $t {
             side_by_side!($($registers)*);

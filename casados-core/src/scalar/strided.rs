@@ -5,7 +5,7 @@
 //! that of another stage make it the others' turn.
 
 use super::lanes::functions::Elementary;
-use super::{Field, Lanes, Piece, Scalar};
+use super::{Field, Lanes, Piece, Scalar, Sealed};
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -147,6 +147,8 @@ impl<E: Scalar + Plain, const S: usize> Scalar for Strided<E, S> {
         combine: and or
     }
 }
+
+impl<E: Lanes, const S: usize> Sealed for Strided<E, S> {}
 
 impl<E: Lanes, const S: usize> Lanes for Strided<E, S> {
     const LANES: usize = E::LANES;

@@ -5,7 +5,7 @@
 //! emitted code it yields condition times epsilon of every entry, which is what tolerances of
 //! comparisons are made of.
 
-use crate::scalar::{Field, Lanes, Scalar, own_cell};
+use crate::scalar::{Field, Lanes, Scalar, Sealed, own_cell};
 use bytemuck::Zeroable;
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -206,6 +206,8 @@ impl Scalar for Bounded {
         !a
     }
 }
+
+impl Sealed for Bounded {}
 
 impl Lanes for Bounded {
     const LANES: usize = 1;

@@ -211,6 +211,7 @@ macro_rules! blocks {
             target: &mut [[Self; S]; S],
             left: &[[Self; S]; S],
             right: &[[Self; S]; S],
+            known: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::$avx2 as Register;
             if let (Some([t0, t1]), Some([l0, l1]), Some([r0, r1])) =
@@ -255,11 +256,15 @@ macro_rules! blocks {
                 return;
             }
             for (target, right) in target.iter_mut().zip(right) {
-                Self::subtract_columns::<S, WIDE>(target, left, right);
+                Self::subtract_columns(target, left, right, known);
             }
         }
         #[inline(always)]
-        fn write_block<const S: usize>(target: &mut [[Self; S]; S], block: &[[Self; S]; S]) {
+        fn write_block<const S: usize, const WIDE: bool>(
+            target: &mut [[Self; S]; S],
+            block: &[[Self; S]; S],
+            _: crate::scalar::Known<WIDE>,
+        ) {
             use crate::scalar::lanes::$avx2 as Register;
             if let (&[a, b, c, d], [to]) =
                 (block.as_flattened(), target.as_flattened_mut().as_chunks_mut::<4>().0)
@@ -274,6 +279,7 @@ macro_rules! blocks {
             target: &mut [Self; S],
             block: &[[Self; S]; S],
             x: &[Self; S],
+            _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::$avx2 as Register;
             if const { WIDE && S == $most } {
@@ -306,6 +312,7 @@ macro_rules! blocks {
             target: &mut [Self; W],
             a: &[Self; W],
             b: &[Self; W],
+            _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
             if const { WIDE && W.is_multiple_of($most) } {
@@ -330,7 +337,10 @@ macro_rules! blocks {
             }
         }
         #[inline(always)]
-        fn transposed<const N: usize>(rows: &[[Self; N]; N]) -> [[Self; N]; N] {
+        fn transposed<const N: usize, const WIDE: bool>(
+            rows: &[[Self; N]; N],
+            _: crate::scalar::Known<WIDE>,
+        ) -> [[Self; N]; N] {
             use crate::scalar::{Lanes, lanes::$avx2 as Register};
             if const { N == $more } {
                 let (mut registers, mut columns) = ([Register::<N>::splat(0.0); N], *rows);
@@ -347,6 +357,7 @@ macro_rules! blocks {
             target: &mut [Self; W],
             factor: Self,
             row: &[Self; W],
+            _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
             if const { WIDE && W.is_multiple_of($most) } {
@@ -373,6 +384,7 @@ macro_rules! blocks {
             target: &mut [Self; N],
             a: &[Self; N],
             b: &[Self; N],
+            _: crate::scalar::Known<WIDE>,
         ) {
             use crate::scalar::lanes::{$avx2 as Register, $avx512 as Wide};
             // The complex ones, and the real one behind them.

@@ -9,7 +9,7 @@ use super::together::{Abreast, Wider, abreast, ends, of_eights, of_fours, result
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::{Level, functions::Elementary, level};
-use crate::scalar::{Field, Lanes, Packed, Piece, Scalar, as_it_is};
+use crate::scalar::{Field, Lanes, Packed, Piece, Scalar, Sealed, as_it_is};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -303,6 +303,8 @@ macro_rules! register {
                 $ops::largest(self.0)
             }
         }
+
+        impl<const N: usize> Sealed for $name<N> {}
 
         impl<const N: usize> Lanes for $name<N> {
             const LANES: usize = N;

@@ -341,16 +341,21 @@ macro_rules! masked {
     ($element:ty, $width:literal, $mask:ident, $load:ident, $store:ident, $blend:ident) => {
         pub const WIDTH: usize = $width;
 
+        /// The first `N` lanes; all of them where there are no more, none of them if `N` is zero.
+        const fn first<const N: usize>() -> $mask {
+            if N < $width { !($mask::MAX << N) } else { $mask::MAX }
+        }
+
         /// Lanes that are not used are copies of the first.
         #[inline(always)]
         pub fn load<const N: usize>(cell: &[$element; N]) -> Register {
-            // SAFETY: only the lanes of the array are read.
-            unsafe { $load(splat(cell[0]), $mask::MAX >> ($width - N), cell.as_ptr()) }
+            // SAFETY: only the lanes of the array are read, of one of any length.
+            unsafe { $load(splat(cell[0]), const { first::<N>() }, cell.as_ptr()) }
         }
         #[inline(always)]
         pub fn store<const N: usize>(a: Register, cell: &mut [$element; N]) {
-            // SAFETY: only the lanes of the array are written.
-            unsafe { $store(cell.as_mut_ptr(), $mask::MAX >> ($width - N), a) }
+            // SAFETY: only the lanes of the array are written, of one of any length.
+            unsafe { $store(cell.as_mut_ptr(), const { first::<N>() }, a) }
         }
         define! {
             mask_and(a: Mask, b: Mask) -> Mask { a & b }

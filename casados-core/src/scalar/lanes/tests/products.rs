@@ -3,7 +3,7 @@
 
 use super::super::*;
 use super::inside;
-use crate::scalar::Real;
+use crate::scalar::{Known, Real};
 use core::array::from_fn;
 
 /// Numbers of all signs and several magnitudes, the same ones every time.
@@ -23,26 +23,26 @@ fn blocks<T: Real, const S: usize, const WIDE: bool>() {
         from_fn(|c| from_fn(|r| (0..S).fold(target[c][r], |t, k| subtract(t, left[k][r], right[c][k]))));
 
     let mut found = target;
-    T::subtract_blocks::<S, WIDE>(&mut found, &left, &right);
+    T::subtract_blocks(&mut found, &left, &right, Known::<WIDE>::here());
     assert_eq!(found, columns, "blocks of {S}, {WIDE}");
-    T::write_block(&mut found, &left);
+    T::write_block(&mut found, &left, Known::<WIDE>::here());
     assert_eq!(found, left, "a block of {S}");
     for (c, column) in columns.iter().enumerate() {
         let mut found = target[c];
-        T::subtract_columns::<S, WIDE>(&mut found, &left, &right[c]);
+        T::subtract_columns(&mut found, &left, &right[c], Known::<WIDE>::here());
         assert_eq!(found, *column, "columns of {S}, {WIDE}");
 
         let mut found = target[c];
-        T::subtract_row::<S, WIDE>(&mut found, left[c][0], &right[c]);
+        T::subtract_row(&mut found, left[c][0], &right[c], Known::<WIDE>::here());
         assert_eq!(found, from_fn(|k| subtract(target[c][k], left[c][0], right[c][k])), "rows of {S}");
 
         let mut found = target[c];
-        T::subtract_products::<S, WIDE>(&mut found, &left[c], &right[c]);
+        T::subtract_products(&mut found, &left[c], &right[c], Known::<WIDE>::here());
         assert_eq!(found, from_fn(|k| subtract(target[c][k], left[c][k], right[c][k])), "products of {S}");
     }
     let (mut found, m) = (target[0], S / 2);
     let (target, a, b) = (target[0], left[0], right[0]);
-    T::subtract_complex::<S, WIDE>(&mut found, &a, &b);
+    T::subtract_complex(&mut found, &a, &b, Known::<WIDE>::here());
     for l in 0..m {
         let im = m + l;
         assert_eq!(
