@@ -4,13 +4,13 @@
 # own link for a Cortex-M.
 set -euo pipefail
 cd "$(dirname "$0")"
-cargo build --quiet --release
+cargo build --quiet --locked --release
 ${CC:-gcc} -std=c11 -O2 -Wall -Wextra -Werror -Wl,--gc-sections main.c target/release/libcasados_pendulum.a -lm -o target/main
 target/main
 
 firmware=thumbv7em-none-eabihf
 rustup target add "$firmware" >/dev/null 2>&1 || true
-cargo build --quiet --release --target "$firmware"
+cargo build --quiet --locked --release --target "$firmware"
 linker=$(echo "$(rustc --print sysroot)"/lib/rustlib/*/bin/rust-lld)
 "$linker" -flavor gnu --gc-sections --entry casados_step --undefined casados_new \
     "target/$firmware/release/libcasados_pendulum.a" -o target/library

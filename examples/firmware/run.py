@@ -31,7 +31,7 @@ def build(cpu, programs, **variables):
 def build_for(target, name, programs, arguments, **variables):
     """With a target that is named, the desk's too: then macros and what they need are built once for all of them."""
     bins = [argument for program in programs for argument in ("--bin", program)]
-    cargo(["build", "--quiet", "--release", "--target", target, "--target-dir", str(TARGETS), *arguments, *bins], **variables)
+    cargo(["build", "--quiet", "--locked", "--release", "--target", target, "--target-dir", str(TARGETS), *arguments, *bins], **variables)
     copies = TARGETS / name
     copies.mkdir(exist_ok=True)
     return {program: pathlib.Path(shutil.copy(TARGETS / target / "release" / program, copies)) for program in programs}
