@@ -1,5 +1,5 @@
-//! A number type of one's own is a `Scalar`, which models compute with; kernels, which go by the alignment of
-//! their numbers, are for those of the library.
+//! A number type of one's own is a `Scalar`, which models compute with. Kernels go by the alignment
+//! of numbers: they are for those of the library.
 
 use bytemuck::Zeroable;
 use casados::scalar::Known;
