@@ -1,7 +1,7 @@
 //! The Cholesky factor of the controls of a stage, and substitutions with it.
 //!
-//! Where pivots of either sign are allowed, `M_uu = L S Lᵀ` with signs `S`, which the reciprocals of
-//! pivots have.
+//! Where pivots of either sign are allowed, `M_uu = L S Lᵀ` with signs `S`, which the reciprocals
+//! of pivots have.
 
 use super::kernels::{Columns, Part, Source, product, scale, subtract_column};
 use crate::qp::layout::part;
