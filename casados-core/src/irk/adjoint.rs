@@ -7,10 +7,10 @@
 //! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
 //! there is `ℓ_i(0) ν`.
 
-use super::along::Along;
-use super::evaluate::entry;
-use super::record::{Coefficients, Linearization, Step, Work, copy};
+use super::integrand::Along;
+use super::stages::evaluate::entry;
 use super::step::check;
+use super::workspace::{Coefficients, Linearization, Step, Work, copy};
 use crate::error::Error;
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
 use crate::memory::Fallback;

@@ -1,11 +1,11 @@
 //! The integrator as its users see it: how it is made, what is set, simulation. Its derivatives are
 //! in `sensitivities`.
 
-use super::along::{Along, begin, finish};
-use super::dense::Point;
-use super::forward::ForwardMemory;
-use super::hessian::{HessianMemory, HessianStep};
-use super::run::{Arguments, Run};
+use super::dense_output::Point;
+use super::driver::{Arguments, Run};
+use super::forward::memory::ForwardMemory;
+use super::hessian::pass::{HessianMemory, HessianStep};
+use super::integrand::{Along, begin, finish};
 use crate::error::Error;
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;

@@ -1,11 +1,11 @@
 //! Derivatives of a call, as users see them: forward, in directions, adjoint, of second order.
 
-use super::along::{Along, begin, finish, reborrow};
-use super::dense::Point;
-use super::forward::{ForwardMemory, StepOf, gradient};
-use super::hessian::HessianMemory;
+use super::dense_output::Point;
+use super::driver::{Arguments, check};
+use super::forward::memory::{ForwardMemory, StepOf, gradient};
+use super::hessian::pass::HessianMemory;
+use super::integrand::{Along, begin, finish, reborrow};
 use super::integrator::Integrator;
-use super::run::{Arguments, check};
 use crate::error::{Argument, Error};
 use crate::memory::{Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
 use crate::model::{Dae, MatrixXC, VectorU, VectorX, VectorZ};

@@ -1,9 +1,9 @@
 //! The steps of an interval, one after the other.
 
-use super::compensated;
-use super::evaluate::{dot, not_finite};
-use super::pivoted::unknown_name;
-use super::record::{Coefficients, Linearization, Step, Validity, Work};
+use super::newton::dense_fallback::unknown_name;
+use super::stages::compensated;
+use super::stages::evaluate::{dot, not_finite};
+use super::workspace::{Coefficients, Linearization, Step, Validity, Work};
 use crate::error::{Error, Place};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;

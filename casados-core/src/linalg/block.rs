@@ -4,7 +4,7 @@
 //! lie column after column: a column is a vector over the stages, which is what one right-hand side
 //! wants.
 
-use super::fused::Arithmetic;
+use super::kernel::dispatch::Arithmetic;
 use crate::scalar::Field;
 
 /// An s×s matrix, column after column.
@@ -231,9 +231,9 @@ fn eliminate<A: Arithmetic, E: Field, const S: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::complex::Complex;
-    use super::super::fused::Separate;
     use super::*;
+    use crate::linalg::kernel::dispatch::Separate;
+    use crate::linalg::transformed::complex::Complex;
 
     /// Two complex numbers and a real one, each a system of its own.
     type Three = Complex<f64, 5>;

@@ -1,9 +1,9 @@
 //! Kinematic states in iterations of Newton's method: `k_q` at the stages, before and after.
 
 use super::{count, is_any, minus_c, velocity};
-use crate::irk::evaluate::{entry, stages};
-use crate::irk::record::{Coefficients, Work};
-use crate::irk::right_side::nodes;
+use crate::irk::forward::right_hand_side::nodes;
+use crate::irk::stages::evaluate::{entry, stages};
+use crate::irk::workspace::{Coefficients, Work};
 use crate::linalg::{Arithmetic, Kernel, coupling, dispatch, kinematic};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
@@ -54,8 +54,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         dispatch(EliminateMissing::<M, E, S> { jacobian, points, f, a, h });
     }
 
-    /// Writes what follows from sums that have been [compensated](crate::irk::compensated), to its
-    /// last digit.
+    /// Writes what follows from [compensated](crate::irk::stages::compensated) sums, to its last
+    /// digit.
     pub(in crate::irk) fn reconstruct_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
         if const { !is_any::<M>() } {
             return;

@@ -1,0 +1,18 @@
+//! Forward sensitivities: the implicit function theorem at the converged stages.
+//!
+//! ```text
+//! J dK = −(f_x,i V_n + f_w,i)        V_{n+1} = V_n + h Σ_i b_i dk_i
+//! ```
+//!
+//! The [`sweep`] takes a step panel by panel: the [right-hand side](right_hand_side), the solution,
+//! its [sums](checksum) over all directions, [rows of `D`](stage_rows) for second derivatives, the
+//! [output](output). [Refined](refine) are derivatives whose equations have lost digits. What a
+//! call keeps, and the results, are its [`memory`].
+
+pub(super) mod checksum;
+pub(super) mod memory;
+pub(super) mod output;
+mod refine;
+pub(super) mod right_hand_side;
+pub(super) mod stage_rows;
+pub(super) mod sweep;
