@@ -5,11 +5,11 @@
 //! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
 //! ```
 
-use super::along::Along;
 use super::forward::Variation;
 use super::step::{Grid, Point, Record, Scheme, add, check};
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayV, ArrayW, Ode};
+use crate::quadrature::Along;
 use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 use bytemuck::Zeroable;

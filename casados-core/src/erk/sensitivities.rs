@@ -1,7 +1,7 @@
 //! Derivatives of a call, as users see them: each answers one question, with nothing else computed.
 
 use super::adjoint::Sweep;
-use super::along::{Along, begin, finish, forward};
+use super::along::forward;
 use super::forward::{Seeded, Unit, Variation, write};
 use super::hessian::Curvature;
 use super::integrator::{AdjointMemory, ForwardMemory, HessianMemory, Integrator, finite, write_state};
@@ -9,6 +9,7 @@ use super::step::{Base, Grid};
 use crate::error::{Argument, Error};
 use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{ArrayW, MatrixXC, Ode, VectorU, VectorX};
+use crate::quadrature::{Along, begin, finish};
 use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape};

@@ -7,19 +7,21 @@
 //! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
 //! there is `ℓ_i(0) ν`.
 
-use super::integrand::Along;
-use super::stages::evaluate::entry;
-use super::step::check;
-use super::workspace::{Coefficients, Linearization, Step, Work, copy};
+use super::workspace::{Linearization, Step, Work, copy};
 use crate::error::Error;
+use crate::finite::check_output;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::jacobian_entries::entry;
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
-use crate::memory::Fallback;
+use crate::memory::{Fallback, Family};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
+use crate::quadrature::Along;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Aligned, Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// The adjoint of `C` seeds while it goes backwards.
 #[derive(Zeroable)]
@@ -281,6 +283,12 @@ pub struct AdjointMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] AdjointMemory<M, T, S, C>);
 
+/// The memory of adjoints, of any number of seeds.
+pub struct Adjoints<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);
+impl<M: Dae, T: Real, const S: usize> Family for Adjoints<M, T, S> {
+    type Of<const C: usize> = AdjointMemory<M, T, S, C>;
+}
+
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C> {
     /// The result, after the first step.
     pub(crate) fn collect<F: Fallback>(&mut self, work: &Work<M, E, S, F>) {
@@ -309,8 +317,8 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> 
     pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>) -> Result<(), Error> {
         self.collect(work);
         let result = &self.result;
-        check(result.grad_x0.as_slice(), 0)?;
-        check(result.grad_u.as_slice(), 0)?;
-        check(result.grad_p.as_slice(), 0)
+        check_output(result.grad_x0.as_slice(), 0)?;
+        check_output(result.grad_u.as_slice(), 0)?;
+        check_output(result.grad_p.as_slice(), 0)
     }
 }

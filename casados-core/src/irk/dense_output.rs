@@ -5,10 +5,11 @@
 //! ```
 
 use super::forward::memory::ForwardMemory;
-use super::stages::evaluate::dot;
-use super::step::{algebraic, check};
+use super::step::algebraic;
 use super::workspace::{Inputs, Step};
 use crate::error::{Argument, Error};
+use crate::finite::check_output;
+use crate::irk::coefficients::dot;
 use crate::model::Dae;
 use crate::result::Dense;
 use crate::scalar::Real;
@@ -73,8 +74,8 @@ impl<T: Real, const S: usize> Point<T, S> {
             *to = *x + h * dot(&self.weights, k);
         }
         algebraic::<M, T, S>(result.z.as_mut_slice(), &step.y, &self.lagrange);
-        check(result.x.as_slice(), self.step)?;
-        check(result.z.as_slice(), self.step)
+        check_output(result.x.as_slice(), self.step)?;
+        check_output(result.z.as_slice(), self.step)
     }
 
     /// # Errors
@@ -94,7 +95,7 @@ impl<T: Real, const S: usize> Point<T, S> {
             dense.dz_du.as_slice(),
             dense.dz_dp.as_slice(),
         ] {
-            check(values, self.step)?;
+            check_output(values, self.step)?;
         }
         Ok(())
     }

@@ -1,10 +1,11 @@
 //! What all calls of an integrator share: arguments checked, steps taken, and the record of them
 //! kept only if everything succeeded.
 
-use super::stages::evaluate::not_finite;
-use super::step::From;
-use super::workspace::{Coefficients, Step, Work};
+use super::workspace::{Step, Work};
 use crate::error::{Argument, Error};
+use crate::finite::{check_input, not_finite};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::stages::initial_guess::InitialGuess;
 use crate::memory::{Fallback, Memory};
 #[cfg(feature = "alloc")]
 use crate::model::ArrayV;
@@ -97,21 +98,21 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        check(Argument::P, p.as_slice())?;
+        check_input(Argument::P, p.as_slice())?;
         W::nominal(&mut self.work)?.parameters = *p;
         self.parameters = true;
         Ok(())
     }
 
     pub fn set_time(&mut self, t: T) -> Result<(), Error> {
-        check(Argument::T, &[t])?;
+        check_input(Argument::T, &[t])?;
         self.time = t;
         Ok(())
     }
 
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check(Argument::StartXdot, xdot.as_slice())?;
-        check(Argument::StartZ, z.as_slice())?;
+        check_input(Argument::StartXdot, xdot.as_slice())?;
+        check_input(Argument::StartZ, z.as_slice())?;
         let given = W::nominal(&mut self.work)?.given.as_mut();
         for (to, from) in given.iter_mut().zip(xdot.as_slice().iter().chain(z.as_slice())) {
             *to = *from;
@@ -133,9 +134,9 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     ) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
         let Self { options, coefficients, statistics, work, tapes, .. } = self;
         *statistics = Statistics::default();
-        check(Argument::X0, arguments.x0.as_slice())?;
-        check(Argument::U, arguments.u.as_slice())?;
-        check(Argument::H, &[arguments.h])?;
+        check_input(Argument::X0, arguments.x0.as_slice())?;
+        check_input(Argument::U, arguments.u.as_slice())?;
+        check_input(Argument::H, &[arguments.h])?;
         if M::Shape::NP > 0 && !self.parameters {
             return Err(Error::ParametersNotSet);
         }
@@ -153,12 +154,12 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         let steps = W::tape(running, options.steps)?;
         let kept = W::tape(kept, options.steps)?;
         let from = match options.start {
-            _ if core::mem::take(&mut self.solved) => From::Solved(kept),
-            Start::Zero => From::Zero,
+            _ if core::mem::take(&mut self.solved) => InitialGuess::Solution(kept),
+            Start::Zero => InitialGuess::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
-            Start::Warm if self.warm => From::Record(kept),
-            _ if self.given => From::Given,
-            _ => From::Nominal,
+            Start::Warm if self.warm => InitialGuess::Previous(kept),
+            _ if self.given => InitialGuess::Given,
+            _ => InitialGuess::Nominal,
         };
         work.integrate(
             coefficients,
@@ -255,14 +256,5 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
     /// See [`Work::linearize`].
     pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, exact: bool) -> Result<(), Error> {
         self.work.linearize(self.coefficients, n, step, exact, self.statistics)
-    }
-}
-
-/// # Errors
-/// [`Error::NonFiniteInput`]
-pub(crate) fn check<T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
-    match not_finite(values) {
-        Some((index, value)) => Err(Error::NonFiniteInput { argument, index, value }),
-        None => Ok(()),
     }
 }

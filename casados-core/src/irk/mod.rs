@@ -17,10 +17,12 @@
 //! that solves them. Derivatives go `forward`, backwards by the `adjoint`, and to second order with
 //! the `hessian`; each is held against its own equations by its `backward_error`. An `integrand` is
 //! summed up along the way, `dense_output` interpolates. `kinematic` states are no unknowns;
-//! `directions` are what derivatives are found in; `coefficients` and `workspace` are the data.
+//! `directions` are what derivatives are found in. `coefficients`, `jacobian_entries`,
+//! `stage_array` and `workspace` are the data.
 
 mod adjoint;
 mod backward_error;
+mod coefficients;
 mod dense_output;
 mod directions;
 mod driver;
@@ -28,30 +30,35 @@ mod forward;
 mod hessian;
 mod integrand;
 mod integrator;
+mod jacobian_entries;
 mod kinematic;
 mod newton;
 mod sensitivities;
+mod stage_array;
 mod stages;
 mod step;
 mod workspace;
 
-pub use adjoint::AdjointMemory;
-pub use forward::memory::{DirectionalMemory, ForwardMemory};
+pub use adjoint::{AdjointMemory, Adjoints};
+pub use forward::memory::{DirectionalMemory, Directionals, ForwardMemory};
 pub use integrator::Integrator;
+
+// Under their old place for those who ask here.
+#[cfg(feature = "alloc")]
+pub(crate) use crate::finite::check_input as check;
+pub(crate) use crate::finite::not_finite;
 
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
-    driver::{Arguments, check},
+    coefficients::{Coefficients, dot},
+    driver::Arguments,
     forward::memory::{StepOf, check_result, multiply},
     hessian::pass::{HessianMemory, HessianStep},
     newton::dense_fallback::unknown_name,
-    stages::evaluate::dot,
-    step::From,
-    workspace::{Coefficients, Linearization, Step, Work},
+    stages::initial_guess::InitialGuess,
+    workspace::{Linearization, Step, Work},
 };
-// What integrands are computed with too.
-pub(crate) use self::{stages::evaluate::not_finite, step::check as check_values};
 
 use crate::memory::Memory;
 use crate::model::Dae;

@@ -1,14 +1,15 @@
 //! Derivatives of a call, as users see them: forward, in directions, adjoint, of second order.
 
 use super::dense_output::Point;
-use super::driver::{Arguments, check};
+use super::driver::Arguments;
 use super::forward::memory::{ForwardMemory, StepOf, gradient};
 use super::hessian::pass::HessianMemory;
-use super::integrand::{Along, begin, finish, reborrow};
 use super::integrator::Integrator;
 use crate::error::{Argument, Error};
+use crate::finite::check_input;
 use crate::memory::{Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
 use crate::model::{Dae, MatrixXC, VectorU, VectorX, VectorZ};
+use crate::quadrature::{Along, begin, finish, reborrow};
 use crate::result::{Adjoint, DenseForward, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -97,7 +98,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_input(Argument::Lambda, lambda.as_slice())?;
         self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
         gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
         self.keep_forward()?;
@@ -116,7 +117,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check(Argument::Lambda, lambda)?;
+        check_input(Argument::Lambda, lambda)?;
         self.differentiate::<false>(arguments, None, Some(&mut to.forward))?;
         gradient(to, lambda)?;
         self.keep_forward().map(|_| ())
@@ -247,9 +248,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithDirectional<C>,
     {
-        check(Argument::SeedX, seeds.x0.as_slice())?;
-        check(Argument::SeedU, seeds.u.as_slice())?;
-        check(Argument::SeedP, seeds.p.as_slice())?;
+        check_input(Argument::SeedX, seeds.x0.as_slice())?;
+        check_input(Argument::SeedU, seeds.u.as_slice())?;
+        check_input(Argument::SeedP, seeds.p.as_slice())?;
         let memory = W::directional(&mut self.directional)?;
         memory.seed(seeds);
         let count = self.run.options.steps;
@@ -334,7 +335,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<C>,
     {
-        check(Argument::Lambda, seeds)?;
+        check_input(Argument::Lambda, seeds)?;
         begin(&mut along);
         let memory = W::adjoint(&mut self.adjoint)?;
         let count = self.run.options.steps;
@@ -463,8 +464,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        check(Argument::Lambda, lambda)?;
-        check(Argument::Nu, nu)?;
+        check_input(Argument::Lambda, lambda)?;
+        check_input(Argument::Nu, nu)?;
         begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;

@@ -2,9 +2,12 @@
 
 use super::newton::dense_fallback::unknown_name;
 use super::stages::compensated;
-use super::stages::evaluate::{dot, not_finite};
-use super::workspace::{Coefficients, Linearization, Step, Validity, Work};
+use super::stages::initial_guess::{InitialGuess, stay};
+use super::workspace::{Linearization, Step, Validity, Work};
 use crate::error::{Error, Place};
+use crate::finite::{check_output, not_finite};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::dot;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -13,17 +16,6 @@ use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, assign};
 use crate::statistics::Statistics;
 
-/// Where the unknowns of the stages start.
-pub(crate) enum From<'a, M: Dae, E: Lanes, const S: usize> {
-    /// At the start values of the model.
-    Nominal,
-    Zero,
-    Given,
-    Record(&'a [Step<M, E, S>]),
-    /// These are solutions.
-    Solved(&'a [Step<M, E, S>]),
-}
-
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// What comes before the first step of a call.
     pub(crate) fn begin(&mut self) {
@@ -31,47 +23,6 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         // The same input gives the same bits in every call: nothing of the last one is taken over.
         self.validity = Default::default();
         self.rest.as_mut().fill(E::from_f64(0.0));
-    }
-
-    /// Start values of the stages of step `n`: after the first one the polynomial of the step
-    /// before, continued, or if that is not worth much its algebraic states.
-    pub(crate) fn start(
-        &mut self,
-        coefficients: &Coefficients<E, S>,
-        from: &From<'_, M, E, S>,
-        n: usize,
-        before: Option<&Step<M, E, S>>,
-        y: &mut ArrayK<M, [E; S]>,
-    ) {
-        self.alike = false;
-        match (from, before, &coefficients.next) {
-            (From::Record(record) | From::Solved(record), ..) => {
-                if let Some(record) = record.get(n) {
-                    assign(y, &record.y);
-                }
-            }
-            (_, Some(before), Some(next)) => {
-                dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
-            }
-            (From::Nominal | From::Zero, ..) => {
-                y.as_mut().fill([E::from_f64(0.0); S]);
-                self.alike = M::STRUCTURE.autonomous;
-                if matches!(from, From::Nominal) {
-                    for (y, start) in y.as_mut().iter_mut().zip(M::START) {
-                        *y = [E::from_f64(*start); S];
-                    }
-                    self.alike &= const { starts_at_rest::<M>() };
-                }
-            }
-            (From::Given, ..) => {
-                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
-                    *y = [*given; S];
-                }
-            }
-        }
-        if coefficients.next.is_none() && !matches!(from, From::Record(_) | From::Solved(_)) {
-            stay(before, y);
-        }
     }
 
     /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
@@ -112,7 +63,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         &mut self,
         coefficients: &Coefficients<T, S>,
         options: &Options,
-        from: &From<'_, M, T, S>,
+        from: &InitialGuess<'_, M, T, S>,
         steps: &mut [Step<M, T, S>],
         statistics: &mut Statistics,
         mut after: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
@@ -132,7 +83,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             statistics.steps += 1;
         }
         for z in [self.result.z0.as_slice(), self.result.z.as_slice()] {
-            check(z, count - 1)?;
+            check_output(z, count - 1)?;
         }
         Ok(())
     }
@@ -144,14 +95,14 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         &mut self,
         coefficients: &Coefficients<T, S>,
         options: &Options,
-        from: &From<'_, M, T, S>,
+        from: &InitialGuess<'_, M, T, S>,
         n: usize,
         before: Option<&Step<M, T, S>>,
         step: &mut Step<M, T, S>,
         statistics: &mut Statistics,
     ) -> Result<bool, Error> {
         self.start(coefficients, from, n, before, &mut step.y);
-        if matches!(from, From::Solved(_)) {
+        if matches!(from, InitialGuess::Solution(_)) {
             return Ok(false);
         }
         let Step { x, y } = step;
@@ -164,7 +115,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             }
             undetermined = solved.undetermined;
             self.start(coefficients, from, n, None, y);
-            if !matches!(from, From::Record(_)) {
+            if !matches!(from, InitialGuess::Previous(_)) {
                 stay(before, y);
             }
         }
@@ -245,31 +196,6 @@ fn singular<M: Dae>(unknown: usize, step: usize) -> Error {
     Error::Singular { unknown: unknown_name::<M>(unknown), at: Place { step, stage: 0, iteration: 1 } }
 }
 
-/// Algebraic states as at the last stage of the step before: on its branch.
-pub(crate) fn stay<M: Dae, E: Lanes, const S: usize>(
-    before: Option<&Step<M, E, S>>,
-    y: &mut ArrayK<M, [E; S]>,
-) {
-    let Some(before) = before else { return };
-    for (y, before) in y.as_mut().iter_mut().zip(before.y.as_ref()).skip(M::Shape::NX) {
-        if let Some(&last) = before.last() {
-            *y = [last; S];
-        }
-    }
-}
-
-/// Whether every `ẋ` starts at zero: then states are the same at all stages.
-const fn starts_at_rest<M: Dae>() -> bool {
-    let mut unknown = 0;
-    while unknown < M::Shape::NX && unknown < M::START.len() {
-        if M::START[unknown] != 0.0 {
-            return false;
-        }
-        unknown += 1;
-    }
-    true
-}
-
 /// Algebraic states at a point of the polynomial through the stages.
 pub(crate) fn algebraic<M: Dae, E: Lanes, const S: usize>(
     z: &mut [E],
@@ -294,47 +220,6 @@ impl<E: Field, const S: usize> Kernel for Combine<'_, E, S> {
     fn run<A: Arithmetic>(self) {
         for (to, y) in self.to.iter_mut().zip(self.y) {
             *to = dot(self.weights, y);
-        }
-    }
-}
-
-/// # Errors
-/// [`Error::Overflow`] of the first element that is not finite.
-pub(crate) fn check<T: Real>(values: &[T], step: usize) -> Result<(), Error> {
-    match not_finite(values) {
-        Some((index, _)) => Err(Error::Overflow { step, index }),
-        None => Ok(()),
-    }
-}
-
-/// The polynomial through the stages at those of the next step.
-struct Continue<'a, E, const S: usize> {
-    from: &'a [[E; S]],
-    next: &'a [[E; S]; S],
-    to: &'a mut [[E; S]],
-}
-
-impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let zero = E::from_f64(0.0);
-        // By columns: the stages of an unknown are a vector.
-        let mut next = [[zero; S]; S];
-        for (i, row) in self.next.iter().enumerate() {
-            for (column, &l) in next.iter_mut().zip(row) {
-                column[i] = -l;
-            }
-        }
-        for (to, from) in self.to.iter_mut().zip(self.from) {
-            let mut sum = [zero; S];
-            for (column, &value) in next.iter().zip(from) {
-                for (sum, &element) in sum.iter_mut().zip(column) {
-                    *sum = A::subtract(*sum, element, value);
-                }
-            }
-            *to = sum;
         }
     }
 }

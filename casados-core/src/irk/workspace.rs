@@ -1,13 +1,12 @@
 //! What is remembered about steps, and the memory that all calls work in.
 
-use super::stages::view::Stages;
-use crate::linalg::{Eigenbasis, Factors, MeanFactors};
+use super::stage_array::Stages;
+use crate::linalg::{Factors, MeanFactors};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
 use crate::scalar::{Lanes, Strided};
 use crate::shape::{Aligned, Plain, assign};
-use crate::tableau::Tableau;
 use bytemuck::Zeroable;
 
 /// `Copy` without the bounds of a derive.
@@ -22,47 +21,6 @@ macro_rules! copy {
     };
 }
 pub(crate) use copy;
-
-/// The coefficients of a tableau in the number type of the integrator.
-pub(crate) struct Coefficients<E, const S: usize> {
-    pub a: [[E; S]; S],
-    pub b: [E; S],
-    pub c: [E; S],
-    /// Lagrange polynomials at the start of the step.
-    pub start: [E; S],
-    /// Lagrange polynomials at its end.
-    pub end: [E; S],
-    /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them;
-    /// if there are any.
-    pub next: Option<[[E; S]; S]>,
-    /// The eigenbasis of `A`, if iterations in it are cheaper than with blocks.
-    pub basis: Option<Eigenbasis<E, S, S>>,
-    pub tableau: Tableau<S>,
-}
-
-impl<E: Lanes, const S: usize> Coefficients<E, S> {
-    /// With the eigenbasis, if `mean` Jacobians are to be used.
-    pub fn new(tableau: Tableau<S>, mean: bool) -> Self {
-        let mut end = tableau.lagrange(1.0);
-        if tableau.is_stiffly_accurate() {
-            // The last stage is the end: not even a rounding error apart.
-            end = core::array::from_fn(|i| if i + 1 == S { 1.0 } else { 0.0 });
-        }
-        let next = tableau.c().map(|c| tableau.lagrange(1.0 + c));
-        let finite = next.as_flattened().iter().all(|l| l.is_finite());
-        Self {
-            a: tableau.a().map(|row| row.map(E::from_f64)),
-            b: tableau.b().map(E::from_f64),
-            c: tableau.c().map(E::from_f64),
-            start: tableau.lagrange(0.0).map(E::from_f64),
-            end: end.map(E::from_f64),
-            // Polynomials of higher degree are not worth much outside of their interval.
-            next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
-            basis: if const { S < 3 } || !mean { None } else { Eigenbasis::new(&tableau) },
-            tableau,
-        }
-    }
-}
 
 /// One step: all that is needed to find out anything else about it.
 #[derive(Zeroable)]

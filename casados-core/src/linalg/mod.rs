@@ -23,9 +23,10 @@ mod newton_matrix;
 mod sparse_lu;
 mod transformed;
 
-pub(crate) use block::{Block, Packet, coupling, subtract, subtract_diagonal, subtract_transposed};
+pub(crate) use block::{Packet, coupling, subtract, subtract_diagonal, subtract_transposed};
 pub(crate) use kernel::{
-    dispatch::{Arithmetic, Kernel, dispatch},
+    arithmetic::{Arithmetic, Block},
+    dispatch::{Kernel, dispatch},
     double_double::{dot_compensated, moved, two_product},
     prefetch::Ahead,
     unroll::{AtRow, each_row, is_long, is_short},

@@ -1,12 +1,13 @@
 //! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
 
-use super::block::{Block, coupling};
+use super::block::coupling;
 use super::dense_lu::Dense;
-use super::kernel::dispatch::{Arithmetic, Kernel, dispatch};
+use super::kernel::dispatch::{Kernel, dispatch};
 use super::kernel::unroll::{AtRow, each_row};
 use super::kernel::vector::axpy;
 use super::sparse_lu::factor::{self, Planned};
 use super::sparse_lu::solve;
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::memory::{Fallback, Kept, fallback::Pivoting};
 use crate::model::{ArrayK, Dae, Kinematic};
 use crate::scalar::{Field, Lanes, Real};

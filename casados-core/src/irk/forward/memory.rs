@@ -9,11 +9,12 @@
 use super::output::Target;
 use super::sweep::{Outputs, Sweep};
 use crate::error::Error;
+use crate::finite::check_output;
+use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{Identity, Seeded};
-use crate::irk::step::check;
-use crate::irk::workspace::{Coefficients, Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
-use crate::memory::Fallback;
+use crate::memory::{Fallback, Family};
 #[cfg(feature = "alloc")]
 use crate::model::ArrayX;
 use crate::model::{ArrayW, Dae, NO_COLUMN};
@@ -197,7 +198,7 @@ pub(crate) fn check_result<M: Dae, T: Real>(result: &Forward<M, T>, step: usize)
         result.dz0_du.as_slice(),
         result.dz0_dp.as_slice(),
     ] {
-        check(values, step)?;
+        check_output(values, step)?;
     }
     Ok(())
 }
@@ -223,9 +224,9 @@ pub(crate) fn gradient<M: Dae, T: Real>(
     lambda: &[T],
 ) -> Result<(), Error> {
     multiply(result, lambda);
-    check(result.grad_x0.as_slice(), 0)?;
-    check(result.grad_u.as_slice(), 0)?;
-    check(result.grad_p.as_slice(), 0)
+    check_output(result.grad_x0.as_slice(), 0)?;
+    check_output(result.grad_u.as_slice(), 0)?;
+    check_output(result.grad_p.as_slice(), 0)
 }
 
 /// `gradientᵀ = λᵀ S`, with `S` column after column.
@@ -376,6 +377,12 @@ pub struct DirectionalMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] DirectionalMemory<M, T, S, C>);
 
+/// The memory of sensitivities in directions, of any number.
+pub struct Directionals<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);
+impl<M: Dae, T: Real, const S: usize> Family for Directionals<M, T, S> {
+    type Of<const C: usize> = DirectionalMemory<M, T, S, C>;
+}
+
 impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S, C> {
     pub(crate) fn seed(&mut self, seeds: &Seeds<M, T, C>) {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
@@ -434,8 +441,8 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
     /// [`Error::Overflow`]
     pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>, step: usize) -> Result<(), Error> {
         self.result.nominal = work.result;
-        check(self.result.dx.as_slice(), step)?;
-        check(self.result.dz.as_slice(), step)?;
-        check(self.result.dz0.as_slice(), step)
+        check_output(self.result.dx.as_slice(), step)?;
+        check_output(self.result.dz.as_slice(), step)?;
+        check_output(self.result.dz0.as_slice(), step)
     }
 }

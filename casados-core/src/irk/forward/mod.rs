@@ -6,8 +6,8 @@
 //!
 //! The [`sweep`] takes a step panel by panel: the [right-hand side](right_hand_side), the solution,
 //! its [sums](checksum) over all directions, [rows of `D`](stage_rows) for second derivatives, the
-//! [output](output). [Refined](refine) are derivatives whose equations have lost digits. What a
-//! call keeps, and the results, are its [`memory`].
+//! [output](output). More is [written](write) after the step where it is asked for. Derivatives
+//! whose equations have lost digits are [refined](refine). [`memory`] is what a call keeps.
 
 pub(super) mod checksum;
 pub(super) mod memory;
@@ -16,3 +16,4 @@ mod refine;
 pub(super) mod right_hand_side;
 pub(super) mod stage_rows;
 pub(super) mod sweep;
+mod write;

@@ -16,8 +16,9 @@
 use super::checksum::total;
 use super::output::Target;
 use super::sweep::{Outputs, Sweep};
+use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{Directions, panel, panel_mut, panels};
-use crate::irk::workspace::{Coefficients, Work};
+use crate::irk::workspace::Work;
 use crate::linalg::{Arithmetic, Kernel, Packet, dispatch, slot};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, Dae};

@@ -6,28 +6,16 @@
 //! ```
 
 use crate::irk::directions::{Directions, panel_of};
+use crate::irk::jacobian_entries::entry;
 use crate::irk::kinematic::{Forward, dependence, minus_c};
-use crate::irk::stages::evaluate::entry;
 use crate::linalg::{Arithmetic, AtRow, Packet, each_row, is_short, kinematic, slot};
 use crate::model::{Dae, Dependent};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
 
-/// `h c_i`, as sums of the rows of `hA`.
-#[inline(always)]
-pub(in crate::irk) fn nodes<E: Lanes, const S: usize>(a: &[[E; S]; S], h: E) -> [E; S] {
-    let mut nodes = [E::from_f64(0.0); S];
-    for (node, row) in nodes.iter_mut().zip(a) {
-        for &a in row {
-            *node = *node + h * a;
-        }
-    }
-    nodes
-}
-
-/// The same where every direction is an element of `w` and `V_n` the unit matrix: entries of the
-/// Jacobian go to their places in all panels.
+/// Right-hand sides where every direction is an element of `w` and `V_n` the unit matrix: entries
+/// of the Jacobian go to their places in all panels.
 pub(in crate::irk) struct Scatter<'a, M: Dae, E: Plain, D, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     pub nodes: &'a [E; S],

@@ -2,12 +2,29 @@
 //! derivatives of a step.
 
 use crate::irk::directions::Directions;
-use crate::irk::hessian::products::row_of;
+use crate::irk::directions::{NEAREST, width};
 use crate::linalg::{Arithmetic, Block, Packet};
 use crate::model::Dae;
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
 use core::marker::PhantomData;
+
+/// Whether all stages of a variable lie together: unless a panel is too large for the nearest
+/// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
+pub(in crate::irk) const fn together<M: Dae, E, const S: usize>() -> bool {
+    let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, M::STRUCTURE.directions.len()) * size_of::<E>();
+    panel <= NEAREST / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
+}
+
+/// Where the row of a curved variable at a stage lies in a panel of `D`.
+#[inline(always)]
+pub(in crate::irk) const fn row_of<M: Dae, E, const S: usize>(variable: usize, stage: usize) -> usize {
+    if const { together::<M, E, S>() } {
+        variable * S + stage
+    } else {
+        stage * M::STRUCTURE.curved.len() + variable
+    }
+}
 
 /// What they are made by.
 pub(in crate::irk) struct CurvedRows<'a, M, E: Plain, D, const S: usize> {

@@ -3,11 +3,13 @@
 
 use super::checksum::{STRANDS, Summed, accumulate, clear, minus_weights};
 use super::output::{Columns, Target};
-use super::right_hand_side::{Later, Scatter, nodes, place};
+use super::right_hand_side::{Later, Scatter, place};
 use super::stage_rows::CurvedRows;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::nodes;
 use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::Forward;
-use crate::irk::workspace::{Coefficients, Linearization, Work, copy};
+use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
     Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
     is_short, sweeps,

@@ -13,12 +13,14 @@
 //! this takes a sparse solve for each direction, which is less where a model is large.
 
 use super::matrix_adjoint_step::{Advance, Inverse, add_stages, columns, is_direct};
-use super::products::{COLUMNS, row_of};
+use super::products::COLUMNS;
 use super::sparse_product::multiply_panel;
+use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{Identity, before, panel_of, panels};
+use crate::irk::forward::stage_rows::row_of;
 use crate::irk::forward::sweep::Phase;
 use crate::irk::kinematic::{CONDENSE_TRANSPOSED, RECONSTRUCT_TRANSPOSED, around};
-use crate::irk::workspace::{Coefficients, Linearization, Work};
+use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{
     Ahead, Arithmetic, Block, Kernel, Packet, Planned, TransposedDown, TransposedUp, coupling, dispatch,
     is_long, sweeps,

@@ -8,10 +8,10 @@
 //! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these
 //! are summed up already: it takes the entries of `f_ẋ` alone, most often one for each state.
 
-use super::products::row_of;
+use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::before;
-use crate::irk::stages::evaluate::entry;
-use crate::irk::workspace::Coefficients;
+use crate::irk::forward::stage_rows::row_of;
+use crate::irk::jacobian_entries::entry;
 use crate::linalg::{Arithmetic, Packet, slot};
 use crate::model::Dae;
 use crate::scalar::Lanes;

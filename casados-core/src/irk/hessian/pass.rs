@@ -13,15 +13,15 @@ use super::matrix_adjoint::{Back, is_worth};
 use super::output::Triangle;
 use super::products::{COLUMNS, Subtract};
 use crate::error::{Error, Place, Quantity};
+use crate::finite::{check_output, not_finite};
 use crate::irk::adjoint::Backward;
-use crate::irk::integrand::Along;
-use crate::irk::stages::evaluate::not_finite;
-use crate::irk::stages::view::Stages;
-use crate::irk::step::check;
-use crate::irk::workspace::{Coefficients, Linearization, Step, Work, copy};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::stage_array::Stages;
+use crate::irk::workspace::{Linearization, Step, Work, copy};
 use crate::linalg::{dispatch, slot};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
+use crate::quadrature::Along;
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide, Strided};
 use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
@@ -253,7 +253,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
         let finite = self.collect(more, result).is_finite();
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
         for values in [grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice()] {
-            check(values, 0)?;
+            check_output(values, 0)?;
         }
         if finite {
             return Ok(());
@@ -267,7 +267,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
             result.h_up.as_slice(),
             result.h_pp.as_slice(),
         ] {
-            check(values, 0)?;
+            check_output(values, 0)?;
         }
         Ok(())
     }

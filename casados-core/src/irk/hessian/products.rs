@@ -5,7 +5,8 @@
 //! variables of a stage do: what is multiplied is then in the nearest cache.
 
 use super::sparse_product::multiply;
-use crate::irk::directions::{NEAREST, panel, panels, width};
+use crate::irk::directions::{panel, panels};
+use crate::irk::forward::stage_rows::together;
 use crate::linalg::{Arithmetic, Kernel, is_long};
 use crate::model::Dae;
 use crate::scalar::Lanes;
@@ -16,23 +17,6 @@ use core::marker::PhantomData;
 /// products, or one and what the adjoint makes of it (`matrix_adjoint`). In firmware memory is
 /// dearer than time.
 pub const COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
-
-/// Whether all stages of a variable lie together: unless a panel is too large for the nearest
-/// cache, or numbers are registers of which there may be sixteen, too few for more than two stages.
-pub(in crate::irk) const fn together<M: Dae, E, const S: usize>() -> bool {
-    let panel = M::STRUCTURE.curved.len() * S * width::<E>(S, M::STRUCTURE.directions.len()) * size_of::<E>();
-    panel <= NEAREST / 2 && (S <= 2 || align_of::<E>() <= 8 || align_of::<E>() >= 64)
-}
-
-/// Where the row of a curved variable at a stage lies in a panel of `D`.
-#[inline(always)]
-pub const fn row_of<M: Dae, E, const S: usize>(variable: usize, stage: usize) -> usize {
-    if const { together::<M, E, S>() } {
-        variable * S + stage
-    } else {
-        stage * M::STRUCTURE.curved.len() + variable
-    }
-}
 
 /// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins
 /// with zero.

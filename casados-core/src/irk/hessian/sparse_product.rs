@@ -1,8 +1,8 @@
 //! `G = −H D`: the sparse second derivatives of a step times derivatives of its variables, a few
 //! columns at a time.
 
-use super::products::together;
 use crate::irk::directions::panel;
+use crate::irk::forward::stage_rows::together;
 use crate::linalg::Arithmetic;
 use crate::model::{Dae, Term};
 use crate::scalar::Lanes;

@@ -1,9 +1,11 @@
 //! Kinematic states in iterations of Newton's method: `k_q` at the stages, before and after.
 
 use super::{count, is_any, minus_c, velocity};
-use crate::irk::forward::right_hand_side::nodes;
-use crate::irk::stages::evaluate::{entry, stages};
-use crate::irk::workspace::{Coefficients, Work};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::nodes;
+use crate::irk::coefficients::stage_values;
+use crate::irk::jacobian_entries::entry;
+use crate::irk::workspace::Work;
 use crate::linalg::{Arithmetic, Kernel, coupling, dispatch, kinematic};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
@@ -119,7 +121,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructStages<'_, M, E, S>
                 && let (Some(&x), Some(&rest), Some(k)) = (x.as_ref().get(v), rest.as_ref().get(v), y.get(v))
                 && let Some(xi) = points.get_mut(M::Shape::NX + v)
             {
-                *xi = stages::<A, E, S>(rest, &minus_ha, k);
+                *xi = stage_values::<A, E, S>(rest, &minus_ha, k);
                 for xi in xi {
                     *xi = *xi + x;
                 }
@@ -222,7 +224,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateRounded<'_, M, E, S> 
                 continue;
             };
             if dependent.entry as usize >= M::STRUCTURE.blocks[1] {
-                residual = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
+                residual = stage_values::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
             }
             if let Some(f) = f.as_mut().get_mut(row) {
                 A::subtract_products(f, values, &residual);

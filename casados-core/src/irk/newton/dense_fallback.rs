@@ -11,8 +11,9 @@
 //! shrinking. Then it has converged too if either is small: more cannot be known.
 
 use crate::error::{Error, Place, Quantity};
-use crate::irk::stages::evaluate::not_finite;
-use crate::irk::workspace::{Coefficients, Work};
+use crate::finite::not_finite;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::workspace::Work;
 use crate::linalg::slot;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae, Pattern};

@@ -1,7 +1,7 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
 use super::norm::{Followed, Measure};
-use crate::irk::kinematic::unknowns;
+use super::norm::{part, part_mut};
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::Lanes;
@@ -158,17 +158,6 @@ fn subtract<E: Lanes, const S: usize, const N: usize>(
     if const { E::LANES > 1 } {
         *increments = deltas;
     }
-}
-
-/// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
-#[inline(always)]
-pub(in crate::irk) fn part<M: Dae, T>(of: &[T]) -> &[T] {
-    of.get(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
-}
-
-#[inline(always)]
-pub(in crate::irk) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
-    of.get_mut(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
 }
 
 /// What is known of the increments of some unknowns, in `N` strands.

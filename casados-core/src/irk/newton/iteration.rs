@@ -37,7 +37,8 @@
 use super::convergence::{Look, Progress, Verdict, remaining};
 use super::increment::{Largest, PlaceResidual, Subtract, Update};
 use super::norm::{Followed, Measure};
-use crate::irk::workspace::{Coefficients, Linearization, Work};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::workspace::{Linearization, Work};
 use crate::linalg::{Eigenbasis, dispatch};
 use crate::memory::{Fallback, Kept};
 use crate::model::{ArrayK, ArrayX, Dae};

@@ -11,7 +11,8 @@
 //! may be as stiff as it likes. Where the planned elimination is to blame, pivoting the whole
 //! matrix tells.
 
-use crate::irk::workspace::{Coefficients, Work};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::workspace::Work;
 use crate::linalg::kinematic;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};

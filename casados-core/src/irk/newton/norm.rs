@@ -1,7 +1,6 @@
 //! How large an increment of Newton's method is, relative to the unknowns, and what that means for
 //! kinematic states.
 
-use super::increment::{part, part_mut};
 use crate::irk::kinematic::{count, is_any, minus_c, unknowns, velocity};
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
@@ -190,6 +189,17 @@ pub(in crate::irk) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
     /// Where their `k` are.
     pub points: &'a ArrayV<M, [E; S]>,
     pub a: &'a [[E; S]; S],
+}
+
+/// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
+#[inline(always)]
+pub(in crate::irk) fn part<M: Dae, T>(of: &[T]) -> &[T] {
+    of.get(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
+}
+
+#[inline(always)]
+pub(in crate::irk) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
+    of.get_mut(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
 }
 
 /// The largest of two strands, or what is not a number.

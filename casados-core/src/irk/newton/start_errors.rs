@@ -2,8 +2,9 @@
 
 use super::dense_fallback::unknown_name;
 use crate::error::{Error, Started};
-use crate::irk::stages::evaluate::{entries, not_finite};
-use crate::irk::step::From;
+use crate::finite::not_finite;
+use crate::irk::jacobian_entries::entries;
+use crate::irk::stages::initial_guess::InitialGuess;
 use crate::irk::workspace::Work;
 use crate::memory::Fallback;
 use crate::model::Dae;
@@ -15,15 +16,15 @@ const TRIED: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
 
 impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// The error of the first step, as [`Work::explain_from`] says; with a warm start as it is.
-    pub(in crate::irk) fn explain_start(&mut self, error: Error, from: &From<'_, M, T, S>) -> Error {
+    pub(in crate::irk) fn explain_start(&mut self, error: Error, from: &InitialGuess<'_, M, T, S>) -> Error {
         let given = self.given;
         match from {
-            From::Nominal => self.explain_from(error, |unknown| M::START.get(unknown).copied()),
-            From::Given => {
+            InitialGuess::Nominal => self.explain_from(error, |unknown| M::START.get(unknown).copied()),
+            InitialGuess::Given => {
                 self.explain_from(error, |unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
             }
-            From::Zero => self.explain_from(error, |_| None),
-            From::Record(_) | From::Solved(_) => error,
+            InitialGuess::Zero => self.explain_from(error, |_| None),
+            InitialGuess::Previous(_) | InitialGuess::Solution(_) => error,
         }
     }
 

@@ -15,8 +15,10 @@
 //! What is left is the rounding of the model itself. Products are exact where the machine
 //! multiplies and adds in one instruction; elsewhere only sums are compensated.
 
-use super::evaluate::{dot, entries};
-use crate::irk::workspace::{Coefficients, Work};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::dot;
+use crate::irk::jacobian_entries::entries;
+use crate::irk::workspace::Work;
 use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, moved, two_product};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};

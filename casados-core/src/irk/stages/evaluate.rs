@@ -3,13 +3,15 @@
 //! Every variable, equation and entry of the Jacobian has its values at all stages side by side:
 //! where the machine has registers of that many numbers, one call of the model computes them all.
 
-use super::view::Stages;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::stage_values;
 use crate::irk::kinematic::{self, are_together, derivative, unknowns};
-use crate::irk::workspace::{Coefficients, Times, Work};
-use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, are_finite, coupling, dispatch, each_row};
+use crate::irk::stage_array::Stages;
+use crate::irk::workspace::{Times, Work};
+use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row};
 use crate::memory::Fallback;
-use crate::model::{ArrayK, ArrayV, ArrayX, Dae, Pattern, Structure};
-use crate::scalar::{Field, Lanes, Real, SideBySide, Strided};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::scalar::{Lanes, SideBySide, Strided};
 use crate::shape::{Matrix, Plain, Shape};
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
@@ -236,7 +238,7 @@ impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_
         let own_y = y.get(k.clone()).unwrap_or_default();
         for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(k).zip(own_y) {
             if !(UNKNOWNS && (const { !are_together::<M>() }) && linalg::kinematic::<M>(state).is_some()) {
-                (*xdot, *xi) = (*k, stages::<A, E, S>(x, &minus_ha, k));
+                (*xdot, *xi) = (*k, stage_values::<A, E, S>(x, &minus_ha, k));
             }
         }
         if UNKNOWNS {
@@ -262,83 +264,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Reconstruct<'_, M, E, S> {
         let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
         *xdot = k;
         if let Some(xi) = self.points.get_mut(M::Shape::NX + state) {
-            *xi = stages::<A, E, S>(x, &self.minus_ha, &k);
+            *xi = stage_values::<A, E, S>(x, &self.minus_ha, &k);
         }
-    }
-}
-
-/// `x + h Σ_j a_ij k_j`
-#[inline(always)]
-pub(in crate::irk) fn stages<A: Arithmetic, E: Field, const S: usize>(
-    x: E,
-    minus_ha: &[[E; S]; S],
-    k: &[E; S],
-) -> [E; S] {
-    let mut sum = [x; S];
-    for (column, &k) in minus_ha.iter().zip(k) {
-        for (sum, &element) in sum.iter_mut().zip(column) {
-            *sum = A::subtract(*sum, element, k);
-        }
-    }
-    sum
-}
-
-/// The entries from `begin` to `end` of a Jacobian: row, column, value.
-#[inline(always)]
-pub(crate) fn entries<'a, V>(
-    structure: &Structure,
-    jacobian: &'a [V],
-    begin: usize,
-    end: usize,
-) -> impl Iterator<Item = (usize, usize, &'a V)> + use<'a, V> {
-    let Pattern { rows, columns } = structure.jacobian;
-    let places =
-        rows.get(begin..end).unwrap_or_default().iter().zip(columns.get(begin..end).unwrap_or_default());
-    let values = jacobian.get(begin..end).unwrap_or_default();
-    places.zip(values).map(|((row, column), value)| (*row as usize, *column as usize, value))
-}
-
-/// An entry of a Jacobian: row, column, value.
-#[inline(always)]
-pub(crate) fn entry<M: Dae, V: Plain>(jacobian: &M::Jacobian<V>, index: usize) -> Option<(usize, usize, &V)> {
-    let Pattern { rows, columns } = M::STRUCTURE.jacobian;
-    match (rows.get(index), columns.get(index), jacobian.as_ref().get(index)) {
-        (Some(&row), Some(&column), Some(value)) => Some((row as usize, column as usize, value)),
-        _ => None,
-    }
-}
-
-/// `Σ_j a_j b_j`
-#[inline(always)]
-pub(crate) fn dot<E: Field, const S: usize>(a: &[E; S], b: &[E; S]) -> E {
-    let mut sum = E::from_f64(0.0);
-    for (a, b) in a.iter().zip(b) {
-        sum = sum + *a * *b;
-    }
-    sum
-}
-
-/// The first element that is infinite or NaN.
-#[inline]
-pub(crate) fn not_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
-    // A few are looked at before the function for many is entered.
-    let finite = if values.len() < 16 { are_finite(values) } else { dispatch(Finite { values }) };
-    if finite {
-        return None;
-    }
-    values.iter().position(|value| !value.is_finite()).map(|index| (index, values[index].to_f64()))
-}
-
-/// See [`are_finite`].
-struct Finite<'a, T> {
-    values: &'a [T],
-}
-
-impl<T: Real> Kernel for Finite<'_, T> {
-    type Number = T;
-    type Output = bool;
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) -> bool {
-        are_finite(self.values)
     }
 }

@@ -1,6 +1,6 @@
 //! Sums with twice the digits, as a number and what rounding left of it (T. J. Dekker; D. Knuth).
 
-use super::dispatch::Arithmetic;
+use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::scalar::{Field, two_sum};
 
 /// `a b`, rounded, and what rounding left of it; zero where the machine cannot tell.

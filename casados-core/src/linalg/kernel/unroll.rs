@@ -5,7 +5,7 @@
 //! small block are spent on finding it: a solve with the blocks of two stages takes a fifth of the
 //! instructions.
 
-use super::dispatch::Arithmetic;
+use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Dae, Pivot, Supernode, Update};
 
 // Where nothing is optimised straight lines would only be long, and in firmware memory is dearer

@@ -15,8 +15,9 @@
 //! does not look into the tables of the plan; elements are fetched with `get`, whose never-taken
 //! exit costs nothing beside a block and leaves no panic in the program.
 
-use crate::linalg::block::{Block, inverse, product};
-use crate::linalg::kernel::dispatch::{Arithmetic, Kernel, dispatch};
+use crate::linalg::block::{inverse, product};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::unroll::{AtPivot, from_first, is_long};
 use crate::model::{Dae, Pivot, Update};
 use crate::scalar::Field;

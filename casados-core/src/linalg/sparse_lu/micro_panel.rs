@@ -1,7 +1,7 @@
 //! Packets of right-hand sides, between memory and registers.
 
-use crate::linalg::block::{Block, Packet, subtract};
-use crate::linalg::kernel::dispatch::Arithmetic;
+use crate::linalg::block::{Packet, subtract};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};
 

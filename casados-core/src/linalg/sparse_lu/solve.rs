@@ -7,8 +7,9 @@
 
 use super::factor::{Planned, beside, has_all};
 use super::micro_panel::{is_zero, load, store, subtract_of};
-use crate::linalg::block::{Block, Packet, negate, subtract};
-use crate::linalg::kernel::dispatch::{Arithmetic, Kernel, dispatch};
+use crate::linalg::block::{Packet, negate, subtract};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::prefetch::Ahead;
 use crate::linalg::kernel::unroll::{AtPivot, from_first, from_last, is_long};
 use crate::model::{Dae, Pivot, Update};

@@ -8,8 +8,8 @@
 use super::factor::{Planned, beside};
 use super::micro_panel::{load, store};
 use super::solve::Sweep;
-use crate::linalg::block::{Block, negate, subtract_transposed};
-use crate::linalg::kernel::dispatch::Arithmetic;
+use crate::linalg::block::{negate, subtract_transposed};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::model::{Dae, Pivot};
 use crate::scalar::Field;
 use crate::shape::{Array, Plain};

@@ -14,7 +14,7 @@
 //! complex one, and what is left of a register repeats the last.
 
 use super::complex::Complex;
-use crate::linalg::kernel::dispatch::Arithmetic;
+use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::scalar::Lanes;
 use crate::tableau::Tableau;
 use core::array::from_fn;
@@ -289,8 +289,8 @@ mod tests {
         let basis = Eigenbasis::<f64, S, N>::new(tableau).expect("a basis");
         for column in 0..S {
             let unit = from_fn(|j| if j == column { 1.0 } else { 0.0 });
-            let image = *basis.values() * basis.split::<super::super::fused::Separate>(&unit);
-            let found = basis.join::<super::super::fused::Separate>(&image);
+            let image = *basis.values() * basis.split::<crate::linalg::kernel::arithmetic::Separate>(&unit);
+            let found = basis.join::<crate::linalg::kernel::arithmetic::Separate>(&image);
             for (stage, found) in found.into_iter().enumerate() {
                 let size = |parts: &[f64; N], l: usize| parts[l].hypot(parts[N / 2 + l]);
                 let right: [f64; N] = from_fn(|part| basis.right[part][stage]);

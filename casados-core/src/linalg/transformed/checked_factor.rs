@@ -2,9 +2,9 @@
 //! where they do not: what steps of variable size iterate with.
 
 use super::complex::Complex;
-use crate::linalg::block::Block;
 use crate::linalg::dense_lu::Dense;
-use crate::linalg::kernel::dispatch::{Arithmetic, Kernel, dispatch};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::newton_matrix::{each_entry, kinematic, slot};
 use crate::linalg::sparse_lu::factor::{self, Planned};
 use crate::linalg::sparse_lu::solve;

@@ -7,5 +7,6 @@ pub mod basis;
 #[cfg(feature = "alloc")]
 pub mod checked_factor;
 pub mod complex;
+mod number;
 pub mod shared_factor;
 mod shared_solve;

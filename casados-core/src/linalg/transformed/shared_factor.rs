@@ -4,8 +4,10 @@
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
+use super::number::{Number, coarse};
 use super::shared_solve::Solve;
-use crate::linalg::kernel::dispatch::{Arithmetic, Kernel, dispatch};
+use crate::linalg::kernel::arithmetic::Arithmetic;
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
 use crate::linalg::kernel::unroll::{AtRow, each_row};
 use crate::linalg::sparse_lu::factor;
 use crate::model::{ArrayK, Dae};
@@ -21,9 +23,6 @@ pub struct MeanFactors<M: Dae, E: Lanes, const S: usize> {
     blocks: Aligned<M::Factors<[[Number<E, S>; 1]; 1]>>,
     rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
 }
-
-/// What systems in the eigenbasis are solved with.
-pub(in crate::linalg) type Number<E, const S: usize> = Complex<<E as Lanes>::Coarse, S>;
 
 impl<M: Dae, E: Lanes, const S: usize> Clone for MeanFactors<M, E, S> {
     fn clone(&self) -> Self {
@@ -155,10 +154,4 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S,
         }
         total
     }
-}
-
-/// With half of the digits.
-#[inline(always)]
-pub(in crate::linalg) fn coarse<T: Lanes, const S: usize>(number: Complex<T, S>) -> Number<T, S> {
-    Complex { parts: number.parts.map(T::coarse) }
 }

@@ -6,8 +6,9 @@
 
 use super::basis::Eigenbasis;
 use super::complex::Complex;
-use super::shared_factor::{Number, coarse};
-use crate::linalg::kernel::dispatch::{Arithmetic, Kernel};
+use super::number::{Number, coarse};
+use crate::linalg::kernel::arithmetic::Arithmetic;
+use crate::linalg::kernel::dispatch::Kernel;
 use crate::linalg::kernel::unroll::{AtSupernode, is_long, supernodes_from_first, supernodes_from_last};
 use crate::model::{ArrayK, Dae, Pivot};
 use crate::scalar::Lanes;

@@ -5,7 +5,7 @@
 #![cfg_attr(any(debug_assertions, not(feature = "std")), allow(dead_code))] // Tests only.
 
 use super::{AtPivot, AtRow, CHUNK, updates_of};
-use crate::linalg::kernel::dispatch::Arithmetic;
+use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Dae, Elimination, Pivot, Update};
 use core::marker::PhantomData;
 
@@ -92,7 +92,7 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
 mod tests {
     use super::super::MOST;
     use super::*;
-    use crate::linalg::kernel::dispatch::Separate;
+    use crate::linalg::kernel::arithmetic::Separate;
     use alloc::vec::Vec;
 
     /// Writes down where it comes by.
