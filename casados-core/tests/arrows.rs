@@ -124,12 +124,10 @@ fn rooms_import_what_the_list_says() {
     let found = rooms(&source(), "crate::");
     for (room, imports) in &found {
         let allowed = listed.get(room).unwrap_or_else(|| panic!("`{room}` is no room of the list"));
-        for import in imports.difference(allowed) {
-            panic!("`{room}` imports `{import}`, which the list does not allow");
-        }
-        for import in allowed.difference(imports) {
-            panic!("`{room}` no longer imports `{import}`: strike it from the list");
-        }
+        let forbidden: Vec<_> = imports.difference(allowed).collect();
+        assert!(forbidden.is_empty(), "`{room}` imports {forbidden:?}, which the list does not allow");
+        let gone: Vec<_> = allowed.difference(imports).collect();
+        assert!(gone.is_empty(), "`{room}` no longer imports {gone:?}: strike it from the list");
     }
     assert_eq!(found.len(), listed.len(), "a room of the list is gone");
 }

@@ -8,7 +8,7 @@ use super::lanes::{MOST_LANES, Pack, Unpack, Verdict, yes};
 use crate::error::Error;
 use crate::irk::{
     AdjointMemory, Coefficients, ForwardMemory, HessianMemory, HessianStep, InitialGuess, Linearization,
-    Step, StepOf, Work, multiply,
+    StageEquations, Step, StepOf, Work, multiply,
 };
 use crate::linalg::dispatch;
 use crate::memory::{Heap, Memory, WithForward, WithHessian};
@@ -301,7 +301,8 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             let (remembered, record) = records.split_at_mut_checked(n).unwrap_or_default();
             let kept = if HessianStep::<M, E, S>::DIRECT { remembered.last() } else { None };
             let kept = kept.and_then(|record| record.kept(false));
-            let solved = work.newton(coefficients, kept, options, n, x, y, statistics);
+            let equations = StageEquations { coefficients, kept, n, x };
+            let solved = work.newton(equations, options, y, statistics);
             work.advance(coefficients, options.compensated, step, n, count);
             good = E::and(good, solved.converged);
             let mut pass =

@@ -7,6 +7,7 @@
 //! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
 //! there is `ℓ_i(0) ν`.
 
+use super::driver::Parts;
 use super::workspace::{Linearization, Step, Work, copy};
 use crate::error::Error;
 use crate::finite::check_output;
@@ -19,7 +20,6 @@ use crate::quadrature::Along;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Aligned, Matrix, Plain, Shape};
-use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -123,17 +123,15 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.
-    #[allow(clippy::too_many_arguments)]
     pub(crate) fn step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
+        parts: &mut Parts<'_, M, T, S, F>,
         kept: &mut Option<&Linearization<M, T, S, F>>,
-        coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
-        statistics: &mut Statistics,
         along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
+        let Parts { work, coefficients, statistics, .. } = parts;
         if let Some(integrand) = along {
             work.along_adjoint(coefficients, n, step, self, &mut **integrand)?;
         }

@@ -1,6 +1,7 @@
 //! What all calls of an integrator share: arguments checked, steps taken, and the record of them
 //! kept only if everything succeeded.
 
+use super::step::Scheme;
 use super::workspace::{Step, Work};
 use crate::error::{Argument, Error};
 use crate::finite::{check_input, not_finite};
@@ -153,7 +154,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         // Both in the first call: later ones do not allocate.
         let steps = W::tape(running, options.steps)?;
         let kept = W::tape(kept, options.steps)?;
-        let from = match options.start {
+        let guess = match options.start {
             _ if core::mem::take(&mut self.solved) => InitialGuess::Solution(kept),
             Start::Zero => InitialGuess::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
@@ -161,16 +162,10 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             _ if self.given => InitialGuess::Given,
             _ => InitialGuess::Nominal,
         };
-        work.integrate(
-            coefficients,
-            options,
-            &from,
-            steps,
-            statistics,
-            |work, n, step, exact, statistics| {
-                after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, exact)
-            },
-        )?;
+        let scheme = Scheme { coefficients, options, guess };
+        work.integrate(&scheme, steps, statistics, |work, n, step, exact, statistics| {
+            after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, exact)
+        })?;
         Ok(Parts { work, coefficients, steps, statistics })
     }
 

@@ -56,6 +56,7 @@ pub(crate) use self::{
     forward::memory::{StepOf, check_result, multiply},
     hessian::pass::{HessianMemory, HessianStep},
     newton::dense_fallback::unknown_name,
+    newton::iteration::StageEquations,
     stages::initial_guess::InitialGuess,
     workspace::{Linearization, Step, Work},
 };

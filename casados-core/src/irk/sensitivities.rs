@@ -141,9 +141,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            let (work, coefficients, at) =
-                (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
-            pass.step::<_, REFINED>(work, coefficients, at, parts.statistics, None, to)?;
+            pass.step::<_, REFINED>(parts, StepOf { n, count, distant }, None, to)?;
             match &mut along {
                 Some(integrand) => parts.along_forward(n, step, &pass.sweep, false, &mut **integrand),
                 None => Ok(()),
@@ -206,10 +204,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;
             let ForwardMemory { result, pass, .. } = &mut *forward;
-            let (work, coefficients) = (&mut *parts.work, parts.coefficients);
             // None of them is the last one: there is a result already.
             let at = StepOf { n, count: usize::MAX, distant: false };
-            pass.step::<_, false>(work, coefficients, at, parts.statistics, None, &mut result.forward)?;
+            pass.step::<_, false>(&mut parts, at, None, &mut result.forward)?;
         }
         self.sweep = Some(point.step);
         let h = parts.work.kept.time.step;
@@ -256,7 +253,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            memory.step(parts.work, parts.coefficients, n, count, parts.statistics)
+            memory.step(parts, n, count)
         })?;
         memory.finish(parts.work, count - 1)?;
         self.sweep = None;
@@ -351,15 +348,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
             }
-            memory.backward.step(
-                parts.work,
-                &mut None,
-                parts.coefficients,
-                n,
-                step,
-                parts.statistics,
-                &mut along,
-            )?;
+            memory.backward.step(&mut parts, &mut None, n, step, &mut along)?;
         }
         memory.finish(parts.work)?;
         finish(&mut along)?;
@@ -477,10 +466,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };
-            let (work, coefficients, at) =
-                (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
-            let (curved, to) = (Some(record.curved()), &mut to.first.forward);
-            forward.step::<_, false>(work, coefficients, at, parts.statistics, curved, to)?;
+            let (at, to) = (StepOf { n, count, distant }, &mut to.first.forward);
+            forward.step::<_, false>(parts, at, Some(record.curved()), to)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
@@ -492,17 +479,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         })?;
         forward.finish(&parts.work.result, count - 1, &mut to.first.forward)?;
         finish(&mut along)?;
-        pass.run(
-            parts.work,
-            parts.coefficients,
-            parts.steps,
-            records,
-            lambda,
-            nu,
-            parts.statistics,
-            if distant { to.h_xx.as_slice() } else { &[] },
-            reborrow(&mut along),
-        )?;
+        let ahead = if distant { to.h_xx.as_slice() } else { &[] };
+        pass.run(parts, records, [lambda, nu], ahead, reborrow(&mut along))?;
         pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
         self.keep_forward().map(|_| ())
     }

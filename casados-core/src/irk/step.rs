@@ -1,6 +1,7 @@
 //! The steps of an interval, one after the other.
 
 use super::newton::dense_fallback::unknown_name;
+use super::newton::iteration::StageEquations;
 use super::stages::compensated;
 use super::stages::initial_guess::{InitialGuess, stay};
 use super::workspace::{Linearization, Step, Validity, Work};
@@ -15,6 +16,13 @@ use crate::options::Options;
 use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, assign};
 use crate::statistics::Statistics;
+
+/// How an interval is integrated.
+pub(crate) struct Scheme<'a, M: Dae, E: Lanes, const S: usize> {
+    pub coefficients: &'a Coefficients<E, S>,
+    pub options: &'a Options,
+    pub guess: InitialGuess<'a, M, E, S>,
+}
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// What comes before the first step of a call.
@@ -61,9 +69,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// Those of Newton's method; [`Error::Overflow`].
     pub(crate) fn integrate(
         &mut self,
-        coefficients: &Coefficients<T, S>,
-        options: &Options,
-        from: &InitialGuess<'_, M, T, S>,
+        scheme: &Scheme<'_, M, T, S>,
         steps: &mut [Step<M, T, S>],
         statistics: &mut Statistics,
         mut after: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
@@ -74,8 +80,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             let (done, rest) = steps.split_at_mut(n);
             let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
             step.x = self.x;
-            let exact = self.solve(coefficients, options, from, n, before, step, statistics)?;
-            self.advance(coefficients, options.compensated, step, n, count);
+            let exact = self.solve(scheme, n, before, step, statistics)?;
+            self.advance(scheme.coefficients, scheme.options.compensated, step, n, count);
             if let Some((index, _)) = not_finite(self.x.as_ref()) {
                 return Err(Error::Overflow { step: n, index });
             }
@@ -88,34 +94,33 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         Ok(())
     }
 
-    /// The stages of a step, the fast way, and where that does not arrive the careful one; whether
-    /// the factors that are there are those of the solution.
-    #[allow(clippy::too_many_arguments)]
+    /// The stages of a step by the planned elimination, and where that does not arrive by the dense
+    /// fallback; whether the factors that are there are those of the solution.
     fn solve(
         &mut self,
-        coefficients: &Coefficients<T, S>,
-        options: &Options,
-        from: &InitialGuess<'_, M, T, S>,
+        scheme: &Scheme<'_, M, T, S>,
         n: usize,
         before: Option<&Step<M, T, S>>,
         step: &mut Step<M, T, S>,
         statistics: &mut Statistics,
     ) -> Result<bool, Error> {
-        self.start(coefficients, from, n, before, &mut step.y);
-        if matches!(from, InitialGuess::Solution(_)) {
+        let Scheme { coefficients, options, guess } = scheme;
+        self.start(coefficients, guess, n, before, &mut step.y);
+        if matches!(guess, InitialGuess::Solution(_)) {
             return Ok(false);
         }
         let Step { x, y } = step;
         let mut undetermined = None;
         if !M::STRUCTURE.elimination.pivots.is_empty() {
-            let solved = self.newton(coefficients, None, options, n, x, y, statistics);
+            let equations = StageEquations { coefficients, kept: None, n, x };
+            let solved = self.newton(equations, options, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
             }
             undetermined = solved.undetermined;
-            self.start(coefficients, from, n, None, y);
-            if !matches!(from, InitialGuess::Previous(_)) {
+            self.start(coefficients, guess, n, None, y);
+            if !matches!(guess, InitialGuess::Previous(_)) {
                 stay(before, y);
             }
         }
@@ -131,7 +136,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 None => Ok(false),
             },
             Ok(()) => Ok(false),
-            Err(error) if n == 0 => Err(self.explain_start(error, from)),
+            Err(error) if n == 0 => Err(self.explain_start(error, guess)),
             Err(error) => Err(error),
         }
     }

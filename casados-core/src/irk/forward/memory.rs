@@ -7,11 +7,12 @@
 //! `V_n = dx_n/dw`, one row per state, all directions `w` side by side.
 
 use super::output::Target;
-use super::sweep::{Outputs, Sweep};
+use super::sweep::{Linearized, Outputs, Sweep};
 use crate::error::Error;
 use crate::finite::check_output;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{Identity, Seeded};
+use crate::irk::driver::Parts;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::{Fallback, Family};
@@ -21,7 +22,6 @@ use crate::model::{ArrayW, Dae, NO_COLUMN};
 use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Nominal, Seeds};
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape};
-use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 use core::mem::take;
@@ -58,12 +58,11 @@ impl<M: Dae, E: Lanes, const S: usize> ForwardPass<M, E, S> {
         curved: Option<&mut [E]>,
         to: &mut Forward<M, E>,
     ) -> E::Mask {
-        let directions = &Identity::<M>::ALL;
+        let of = at.linearized(kept, coefficients);
         if at.n == 0 {
-            self.sweep.start(directions);
+            self.sweep.start(of.directions);
         }
-        let good =
-            self.sweep.step(work, kept, coefficients, directions, at.n == 0, &mut at.outputs(curved, to));
+        let good = self.sweep.step(work, of, &mut at.outputs(curved, to));
         self.collect(coefficients, at, to);
         good
     }
@@ -105,6 +104,15 @@ impl StepOf {
         self.n + 1 == self.count
     }
 
+    /// The step, which goes through in all directions.
+    fn linearized<'a, M: Dae, E: Lanes, const S: usize, F: Fallback>(
+        self,
+        kept: Option<&'a Linearization<M, E, S, F>>,
+        coefficients: &'a Coefficients<E, S>,
+    ) -> Linearized<'a, M, E, Identity<M>, S, F> {
+        Linearized { kept, coefficients, directions: &Identity::ALL, first: self.n == 0 }
+    }
+
     /// What the step writes.
     fn outputs<'a, M: Dae, E: Lanes>(
         self,
@@ -122,27 +130,25 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
     ///
     /// # Errors
     /// [`Error::Singular`]
-    #[allow(clippy::too_many_arguments)]
     pub(crate) fn step<F: Fallback, const REFINED: bool>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
-        coefficients: &Coefficients<T, S>,
+        parts: &mut Parts<'_, M, T, S, F>,
         at: StepOf,
-        statistics: &mut Statistics,
         mut curved: Option<&mut [T]>,
         to: &mut Forward<M, T>,
     ) -> Result<(), Error> {
-        let (directions, first) = (&Identity::<M>::ALL, at.n == 0);
+        let Parts { work, coefficients, statistics, .. } = parts;
         let good = self.advance(work, None, coefficients, at, curved.as_deref_mut(), to);
         if good && !REFINED {
             return Ok(());
         }
+        let of = at.linearized(None, coefficients);
         if !good && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, at.n, 0, statistics)?;
-            self.sweep.repeat(work, None, coefficients, directions, first, &mut at.outputs(curved, to));
+            self.sweep.repeat(work, of, &mut at.outputs(curved, to));
         }
         if const { REFINED } {
-            self.sweep.refine(work, coefficients, directions, first, &mut at.outputs(None, to));
+            self.sweep.refine(work, of, &mut at.outputs(None, to));
         }
         self.collect(coefficients, at, to);
         Ok(())
@@ -405,25 +411,22 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
     /// [`Error::Singular`]
     pub(crate) fn step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
-        coefficients: &Coefficients<T, S>,
+        parts: &mut Parts<'_, M, T, S, F>,
         n: usize,
         count: usize,
-        statistics: &mut Statistics,
     ) -> Result<(), Error> {
+        let Parts { work, coefficients, statistics, .. } = parts;
         let Self { result, sweep, seeds } = self;
-        let directions = &Seeded(seeds.as_ref());
+        let of = Linearized { kept: None, coefficients, directions: &Seeded(seeds.as_ref()), first: n == 0 };
         if n == 0 {
-            sweep.start(directions);
+            sweep.start(of.directions);
         }
         let nx = M::Shape::NX;
         let end = (n + 1 == count).then(|| Single { matrix: result.dx.as_mut_slice(), rows: nx });
         let outputs = &mut Outputs { curved: None, end, distant: false };
-        if !sweep.step(work, None, coefficients, directions, n == 0, outputs)
-            && work.linear.factors.is_planned()
-        {
+        if !sweep.step(work, of, outputs) && work.linear.factors.is_planned() {
             work.factor_pivoted(coefficients, n, 0, statistics)?;
-            sweep.repeat(work, None, coefficients, directions, n == 0, outputs);
+            sweep.repeat(work, of, outputs);
         }
         let nz = M::Shape::NZ;
         if n == 0 {

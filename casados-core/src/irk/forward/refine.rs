@@ -15,7 +15,7 @@
 
 use super::checksum::total;
 use super::output::Target;
-use super::sweep::{Outputs, Sweep};
+use super::sweep::{Linearized, Outputs, Sweep};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::directions::{Directions, panel, panel_mut, panels};
 use crate::irk::workspace::Work;
@@ -39,11 +39,10 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     pub(in crate::irk) fn refine<D: Directions<T>, G: Target<T>, F: Fallback>(
         &mut self,
         work: &mut Work<M, T, S, F>,
-        coefficients: &Coefficients<T, S>,
-        directions: &D,
-        first: bool,
+        of: Linearized<'_, M, T, D, S, F>,
         outputs: &mut Outputs<'_, T, G>,
     ) {
+        let Linearized { coefficients, directions, .. } = of;
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             let correction = self.correction(work, coefficients);
@@ -53,7 +52,7 @@ impl<M: Dae, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
             }
             last = correction;
             self.refine_columns(work, coefficients, directions);
-            self.conclude(work, coefficients, directions, first, outputs);
+            self.conclude(work, of, outputs);
             // Each correction is that part of the one before.
             if correction * correction <= ROUNDING * T::EPSILON {
                 return;

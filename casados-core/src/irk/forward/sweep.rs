@@ -41,6 +41,17 @@ pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
 }
 copy!([M: Dae, T: Plain, R: Plain, const S: usize] Sweep<M, T, R, S>);
 
+/// A step that is linearised, and the directions that go through it.
+pub(in crate::irk) struct Linearized<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {
+    /// Where its factors are, if they are not where they are made.
+    pub kept: Option<&'a Linearization<M, E, S, F>>,
+    pub coefficients: &'a Coefficients<E, S>,
+    pub directions: &'a D,
+    /// Whether it is the first of the interval.
+    pub first: bool,
+}
+copy!(['a, M: Dae, E: Lanes, D, const S: usize, F: Fallback] Linearized<'a, M, E, D, S, F>);
+
 /// What a step writes beside its own memory.
 pub(in crate::irk) struct Outputs<'a, E, G> {
     /// The rows of `D` for second derivatives.
@@ -74,64 +85,50 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         self.begun = D::SPARSE;
     }
 
-    /// The step that follows, which is linearised; the `first` of the interval or a later one.
-    /// Whether the derivatives of the stages satisfy their equations.
-    #[allow(clippy::too_many_arguments)]
+    /// The step that follows, which is linearised. Whether the derivatives of the stages satisfy
+    /// their equations.
     pub(in crate::irk) fn step<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
-        kept: Option<&Linearization<M, E, S, F>>,
-        coefficients: &Coefficients<E, S>,
-        directions: &D,
-        first: bool,
+        of: Linearized<'_, M, E, D, S, F>,
         outputs: &mut Outputs<'_, E, G>,
     ) -> E::Mask {
         self.end = !self.end;
-        self.repeat(work, kept, coefficients, directions, first, outputs)
+        self.repeat(work, of, outputs)
     }
 
     /// The same step again.
-    #[allow(clippy::too_many_arguments)]
     pub(in crate::irk) fn repeat<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &mut Work<M, E, S, F>,
-        kept: Option<&Linearization<M, E, S, F>>,
-        coefficients: &Coefficients<E, S>,
-        directions: &D,
-        first: bool,
+        of: Linearized<'_, M, E, D, S, F>,
         outputs: &mut Outputs<'_, E, G>,
     ) -> E::Mask {
-        let mut run = |this: &mut Self, work: &Work<M, E, S, F>, phase, second| {
-            this.run(work, kept, coefficients, directions, first, outputs, phase, second);
-        };
-        if work.linear(kept).factors.is_planned() {
-            run(self, work, Phase::Whole, false);
+        if work.linear(of.kept).factors.is_planned() {
+            self.run(work, of, outputs, Phase::Whole, false);
         } else {
-            run(self, work, Phase::Before, false);
+            self.run(work, of, outputs, Phase::Before, false);
             self.solve_columns::<D, F>(work);
-            run(self, work, Phase::After, false);
+            self.run(work, of, outputs, Phase::After, false);
         }
-        let good = work.verify_forward(self, coefficients, directions, false);
+        let good = work.verify_forward(self, of.coefficients, of.directions, false);
         if E::all(good) {
             return good;
         }
-        run(self, work, Phase::After, true);
-        E::or(good, work.verify_forward(self, coefficients, directions, true))
+        self.run(work, of, outputs, Phase::After, true);
+        E::or(good, work.verify_forward(self, of.coefficients, of.directions, true))
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn run<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &Work<M, E, S, F>,
-        kept: Option<&Linearization<M, E, S, F>>,
-        coefficients: &Coefficients<E, S>,
-        directions: &D,
-        first: bool,
+        of: Linearized<'_, M, E, D, S, F>,
         outputs: &mut Outputs<'_, E, G>,
         phase: Phase,
         second: bool,
     ) {
         self.begun &= self.end;
+        let Linearized { kept, coefficients, directions, first } = of;
         let Self { v, end, dy, sums, start_sums, finite, .. } = self;
         let [start, other] = v;
         let (v, next) = if *end { (start, other) } else { (other, start) };
@@ -163,12 +160,10 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     pub(in crate::irk) fn conclude<D: Directions<E>, G: Target<E>, F: Fallback>(
         &mut self,
         work: &Work<M, E, S, F>,
-        coefficients: &Coefficients<E, S>,
-        directions: &D,
-        first: bool,
+        of: Linearized<'_, M, E, D, S, F>,
         outputs: &mut Outputs<'_, E, G>,
     ) {
-        self.run(work, None, coefficients, directions, first, outputs, Phase::After, false);
+        self.run(work, of, outputs, Phase::After, false);
     }
 
     /// `V` at the start of the step.

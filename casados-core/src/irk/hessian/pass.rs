@@ -16,6 +16,7 @@ use crate::error::{Error, Place, Quantity};
 use crate::finite::{check_output, not_finite};
 use crate::irk::adjoint::Backward;
 use crate::irk::coefficients::Coefficients;
+use crate::irk::driver::Parts;
 use crate::irk::stage_array::Stages;
 use crate::irk::workspace::{Linearization, Step, Work, copy};
 use crate::linalg::{dispatch, slot};
@@ -25,7 +26,6 @@ use crate::quadrature::Along;
 use crate::result::{ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real, SideBySide, Strided};
 use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
-use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -96,27 +96,24 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
 }
 
 impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
-    /// The way back; the linearisation of the last step is still there.
+    /// The way back, with `λ` and `ν`; the linearisation of the last step is still there.
     ///
     /// # Errors
     /// A second derivative of the model that is not finite, a singular matrix.
-    #[allow(clippy::too_many_arguments)]
     pub(crate) fn run<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
-        coefficients: &Coefficients<T, S>,
-        steps: &[Step<M, T, S>],
+        mut parts: Parts<'_, M, T, S, F>,
         records: &[HessianStep<M, T, S, F>],
-        lambda: &[T],
-        nu: &[T],
-        statistics: &mut Statistics,
+        [lambda, nu]: [&[T]; 2],
         ahead: &[T],
         mut along: Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
         self.begin(lambda, nu);
+        let steps = parts.steps;
         for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
             let kept = &mut record.kept(n + 1 == steps.len());
-            self.backward.step(work, kept, coefficients, n, step, statistics, &mut along)?;
+            self.backward.step(&mut parts, kept, n, step, &mut along)?;
+            let Parts { work, coefficients, .. } = &mut parts;
             self.curvature(work, coefficients, n, step);
             if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
                 return Err(Error::NonFiniteModel {

@@ -1,4 +1,4 @@
-//! How far Newton's method is, lane by lane.
+//! The convergence test of Newton's method, lane by lane.
 
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::scalar::Lanes;
@@ -11,7 +11,7 @@ const LITTLE_MOVED: f64 = 1.0 / 8.0;
 
 /// What is known of every lane. One that is neither active nor has converged has failed.
 #[derive(Clone, Copy)]
-pub(in crate::irk) struct Progress<E: Lanes> {
+pub(in crate::irk) struct ConvergenceTest<E: Lanes> {
     /// Which lanes go on.
     pub active: E::Mask,
     /// Which have converged.
@@ -29,9 +29,9 @@ pub(in crate::irk) struct Progress<E: Lanes> {
     exact: bool,
 }
 
-/// What an increment is looked at for.
+/// Which increment the test takes.
 #[derive(Clone, Copy)]
-pub(in crate::irk) enum Look {
+pub(in crate::irk) enum IncrementKind {
     /// The first one of a step, with factors that are `new` or older ones.
     First { new: bool },
     /// A later one.
@@ -42,7 +42,7 @@ pub(in crate::irk) enum Look {
 
 /// What all lanes together have to say.
 #[derive(Clone, Copy, Default)]
-pub(in crate::irk) struct Verdict {
+pub(in crate::irk) struct Status {
     /// Some lane goes on.
     pub active: bool,
     /// Some lane does no longer.
@@ -57,7 +57,7 @@ pub(in crate::irk) struct Verdict {
     pub remaining: f64,
 }
 
-impl<E: Lanes> Progress<E> {
+impl<E: Lanes> ConvergenceTest<E> {
     /// With factors for which increments shrank by `rate`; zero if that is not known.
     pub fn start(tolerance: f64, rate: f64, exact: bool) -> Self {
         let zero = E::from_f64(0.0);
@@ -68,10 +68,10 @@ impl<E: Lanes> Progress<E> {
 
     /// After an increment of this `size`, and what is expected of the `next` one.
     #[inline]
-    pub fn judge(&mut self, look: Look, size: E, next: E) -> Verdict {
-        let judge = Judge { progress: self, look, size, next };
+    pub fn take(&mut self, kind: IncrementKind, size: E, next: E) -> Status {
+        let test = Take { test: self, kind, size, next };
         // What one lane says is known in registers.
-        if const { E::LANES == 1 } { judge.verdict() } else { dispatch(judge) }
+        if const { E::LANES == 1 } { test.status() } else { dispatch(test) }
     }
 
     /// Lanes that hardly make progress have converged where their equations are `satisfied`.
@@ -95,41 +95,41 @@ impl<E: Lanes> Progress<E> {
     }
 }
 
-/// See [`Progress::judge`].
-struct Judge<'a, E: Lanes> {
-    progress: &'a mut Progress<E>,
-    look: Look,
+/// See [`ConvergenceTest::take`].
+struct Take<'a, E: Lanes> {
+    test: &'a mut ConvergenceTest<E>,
+    kind: IncrementKind,
     size: E,
     next: E,
 }
 
-impl<E: Lanes> Kernel for Judge<'_, E> {
+impl<E: Lanes> Kernel for Take<'_, E> {
     type Number = E;
-    type Output = Verdict;
+    type Output = Status;
     #[inline(always)]
-    fn run<A: Arithmetic>(self) -> Verdict {
-        self.verdict()
+    fn run<A: Arithmetic>(self) -> Status {
+        self.status()
     }
 }
 
-impl<E: Lanes> Judge<'_, E> {
+impl<E: Lanes> Take<'_, E> {
     #[inline(always)]
-    fn verdict(self) -> Verdict {
-        let Self { progress, look, size, next } = self;
-        let Progress { mut active, mut converged, mut last, mut rate, mut moved, tolerance, exact } =
-            *progress;
+    fn status(self) -> Status {
+        let Self { test, kind, size, next } = self;
+        let ConvergenceTest { mut active, mut converged, mut last, mut rate, mut moved, tolerance, exact } =
+            *test;
         let (zero, one, half) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(0.5));
         let before = active;
-        match look {
-            Look::Again => {
+        match kind {
+            IncrementKind::Again => {
                 let back = E::and(converged, E::lt(last + last, size));
                 converged = E::and(converged, E::not(back));
                 active = E::or(active, back);
                 last = E::select(back, size, last);
             }
-            Look::First { .. } | Look::Later => {
+            IncrementKind::First { .. } | IncrementKind::Later => {
                 let mut expected = size;
-                if let Look::First { new } = look {
+                if let IncrementKind::First { new } = kind {
                     // What the last step found out holds for its factors only; and too roughly to
                     // stop by it.
                     rate = if new { zero } else { rate };
@@ -150,8 +150,8 @@ impl<E: Lanes> Judge<'_, E> {
                 }
             }
         }
-        *progress = Progress { active, converged, last, rate, moved, tolerance, exact };
-        Verdict {
+        *test = ConvergenceTest { active, converged, last, rate, moved, tolerance, exact };
+        Status {
             active: E::any(active),
             changed: E::any(E::and(before, E::not(active))),
             grows: E::any(E::and(active, E::lt(one, rate))),

@@ -43,7 +43,6 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         statistics: &mut Statistics,
     ) -> Result<(), Error> {
         let (rounding, noise) = (T::from_f64(T::EPSILON * ROUNDING), T::from_f64(T::EPSILON * NOISE));
-        let small = T::from_f64(T::STAGNATION);
         let tolerance = T::from_f64(options.tolerance).max(rounding);
         let frozen = options.jacobian == Jacobian::Frozen;
         let most = options.fixed_iterations.unwrap_or(options.max_iterations);
@@ -98,22 +97,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             if !increment.size.is_finite() {
                 return Err(Error::Overflow { step, index: increment.unknown });
             }
-            if test {
-                if iteration > 1 {
-                    let rate = increment.size / last.size;
-                    // With the current Jacobian it will be less, but how much less differs from
-                    // unknown to unknown.
-                    let next = rate / (T::ONE - rate) * increment.size;
-                    // A rate near one says nothing about the next increment.
-                    let shrinks = rate + rate < T::ONE;
-                    if shrinks && next <= tolerance || !shrinks && increment.size <= small {
-                        return Ok(());
-                    }
-                }
-                if increment.size == T::ZERO {
-                    return Ok(());
-                }
-            } else if iteration == most {
+            let settled = || iteration > 1 && is_settled(increment.size, last.size, tolerance);
+            if test && (settled() || increment.size == T::ZERO) || !test && iteration == most {
                 return Ok(());
             }
             last = increment;
@@ -228,6 +213,16 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         }
         largest
     }
+}
+
+/// Whether the increment that comes next is small enough, by how the last two shrank.
+fn is_settled<T: Real>(size: T, last: T, tolerance: T) -> bool {
+    let rate = size / last;
+    // With the current Jacobian it will be less, but how much less differs from unknown to unknown.
+    let next = rate / (T::ONE - rate) * size;
+    // A rate near one says nothing about the next increment.
+    let shrinks = rate + rate < T::ONE;
+    shrinks && next <= tolerance || !shrinks && size <= T::from_f64(T::STAGNATION)
 }
 
 /// The largest increment of an iteration.
