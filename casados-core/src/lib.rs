@@ -39,6 +39,7 @@ pub mod batch;
 pub mod dual;
 pub mod erk;
 pub mod error;
+mod finite;
 pub mod function;
 pub mod irk;
 mod linalg;

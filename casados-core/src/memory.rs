@@ -26,16 +26,27 @@
 //! }
 //! ```
 
+pub mod fallback;
+#[cfg(feature = "alloc")]
+mod heap;
+
+pub use fallback::{Fallback, Kept};
+#[cfg(feature = "alloc")]
+pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap};
+
 use crate::error::Error;
-use crate::irk::{AdjointMemory, DirectionalMemory};
-use crate::model::Dae;
-use crate::scalar::Real;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
 /// What memory can hold.
 pub trait Stored: Zeroable + Send + Sync + 'static {}
 impl<V: Zeroable + Send + Sync + 'static> Stored for V {}
+
+/// Values with a number of columns, one type for each number: seeds or directions.
+pub trait Family: 'static {
+    /// That of `C` columns.
+    type Of<const C: usize>: Stored;
+}
 
 /// What the memory of an [`Inline`] integrator is for. Every mode contains `solve`.
 pub mod mode {
@@ -69,9 +80,9 @@ pub trait Memory: sealed::Sealed + 'static {
     /// A place for forward sensitivities.
     type Forward<V: Stored>: Default + Send + Sync;
     /// A place for forward sensitivities in given directions.
-    type Directional<M: Dae, T: Real, const S: usize>: Default + Send + Sync;
+    type Directional<V: Family>: Default + Send + Sync;
     /// A place for adjoint sensitivities.
-    type Adjoint<M: Dae, T: Real, const S: usize>: Default + Send + Sync;
+    type Adjoint<V: Family>: Default + Send + Sync;
     /// A place for second-order sensitivities.
     type Hessian<V: Stored>: Default + Send + Sync;
     /// A place for what second-order sensitivities remember of every step.
@@ -118,9 +129,7 @@ pub trait WithDirectional<const C: usize>: Memory {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn directional<M: Dae, T: Real, const S: usize>(
-        place: &mut Self::Directional<M, T, S>,
-    ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error>;
+    fn directional<V: Family>(place: &mut Self::Directional<V>) -> Result<&mut V::Of<C>, Error>;
 }
 
 /// Memory with a place for the adjoint of `C` seeds.
@@ -133,9 +142,7 @@ pub trait WithAdjoint<const C: usize>: Memory {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`]
-    fn adjoint<M: Dae, T: Real, const S: usize>(
-        place: &mut Self::Adjoint<M, T, S>,
-    ) -> Result<&mut AdjointMemory<M, T, S, C>, Error>;
+    fn adjoint<V: Family>(place: &mut Self::Adjoint<V>) -> Result<&mut V::Of<C>, Error>;
 }
 
 /// Memory with a place for second-order sensitivities.
@@ -188,77 +195,6 @@ pub struct Inline<Mode, const STEPS: usize = 1, F = fallback::Pivoting>(PhantomD
 
 impl<Mode, const STEPS: usize, F> sealed::Sealed for Inline<Mode, STEPS, F> {}
 
-/// What an implicit integrator does where the planned elimination is not good enough.
-pub mod fallback {
-    /// It pivots the whole matrix. With three stages or more it has memory for the mean Jacobian of
-    /// the stages too, which Newton's method takes where iterations are not fixed.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Pivoting;
-
-    /// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no
-    /// other worst case than the usual one. Neither the whole matrix nor the mean Jacobian of the
-    /// stages has any memory or any code: for firmware with fixed iterations.
-    ///
-    /// ```
-    /// # use casados_core::{Dae, Error, Gauss, Inline, Irk, memory::fallback, mode};
-    /// type Whole<M> = Irk<M, Gauss<4>, f64, Inline<mode::Forward>>;
-    /// type Lean<M> = Irk<M, Gauss<4>, f64, Inline<mode::Forward, 1, fallback::Refusing>>;
-    /// fn saved<M: Dae>() -> usize {
-    ///     Whole::<M>::SIZE - Lean::<M>::SIZE
-    /// }
-    /// ```
-    #[derive(Clone, Copy, Debug)]
-    pub struct Refusing;
-}
-
-/// [`fallback::Pivoting`] or [`fallback::Refusing`].
-pub trait Fallback: sealed::Sealed + 'static {
-    /// A place for what only the fallback needs.
-    type Place<V: Stored + Copy>: Kept<V>;
-    /// Whether there is one.
-    const KEPT: bool;
-}
-
-/// A place that has a value, or has none.
-pub trait Kept<V>: Stored + Copy {
-    /// The value.
-    fn get(&self) -> Option<&V>;
-    /// The value, to be written.
-    fn get_mut(&mut self) -> Option<&mut V>;
-}
-
-impl sealed::Sealed for fallback::Pivoting {}
-impl Fallback for fallback::Pivoting {
-    type Place<V: Stored + Copy> = Inside<V>;
-    const KEPT: bool = true;
-}
-impl sealed::Sealed for fallback::Refusing {}
-impl Fallback for fallback::Refusing {
-    type Place<V: Stored + Copy> = Absent;
-    const KEPT: bool = false;
-}
-
-impl<V: Stored + Copy> Kept<V> for Inside<V> {
-    #[inline(always)]
-    fn get(&self) -> Option<&V> {
-        Some(&self.0)
-    }
-    #[inline(always)]
-    fn get_mut(&mut self) -> Option<&mut V> {
-        Some(&mut self.0)
-    }
-}
-impl<V> Kept<V> for Absent {
-    #[inline(always)]
-    fn get(&self) -> Option<&V> {
-        None
-    }
-    #[inline(always)]
-    fn get_mut(&mut self) -> Option<&mut V> {
-        None
-    }
-}
-
 /// The places of one mode.
 macro_rules! inline {
     ([$($constant:ident)?] $mode:ty {
@@ -269,8 +205,8 @@ macro_rules! inline {
             type Nominal<V: Stored> = Inside<V>;
             type Tape<V: Stored> = Inside<[V; STEPS]>;
             type Forward<V: Stored> = $forward;
-            type Directional<M: Dae, T: Real, const S: usize> = $directional;
-            type Adjoint<M: Dae, T: Real, const S: usize> = $adjoint;
+            type Directional<V: Family> = $directional;
+            type Adjoint<V: Family> = $adjoint;
             type Hessian<V: Stored> = $hessian;
             type HessianTape<V: Stored> = $tape;
             const STEPS: usize = STEPS;
@@ -291,11 +227,11 @@ inline!([] mode::Forward {
     forward: Inside<V>, directional: Absent, adjoint: Absent, hessian: Absent, hessian_tape: Absent,
 });
 inline!([C] mode::Directional<C> {
-    forward: Absent, directional: Inside<DirectionalMemory<M, T, S, C>>, adjoint: Absent, hessian: Absent,
+    forward: Absent, directional: Inside<V::Of<C>>, adjoint: Absent, hessian: Absent,
     hessian_tape: Absent,
 });
 inline!([C] mode::Adjoint<C> {
-    forward: Absent, directional: Absent, adjoint: Inside<AdjointMemory<M, T, S, C>>, hessian: Absent,
+    forward: Absent, directional: Absent, adjoint: Inside<V::Of<C>>, hessian: Absent,
     hessian_tape: Absent,
 });
 inline!([] mode::Hessian {
@@ -316,16 +252,12 @@ impl<const STEPS: usize, F: Fallback> WithForward for Inline<mode::Hessian, STEP
 impl<const C: usize, const STEPS: usize, F: Fallback> WithDirectional<C>
     for Inline<mode::Directional<C>, STEPS, F>
 {
-    fn directional<M: Dae, T: Real, const S: usize>(
-        place: &mut Self::Directional<M, T, S>,
-    ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error> {
+    fn directional<V: Family>(place: &mut Self::Directional<V>) -> Result<&mut V::Of<C>, Error> {
         Ok(&mut place.0)
     }
 }
 impl<const C: usize, const STEPS: usize, F: Fallback> WithAdjoint<C> for Inline<mode::Adjoint<C>, STEPS, F> {
-    fn adjoint<M: Dae, T: Real, const S: usize>(
-        place: &mut Self::Adjoint<M, T, S>,
-    ) -> Result<&mut AdjointMemory<M, T, S, C>, Error> {
+    fn adjoint<V: Family>(place: &mut Self::Adjoint<V>) -> Result<&mut V::Of<C>, Error> {
         Ok(&mut place.0)
     }
 }
@@ -340,130 +272,4 @@ impl<const STEPS: usize, F: Fallback> WithHessian for Inline<mode::Hessian, STEP
 
 fn steps_of<V: Stored>(place: &mut [V], steps: usize) -> Result<&mut [V], Error> {
     place.get_mut(..steps).ok_or(Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) })
-}
-
-#[cfg(feature = "alloc")]
-pub use heap::{Allocated, AllocatedByType, AllocatedTape, Heap};
-
-#[cfg(feature = "alloc")]
-mod heap {
-    use super::*;
-    use alloc::boxed::Box;
-    use alloc::vec::Vec;
-    use bytemuck::allocation::{try_zeroed_box, try_zeroed_slice_box};
-    use core::any::Any;
-
-    /// Memory on the heap: allocated when it is needed first.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Heap;
-
-    /// A value on the heap.
-    #[derive(Debug)]
-    pub struct Allocated<V>(Option<Box<V>>);
-
-    /// Values on the heap, one for each step.
-    #[derive(Debug)]
-    pub struct AllocatedTape<V>(Option<Box<[V]>>);
-
-    /// Values on the heap, one of each type that was asked for: types differ in the number of
-    /// seeds.
-    #[derive(Debug, Default)]
-    pub struct AllocatedByType(Vec<Box<dyn Any + Send + Sync>>);
-
-    impl<V> Default for Allocated<V> {
-        fn default() -> Self {
-            Self(None)
-        }
-    }
-    impl<V> Default for AllocatedTape<V> {
-        fn default() -> Self {
-            Self(None)
-        }
-    }
-
-    fn allocate<V: Stored>() -> Result<Box<V>, Error> {
-        try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<V>() })
-    }
-
-    impl<V: Stored> Allocated<V> {
-        fn open(&mut self) -> Result<&mut V, Error> {
-            if self.0.is_none() {
-                self.0 = Some(allocate()?);
-            }
-            self.0.as_deref_mut().ok_or(Error::OutOfMemory { bytes: size_of::<V>() })
-        }
-    }
-
-    impl<V: Stored> AllocatedTape<V> {
-        fn open(&mut self, steps: usize) -> Result<&mut [V], Error> {
-            let error = Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) };
-            if self.0.is_none() {
-                self.0 = Some(try_zeroed_slice_box(steps).map_err(|()| error)?);
-            }
-            self.0.as_deref_mut().ok_or(error)
-        }
-    }
-
-    impl AllocatedByType {
-        fn open<V: Stored>(&mut self) -> Result<&mut V, Error> {
-            let error = Error::OutOfMemory { bytes: size_of::<V>() };
-            let index = match self.0.iter().position(|value| (**value).is::<V>()) {
-                Some(index) => index,
-                None => {
-                    let value: Box<V> = allocate()?;
-                    self.0.try_reserve(1).map_err(|_| error)?;
-                    self.0.push(value);
-                    self.0.len() - 1
-                }
-            };
-            self.0.get_mut(index).and_then(|value| value.downcast_mut()).ok_or(error)
-        }
-    }
-
-    impl sealed::Sealed for Heap {}
-
-    impl Memory for Heap {
-        type Nominal<V: Stored> = Allocated<V>;
-        type Tape<V: Stored> = AllocatedTape<V>;
-        type Forward<V: Stored> = Allocated<V>;
-        type Directional<M: Dae, T: Real, const S: usize> = AllocatedByType;
-        type Adjoint<M: Dae, T: Real, const S: usize> = AllocatedByType;
-        type Hessian<V: Stored> = Allocated<V>;
-        type HessianTape<V: Stored> = AllocatedTape<V>;
-        type Fallback = fallback::Pivoting;
-        const STEPS: usize = usize::MAX;
-        fn nominal<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
-            place.open()
-        }
-        fn tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
-            place.open(steps)
-        }
-    }
-    impl WithForward for Heap {
-        fn forward<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
-            place.open()
-        }
-    }
-    impl<const C: usize> WithDirectional<C> for Heap {
-        fn directional<M: Dae, T: Real, const S: usize>(
-            place: &mut AllocatedByType,
-        ) -> Result<&mut DirectionalMemory<M, T, S, C>, Error> {
-            place.open()
-        }
-    }
-    impl<const C: usize> WithAdjoint<C> for Heap {
-        fn adjoint<M: Dae, T: Real, const S: usize>(
-            place: &mut AllocatedByType,
-        ) -> Result<&mut AdjointMemory<M, T, S, C>, Error> {
-            place.open()
-        }
-    }
-    impl WithHessian for Heap {
-        fn hessian<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
-            place.open()
-        }
-        fn hessian_tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
-            place.open(steps)
-        }
-    }
 }

@@ -1,7 +1,8 @@
 //! The questions that a batch can be asked, each known by what it answers.
 
-use super::group::{Group, MOST_LANES, Verdict};
+use super::group::Group;
 use super::intervals::{Interval, vector};
+use super::lanes::{MOST_LANES, Verdict, unpack, yes};
 use crate::error::Error;
 use crate::irk::{Arguments, Integrator};
 use crate::memory::Heap;
@@ -9,7 +10,6 @@ use crate::model::{ArrayK, Dae};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, assign};
-use bytemuck::Zeroable;
 
 /// A result of several intervals, with a number for each of them in the lanes of its registers. All
 /// of it is inlined into kernels.
@@ -65,12 +65,6 @@ wide!(Adjoint: nominal; grad_x0, grad_u, grad_p;);
 wide!(ForwardAdjoint: forward; grad_x0, grad_u, grad_p;);
 wide!(Hessian: first;; h_xx, h_xu, h_uu, h_xp, h_up, h_pp);
 
-/// True in every lane.
-#[inline(always)]
-pub fn yes<E: Lanes>() -> E::Mask {
-    E::le(E::from_f64(0.0), E::from_f64(0.0))
-}
-
 /// Which lanes are finite, beside those that are not in `finite`.
 #[inline(always)]
 fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
@@ -78,34 +72,6 @@ fn are_finite<E: Lanes>(values: &[E], mut finite: E::Mask) -> E::Mask {
         finite = E::and(finite, value.is_finite());
     }
     finite
-}
-
-/// The elements of each lane in a slice of their own, which may be empty.
-#[inline(always)]
-pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], to: &mut [&mut [T]; MOST_LANES]) {
-    let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
-    let Some(tile) = tile.get_mut(..E::LANES) else { return };
-    let mut begin = 0;
-    let mut whole = from.chunks_exact(E::LANES);
-    for from in &mut whole {
-        E::transpose(from, tile);
-        for (to, cell) in to.iter_mut().zip(&*tile) {
-            // As many as the optimiser knows.
-            if let Some(to) = to.get_mut(begin..begin + E::LANES) {
-                to.copy_from_slice(cell.as_ref());
-            }
-        }
-        begin += E::LANES;
-    }
-    let mut cell: E::Cell = Zeroable::zeroed();
-    for (index, from) in whole.remainder().iter().enumerate() {
-        from.store(&mut cell);
-        for (to, &element) in to.iter_mut().zip(cell.as_ref()) {
-            if let Some(to) = to.get_mut(begin + index) {
-                *to = element;
-            }
-        }
-    }
 }
 
 /// What a call of a batch answers for each interval.

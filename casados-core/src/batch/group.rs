@@ -3,14 +3,14 @@
 //! Every lane has its own verdict, whether its iterations converged and its derivatives satisfy
 //! their equations; lanes never mix, so that one that fails takes nobody with it.
 
-use super::answer::{unpack, yes};
 use super::intervals::Interval;
+use super::lanes::{MOST_LANES, Pack, Unpack, Verdict, yes};
 use crate::error::Error;
 use crate::irk::{
-    AdjointMemory, Coefficients, ForwardMemory, From, HessianMemory, HessianStep, Linearization, Step,
-    StepOf, Work, multiply,
+    AdjointMemory, Coefficients, ForwardMemory, HessianMemory, HessianStep, InitialGuess, Linearization,
+    StageEquations, Step, StepOf, Work, multiply,
 };
-use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::linalg::dispatch;
 use crate::memory::{Heap, Memory, WithForward, WithHessian};
 use crate::model::{ArrayK, ArrayX, Dae, VectorZ};
 use crate::options::{Options, Start};
@@ -19,9 +19,6 @@ use crate::scalar::Lanes;
 use crate::shape::{Matrix, Plain, Shape};
 use crate::statistics::Statistics;
 use crate::tableau::Tableau;
-
-/// More lanes than any register has.
-pub const MOST_LANES: usize = 16;
 
 type Place<V> = <Heap as Memory>::Nominal<V>;
 type Places<V> = <Heap as Memory>::Tape<V>;
@@ -57,11 +54,8 @@ struct Pass<'a, M: Dae, E: Lanes, const S: usize> {
     statistics: &'a mut Statistics,
     work: &'a mut Work<M, E, S>,
     steps: &'a mut [Step<M, E, S>],
-    from: From<'a, M, E, S>,
+    from: InitialGuess<'a, M, E, S>,
 }
-
-/// The verdict on lanes, and the results of those for which it is good.
-pub type Verdict<'a, E, R> = Result<(<E as crate::scalar::Field>::Mask, &'a R), Error>;
 
 /// Opens what every pass needs.
 macro_rules! pass {
@@ -69,10 +63,10 @@ macro_rules! pass {
         $group.statistics = Statistics::default();
         let count = $group.options.steps;
         let from = match $group.options.start {
-            Start::Warm if $warm => From::Record(Heap::tape(&mut $group.record, count)?),
-            Start::Zero => From::Zero,
-            _ if $group.given => From::Given,
-            _ => From::Nominal,
+            Start::Warm if $warm => InitialGuess::Previous(Heap::tape(&mut $group.record, count)?),
+            Start::Zero => InitialGuess::Zero,
+            _ if $group.given => InitialGuess::Given,
+            _ => InitialGuess::Nominal,
         };
         Pass {
             options: &$group.options,
@@ -307,10 +301,12 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             let (remembered, record) = records.split_at_mut_checked(n).unwrap_or_default();
             let kept = if HessianStep::<M, E, S>::DIRECT { remembered.last() } else { None };
             let kept = kept.and_then(|record| record.kept(false));
-            let solved = work.newton(coefficients, kept, options, n, x, y, statistics);
+            let equations = StageEquations { coefficients, kept, n, x };
+            let solved = work.newton(equations, options, y, statistics);
             work.advance(coefficients, options.compensated, step, n, count);
             good = E::and(good, solved.converged);
-            let mut pass = Pass { options, coefficients, statistics, work, steps: &mut [], from: From::Zero };
+            let mut pass =
+                Pass { options, coefficients, statistics, work, steps: &mut [], from: InitialGuess::Zero };
             good = E::and(good, after(&mut pass, n, step, solved.exact, record.first_mut()));
             self.statistics.steps += 1;
         }
@@ -325,43 +321,5 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
         exact: bool,
     ) {
         self.work.linearize_planned(self.coefficients, to, n, step, exact, self.statistics);
-    }
-}
-
-/// The elements of several slices, one of each in the lanes of a register.
-struct Pack<'a, T, E> {
-    from: &'a [&'a [T]; MOST_LANES],
-    to: &'a mut [E],
-}
-
-impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let mut cell: E::Cell = bytemuck::Zeroable::zeroed();
-        for (i, to) in self.to.iter_mut().enumerate() {
-            for (cell, from) in cell.as_mut().iter_mut().zip(self.from) {
-                if let Some(&from) = from.get(i) {
-                    *cell = from;
-                }
-            }
-            *to = E::load(&cell);
-        }
-    }
-}
-
-/// The elements of registers, those of each lane in a slice of their own.
-struct Unpack<'a, T, E> {
-    from: &'a [E],
-    to: [&'a mut [T]; MOST_LANES],
-}
-
-impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(mut self) {
-        unpack(self.from, &mut self.to);
     }
 }

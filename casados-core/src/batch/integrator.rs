@@ -8,7 +8,7 @@ use super::statistics::BatchStatistics;
 use super::work::parallel;
 use super::work::{Share, Work, Worker, fill, width};
 use crate::error::{Argument, Error};
-use crate::irk::check;
+use crate::finite::check_input;
 use crate::model::{ArrayK, Dae, VectorX, VectorZ};
 use crate::options::{Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
@@ -90,8 +90,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check(Argument::StartXdot, xdot.as_slice())?;
-        check(Argument::StartZ, z.as_slice())?;
+        check_input(Argument::StartXdot, xdot.as_slice())?;
+        check_input(Argument::StartZ, z.as_slice())?;
         self.given = Some((*xdot, *z));
         Ok(())
     }

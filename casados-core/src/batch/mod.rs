@@ -12,13 +12,14 @@
 //! change a result by rounding errors.
 //!
 //! One file for each thing: `intervals` what is given, `answer` what is asked, `group` intervals
-//! side by side, `work` who computes what, `integrator` what users see.
+//! side by side in `lanes`, `work` who computes what, `integrator` what users see.
 
 mod answer;
 mod error;
 mod group;
 mod integrator;
 mod intervals;
+mod lanes;
 mod statistics;
 mod work;
 

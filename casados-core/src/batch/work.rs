@@ -3,8 +3,9 @@
 
 use super::answer::{Answer, Wide};
 use super::error::BatchError;
-use super::group::{Group, MOST_LANES};
+use super::group::Group;
 use super::intervals::{Inputs, Interval, vector};
+use super::lanes::MOST_LANES;
 use super::statistics::BatchStatistics;
 use crate::error::Error;
 use crate::irk;

@@ -5,11 +5,11 @@
 //! λ_n = λ_{n+1} + Σ_i ξ̄_i                       λ_w += Σ_i g_wᵀ k̄_i
 //! ```
 
-use super::along::Along;
 use super::forward::Variation;
 use super::step::{Grid, Point, Record, Scheme, add, check};
 use crate::error::{Error, Place, Quantity};
 use crate::model::{ArrayK, ArrayV, ArrayW, Ode};
+use crate::quadrature::Along;
 use crate::scalar::Real;
 use crate::shape::{Array, Shape};
 use bytemuck::Zeroable;
@@ -27,6 +27,14 @@ pub(super) struct Sweep<M: Ode, T: Real, R: Array<T>, const S: usize> {
     pub lambda: ArrayW<M, R>,
 }
 
+/// The way back over the steps.
+pub(super) struct Way<'a, M: Ode, T: Real, const S: usize> {
+    pub scheme: &'a Scheme<M, T, S>,
+    pub grid: Grid<T>,
+    /// How many seeds there are.
+    pub columns: usize,
+}
+
 impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
     /// Seeds: of each state the columns.
     pub fn seed(&mut self, columns: usize, seed: impl Fn(usize, usize) -> T) {
@@ -39,37 +47,31 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
 
     /// Back over all recorded steps, from `lambda` to `lambda`. `multipliers` keeps the `μ_i` of
     /// every stage for the Hessian. An integrand takes part if there is one seed.
-    #[expect(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
+        way: Way<'_, M, T, S>,
         point: &mut Point<M, T>,
         records: &[Record<M, T, S>],
-        columns: usize,
         mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
         along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
+        let columns = way.columns;
         M::jacobian_constants::<T>(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
             lambda.as_mut()[..columns].fill(T::ZERO);
         }
         for (step, record) in records.iter().enumerate().rev() {
             let multipliers = multipliers.as_deref_mut().and_then(|of_steps| of_steps.get_mut(step));
-            self.step(scheme, grid, point, record, step, columns, multipliers, along)?;
+            self.step(&way, point, (step, record), multipliers, along)?;
         }
         Ok(())
     }
 
-    #[expect(clippy::too_many_arguments)]
     fn step(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
+        &Way { scheme, grid, columns }: &Way<'_, M, T, S>,
         point: &mut Point<M, T>,
-        record: &Record<M, T, S>,
-        step: usize,
-        columns: usize,
+        (step, record): (usize, &Record<M, T, S>),
         mut multipliers: Option<&mut [ArrayK<M, T>; S]>,
         along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {

@@ -108,7 +108,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
         for step in 0..grid.steps {
             let Base { point, record, x, rest, .. } = &mut *base;
             record.x = *x;
-            self.stages(scheme, grid, point, record, step, directions, &mut at_stage)?;
+            self.stages(scheme, grid, (point, record), step, directions, &mut at_stage)?;
             record.end(scheme, grid, step, x, grid.compensated.then_some(rest))?;
             self.end(scheme, grid.h, columns);
             point.counts.steps += 1;
@@ -117,13 +117,11 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
     }
 
     /// The stages of one step with their derivatives.
-    #[expect(clippy::too_many_arguments)]
     fn stages(
         &mut self,
         scheme: &Scheme<M, T, S>,
         grid: Grid<T>,
-        point: &mut Point<M, T>,
-        record: &mut Record<M, T, S>,
+        (point, record): (&mut Point<M, T>, &mut Record<M, T, S>),
         step: usize,
         directions: impl Directions<M, T>,
         at_stage: &mut impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,

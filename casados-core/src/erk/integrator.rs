@@ -2,7 +2,6 @@
 //! `sensitivities`.
 
 use super::adjoint::Sweep;
-use super::along::{Along, begin, finish};
 use super::hessian::Curvature;
 use super::step::{Base, Counts, Grid, Record, Scheme};
 use crate::error::{Argument, Error};
@@ -11,6 +10,7 @@ use crate::memory::Heap;
 use crate::memory::{Fallback, Inline, Memory};
 use crate::model::{ArrayK, ArrayW, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
+use crate::quadrature::{Along, begin, finish};
 use crate::result::{Adjoint, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};

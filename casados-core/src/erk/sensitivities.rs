@@ -1,7 +1,7 @@
 //! Derivatives of a call, as users see them: each answers one question, with nothing else computed.
 
-use super::adjoint::Sweep;
-use super::along::{Along, begin, finish, forward};
+use super::adjoint::{Sweep, Way};
+use super::along::forward;
 use super::forward::{Seeded, Unit, Variation, write};
 use super::hessian::Curvature;
 use super::integrator::{AdjointMemory, ForwardMemory, HessianMemory, Integrator, finite, write_state};
@@ -9,6 +9,7 @@ use super::step::{Base, Grid};
 use crate::error::{Argument, Error};
 use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{ArrayW, MatrixXC, Ode, VectorU, VectorX};
+use crate::quadrature::{Along, begin, finish};
 use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Shape};
@@ -146,9 +147,10 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
         let records = W::tape(&mut self.trajectory, grid.steps)?;
         sweep.seed(1, |x, _| lambda.as_slice()[x]);
+        let way = Way { scheme: &self.scheme, grid, columns: 1 };
         let run = base
             .record(&self.scheme, grid, records, &mut along)
-            .and_then(|()| sweep.run(&self.scheme, grid, &mut base.point, records, 1, None, &mut along));
+            .and_then(|()| sweep.run(way, &mut base.point, records, None, &mut along));
         self.counts = base.point.counts;
         run?;
         finish(&mut along)?;
@@ -185,7 +187,8 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         for first in (0..C).step_by(most) {
             let columns = most.min(C - first);
             sweep.seed(columns, |x, column| lambdas[(x, first + column)]);
-            let run = sweep.run(&self.scheme, grid, &mut base.point, records, columns, None, &mut None);
+            let way = Way { scheme: &self.scheme, grid, columns };
+            let run = sweep.run(way, &mut base.point, records, None, &mut None);
             self.counts = base.point.counts;
             run?;
             write_gradient(sweep, 0..columns, &mut result, first)?;
@@ -278,7 +281,13 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         curvature.start();
         let mut run = || {
             base.record(scheme, grid, records, &mut None)?;
-            sweep.run(scheme, grid, &mut base.point, records, 1, Some(multipliers), &mut along)?;
+            sweep.run(
+                Way { scheme, grid, columns: 1 },
+                &mut base.point,
+                records,
+                Some(multipliers),
+                &mut along,
+            )?;
             base.x = start;
             base.point.counts.steps = 0;
             variation.run(scheme, grid, base, Unit, |point, dxi, at| {

@@ -1,10 +1,9 @@
 //! One step of an explicit method: the stages one after the other, and the end.
 
-use super::along::Along;
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, Kernel, are_finite, dispatch, dot_compensated, moved};
 use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Ode};
-use crate::quadrature::Integrand;
+use crate::quadrature::{Along, Integrand};
 use crate::result::Nominal;
 use crate::scalar::Real;
 use crate::scalar::lanes::REGISTERS;

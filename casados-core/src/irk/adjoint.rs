@@ -7,19 +7,21 @@
 //! Of `λᵀx_N + νᵀz₀`, with `z₀ = Σ_i ℓ_i(0) z_i` of the first step, the right-hand side of `z_i`
 //! there is `ℓ_i(0) ν`.
 
-use super::along::Along;
-use super::evaluate::entry;
-use super::record::{Coefficients, Linearization, Step, Work, copy};
-use super::step::check;
+use super::driver::Parts;
+use super::workspace::{Linearization, Step, Work, copy};
 use crate::error::Error;
+use crate::finite::check_output;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::jacobian_entries::entry;
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
-use crate::memory::Fallback;
+use crate::memory::{Fallback, Family};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
+use crate::quadrature::Along;
 use crate::result::Adjoint;
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Aligned, Matrix, Plain, Shape};
-use crate::statistics::Statistics;
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 
 /// The adjoint of `C` seeds while it goes backwards.
 #[derive(Zeroable)]
@@ -121,17 +123,15 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
     ///
     /// # Errors
     /// [`Error::Singular`]; an integrand that is not finite.
-    #[allow(clippy::too_many_arguments)]
     pub(crate) fn step<F: Fallback>(
         &mut self,
-        work: &mut Work<M, T, S, F>,
+        parts: &mut Parts<'_, M, T, S, F>,
         kept: &mut Option<&Linearization<M, T, S, F>>,
-        coefficients: &Coefficients<T, S>,
         n: usize,
         step: &Step<M, T, S>,
-        statistics: &mut Statistics,
         along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
+        let Parts { work, coefficients, statistics, .. } = parts;
         if let Some(integrand) = along {
             work.along_adjoint(coefficients, n, step, self, &mut **integrand)?;
         }
@@ -281,6 +281,12 @@ pub struct AdjointMemory<M: Dae, T: Plain, const S: usize, const C: usize> {
 }
 copy!([M: Dae, T: Plain, const S: usize, const C: usize] AdjointMemory<M, T, S, C>);
 
+/// The memory of adjoints, of any number of seeds.
+pub struct Adjoints<M, T, const S: usize>(PhantomData<fn() -> (M, T)>);
+impl<M: Dae, T: Real, const S: usize> Family for Adjoints<M, T, S> {
+    type Of<const C: usize> = AdjointMemory<M, T, S, C>;
+}
+
 impl<M: Dae, E: Lanes, const S: usize, const C: usize> AdjointMemory<M, E, S, C> {
     /// The result, after the first step.
     pub(crate) fn collect<F: Fallback>(&mut self, work: &Work<M, E, S, F>) {
@@ -309,8 +315,8 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> AdjointMemory<M, T, S, C> 
     pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>) -> Result<(), Error> {
         self.collect(work);
         let result = &self.result;
-        check(result.grad_x0.as_slice(), 0)?;
-        check(result.grad_u.as_slice(), 0)?;
-        check(result.grad_p.as_slice(), 0)
+        check_output(result.grad_x0.as_slice(), 0)?;
+        check_output(result.grad_u.as_slice(), 0)?;
+        check_output(result.grad_p.as_slice(), 0)
     }
 }

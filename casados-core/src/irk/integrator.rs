@@ -1,17 +1,18 @@
 //! The integrator as its users see it: how it is made, what is set, simulation. Its derivatives are
 //! in `sensitivities`.
 
-use super::along::{Along, begin, finish};
-use super::dense::Point;
-use super::forward::ForwardMemory;
-use super::hessian::{HessianMemory, HessianStep};
-use super::run::{Arguments, Run};
+use super::adjoint::Adjoints;
+use super::dense_output::Point;
+use super::driver::{Arguments, Run};
+use super::forward::memory::{Directionals, ForwardMemory};
+use super::hessian::pass::{HessianMemory, HessianStep};
 use crate::error::Error;
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;
 use crate::memory::{Fallback, Inline, Memory};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::options::Options;
+use crate::quadrature::{Along, begin, finish};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::statistics::Statistics;
@@ -43,8 +44,8 @@ use core::marker::PhantomData;
 pub struct Integrator<M: Dae, B, const S: usize, T: Real, W: Memory> {
     pub(super) run: Run<M, T, S, W>,
     pub(super) forward: W::Forward<ForwardMemory<M, T, S>>,
-    pub(super) directional: W::Directional<M, T, S>,
-    pub(super) adjoint: W::Adjoint<M, T, S>,
+    pub(super) directional: W::Directional<Directionals<M, T, S>>,
+    pub(super) adjoint: W::Adjoint<Adjoints<M, T, S>>,
     pub(super) hessian: W::Hessian<HessianMemory<M, T, S>>,
     pub(super) hessian_tape: W::HessianTape<HessianStep<M, T, S, W::Fallback>>,
     /// The step of the last successful call whose derivatives are in the memory of `forward`.

@@ -12,68 +12,54 @@
 //! there, whatever the iteration took. `z` at the ends of an interval is the polynomial through the
 //! stages; for stiffly accurate methods its value at the end is the last stage.
 //!
-//! One file for each thing: `evaluate` the model at the `stages`, `newton`, its `increment` and its
-//! `progress`, and, where that does not arrive, `pivoted`, what errors say about where it
-//! `start_errors`, and `near_singular` about linear equations, `step`, `forward` by `sweep` over
-//! panels of `directions` from their `right_side`, `adjoint`, `hessian` by products of panels
-//! (`curvature`) or by a `curved_adjoint` of large models, `along` an integrand, `verify` what was
-//! solved, states that are `kinematic`, `dense`; `record` is the memory, `run` what all calls
-//! share, `integrator` and its `sensitivities` what users see.
+//! In the order of a call: `integrator` and `sensitivities` are what users see, `driver` what all
+//! calls share, `step` the loop over the steps, `stages` the model at them, `newton` the iteration
+//! that solves them. Derivatives go `forward`, backwards by the `adjoint`, and to second order with
+//! the `hessian`; each is held against its own equations by its `backward_error`. An `integrand` is
+//! summed up along the way, `dense_output` interpolates. `kinematic` states are no unknowns;
+//! `directions` are what derivatives are found in. `coefficients`, `jacobian_entries`,
+//! `stage_array` and `workspace` are the data.
 
 mod adjoint;
-mod along;
-mod compensated;
-mod curvature;
-mod curved_adjoint;
-mod curved_advance;
-mod curved_rows;
-mod dense;
+mod backward_error;
+mod coefficients;
+mod dense_output;
 mod directions;
-mod evaluate;
+mod driver;
 mod forward;
 mod hessian;
-mod increment;
+mod integrand;
 mod integrator;
+mod jacobian_entries;
 mod kinematic;
-mod lone;
-mod measure;
-mod multiply;
-mod near_singular;
 mod newton;
-mod pivoted;
-mod progress;
-mod record;
-mod refine;
-mod right_side;
-mod run;
 mod sensitivities;
+mod stage_array;
 mod stages;
-mod start_errors;
 mod step;
-mod sums;
-mod sweep;
-mod triangle;
-mod verify;
-mod write;
+mod workspace;
 
-pub use adjoint::AdjointMemory;
-pub use forward::{DirectionalMemory, ForwardMemory};
+pub use adjoint::{AdjointMemory, Adjoints};
+pub use forward::memory::{DirectionalMemory, Directionals, ForwardMemory};
 pub use integrator::Integrator;
+
+// Under their old place for those who ask here.
+#[cfg(feature = "alloc")]
+pub(crate) use crate::finite::check_input as check;
+pub(crate) use crate::finite::not_finite;
 
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
 pub(crate) use self::{
-    evaluate::dot,
-    forward::{StepOf, check_result, multiply},
-    pivoted::unknown_name,
-    record::{Coefficients, Linearization, Step, Work},
-    run::{Arguments, check},
-    step::From,
+    coefficients::{Coefficients, dot},
+    driver::Arguments,
+    forward::memory::{StepOf, check_result, multiply},
+    hessian::pass::{HessianMemory, HessianStep},
+    newton::dense_fallback::unknown_name,
+    newton::iteration::StageEquations,
+    stages::initial_guess::InitialGuess,
+    workspace::{Linearization, Step, Work},
 };
-#[cfg(feature = "alloc")]
-pub(crate) use hessian::{HessianMemory, HessianStep};
-// What integrands are computed with too.
-pub(crate) use self::{evaluate::not_finite, step::check as check_values};
 
 use crate::memory::Memory;
 use crate::model::Dae;

@@ -1,14 +1,15 @@
 //! Derivatives of a call, as users see them: forward, in directions, adjoint, of second order.
 
-use super::along::{Along, begin, finish, reborrow};
-use super::dense::Point;
-use super::forward::{ForwardMemory, StepOf, gradient};
-use super::hessian::HessianMemory;
+use super::dense_output::Point;
+use super::driver::Arguments;
+use super::forward::memory::{ForwardMemory, StepOf, gradient};
+use super::hessian::pass::HessianMemory;
 use super::integrator::Integrator;
-use super::run::{Arguments, check};
 use crate::error::{Argument, Error};
+use crate::finite::check_input;
 use crate::memory::{Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
 use crate::model::{Dae, MatrixXC, VectorU, VectorX, VectorZ};
+use crate::quadrature::{Along, begin, finish, reborrow};
 use crate::result::{Adjoint, DenseForward, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -97,7 +98,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_input(Argument::Lambda, lambda.as_slice())?;
         self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
         gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
         self.keep_forward()?;
@@ -116,7 +117,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check(Argument::Lambda, lambda)?;
+        check_input(Argument::Lambda, lambda)?;
         self.differentiate::<false>(arguments, None, Some(&mut to.forward))?;
         gradient(to, lambda)?;
         self.keep_forward().map(|_| ())
@@ -140,9 +141,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let count = self.run.options.steps;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            let (work, coefficients, at) =
-                (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
-            pass.step::<_, REFINED>(work, coefficients, at, parts.statistics, None, to)?;
+            pass.step::<_, REFINED>(parts, StepOf { n, count, distant }, None, to)?;
             match &mut along {
                 Some(integrand) => parts.along_forward(n, step, &pass.sweep, false, &mut **integrand),
                 None => Ok(()),
@@ -205,10 +204,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         for (n, step) in parts.steps.iter().enumerate().take(point.step + 1).skip(first) {
             parts.linearize(n, step, false)?;
             let ForwardMemory { result, pass, .. } = &mut *forward;
-            let (work, coefficients) = (&mut *parts.work, parts.coefficients);
             // None of them is the last one: there is a result already.
             let at = StepOf { n, count: usize::MAX, distant: false };
-            pass.step::<_, false>(work, coefficients, at, parts.statistics, None, &mut result.forward)?;
+            pass.step::<_, false>(&mut parts, at, None, &mut result.forward)?;
         }
         self.sweep = Some(point.step);
         let h = parts.work.kept.time.step;
@@ -247,15 +245,15 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithDirectional<C>,
     {
-        check(Argument::SeedX, seeds.x0.as_slice())?;
-        check(Argument::SeedU, seeds.u.as_slice())?;
-        check(Argument::SeedP, seeds.p.as_slice())?;
+        check_input(Argument::SeedX, seeds.x0.as_slice())?;
+        check_input(Argument::SeedU, seeds.u.as_slice())?;
+        check_input(Argument::SeedP, seeds.p.as_slice())?;
         let memory = W::directional(&mut self.directional)?;
         memory.seed(seeds);
         let count = self.run.options.steps;
         let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
-            memory.step(parts.work, parts.coefficients, n, count, parts.statistics)
+            memory.step(parts, n, count)
         })?;
         memory.finish(parts.work, count - 1)?;
         self.sweep = None;
@@ -334,7 +332,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<C>,
     {
-        check(Argument::Lambda, seeds)?;
+        check_input(Argument::Lambda, seeds)?;
         begin(&mut along);
         let memory = W::adjoint(&mut self.adjoint)?;
         let count = self.run.options.steps;
@@ -350,15 +348,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             if n + 1 < count {
                 parts.linearize(n, step, false)?;
             }
-            memory.backward.step(
-                parts.work,
-                &mut None,
-                parts.coefficients,
-                n,
-                step,
-                parts.statistics,
-                &mut along,
-            )?;
+            memory.backward.step(&mut parts, &mut None, n, step, &mut along)?;
         }
         memory.finish(parts.work)?;
         finish(&mut along)?;
@@ -463,8 +453,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        check(Argument::Lambda, lambda)?;
-        check(Argument::Nu, nu)?;
+        check_input(Argument::Lambda, lambda)?;
+        check_input(Argument::Nu, nu)?;
         begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;
@@ -476,10 +466,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };
-            let (work, coefficients, at) =
-                (&mut *parts.work, parts.coefficients, StepOf { n, count, distant });
-            let (curved, to) = (Some(record.curved()), &mut to.first.forward);
-            forward.step::<_, false>(work, coefficients, at, parts.statistics, curved, to)?;
+            let (at, to) = (StepOf { n, count, distant }, &mut to.first.forward);
+            forward.step::<_, false>(parts, at, Some(record.curved()), to)?;
             if let Some(integrand) = &mut along {
                 parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
             }
@@ -491,17 +479,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         })?;
         forward.finish(&parts.work.result, count - 1, &mut to.first.forward)?;
         finish(&mut along)?;
-        pass.run(
-            parts.work,
-            parts.coefficients,
-            parts.steps,
-            records,
-            lambda,
-            nu,
-            parts.statistics,
-            if distant { to.h_xx.as_slice() } else { &[] },
-            reborrow(&mut along),
-        )?;
+        let ahead = if distant { to.h_xx.as_slice() } else { &[] };
+        pass.run(parts, records, [lambda, nu], ahead, reborrow(&mut along))?;
         pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
         self.keep_forward().map(|_| ())
     }

@@ -1,10 +1,14 @@
 //! The steps of an interval, one after the other.
 
-use super::compensated;
-use super::evaluate::{dot, not_finite};
-use super::pivoted::unknown_name;
-use super::record::{Coefficients, Linearization, Step, Validity, Work};
+use super::newton::dense_fallback::unknown_name;
+use super::newton::iteration::StageEquations;
+use super::stages::compensated;
+use super::stages::initial_guess::{InitialGuess, stay};
+use super::workspace::{Linearization, Step, Validity, Work};
 use crate::error::{Error, Place};
+use crate::finite::{check_output, not_finite};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::dot;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -13,15 +17,11 @@ use crate::scalar::{Field, Lanes, Real};
 use crate::shape::{Matrix, Plain, Shape, assign};
 use crate::statistics::Statistics;
 
-/// Where the unknowns of the stages start.
-pub(crate) enum From<'a, M: Dae, E: Lanes, const S: usize> {
-    /// At the start values of the model.
-    Nominal,
-    Zero,
-    Given,
-    Record(&'a [Step<M, E, S>]),
-    /// These are solutions.
-    Solved(&'a [Step<M, E, S>]),
+/// How an interval is integrated.
+pub(crate) struct Scheme<'a, M: Dae, E: Lanes, const S: usize> {
+    pub coefficients: &'a Coefficients<E, S>,
+    pub options: &'a Options,
+    pub guess: InitialGuess<'a, M, E, S>,
 }
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
@@ -31,47 +31,6 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         // The same input gives the same bits in every call: nothing of the last one is taken over.
         self.validity = Default::default();
         self.rest.as_mut().fill(E::from_f64(0.0));
-    }
-
-    /// Start values of the stages of step `n`: after the first one the polynomial of the step
-    /// before, continued, or if that is not worth much its algebraic states.
-    pub(crate) fn start(
-        &mut self,
-        coefficients: &Coefficients<E, S>,
-        from: &From<'_, M, E, S>,
-        n: usize,
-        before: Option<&Step<M, E, S>>,
-        y: &mut ArrayK<M, [E; S]>,
-    ) {
-        self.alike = false;
-        match (from, before, &coefficients.next) {
-            (From::Record(record) | From::Solved(record), ..) => {
-                if let Some(record) = record.get(n) {
-                    assign(y, &record.y);
-                }
-            }
-            (_, Some(before), Some(next)) => {
-                dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
-            }
-            (From::Nominal | From::Zero, ..) => {
-                y.as_mut().fill([E::from_f64(0.0); S]);
-                self.alike = M::STRUCTURE.autonomous;
-                if matches!(from, From::Nominal) {
-                    for (y, start) in y.as_mut().iter_mut().zip(M::START) {
-                        *y = [E::from_f64(*start); S];
-                    }
-                    self.alike &= const { starts_at_rest::<M>() };
-                }
-            }
-            (From::Given, ..) => {
-                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
-                    *y = [*given; S];
-                }
-            }
-        }
-        if coefficients.next.is_none() && !matches!(from, From::Record(_) | From::Solved(_)) {
-            stay(before, y);
-        }
     }
 
     /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
@@ -110,9 +69,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     /// Those of Newton's method; [`Error::Overflow`].
     pub(crate) fn integrate(
         &mut self,
-        coefficients: &Coefficients<T, S>,
-        options: &Options,
-        from: &From<'_, M, T, S>,
+        scheme: &Scheme<'_, M, T, S>,
         steps: &mut [Step<M, T, S>],
         statistics: &mut Statistics,
         mut after: impl FnMut(&mut Self, usize, &Step<M, T, S>, bool, &mut Statistics) -> Result<(), Error>,
@@ -123,8 +80,8 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             let (done, rest) = steps.split_at_mut(n);
             let (before, Some(step)) = (done.last(), rest.first_mut()) else { break };
             step.x = self.x;
-            let exact = self.solve(coefficients, options, from, n, before, step, statistics)?;
-            self.advance(coefficients, options.compensated, step, n, count);
+            let exact = self.solve(scheme, n, before, step, statistics)?;
+            self.advance(scheme.coefficients, scheme.options.compensated, step, n, count);
             if let Some((index, _)) = not_finite(self.x.as_ref()) {
                 return Err(Error::Overflow { step: n, index });
             }
@@ -132,39 +89,38 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
             statistics.steps += 1;
         }
         for z in [self.result.z0.as_slice(), self.result.z.as_slice()] {
-            check(z, count - 1)?;
+            check_output(z, count - 1)?;
         }
         Ok(())
     }
 
-    /// The stages of a step, the fast way, and where that does not arrive the careful one; whether
-    /// the factors that are there are those of the solution.
-    #[allow(clippy::too_many_arguments)]
+    /// The stages of a step by the planned elimination, and where that does not arrive by the dense
+    /// fallback; whether the factors that are there are those of the solution.
     fn solve(
         &mut self,
-        coefficients: &Coefficients<T, S>,
-        options: &Options,
-        from: &From<'_, M, T, S>,
+        scheme: &Scheme<'_, M, T, S>,
         n: usize,
         before: Option<&Step<M, T, S>>,
         step: &mut Step<M, T, S>,
         statistics: &mut Statistics,
     ) -> Result<bool, Error> {
-        self.start(coefficients, from, n, before, &mut step.y);
-        if matches!(from, From::Solved(_)) {
+        let Scheme { coefficients, options, guess } = scheme;
+        self.start(coefficients, guess, n, before, &mut step.y);
+        if matches!(guess, InitialGuess::Solution(_)) {
             return Ok(false);
         }
         let Step { x, y } = step;
         let mut undetermined = None;
         if !M::STRUCTURE.elimination.pivots.is_empty() {
-            let solved = self.newton(coefficients, None, options, n, x, y, statistics);
+            let equations = StageEquations { coefficients, kept: None, n, x };
+            let solved = self.newton(equations, options, y, statistics);
             let finite = y.as_ref().as_flattened().iter().fold(true, |finite, y| finite & y.is_finite());
             if solved.converged && finite {
                 return Ok(solved.exact);
             }
             undetermined = solved.undetermined;
-            self.start(coefficients, from, n, None, y);
-            if !matches!(from, From::Record(_)) {
+            self.start(coefficients, guess, n, None, y);
+            if !matches!(guess, InitialGuess::Previous(_)) {
                 stay(before, y);
             }
         }
@@ -180,7 +136,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 None => Ok(false),
             },
             Ok(()) => Ok(false),
-            Err(error) if n == 0 => Err(self.explain_start(error, from)),
+            Err(error) if n == 0 => Err(self.explain_start(error, guess)),
             Err(error) => Err(error),
         }
     }
@@ -245,31 +201,6 @@ fn singular<M: Dae>(unknown: usize, step: usize) -> Error {
     Error::Singular { unknown: unknown_name::<M>(unknown), at: Place { step, stage: 0, iteration: 1 } }
 }
 
-/// Algebraic states as at the last stage of the step before: on its branch.
-pub(crate) fn stay<M: Dae, E: Lanes, const S: usize>(
-    before: Option<&Step<M, E, S>>,
-    y: &mut ArrayK<M, [E; S]>,
-) {
-    let Some(before) = before else { return };
-    for (y, before) in y.as_mut().iter_mut().zip(before.y.as_ref()).skip(M::Shape::NX) {
-        if let Some(&last) = before.last() {
-            *y = [last; S];
-        }
-    }
-}
-
-/// Whether every `ẋ` starts at zero: then states are the same at all stages.
-const fn starts_at_rest<M: Dae>() -> bool {
-    let mut unknown = 0;
-    while unknown < M::Shape::NX && unknown < M::START.len() {
-        if M::START[unknown] != 0.0 {
-            return false;
-        }
-        unknown += 1;
-    }
-    true
-}
-
 /// Algebraic states at a point of the polynomial through the stages.
 pub(crate) fn algebraic<M: Dae, E: Lanes, const S: usize>(
     z: &mut [E],
@@ -294,47 +225,6 @@ impl<E: Field, const S: usize> Kernel for Combine<'_, E, S> {
     fn run<A: Arithmetic>(self) {
         for (to, y) in self.to.iter_mut().zip(self.y) {
             *to = dot(self.weights, y);
-        }
-    }
-}
-
-/// # Errors
-/// [`Error::Overflow`] of the first element that is not finite.
-pub(crate) fn check<T: Real>(values: &[T], step: usize) -> Result<(), Error> {
-    match not_finite(values) {
-        Some((index, _)) => Err(Error::Overflow { step, index }),
-        None => Ok(()),
-    }
-}
-
-/// The polynomial through the stages at those of the next step.
-struct Continue<'a, E, const S: usize> {
-    from: &'a [[E; S]],
-    next: &'a [[E; S]; S],
-    to: &'a mut [[E; S]],
-}
-
-impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let zero = E::from_f64(0.0);
-        // By columns: the stages of an unknown are a vector.
-        let mut next = [[zero; S]; S];
-        for (i, row) in self.next.iter().enumerate() {
-            for (column, &l) in next.iter_mut().zip(row) {
-                column[i] = -l;
-            }
-        }
-        for (to, from) in self.to.iter_mut().zip(self.from) {
-            let mut sum = [zero; S];
-            for (column, &value) in next.iter().zip(from) {
-                for (sum, &element) in sum.iter_mut().zip(column) {
-                    *sum = A::subtract(*sum, element, value);
-                }
-            }
-            *to = sum;
         }
     }
 }

@@ -4,11 +4,8 @@
 //! lie column after column: a column is a vector over the stages, which is what one right-hand side
 //! wants.
 
-use super::fused::Arithmetic;
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
 use crate::scalar::Field;
-
-/// An s×s matrix, column after column.
-pub type Block<E, const S: usize> = [[E; S]; S];
 
 /// `s` rows of `W` columns, row after row: the stages of a slot in a right-hand side.
 pub type Packet<E, const S: usize, const W: usize> = [[E; W]; S];
@@ -231,9 +228,9 @@ fn eliminate<A: Arithmetic, E: Field, const S: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::complex::Complex;
-    use super::super::fused::Separate;
     use super::*;
+    use crate::linalg::kernel::arithmetic::Separate;
+    use crate::linalg::transformed::complex::Complex;
 
     /// Two complex numbers and a real one, each a system of its own.
     type Three = Complex<f64, 5>;

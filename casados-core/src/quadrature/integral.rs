@@ -3,8 +3,8 @@
 use super::memory::{ArrayW, Memory};
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
+use crate::finite::check_output;
 use crate::function::{ArrayY, Function, MatrixYP, MatrixYU, MatrixYX, VectorY};
-use crate::irk::check_values;
 use crate::linalg::axpy;
 use crate::model::Dae;
 use crate::result::split;
@@ -142,9 +142,9 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrat
         for (output, row) in dq.as_ref().iter().enumerate() {
             split(row.as_ref(), output, dq_dx0, dq_du, dq_dp);
         }
-        check_values(q.as_slice(), 0)?;
-        check_values(dq_dx0.as_slice(), 0)?;
-        check_values(dq_du.as_slice(), 0)?;
-        check_values(dq_dp.as_slice(), 0)
+        check_output(q.as_slice(), 0)?;
+        check_output(dq_dx0.as_slice(), 0)?;
+        check_output(dq_du.as_slice(), 0)?;
+        check_output(dq_dp.as_slice(), 0)
     }
 }

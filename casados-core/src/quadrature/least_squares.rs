@@ -3,8 +3,8 @@
 use super::memory::{ArrayW, Memory};
 use super::{Integrand, sealed};
 use crate::error::{Error, Place};
+use crate::finite::check_output;
 use crate::function::{Function, MatrixYY};
-use crate::irk::check_values;
 use crate::linalg::axpy;
 use crate::model::Dae;
 use crate::result::symmetric;
@@ -195,10 +195,10 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSq
         for (second, row) in self.memory.second.as_mut().iter_mut().zip(rows) {
             axpy(T::ONE, row.as_ref(), second.as_mut());
         }
-        check_values(&[self.value], 0)?;
-        check_values(self.gradient.as_ref(), 0)?;
+        check_output(&[self.value], 0)?;
+        check_output(self.gradient.as_ref(), 0)?;
         for (i, row) in self.sum.as_ref().iter().enumerate() {
-            check_values(&row.as_ref()[..=i], 0)?;
+            check_output(&row.as_ref()[..=i], 0)?;
         }
         Ok(())
     }

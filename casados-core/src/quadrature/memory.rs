@@ -2,8 +2,8 @@
 
 use super::product::Subtract;
 use crate::error::{Error, Place};
+use crate::finite::not_finite;
 use crate::function::{ArrayV, ArrayY, Function};
-use crate::irk::not_finite;
 use crate::linalg::{axpy, dispatch};
 use crate::scalar::Real;
 use crate::shape::{Plain, Shape};

@@ -15,9 +15,10 @@ mod stages;
 
 pub(super) use stages::derivative;
 
-use super::directions::Directions;
-use super::evaluate::entry;
-use super::record::{Coefficients, Linearization};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::directions::Directions;
+use crate::irk::jacobian_entries::entry;
+use crate::irk::workspace::Linearization;
 use crate::linalg::{
     Arithmetic, AtRow, Block, Kernel, Packet, Viewer, coupling, dispatch, each_row, kinematic, slot,
     subtract, subtract_diagonal, subtract_transposed,

@@ -1,9 +1,11 @@
 //! Kinematic states in iterations of Newton's method: `k_q` at the stages, before and after.
 
 use super::{count, is_any, minus_c, velocity};
-use crate::irk::evaluate::{entry, stages};
-use crate::irk::record::{Coefficients, Work};
-use crate::irk::right_side::nodes;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::nodes;
+use crate::irk::coefficients::stage_values;
+use crate::irk::jacobian_entries::entry;
+use crate::irk::workspace::Work;
 use crate::linalg::{Arithmetic, Kernel, coupling, dispatch, kinematic};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
@@ -54,8 +56,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         dispatch(EliminateMissing::<M, E, S> { jacobian, points, f, a, h });
     }
 
-    /// Writes what follows from sums that have been [compensated](crate::irk::compensated), to its
-    /// last digit.
+    /// Writes what follows from [compensated](crate::irk::stages::compensated) sums, to its last
+    /// digit.
     pub(in crate::irk) fn reconstruct_compensated(&mut self, y: &mut ArrayK<M, [E; S]>) {
         if const { !is_any::<M>() } {
             return;
@@ -119,7 +121,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructStages<'_, M, E, S>
                 && let (Some(&x), Some(&rest), Some(k)) = (x.as_ref().get(v), rest.as_ref().get(v), y.get(v))
                 && let Some(xi) = points.get_mut(M::Shape::NX + v)
             {
-                *xi = stages::<A, E, S>(rest, &minus_ha, k);
+                *xi = stage_values::<A, E, S>(rest, &minus_ha, k);
                 for xi in xi {
                     *xi = *xi + x;
                 }
@@ -222,7 +224,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateRounded<'_, M, E, S> 
                 continue;
             };
             if dependent.entry as usize >= M::STRUCTURE.blocks[1] {
-                residual = stages::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
+                residual = stage_values::<A, E, S>(E::from_f64(0.0), &minus_ha, &residual);
             }
             if let Some(f) = f.as_mut().get_mut(row) {
                 A::subtract_products(f, values, &residual);

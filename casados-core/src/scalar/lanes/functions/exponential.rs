@@ -4,14 +4,10 @@
 //! polynomial, whose leading terms are added as a pair.
 
 use super::pair::{Pair, c, ordered_sum, polynomial, product, sum};
+use super::rounding::{LN_2, clamp, copy_sign, nearest, power_of_two};
 use super::{Double, repair2};
 use crate::scalar::Scalar;
 
-/// `1.5 · 2⁵²`: added and subtracted, it rounds to an integer; added, it leaves the integer in the
-/// last bits.
-pub const ROUND: f64 = 6_755_399_441_055_744.0;
-/// The first 42 bits of ln 2, and the next 53.
-pub const LN_2: [f64; 2] = [0.6931471805598903, 5.497923018708371e-14];
 /// ln 2 as a pair.
 const LN_2_PAIR: [f64; 2] = [core::f64::consts::LN_2, 2.3190468138462996e-17];
 
@@ -29,25 +25,6 @@ const Q: [f64; 11] = [
     2.510617467419995e-8,
     2.0920747364903866e-9,
 ];
-
-/// `2ⁿ` for an integer `−1022 ≤ n ≤ 1023`
-#[inline(always)]
-pub fn power_of_two<D: Double>(n: D) -> D {
-    (n + c(ROUND + 1023.0)).shift_left::<52>()
-}
-
-/// The nearest integer, `|a| < 2⁵¹`.
-#[inline(always)]
-pub fn nearest<D: Double>(a: D) -> D {
-    (a + c(ROUND)) - c(ROUND)
-}
-
-/// `a` between bounds; NaN stays.
-#[inline(always)]
-pub fn clamp<D: Double>(a: D, low: f64, high: f64) -> D {
-    let a = D::select(c::<D>(high).lt(a), c(high), a);
-    D::select(a.lt(c(low)), c(low), a)
-}
 
 /// `(n, r)` with `a = n ln 2 + r`, for `|a| < 1500`
 #[inline(always)]
@@ -174,12 +151,6 @@ pub fn tanh<D: Double>(a: D) -> D {
     let quotient = above.div(Pair::new(c(1.0)).add(above)).round();
     let tiny = magnitude.lt(c(1e-9));
     copy_sign(D::select(tiny, magnitude, quotient), a)
-}
-
-/// A magnitude with the sign of `a`.
-#[inline(always)]
-pub fn copy_sign<D: Double>(magnitude: D, a: D) -> D {
-    magnitude.or_bits(a.and_bits(c(-0.0)))
 }
 
 /// `aᵇ = exp(b ln a)`, the logarithm to about 65 bits. Unusual arguments are left to the function

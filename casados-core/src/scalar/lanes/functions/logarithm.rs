@@ -3,8 +3,8 @@
 //! `a = 2ᵏ m` with `√½ ≤ m < √2`, and `ln m = 2 artanh s` with `s = (m − 1)/(m + 1)`, a minimax
 //! polynomial in `s²`.
 
-use super::exponential::{LN_2, copy_sign};
 use super::pair::{Pair, c, ordered_sum, pattern, polynomial, product, sum};
+use super::rounding::{LN_2, copy_sign};
 use super::{Double, repair};
 use crate::scalar::Scalar;
 
@@ -47,7 +47,7 @@ fn split<D: Double>(a: D) -> (D, D) {
 /// `2⁻ᵏ`
 #[inline(always)]
 fn inverse_power<D: Double>(k: D) -> D {
-    super::exponential::power_of_two(-k)
+    super::rounding::power_of_two(-k)
 }
 
 /// `ln(1 + f)` to about 65 bits, for `−0.3 ≤ f ≤ 0.42`

@@ -39,6 +39,7 @@ mod logarithm;
 mod number;
 mod pair;
 mod root;
+mod rounding;
 mod trigonometric;
 
 use crate::scalar::{Field, Lanes, Piece, Scalar};

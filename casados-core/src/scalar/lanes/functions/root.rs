@@ -1,7 +1,7 @@
 //! Cube roots and lengths.
 
-use super::exponential::{copy_sign, nearest, power_of_two};
 use super::pair::{c, ordered_sum, pattern, polynomial, product};
+use super::rounding::{copy_sign, nearest, power_of_two};
 use super::{Double, repair, repair2};
 use crate::scalar::Scalar;
 

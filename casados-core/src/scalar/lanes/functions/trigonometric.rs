@@ -3,8 +3,8 @@
 //! `a = n π/2 + r` with `|r| ≤ π/4` by constants of 152 bits (Cody and Waite); larger arguments go
 //! through the function of one number. Minimax polynomials, whose leading terms are added as pairs.
 
-use super::exponential::{ROUND, clamp, copy_sign};
 use super::pair::{Pair, c, ordered_sum, pattern, polynomial, product, sum};
+use super::rounding::{ROUND, clamp, copy_sign};
 use super::{Double, one, repair, repair2};
 use crate::scalar::Scalar;
 use core::f64::consts::{FRAC_2_PI, FRAC_PI_4, PI};

@@ -1,0 +1,85 @@
+//! Numbers of several intervals in the lanes of registers, and back.
+
+use crate::error::Error;
+use crate::linalg::{Arithmetic, Kernel};
+use crate::scalar::Lanes;
+use crate::shape::Plain;
+use bytemuck::Zeroable;
+
+/// More lanes than any register has.
+pub const MOST_LANES: usize = 16;
+
+/// The verdict on lanes, and the results of those for which it is good.
+pub type Verdict<'a, E, R> = Result<(<E as crate::scalar::Field>::Mask, &'a R), Error>;
+
+/// True in every lane.
+#[inline(always)]
+pub fn yes<E: Lanes>() -> E::Mask {
+    E::le(E::from_f64(0.0), E::from_f64(0.0))
+}
+
+/// The elements of each lane in a slice of their own, which may be empty.
+#[inline(always)]
+pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], to: &mut [&mut [T]; MOST_LANES]) {
+    let mut tile: [E::Cell; MOST_LANES] = Zeroable::zeroed();
+    let Some(tile) = tile.get_mut(..E::LANES) else { return };
+    let mut begin = 0;
+    let mut whole = from.chunks_exact(E::LANES);
+    for from in &mut whole {
+        E::transpose(from, tile);
+        for (to, cell) in to.iter_mut().zip(&*tile) {
+            // As many as the optimiser knows.
+            if let Some(to) = to.get_mut(begin..begin + E::LANES) {
+                to.copy_from_slice(cell.as_ref());
+            }
+        }
+        begin += E::LANES;
+    }
+    let mut cell: E::Cell = Zeroable::zeroed();
+    for (index, from) in whole.remainder().iter().enumerate() {
+        from.store(&mut cell);
+        for (to, &element) in to.iter_mut().zip(cell.as_ref()) {
+            if let Some(to) = to.get_mut(begin + index) {
+                *to = element;
+            }
+        }
+    }
+}
+
+/// The elements of several slices, one of each in the lanes of a register.
+pub struct Pack<'a, T, E> {
+    pub from: &'a [&'a [T]; MOST_LANES],
+    pub to: &'a mut [E],
+}
+
+impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let mut cell: E::Cell = Zeroable::zeroed();
+        for (i, to) in self.to.iter_mut().enumerate() {
+            for (cell, from) in cell.as_mut().iter_mut().zip(self.from) {
+                if let Some(&from) = from.get(i) {
+                    *cell = from;
+                }
+            }
+            *to = E::load(&cell);
+        }
+    }
+}
+
+/// The elements of registers, those of each lane in a slice of their own.
+pub struct Unpack<'a, T, E> {
+    pub from: &'a [E],
+    pub to: [&'a mut [T]; MOST_LANES],
+}
+
+impl<T: Plain, E: Lanes<Cell: AsRef<[T]>>> Kernel for Unpack<'_, T, E> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        unpack(self.from, &mut self.to);
+    }
+}

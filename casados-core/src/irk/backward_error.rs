@@ -1,0 +1,375 @@
+//! Derivatives are tried on their own equations before they are trusted: nothing else would notice
+//! an elimination that lost digits.
+//!
+//! Forward derivatives `D` of all variables satisfy `∂f/∂v D = 0` at every stage, adjoints `μ`
+//! satisfy `Jᵀμ = h (b ⊗ λ, 0)`. A sum over all directions (with weights that are neither equal nor
+//! alternating, so that no structure hides an error) is held against the sizes of its terms,
+//! equation by equation: however equations and unknowns are scaled. What is solved for is `dk`, so
+//! that `dξ = V + h Σ a dk` counts with its own terms (W. Oettli, W. Prager, Compatibility of
+//! approximate solution of linear equations with given error bounds, Numer. Math. 6 (1964)): where
+//! they cancel, no elimination is to blame.
+
+use super::adjoint::Backward;
+use super::directions::{Directions, weight};
+use super::forward::checksum::{STRANDS, total};
+use super::forward::sweep::Sweep;
+use super::workspace::{Linearization, Work};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::jacobian_entries::entry;
+use crate::linalg::{Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, slot};
+use crate::memory::Fallback;
+use crate::model::{ArrayK, ArrayV, Dae};
+use crate::scalar::{Field, Lanes};
+use crate::shape::{Array, Plain, Shape};
+
+/// Derivatives are good if they satisfy their equations to this many ε of the terms.
+const ROUNDING: f64 = 4096.0;
+
+/// A residual is zero below this many ε of its terms.
+const RESIDUAL: f64 = 16.0;
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Whether the forward derivatives of a step satisfy the linearised equations, lane by lane.
+    ///
+    /// Where the directions happen to cancel in the sum, its rounding errors look large beside it.
+    /// They hardly do in a second sum too.
+    pub(crate) fn verify_forward<R: Array<E>, D: Directions<E>>(
+        &mut self,
+        sweep: &Sweep<M, E, R, S>,
+        coefficients: &Coefficients<E, S>,
+        directions: &D,
+        second: bool,
+    ) -> E::Mask {
+        let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+        // The residual has done its work.
+        let Self { probe: [probe, sizes], f, terms, linear, .. } = self;
+        let (probe, sizes) = (probe.as_mut(), sizes.as_mut());
+        let inputs = probe.get_mut(nx + nx + nz..).unwrap_or_default();
+        for (w, input) in inputs.iter_mut().enumerate().take(M::Shape::NU + M::Shape::NP) {
+            *input = [directions.total(nx + w, second); S];
+        }
+        dispatch(VerifyForward::<M, E, S> {
+            start_sums: sweep.start_sums.as_ref(),
+            stage_sums: sweep.sums.as_ref(),
+            a: &coefficients.a,
+            h: self.inputs.time.step,
+            jacobian: &linear.jacobian,
+            probe,
+            sizes,
+            sums: f,
+            terms,
+        })
+    }
+
+    /// Whether the adjoints of a step satisfy their equations, which may have been `kept`, lane by
+    /// lane, with `λ` at the end of the step.
+    pub(crate) fn verify_adjoint<const C: usize>(
+        &mut self,
+        kept: Option<&Linearization<M, E, S, F>>,
+        backward: &Backward<M, E, S, C>,
+        coefficients: &Coefficients<E, S>,
+    ) -> E::Mask {
+        let [sums, sizes] = &mut self.probe;
+        dispatch(VerifyAdjoint::<M, E, S, C> {
+            lambda: backward.lambda.as_ref(),
+            mu: backward.mu.as_ref(),
+            source: if backward.sourced { backward.source.as_ref() } else { &[] },
+            a: &coefficients.a,
+            b: &coefficients.b,
+            h: self.inputs.time.step,
+            jacobian: &kept.unwrap_or(&self.linear).jacobian,
+            sums,
+            sizes,
+        })
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Whether the residual is at the level of the rounding errors of its terms,
+    /// `|f_r| ≤ 16 ε Σ_c |∂f_r/∂v_c v_c|`, lane by lane.
+    pub(crate) fn is_satisfied(&mut self) -> E::Mask {
+        self.complete();
+        dispatch(Satisfied::<M, E, S> {
+            f: self.f.as_ref(),
+            points: &self.points,
+            jacobian: &self.linear.jacobian,
+            sizes: &mut self.terms,
+        })
+    }
+}
+
+struct Satisfied<'a, M: Dae, E: Plain, const S: usize> {
+    f: &'a [[E; S]],
+    points: &'a ArrayV<M, [E; S]>,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    sizes: &'a mut ArrayK<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Satisfied<'_, M, E, S> {
+    type Number = E;
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) -> E::Mask {
+        let (zero, bound) = (E::from_f64(0.0), E::from_f64(RESIDUAL * E::EPSILON));
+        self.sizes.as_mut().fill([E::from_f64(E::SMALLEST); S]);
+        each_row::<A, _>(&mut self);
+        let mut good = E::le(zero, zero);
+        for (f, sizes) in self.f.iter().zip(self.sizes.as_ref()) {
+            for (&f, &size) in f.iter().zip(sizes) {
+                good = E::and(good, E::le(f.abs(), bound * size));
+            }
+        }
+        good
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Satisfied<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
+    const INSTRUCTIONS: usize = 4 * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let (Some(sizes), Some(points)) = (self.sizes.as_mut().get_mut(r), self.points.as_ref().get(c))
+        else {
+            return;
+        };
+        // In registers: the optimiser cannot know that nothing here overlaps.
+        let mut size = *sizes;
+        for i in 0..S {
+            size[i] = size[i] + (values[i] * points[i]).abs();
+        }
+        *sizes = size;
+    }
+}
+
+/// The weighted sum over all seeds.
+#[inline(always)]
+fn sum<E: Field, const C: usize>(seeds: &[E; C]) -> E {
+    if const { C == 1 } {
+        return seeds[0];
+    }
+    let mut sum = E::from_f64(0.0);
+    for (seed, &value) in seeds.iter().enumerate() {
+        sum = sum + weight::<E>(seed, false) * value;
+    }
+    sum
+}
+
+/// `|sum| ≤ ROUNDING ε size`
+#[inline(always)]
+fn is_small<E: Lanes>(sum: E, size: E) -> E::Mask {
+    E::le(sum.abs(), E::from_f64(ROUNDING * E::EPSILON) * size.max(E::from_f64(E::SMALLEST)))
+}
+
+/// `|value|` at each stage.
+#[inline(always)]
+fn sizes_of<E: Lanes, const S: usize>(values: &[E; S]) -> [E; S] {
+    let mut sizes = *values;
+    for size in &mut sizes {
+        *size = size.abs();
+    }
+    sizes
+}
+
+/// `start + h Σ_l a_il dk_l`, and the sizes of the terms.
+#[inline(always)]
+fn moved<A: Arithmetic, E: Lanes, const S: usize>(
+    start: E,
+    minus_ha: &Block<E, S>,
+    (dk, dk_sizes): (&[E; S], &[E; S]),
+) -> ([E; S], [E; S]) {
+    let (mut xi, mut sizes) = ([start; S], [start.abs(); S]);
+    for ((column, &dk), &dk_size) in minus_ha.iter().zip(dk).zip(dk_sizes) {
+        for ((xi, size), &element) in xi.iter_mut().zip(&mut sizes).zip(column) {
+            *xi = A::subtract(*xi, element, dk);
+            *size = A::subtract(*size, -element.abs(), dk_size);
+        }
+    }
+    (xi, sizes)
+}
+
+struct VerifyForward<'a, M: Dae, E: Plain, const S: usize> {
+    start_sums: &'a [[E; STRANDS]],
+    stage_sums: &'a [[[E; STRANDS]; S]],
+    a: &'a [[E; S]; S],
+    h: E,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// The sum over the directions of every variable, and what it is rounded relative to.
+    probe: &'a mut [[E; S]],
+    sizes: &'a mut [[E; S]],
+    /// The same of every equation.
+    sums: &'a mut ArrayK<M, [E; S]>,
+    terms: &'a mut ArrayK<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for VerifyForward<'_, M, E, S> {
+    type Number = E;
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E::Mask {
+        let Self { start_sums, stage_sums, a, h, jacobian, probe, sizes, sums, terms } = self;
+        let (nx, zero) = (M::Shape::NX, E::from_f64(0.0));
+        // Lengths that the optimiser knows need no looking at.
+        let (nk, nv) = (M::Shape::NK, M::Shape::NV);
+        if start_sums.len() != nx || stage_sums.len() != nk || probe.len() != nv || sizes.len() != nv {
+            return E::lt(zero, zero);
+        }
+        let minus_ha = coupling(a, h);
+        for (sizes, values) in sizes.iter_mut().zip(probe.iter()).skip(nx + nk) {
+            *sizes = sizes_of(values);
+        }
+        for (unknown, stages) in stage_sums.iter().enumerate() {
+            let mut sum = [zero; S];
+            for (sum, strands) in sum.iter_mut().zip(stages) {
+                *sum = total(strands);
+            }
+            let size = sizes_of(&sum);
+            if unknown < nx {
+                let xi = moved::<A, E, S>(total(&start_sums[unknown]), &minus_ha, (&sum, &size));
+                (probe[unknown], sizes[unknown]) = (sum, size);
+                (probe[nx + unknown], sizes[nx + unknown]) = xi;
+            } else {
+                (probe[nx + unknown], sizes[nx + unknown]) = (sum, size);
+            }
+        }
+        sums.as_mut().fill([zero; S]);
+        terms.as_mut().fill([zero; S]);
+        let mut total = Total::<M, E, S> { jacobian, probe, sizes, sums, terms };
+        each_row::<A, _>(&mut total);
+        let mut good = E::le(zero, zero);
+        for (sums, terms) in total.sums.as_ref().iter().zip(total.terms.as_ref()) {
+            for (&sum, &size) in sums.iter().zip(terms) {
+                good = E::and(good, is_small(sum, size));
+            }
+        }
+        good
+    }
+}
+
+/// For each equation the sum over all variables, and that of the sizes of its terms.
+struct Total<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    probe: &'a [[E; S]],
+    sizes: &'a [[E; S]],
+    sums: &'a mut ArrayK<M, [E; S]>,
+    terms: &'a mut ArrayK<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Total<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.jacobian.rows.len();
+    const INSTRUCTIONS: usize = 6 * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let Self { probe, sizes, sums, terms, .. } = self;
+        let (Some(sums), Some(terms), Some(probe), Some(sizes)) =
+            (sums.as_mut().get_mut(r), terms.as_mut().get_mut(r), probe.get(c), sizes.get(c))
+        else {
+            return;
+        };
+        // In registers: the optimiser cannot know that nothing here overlaps.
+        let (mut sum, mut term) = (*sums, *terms);
+        for i in 0..S {
+            // The sign of the sum is of no interest.
+            sum[i] = A::subtract(sum[i], values[i], probe[i]);
+            term[i] = A::subtract(term[i], -values[i].abs(), sizes[i]);
+        }
+        (*sums, *terms) = (sum, term);
+    }
+}
+
+struct VerifyAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
+    lambda: &'a [[E; C]],
+    mu: &'a [[[E; C]; S]],
+    /// Right-hand sides of an integrand, the same for all seeds.
+    source: &'a [[E; S]],
+    a: &'a [[E; S]; S],
+    b: &'a [E; S],
+    h: E,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    sums: &'a mut ArrayV<M, [E; S]>,
+    sizes: &'a mut ArrayV<M, [E; S]>,
+}
+
+/// `Σ_r ∂f_r/∂v_c μ_r` of every variable at each stage, and the sizes of the terms.
+struct TotalAdjoint<'a, M: Dae, E: Plain, const S: usize, const C: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    mu: &'a [[[E; C]; S]],
+    sums: &'a mut ArrayV<M, [E; S]>,
+    sizes: &'a mut ArrayV<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> AtRow for TotalAdjoint<'_, M, E, S, C> {
+    /// The entries of `f_ẋ`, `f_x` and `f_z`.
+    const ROWS: usize = M::STRUCTURE.blocks[3];
+    const INSTRUCTIONS: usize = (6 + C) * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let Some((r, c, values)) = entry::<M, _>(self.jacobian, row) else { return };
+        let Self { mu, sums, sizes, .. } = self;
+        let (Some(sums), Some(sizes), Some(mu)) =
+            (sums.as_mut().get_mut(c), sizes.as_mut().get_mut(c), mu.get(slot::<M>(r)))
+        else {
+            return;
+        };
+        // In registers: the optimiser cannot know that nothing here overlaps.
+        let (mut total, mut size) = (*sums, *sizes);
+        for i in 0..S {
+            let term = values[i] * sum(&mu[i]);
+            total[i] = total[i] + term;
+            size[i] = size[i] + term.abs();
+        }
+        (*sums, *sizes) = (total, size);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const C: usize> Kernel for VerifyAdjoint<'_, M, E, S, C> {
+    type Number = E;
+    type Output = E::Mask;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E::Mask {
+        let Self { lambda, mu, source, a, b, h, jacobian, sums, sizes } = self;
+        let (nx, nk, zero) = (M::Shape::NX, M::Shape::NK, E::from_f64(0.0));
+        if mu.len() != nk {
+            return E::lt(zero, zero);
+        }
+        sums.as_mut().fill([zero; S]);
+        sizes.as_mut().fill([zero; S]);
+        let mut total = TotalAdjoint::<M, E, S, C> { jacobian, mu, sums, sizes };
+        each_row::<A, _>(&mut total);
+        let (sums, sizes) = (total.sums.as_ref(), total.sizes.as_ref());
+        let mut good = E::le(zero, zero);
+        for unknown in 0..nk {
+            // Of `k` what multiplies it at its own stage, and through `ξ` at all.
+            let own = if unknown < nx { unknown } else { unknown + nx };
+            let (Some(total), Some(size)) = (sums.get(own), sizes.get(own)) else { continue };
+            let (mut total, mut size) = (*total, *size);
+            if let (true, Some(xi), Some(xi_size)) =
+                (unknown < nx, sums.get(nx + unknown), sizes.get(nx + unknown))
+            {
+                let right = lambda.get(unknown).map_or(zero, |lambda| sum(lambda));
+                for i in 0..S {
+                    let right = h * b[i] * right;
+                    total[i] = total[i] - right;
+                    size[i] = size[i] + right.abs();
+                    for j in 0..S {
+                        let ha = h * a[j][i];
+                        total[i] = A::subtract(total[i], -ha, xi[j]);
+                        size[i] = A::subtract(size[i], -ha.abs(), xi_size[j]);
+                    }
+                }
+            }
+            if let Some(source) = source.get(unknown) {
+                for ((total, size), &source) in total.iter_mut().zip(&mut size).zip(source) {
+                    let right = sum(&[source; C]);
+                    *total = *total - right;
+                    *size = *size + right.abs();
+                }
+            }
+            for (&total, &size) in total.iter().zip(&size) {
+                good = E::and(good, is_small(total, size));
+            }
+        }
+        good
+    }
+}

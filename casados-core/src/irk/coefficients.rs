@@ -1,0 +1,84 @@
+//! The coefficients of a tableau, and the sums over stages that they are made for.
+
+use crate::linalg::{Arithmetic, Eigenbasis};
+use crate::scalar::{Field, Lanes};
+use crate::tableau::Tableau;
+
+/// The coefficients of a tableau in the number type of the integrator.
+pub(crate) struct Coefficients<E, const S: usize> {
+    pub a: [[E; S]; S],
+    pub b: [E; S],
+    pub c: [E; S],
+    /// Lagrange polynomials at the start of the step.
+    pub start: [E; S],
+    /// Lagrange polynomials at its end.
+    pub end: [E; S],
+    /// Lagrange polynomials at the stages of a next step of the same size, a row for each of them;
+    /// if there are any.
+    pub next: Option<[[E; S]; S]>,
+    /// The eigenbasis of `A`, if iterations in it are cheaper than with blocks.
+    pub basis: Option<Eigenbasis<E, S, S>>,
+    pub tableau: Tableau<S>,
+}
+
+impl<E: Lanes, const S: usize> Coefficients<E, S> {
+    /// With the eigenbasis, if `mean` Jacobians are to be used.
+    pub fn new(tableau: Tableau<S>, mean: bool) -> Self {
+        let mut end = tableau.lagrange(1.0);
+        if tableau.is_stiffly_accurate() {
+            // The last stage is the end: not even a rounding error apart.
+            end = core::array::from_fn(|i| if i + 1 == S { 1.0 } else { 0.0 });
+        }
+        let next = tableau.c().map(|c| tableau.lagrange(1.0 + c));
+        let finite = next.as_flattened().iter().all(|l| l.is_finite());
+        Self {
+            a: tableau.a().map(|row| row.map(E::from_f64)),
+            b: tableau.b().map(E::from_f64),
+            c: tableau.c().map(E::from_f64),
+            start: tableau.lagrange(0.0).map(E::from_f64),
+            end: end.map(E::from_f64),
+            // Polynomials of higher degree are not worth much outside of their interval.
+            next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
+            basis: if const { S < 3 } || !mean { None } else { Eigenbasis::new(&tableau) },
+            tableau,
+        }
+    }
+}
+
+/// `x + h Σ_j a_ij k_j`
+#[inline(always)]
+pub(super) fn stage_values<A: Arithmetic, E: Field, const S: usize>(
+    x: E,
+    minus_ha: &[[E; S]; S],
+    k: &[E; S],
+) -> [E; S] {
+    let mut sum = [x; S];
+    for (column, &k) in minus_ha.iter().zip(k) {
+        for (sum, &element) in sum.iter_mut().zip(column) {
+            *sum = A::subtract(*sum, element, k);
+        }
+    }
+    sum
+}
+
+/// `h c_i`, as sums of the rows of `hA`.
+#[inline(always)]
+pub(super) fn nodes<E: Lanes, const S: usize>(a: &[[E; S]; S], h: E) -> [E; S] {
+    let mut nodes = [E::from_f64(0.0); S];
+    for (node, row) in nodes.iter_mut().zip(a) {
+        for &a in row {
+            *node = *node + h * a;
+        }
+    }
+    nodes
+}
+
+/// `Σ_j a_j b_j`
+#[inline(always)]
+pub(crate) fn dot<E: Field, const S: usize>(a: &[E; S], b: &[E; S]) -> E {
+    let mut sum = E::from_f64(0.0);
+    for (a, b) in a.iter().zip(b) {
+        sum = sum + *a * *b;
+    }
+    sum
+}

@@ -1,0 +1,255 @@
+//! What all calls of an integrator share: arguments checked, steps taken, and the record of them
+//! kept only if everything succeeded.
+
+use super::step::Scheme;
+use super::workspace::{Step, Work};
+use crate::error::{Argument, Error};
+use crate::finite::{check_input, not_finite};
+use crate::irk::coefficients::Coefficients;
+use crate::irk::stages::initial_guess::InitialGuess;
+use crate::memory::{Fallback, Memory};
+#[cfg(feature = "alloc")]
+use crate::model::ArrayV;
+use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
+use crate::options::{Options, Start};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use crate::statistics::Statistics;
+use crate::tableau::Tableau;
+
+/// The part of an integrator that every call needs.
+pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
+    pub options: Options,
+    pub coefficients: Coefficients<T, S>,
+    pub statistics: Statistics,
+    work: W::Nominal<Work<M, T, S, W::Fallback>>,
+    /// The record of the last successful call, and that of the call that runs.
+    tapes: [W::Tape<Step<M, T, S>>; 2],
+    kept: usize,
+    /// Whether any call succeeded.
+    any: bool,
+    /// Whether the record is a warm start.
+    warm: bool,
+    /// Whether that record is the solution of the next call.
+    solved: bool,
+    given: bool,
+    parameters: bool,
+    time: T,
+}
+
+/// The arguments of a call that are the same for all.
+pub(crate) struct Arguments<'a, M: Dae, T: Real> {
+    pub x0: &'a VectorX<M, T>,
+    pub u: &'a VectorU<M, T>,
+    pub h: T,
+}
+
+/// What a call has to work with after its steps were taken.
+pub(crate) struct Parts<'a, M: Dae, T: Real, const S: usize, F: Fallback> {
+    pub work: &'a mut Work<M, T, S, F>,
+    pub coefficients: &'a Coefficients<T, S>,
+    pub steps: &'a [Step<M, T, S>],
+    pub statistics: &'a mut Statistics,
+}
+
+impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
+    pub fn new(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
+        options.check()?;
+        if options.steps > W::STEPS {
+            return Err(Error::InvalidOption {
+                option: "steps",
+                value: options.steps as f64,
+                reason: "the memory of the integrator has fewer",
+            });
+        }
+        if !W::Fallback::KEPT && M::STRUCTURE.elimination.pivots.is_empty() {
+            return Err(Error::NotPivoted { step: 0 });
+        }
+        let coefficients = Coefficients::<T, S>::new(tableau, W::Fallback::KEPT);
+        let ends = [&coefficients.start, &coefficients.end];
+        if M::Shape::NZ > 0 && ends.iter().any(|weights| not_finite(*weights).is_some()) {
+            return Err(Error::NoInterpolation);
+        }
+        Ok(Self {
+            options,
+            coefficients,
+            statistics: Statistics::default(),
+            work: Default::default(),
+            tapes: Default::default(),
+            kept: 0,
+            any: false,
+            warm: false,
+            solved: false,
+            given: false,
+            parameters: false,
+            time: T::ZERO,
+        })
+    }
+
+    pub fn reserve(&mut self) -> Result<(), Error> {
+        W::nominal(&mut self.work)?.prepare();
+        for tape in &mut self.tapes {
+            W::tape(tape, self.options.steps)?;
+        }
+        Ok(())
+    }
+
+    pub fn reset(&mut self) {
+        (self.warm, self.solved) = (false, false);
+    }
+
+    pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        check_input(Argument::P, p.as_slice())?;
+        W::nominal(&mut self.work)?.parameters = *p;
+        self.parameters = true;
+        Ok(())
+    }
+
+    pub fn set_time(&mut self, t: T) -> Result<(), Error> {
+        check_input(Argument::T, &[t])?;
+        self.time = t;
+        Ok(())
+    }
+
+    pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
+        check_input(Argument::StartXdot, xdot.as_slice())?;
+        check_input(Argument::StartZ, z.as_slice())?;
+        let given = W::nominal(&mut self.work)?.given.as_mut();
+        for (to, from) in given.iter_mut().zip(xdot.as_slice().iter().chain(z.as_slice())) {
+            *to = *from;
+        }
+        self.given = true;
+        Ok(())
+    }
+
+    /// The steps of a call, with `after` called after each.
+    pub fn steps(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        mut after: impl FnMut(
+            &mut Parts<'_, M, T, S, W::Fallback>,
+            usize,
+            &Step<M, T, S>,
+            bool,
+        ) -> Result<(), Error>,
+    ) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
+        let Self { options, coefficients, statistics, work, tapes, .. } = self;
+        *statistics = Statistics::default();
+        check_input(Argument::X0, arguments.x0.as_slice())?;
+        check_input(Argument::U, arguments.u.as_slice())?;
+        check_input(Argument::H, &[arguments.h])?;
+        if M::Shape::NP > 0 && !self.parameters {
+            return Err(Error::ParametersNotSet);
+        }
+        let work = W::nominal(work)?;
+        work.prepare();
+        work.inputs.u = *arguments.u;
+        work.inputs.p = work.parameters;
+        work.inputs.time.start = self.time;
+        work.inputs.time.interval = arguments.h;
+        work.inputs.time.step = arguments.h / T::from_whole(options.steps);
+        work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
+        let [first, second] = tapes;
+        let (kept, running) = if self.kept == 0 { (first, second) } else { (second, first) };
+        // Both in the first call: later ones do not allocate.
+        let steps = W::tape(running, options.steps)?;
+        let kept = W::tape(kept, options.steps)?;
+        let guess = match options.start {
+            _ if core::mem::take(&mut self.solved) => InitialGuess::Solution(kept),
+            Start::Zero => InitialGuess::Zero,
+            Start::Given if !self.given => return Err(Error::StartNotGiven),
+            Start::Warm if self.warm => InitialGuess::Previous(kept),
+            _ if self.given => InitialGuess::Given,
+            _ => InitialGuess::Nominal,
+        };
+        let scheme = Scheme { coefficients, options, guess };
+        work.integrate(&scheme, steps, statistics, |work, n, step, exact, statistics| {
+            after(&mut Parts { work, coefficients, steps: &[], statistics }, n, step, exact)
+        })?;
+        Ok(Parts { work, coefficients, steps, statistics })
+    }
+
+    /// Whether start values are solutions but for their last digits.
+    #[cfg(feature = "alloc")]
+    pub fn set_near(&mut self, near: bool) -> Result<(), Error> {
+        W::nominal(&mut self.work)?.near = near;
+        Ok(())
+    }
+
+    /// Start values of the stages of the first step, as a warm start: the unknowns `(k, z)`, stages
+    /// innermost.
+    #[cfg(feature = "alloc")]
+    pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
+        let [first, second] = &mut self.tapes;
+        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        if let Some(step) = steps.first_mut() {
+            for (to, from) in step.y.as_mut().as_flattened_mut().iter_mut().zip(y) {
+                *to = *from;
+            }
+            self.warm = true;
+        }
+        Ok(())
+    }
+
+    /// The variables at the stages where the last call ended, successful or not.
+    #[cfg(feature = "alloc")]
+    pub fn points(&mut self) -> Result<&ArrayV<M, [T; S]>, Error> {
+        Ok(&W::nominal(&mut self.work)?.points)
+    }
+
+    /// The error of the last call, whose first step started at `y`, with what that has to do with
+    /// it.
+    #[cfg(feature = "alloc")]
+    pub fn explain_from(&mut self, error: Error, y: &[T]) -> Error {
+        let start = |unknown: usize| y.get(unknown).map(|y| y.to_f64());
+        W::nominal(&mut self.work).map_or(error, |work| work.explain_from(error, start))
+    }
+
+    /// The stages of every step, as a warm start.
+    #[cfg(feature = "alloc")]
+    pub fn set_record(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        let [first, second] = &mut self.tapes;
+        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        for (step, y) in steps.iter_mut().zip(record) {
+            crate::shape::assign(&mut *step.y, y);
+        }
+        (self.warm, self.solved) = (true, false);
+        Ok(())
+    }
+
+    /// The stages of every step of the next call.
+    #[cfg(feature = "alloc")]
+    pub fn set_solution(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
+        self.set_record(record)?;
+        self.solved = true;
+        Ok(())
+    }
+
+    /// Everything succeeded: the record of this call is the one to keep.
+    pub fn keep(&mut self) -> Result<&Work<M, T, S, W::Fallback>, Error> {
+        let work = W::nominal(&mut self.work)?;
+        work.kept = work.inputs;
+        self.kept = 1 - self.kept;
+        self.any = true;
+        self.warm = true;
+        Ok(work)
+    }
+
+    /// The last successful call.
+    pub fn last(&mut self) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
+        if !self.any {
+            return Err(Error::NoResult);
+        }
+        let work = W::nominal(&mut self.work)?;
+        let [first, second] = &mut self.tapes;
+        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        Ok(Parts { work, coefficients: &self.coefficients, steps, statistics: &mut self.statistics })
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
+    /// See [`Work::linearize`].
+    pub fn linearize(&mut self, n: usize, step: &Step<M, T, S>, exact: bool) -> Result<(), Error> {
+        self.work.linearize(self.coefficients, n, step, exact, self.statistics)
+    }
+}

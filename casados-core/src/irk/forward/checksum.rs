@@ -1,0 +1,90 @@
+//! Weighted sums of the derivatives of the stages over all directions, by which they are checked
+//! (`backward_error`, `refine`).
+
+use crate::irk::directions::weight;
+use crate::linalg::{Ahead, Arithmetic, Packet, Viewer};
+use crate::scalar::Field;
+
+/// So many strands a sum over all columns has; of numbers that are registers themselves only the
+/// first is used.
+pub(in crate::irk) const STRANDS: usize = 4;
+
+/// Whether sums have one strand: those of other rows are computed meanwhile, and its memory is
+/// written once for each row of a panel.
+const fn is_one<E>() -> bool {
+    size_of::<E>() > 8
+}
+
+/// The sum of all strands.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(in crate::irk) fn total<E: Field>(strands: &[E; STRANDS]) -> E {
+    let [a, b, c, d] = *strands;
+    if const { is_one::<E>() } { a } else { (a + b) + (c + d) }
+}
+
+/// The weights of some columns, with another sign.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(in crate::irk) fn minus_weights<E: Field, const W: usize>(column: usize, second: bool) -> [E; W] {
+    let mut weights = [E::from_f64(0.0); W];
+    for (w, to) in weights.iter_mut().enumerate() {
+        *to = -weight::<E>(column + w, second);
+    }
+    weights
+}
+
+/// Sums over all columns, of which some are shown.
+pub(in crate::irk) struct Summed<'a, E, const S: usize, const W: usize> {
+    pub sums: &'a mut [[[E; STRANDS]; S]],
+    pub minus_weights: &'a [E; W],
+    /// Where the next panel will be written.
+    pub ahead: Ahead<'a, E>,
+}
+
+impl<E: Field, const S: usize, const W: usize> Viewer<E, S, W> for Summed<'_, E, S, W> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn see<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {
+        for (strands, row) in self.sums.get_mut(slot).into_iter().flatten().zip(packet) {
+            accumulate::<A, E, W>(strands, self.minus_weights, row);
+        }
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn pass(&mut self) {
+        self.ahead.next();
+    }
+}
+
+/// A sum over no columns.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(in crate::irk) fn clear<E: Field>(strands: &mut [E; STRANDS]) {
+    let [first, others @ ..] = strands;
+    *first = E::from_f64(0.0);
+    if const { !is_one::<E>() } {
+        *others = [E::from_f64(0.0); STRANDS - 1];
+    }
+}
+
+/// `strands += weights · row`, as far apart as the strands are.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(in crate::irk) fn accumulate<A: Arithmetic, E: Field, const W: usize>(
+    strands: &mut [E; STRANDS],
+    minus_weights: &[E; W],
+    row: &[E; W],
+) {
+    if const { is_one::<E>() } {
+        let [sum, ..] = strands;
+        for (&weight, &element) in minus_weights.iter().zip(row) {
+            *sum = A::subtract(*sum, weight, element);
+        }
+        return;
+    }
+    let ((weights, last_weights), (row, last)) = (minus_weights.as_chunks(), row.as_chunks());
+    // In registers: the optimiser cannot know that they do not overlap.
+    let mut own = *strands;
+    for (weights, row) in weights.iter().zip(row) {
+        A::subtract_products(&mut own, weights, row);
+    }
+    for ((strand, &weight), &element) in own.iter_mut().zip(last_weights).zip(last) {
+        *strand = A::subtract(*strand, weight, element);
+    }
+    *strands = own;
+}

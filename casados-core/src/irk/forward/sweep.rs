@@ -1,0 +1,416 @@
+//! A step of the forward sweep, panel by panel: from `V_n` to the derivatives of the stages, to
+//! `V_{n+1}`, which after the last step is a result, and to what second derivatives need of both.
+
+use super::checksum::{STRANDS, Summed, accumulate, clear, minus_weights};
+use super::output::{Columns, Target};
+use super::right_hand_side::{Later, Scatter, place};
+use super::stage_rows::CurvedRows;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::nodes;
+use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
+use crate::irk::kinematic::Forward;
+use crate::irk::workspace::{Linearization, Work, copy};
+use crate::linalg::{
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
+    is_short, sweeps,
+};
+use crate::memory::Fallback;
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::scalar::Lanes;
+use crate::shape::{Aligned, Array, Plain, Shape};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// Derivatives of one step in directions, as many as there are elements in `R`, in panels.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Sweep<M: Dae, T: Plain, R: Plain, const S: usize> {
+    /// `dx_n/dw` at the start of the step, and at its end if that is not the end of the interval.
+    v: [Aligned<ArrayX<M, R>>; 2],
+    /// Which of them is at the end.
+    end: bool,
+    /// The first of them is what it is at the start of an interval, where that is always the same.
+    begun: bool,
+    /// `d(k, z)/dw` at its stages.
+    dy: Aligned<ArrayK<M, [R; S]>>,
+    /// Weighted sums over all columns of `dy` and of `V_n`, in strands.
+    pub(in crate::irk) sums: Aligned<ArrayK<M, [[T; STRANDS]; S]>>,
+    pub(in crate::irk) start_sums: Aligned<ArrayX<M, [T; STRANDS]>>,
+    /// Zero if all that was written to a result after the last step is finite, else NaN.
+    pub(in crate::irk) finite: [T; 1],
+}
+copy!([M: Dae, T: Plain, R: Plain, const S: usize] Sweep<M, T, R, S>);
+
+/// A step that is linearised, and the directions that go through it.
+pub(in crate::irk) struct Linearized<'a, M: Dae, E: Lanes, D, const S: usize, F: Fallback> {
+    /// Where its factors are, if they are not where they are made.
+    pub kept: Option<&'a Linearization<M, E, S, F>>,
+    pub coefficients: &'a Coefficients<E, S>,
+    pub directions: &'a D,
+    /// Whether it is the first of the interval.
+    pub first: bool,
+}
+copy!(['a, M: Dae, E: Lanes, D, const S: usize, F: Fallback] Linearized<'a, M, E, D, S, F>);
+
+/// What a step writes beside its own memory.
+pub(in crate::irk) struct Outputs<'a, E, G> {
+    /// The rows of `D` for second derivatives.
+    pub curved: Option<&'a mut [E]>,
+    /// The result, after the last step: it has `V_{n+1}`.
+    pub end: Option<G>,
+    /// Whether that may be in no cache.
+    pub distant: bool,
+}
+
+/// What is done to a panel.
+#[derive(Clone, Copy, PartialEq)]
+pub(in crate::irk) enum Phase {
+    /// All of it.
+    Whole,
+    /// The right-hand side.
+    Before,
+    /// What comes after the solution.
+    After,
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
+    /// `V_0`
+    pub(crate) fn start<D: Directions<E>>(&mut self, directions: &D) {
+        self.end = false;
+        // Without an operating system every call takes the same time, the first one too.
+        if !(cfg!(feature = "std") && D::SPARSE && self.begun) {
+            let end = R::flat_mut(self.v[0].as_mut());
+            dispatch(Start::<_, _, S> { v: end, rows: M::Shape::NX, directions });
+        }
+        self.begun = D::SPARSE;
+    }
+
+    /// The step that follows, which is linearised. Whether the derivatives of the stages satisfy
+    /// their equations.
+    pub(in crate::irk) fn step<D: Directions<E>, G: Target<E>, F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        of: Linearized<'_, M, E, D, S, F>,
+        outputs: &mut Outputs<'_, E, G>,
+    ) -> E::Mask {
+        self.end = !self.end;
+        self.repeat(work, of, outputs)
+    }
+
+    /// The same step again.
+    pub(in crate::irk) fn repeat<D: Directions<E>, G: Target<E>, F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        of: Linearized<'_, M, E, D, S, F>,
+        outputs: &mut Outputs<'_, E, G>,
+    ) -> E::Mask {
+        if work.linear(of.kept).factors.is_planned() {
+            self.run(work, of, outputs, Phase::Whole, false);
+        } else {
+            self.run(work, of, outputs, Phase::Before, false);
+            self.solve_columns::<D, F>(work);
+            self.run(work, of, outputs, Phase::After, false);
+        }
+        let good = work.verify_forward(self, of.coefficients, of.directions, false);
+        if E::all(good) {
+            return good;
+        }
+        self.run(work, of, outputs, Phase::After, true);
+        E::or(good, work.verify_forward(self, of.coefficients, of.directions, true))
+    }
+
+    fn run<D: Directions<E>, G: Target<E>, F: Fallback>(
+        &mut self,
+        work: &Work<M, E, S, F>,
+        of: Linearized<'_, M, E, D, S, F>,
+        outputs: &mut Outputs<'_, E, G>,
+        phase: Phase,
+        second: bool,
+    ) {
+        self.begun &= self.end;
+        let Linearized { kept, coefficients, directions, first } = of;
+        let Self { v, end, dy, sums, start_sums, finite, .. } = self;
+        let [start, other] = v;
+        let (v, next) = if *end { (start, other) } else { (other, start) };
+        *finite = [dispatch(Step::<M, E, D, G, S> {
+            phase,
+            jacobian: &work.linear.jacobian,
+            factors: work.linear(kept).factors.planned(),
+            coefficients,
+            h: work.inputs.time.step,
+            directions,
+            first,
+            v: R::flat(v.as_ref()),
+            next: R::flat_mut(next.as_mut()),
+            dy: R::flat_mut(dy.as_mut().as_flattened_mut()),
+            sums: sums.as_mut(),
+            start_sums: start_sums.as_mut(),
+            curved: outputs.curved.as_deref_mut(),
+            result: outputs.end.as_mut(),
+            distant: outputs.distant,
+            sum: E::from_f64(0.0),
+            second,
+            placed: 0,
+            model: PhantomData,
+        })];
+    }
+
+    /// What follows from derivatives of the stages that are others now: `V_{n+1}`, and the sums
+    /// over all directions.
+    pub(in crate::irk) fn conclude<D: Directions<E>, G: Target<E>, F: Fallback>(
+        &mut self,
+        work: &Work<M, E, S, F>,
+        of: Linearized<'_, M, E, D, S, F>,
+        outputs: &mut Outputs<'_, E, G>,
+    ) {
+        self.run(work, of, outputs, Phase::After, false);
+    }
+
+    /// `V` at the start of the step.
+    pub(in crate::irk) fn v(&self) -> &[E] {
+        self.v.get(usize::from(!self.end)).map_or(&[], |v| R::flat(v.as_ref()))
+    }
+
+    /// The derivatives of the stages.
+    pub(in crate::irk) fn dy(&self) -> &[E] {
+        R::flat(self.dy.as_ref().as_flattened())
+    }
+
+    /// The derivatives of the stages.
+    pub(in crate::irk) fn dy_mut(&mut self) -> &mut [R] {
+        self.dy.as_mut().as_flattened_mut()
+    }
+
+    /// Solves by the factors of the whole matrix, column by column.
+    fn solve_columns<D: Directions<E>, F: Fallback>(&mut self, work: &mut Work<M, E, S, F>) {
+        let Work { increment, linear, .. } = work;
+        let rows = M::Shape::NK;
+        let dy = R::flat_mut(self.dy.as_mut().as_flattened_mut());
+        panels!(D::COUNT, E, S, column, W => {
+            let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
+            for c in 0..W {
+                for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {
+                    *to = from.map(|row| [row[c]]);
+                }
+                linear.factors.solve(increment);
+                for (to, from) in packets.iter_mut().zip(increment.as_ref()) {
+                    for (to, [from]) in to.iter_mut().zip(from) {
+                        to[c] = *from;
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// See [`Sweep::start`].
+struct Start<'a, E, D, const S: usize> {
+    v: &'a mut [E],
+    rows: usize,
+    directions: &'a D,
+}
+
+impl<E: Lanes, D: Directions<E>, const S: usize> Kernel for Start<'_, E, D, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { v, rows, directions } = self;
+        v.fill(E::from_f64(0.0));
+        panels!(D::COUNT, E, S, column, W => {
+            for (index, row) in panel_mut::<E, W>(v, column, rows).iter_mut().enumerate() {
+                directions.add(index, E::from_f64(1.0), column, row);
+            }
+        });
+    }
+}
+
+/// See [`Sweep::step`].
+struct Step<'a, M: Dae, E: Plain, D, G, const S: usize> {
+    phase: Phase,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    factors: Planned<'a, M, E, S>,
+    coefficients: &'a Coefficients<E, S>,
+    h: E,
+    directions: &'a D,
+    first: bool,
+    v: &'a [E],
+    next: &'a mut [E],
+    dy: &'a mut [E],
+    sums: &'a mut [[[E; STRANDS]; S]],
+    start_sums: &'a mut [[E; STRANDS]],
+    curved: Option<&'a mut [E]>,
+    result: Option<&'a mut G>,
+    distant: bool,
+    /// That of all that was written to the result.
+    sum: E,
+    second: bool,
+    /// How many entries of the Jacobian, column by column, are in their panels.
+    placed: usize,
+    model: PhantomData<M>,
+}
+
+/// What all panels share.
+struct Shared<E, const S: usize> {
+    /// `h c_i`
+    nodes: [E; S],
+    /// `−hA`
+    minus_ha: Block<E, S>,
+    /// `−h b_i`
+    minus_weights: [E; S],
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel for Step<'_, M, E, D, G, S> {
+    type Number = E;
+    type Output = E;
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) -> E {
+        let nodes = nodes(&self.coefficients.a, self.h);
+        if self.phase != Phase::Before {
+            for strands in self.sums.as_flattened_mut().iter_mut().chain(&mut *self.start_sums) {
+                clear(strands);
+            }
+            if D::SPARSE && self.first {
+                for (state, [sum, ..]) in self.start_sums.iter_mut().enumerate() {
+                    *sum = self.directions.total(state, self.second);
+                }
+            }
+        }
+        if const { D::SPARSE && Self::is_small::<A>() } && self.phase != Phase::After && self.first {
+            self.dy.fill(E::from_f64(0.0));
+            let (jacobian, dy) = (self.jacobian, &mut *self.dy);
+            each_row::<A, _>(&mut Scatter::<M, E, D, S> {
+                jacobian,
+                nodes: &nodes,
+                dy,
+                directions: PhantomData,
+            });
+        }
+        let Self { coefficients, h, .. } = self;
+        let mut minus_weights = coefficients.b;
+        for weight in &mut minus_weights {
+            *weight = -(h * *weight);
+        }
+        let shared = &Shared { nodes, minus_ha: coupling(&coefficients.a, h), minus_weights };
+        panels!(D::COUNT, E, S, column, W => self.panel::<A, W>(column, shared));
+        // Nothing times what is not finite is not a number.
+        E::from_f64(0.0) * self.sum
+    }
+}
+
+impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
+    /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model
+    /// each is filled when its turn comes.
+    const fn is_small<A: Arithmetic>() -> bool {
+        let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
+        bytes <= NEAREST && is_short::<A, Scatter<'_, M, E, D, S>>()
+    }
+
+    /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
+    /// cache, and registers are few. (Chains of 5 masses took 3 % more otherwise; where numbers are
+    /// registers it takes 2 to 4 % less to see them when they are found.)
+    const fn sums_late<A: Arithmetic>() -> bool {
+        size_of::<E>() <= 8 && Self::is_small::<A>()
+    }
+
+    #[inline(always)]
+    fn panel<A: Arithmetic, const W: usize>(&mut self, column: usize, shared: &Shared<E, S>) {
+        self.before::<A, W>(column, &shared.nodes);
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, M::Shape::NK * S).as_chunks_mut::<S>();
+        let minus_weights = &minus_weights::<E, W>(column, self.second);
+        if self.phase == Phase::Whole && const { Self::sums_late::<A>() } {
+            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, &mut ());
+        } else if self.phase == Phase::Whole {
+            let ahead = match &self.result {
+                Some(to) if self.distant => Ahead(to.following::<W>(column)),
+                _ => Ahead(&[]),
+            };
+            let sums = &mut *self.sums;
+            let viewer = &mut Summed { sums, minus_weights, ahead };
+            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, viewer);
+        }
+        self.after::<A, W>(column, minus_weights, shared);
+    }
+
+    /// The right-hand side of a panel, with `h c_i`.
+    #[inline(always)]
+    fn before<A: Arithmetic, const W: usize>(&mut self, column: usize, nodes: &[E; S]) {
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let v = panel::<E, W>(self.v, column, nx);
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
+        // Lengths that the optimiser knows need no looking at.
+        if self.phase == Phase::After || v.len() != nx || dy.len() != nk {
+            return;
+        }
+        let (jacobian, directions) = (self.jacobian, self.directions);
+        if !(self.first && D::SPARSE) {
+            let kinematic = Forward { jacobian, v, directions, column };
+            Later::<M, E, D, S, W> { kinematic, nodes, dy: &mut *dy }.all::<A>();
+        } else if const { !Self::is_small::<A>() } {
+            self.placed = place::<M, E, D, S, W>(jacobian, nodes, self.placed, dy, column);
+        }
+    }
+
+    /// What follows from the solution of a panel.
+    #[inline(always)]
+    fn after<A: Arithmetic, const W: usize>(
+        &mut self,
+        column: usize,
+        minus_weights: &[E; W],
+        shared: &Shared<E, S>,
+    ) {
+        let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+        let v = panel::<E, W>(self.v, column, nx);
+        let (dy, _) = panel_mut::<E, W>(self.dy, column, nk * S).as_chunks_mut::<S>();
+        if self.phase == Phase::Before || v.len() != nx || dy.len() != nk {
+            return;
+        }
+        let late = self.phase == Phase::After || const { Self::sums_late::<A>() };
+        let (jacobian, directions) = (self.jacobian, self.directions);
+        let kinematic = Forward::<M, E, D, S, W> { jacobian, v, directions, column };
+        let mut sums = Summed { sums: &mut *self.sums, minus_weights, ahead: Ahead(&[]) };
+        if late {
+            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
+            for (slot, packet) in dy.iter().enumerate() {
+                sums.see::<A>(slot, packet);
+            }
+        } else {
+            kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
+        }
+        let unit = self.first && D::SPARSE;
+        if !unit {
+            for (strands, row) in self.start_sums.iter_mut().zip(v) {
+                accumulate::<A, E, W>(strands, minus_weights, row);
+            }
+        }
+        // The unit matrix need not be read.
+        let from = if unit { None } else { Some(v) };
+        let ones = if unit { M::STRUCTURE.directions.get(column..).unwrap_or_default() } else { &[] };
+        if let Some(to) = &mut self.result {
+            let end =
+                Columns { start: from, ones, dy, unknowns: 0..nx, minus_weights: &shared.minus_weights };
+            self.sum = self.sum + end.write::<A>(&mut to.columns::<W>(column));
+        } else {
+            let next = panel_mut::<E, W>(self.next, column, nx);
+            for (n, (to, dk)) in next.iter_mut().zip(dy.iter()).enumerate() {
+                let mut row = from.and_then(|v| v.get(n)).copied().unwrap_or([E::from_f64(0.0); W]);
+                for (&weight, dk) in shared.minus_weights.iter().zip(dk) {
+                    A::subtract_row(&mut row, weight, dk);
+                }
+                *to = row;
+            }
+            for (c, &state) in ones.iter().enumerate().take(W) {
+                if let Some(row) = next.get_mut(state as usize) {
+                    row[c] = row[c] + E::from_f64(1.0);
+                }
+            }
+        }
+        if let Some(curved) = &mut self.curved {
+            let count = M::STRUCTURE.curved.len();
+            let d = panel_mut::<E, W>(curved, column, count * S);
+            CurvedRows::<M, E, D, S> { minus_ha: shared.minus_ha, directions, model: PhantomData }
+                .panel::<A, W>(v, dy, d, column);
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! What comes out of a step of the adjoint in all directions: `Λ_n`, and what it adds to `Λ_w`; see
+//! `matrix_adjoint`.
+//!
+//! ```text
+//! Λ_n = Λ_{n+1} − Σ_i (f_x,iᵀ M_i − G_x,i) = (1 − bᵀ A⁻¹ 1) Λ_{n+1} + Σ_i ω_i (f_ẋ,iᵀ M_i − G_ẋ,i)        ω = (hA)⁻¹ 1
+//! ```
+//!
+//! The first is in the entries of `f_x`, the second follows from `Jᵀ M = …`, in which all of these
+//! are summed up already: it takes the entries of `f_ẋ` alone, most often one for each state.
+
+use crate::irk::coefficients::Coefficients;
+use crate::irk::directions::before;
+use crate::irk::forward::stage_rows::row_of;
+use crate::irk::jacobian_entries::entry;
+use crate::linalg::{Arithmetic, Packet, slot};
+use crate::model::Dae;
+use crate::scalar::Lanes;
+use crate::shape::{Array, Plain, Shape};
+
+/// Whether each equation that has a derivative has that of one state, in their order: the entries
+/// of `f_ẋ` then are those of the states.
+pub(in crate::irk) const fn is_direct<M: Dae>() -> bool {
+    let (count, pattern) = (M::STRUCTURE.blocks[1], &M::STRUCTURE.jacobian);
+    let mut entry = 0;
+    while entry < count {
+        if pattern.at(entry).1 != entry {
+            return false;
+        }
+        entry += 1;
+    }
+    count == M::Shape::NX
+}
+
+/// `−ω`, and `1 − bᵀ A⁻¹ 1`.
+pub(in crate::irk) struct Inverse<E, const S: usize> {
+    minus_weights: [E; S],
+    keep: E,
+}
+
+impl<E: Lanes, const S: usize> Inverse<E, S> {
+    /// No more than this may `Σ |b_i (A⁻¹ 1)_i|` be: so often rounding errors of `Λ` are added.
+    const MOST: f64 = 16.0;
+
+    /// Of a tableau whose `A` has an inverse that is good enough, and steps of a size.
+    pub fn new(coefficients: &Coefficients<E, S>, h: E) -> Option<Self> {
+        let ones = solve_ones(*coefficients.tableau.a());
+        let (mut keep, mut size, mut minus_weights) = (1.0, 0.0, [E::from_f64(0.0); S]);
+        for ((to, b), one) in minus_weights.iter_mut().zip(coefficients.tableau.b()).zip(ones) {
+            keep -= b * one;
+            size += (b * one).abs();
+            *to = E::from_f64(-one) * h.reciprocal();
+        }
+        // What is not finite is not small either.
+        (size <= Self::MOST).then_some(Self { minus_weights, keep: E::from_f64(keep) })
+    }
+}
+
+/// `A⁻¹ 1`, by elimination with pivots of rows; not finite if `A` is singular.
+fn solve_ones<const S: usize>(mut a: [[f64; S]; S]) -> [f64; S] {
+    let mut x = [1.0; S];
+    for k in 0..S {
+        let mut best = k;
+        for i in k + 1..S {
+            if a[i][k].abs() > a[best][k].abs() {
+                best = i;
+            }
+        }
+        a.swap(k, best);
+        x.swap(k, best);
+        let row = a[k];
+        for i in (0..S).filter(|&i| i != k) {
+            let factor = a[i][k] / row[k];
+            for (element, pivot) in a[i].iter_mut().zip(row) {
+                *element -= factor * pivot;
+            }
+            x[i] -= factor * x[k];
+        }
+    }
+    for (k, x) in x.iter_mut().enumerate() {
+        *x /= a[k][k];
+    }
+    x
+}
+
+/// Of a panel.
+pub(in crate::irk) struct Advance<'a, M: Dae, E: Plain, R, const S: usize, const W: usize> {
+    pub jacobian: &'a M::Jacobian<[E; S]>,
+    pub g: &'a [[E; W]],
+    pub m: &'a [Packet<E, S, W>],
+    /// `(Λ, Λ_w)`
+    pub sum: &'a mut [R],
+    pub column: usize,
+    /// Only the lower triangle is wanted.
+    pub first: bool,
+    /// `Λ_{n+1} = 0`
+    pub last: bool,
+    pub inverse: &'a Option<Inverse<E, S>>,
+    /// How many entries of the Jacobian, column by column, belong to rows above the triangle.
+    pub placed: &'a mut usize,
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize, const W: usize> Advance<'_, M, E, R, S, W> {
+    #[inline(always)]
+    pub fn all<A: Arithmetic>(mut self) {
+        let mut row = if self.first { self.column } else { 0 };
+        if const { is_direct::<M>() }
+            && let Some(inverse) = self.inverse
+        {
+            let mut derivative = 0;
+            while let Some(&direction) = M::STRUCTURE.directions.get(row)
+                && (direction as usize) < M::Shape::NX
+            {
+                self.direct::<A>(inverse, row, direction as usize, &mut derivative);
+                row += 1;
+            }
+        }
+        self.by_entries::<A>(row);
+    }
+
+    /// The row of a state, from `f_ẋ`.
+    #[inline(always)]
+    fn direct<A: Arithmetic>(
+        &mut self,
+        inverse: &Inverse<E, S>,
+        row: usize,
+        state: usize,
+        derivative: &mut usize,
+    ) {
+        let mut packet = [E::from_f64(0.0); W];
+        if !self.last
+            && let Some(lambda) = columns::<E, R, W>(self.sum, row, self.column)
+        {
+            A::subtract_row(&mut packet, -inverse.keep, lambda);
+        }
+        if let Some((equation, _, values)) = entry::<M, _>(self.jacobian, state)
+            && let Some(m) = self.m.get(slot::<M>(equation))
+        {
+            for ((&weight, &value), m) in inverse.minus_weights.iter().zip(values).zip(m) {
+                A::subtract_row(&mut packet, weight * value, m);
+            }
+        }
+        while let Some(&of) = M::STRUCTURE.curved.get(*derivative)
+            && of as usize <= state
+        {
+            for (stage, &weight) in inverse.minus_weights.iter().enumerate() {
+                if of as usize == state
+                    && let Some(g) = self.g.get(row_of::<M, E, S>(*derivative, stage))
+                {
+                    A::subtract_row(&mut packet, -weight, g);
+                }
+            }
+            *derivative += 1;
+        }
+        self.put(row, &packet);
+    }
+
+    /// From a row on, from the entries of `f_x`, `f_u` and `f_p`.
+    #[inline(always)]
+    fn by_entries<A: Arithmetic>(&mut self, begin: usize) {
+        let (mut place, mut c, mut row) =
+            (*self.placed, const { before(M::STRUCTURE.curved, M::Shape::NX) }, begin);
+        while let Some(&direction) = M::STRUCTURE.directions.get(row) {
+            let variable = variable_of::<M>(direction as usize);
+            // One sum for each stage: an addition to one does not wait for that to another.
+            let mut sums = [[E::from_f64(0.0); W]; S];
+            if !self.last
+                && let Some(lambda) = columns::<E, R, W>(self.sum, row, self.column)
+            {
+                sums[0] = *lambda;
+            }
+            // Entries of algebraic states, and of rows that are not wanted, are passed by.
+            while let Some(of) = variable_at::<M>(place)
+                && of < variable
+            {
+                place += 1;
+            }
+            // Those are not wanted in later panels either.
+            if row == begin && (self.first || const { is_direct::<M>() } && self.inverse.is_some()) {
+                *self.placed = place;
+            }
+            while let Some(&index) = M::STRUCTURE.by_column.get(place)
+                && let Some((equation, of, values)) = entry::<M, _>(self.jacobian, index as usize)
+                && of == variable
+            {
+                place += 1;
+                if let Some(m) = self.m.get(slot::<M>(equation)) {
+                    for ((sum, &value), m) in sums.iter_mut().zip(values).zip(m) {
+                        A::subtract_row(sum, value, m);
+                    }
+                }
+            }
+            while let Some(&of) = M::STRUCTURE.curved.get(c)
+                && of as usize <= variable
+            {
+                if of as usize == variable {
+                    add_stages::<A, M, E, S, W>(&mut sums, self.g, c);
+                }
+                c += 1;
+            }
+            let Some((packet, others)) = sums.split_first_mut() else { return };
+            for other in others {
+                A::subtract_row(packet, E::from_f64(-1.0), other);
+            }
+            let packet = *packet;
+            self.put(row, &packet);
+            row += 1;
+        }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, row: usize, packet: &[E; W]) {
+        let to = self.sum.get_mut(row).and_then(|row| row.as_mut().get_mut(self.column..));
+        if let Some(to) = to.and_then(|to| to.first_chunk_mut()) {
+            *to = *packet;
+        }
+    }
+}
+
+/// The variable that an entry belongs to, in their order by columns.
+#[inline(always)]
+fn variable_at<M: Dae>(place: usize) -> Option<usize> {
+    let &entry = M::STRUCTURE.by_column.get(place)?;
+    Some(*M::STRUCTURE.jacobian.columns.get(entry as usize)? as usize)
+}
+
+/// The variable that a direction is.
+#[inline(always)]
+const fn variable_of<M: Dae>(direction: usize) -> usize {
+    let (nx, nz) = (M::Shape::NX, M::Shape::NZ);
+    nx + direction + if direction < nx { 0 } else { nz }
+}
+
+/// A few columns of a row.
+#[inline(always)]
+pub(in crate::irk) fn columns<E: Plain, R: Array<E>, const W: usize>(
+    rows: &[R],
+    row: usize,
+    column: usize,
+) -> Option<&[E; W]> {
+    match rows.get(row) {
+        Some(row) => row.as_ref().get(column..)?.first_chunk(),
+        None => None,
+    }
+}
+
+/// `packet += G` of a curved variable.
+#[inline(always)]
+pub(in crate::irk) fn add_stages<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    g: &[[E; W]],
+    curved: usize,
+) {
+    for (stage, row) in packet.iter_mut().enumerate() {
+        if let Some(g) = g.get(row_of::<M, E, S>(curved, stage)) {
+            A::subtract_row(row, E::from_f64(-1.0), g);
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! Second-order sensitivities: symmetric, in one pass over the steps that the adjoint takes.
+//!
+//! ```text
+//! d²(λᵀ x_N)/dw² = − Σ_n Σ_i D_iᵀ [∇²(μ_iᵀ f)_i] D_i
+//! ```
+//!
+//! with `D_i = d(k_i, ξ_i, z_i, u, p)/dw` from the forward sweep; the product is that of
+//! `products`. With weights `ν` of `z₀`, which is a sum of unknowns, it is
+//! `d²(λᵀ x_N + νᵀ z₀)/dw²`: they are in `μ` alone.
+
+use super::diagonal::Lone;
+use super::matrix_adjoint::{Back, is_worth};
+use super::output::Triangle;
+use super::products::{COLUMNS, Subtract};
+use crate::error::{Error, Place, Quantity};
+use crate::finite::{check_output, not_finite};
+use crate::irk::adjoint::Backward;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::driver::Parts;
+use crate::irk::stage_array::Stages;
+use crate::irk::workspace::{Linearization, Step, Work, copy};
+use crate::linalg::{dispatch, slot};
+use crate::memory::{Fallback, fallback::Pivoting};
+use crate::model::{ArrayK, ArrayV, ArrayW, Dae};
+use crate::quadrature::Along;
+use crate::result::{ForwardAdjoint, Hessian};
+use crate::scalar::{Lanes, Real, SideBySide, Strided};
+use crate::shape::{Aligned, Array, Matrix, Plain, Shape};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// Memory of second-order sensitivities.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct HessianMemory<M: Dae, T: Plain, const S: usize> {
+    pub(crate) result: Hessian<M, T>,
+    pub(crate) pass: HessianPass<M, T, S>,
+}
+copy!([M: Dae, T: Plain, const S: usize] HessianMemory<M, T, S>);
+
+/// A pass over the steps, from the last to the first, which writes to a result elsewhere.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct HessianPass<M: Dae, T: Plain, const S: usize> {
+    pub(crate) backward: Backward<M, T, S, 1>,
+    /// `−H D` of a few columns at all stages.
+    g: Aligned<ArrayV<M, [[T; COLUMNS]; S]>>,
+    /// The Hessian over the directions that have any influence, its lower triangle.
+    sum: ArrayW<M, ArrayW<M, T>>,
+    /// `μ` at all stages, in the order of the equations.
+    mu: Aligned<Stages<ArrayK<M, [T; S]>, T, S>>,
+    /// Entries of `∇²(μᵀ f)` at all stages.
+    entries: Aligned<Stages<M::Hessian<[T; S]>, T, S>>,
+}
+copy!([M: Dae, T: Plain, const S: usize] HessianPass<M, T, S>);
+
+/// What the way back needs of a step.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct HessianStep<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
+    linear: Linearization<M, T, S, F>,
+    /// The rows of `D` at all stages that enter second derivatives, in panels.
+    d: Aligned<ArrayV<M, [ArrayW<M, T>; S]>>,
+}
+copy!([M: Dae, T: Plain, const S: usize, F: Fallback] HessianStep<M, T, S, F>);
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> HessianStep<M, E, S, F> {
+    /// Whether the factors of every step are made where they will be kept: no other step has the
+    /// same ones, nor does Newton's method leave those of the solution.
+    #[cfg(feature = "alloc")]
+    pub(crate) const DIRECT: bool = {
+        let structure = &M::STRUCTURE;
+        !(structure.linear_in_state || structure.constant_matrix || structure.elimination.pivots.is_empty())
+    };
+
+    /// Where the way forth writes `D`.
+    pub(crate) fn curved(&mut self) -> &mut [E] {
+        self.parts().1
+    }
+
+    /// The linearisation, and where the way forth writes `D`.
+    pub(crate) fn parts(&mut self) -> (&mut Linearization<M, E, S, F>, &mut [E]) {
+        (&mut self.linear, Array::flat_mut(self.d.as_mut().as_flattened_mut()))
+    }
+
+    /// Remembers the linearisation on the way forth.
+    pub(crate) fn record(&mut self, work: &Work<M, E, S, F>) {
+        self.linear.copy_from(&work.linear);
+    }
+
+    /// What was remembered, if the step is not the `last` one, whose linearisation is still where
+    /// it was made.
+    pub(crate) fn kept(&self, last: bool) -> Option<&Linearization<M, E, S, F>> {
+        (!last).then_some(&self.linear)
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
+    /// The way back, with `λ` and `ν`; the linearisation of the last step is still there.
+    ///
+    /// # Errors
+    /// A second derivative of the model that is not finite, a singular matrix.
+    pub(crate) fn run<F: Fallback>(
+        &mut self,
+        mut parts: Parts<'_, M, T, S, F>,
+        records: &[HessianStep<M, T, S, F>],
+        [lambda, nu]: [&[T]; 2],
+        ahead: &[T],
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<(), Error> {
+        self.begin(lambda, nu);
+        let steps = parts.steps;
+        for (n, (step, record)) in steps.iter().zip(records).enumerate().rev() {
+            let kept = &mut record.kept(n + 1 == steps.len());
+            self.backward.step(&mut parts, kept, n, step, &mut along)?;
+            let Parts { work, coefficients, .. } = &mut parts;
+            self.curvature(work, coefficients, n, step);
+            if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
+                return Err(Error::NonFiniteModel {
+                    quantity: Quantity::Hessian,
+                    equation: M::STRUCTURE.hessian.at(entry / S).0,
+                    value,
+                    at: Place { step: n, stage: entry % S, iteration: 0 },
+                });
+            }
+            self.subtract(work, *kept, coefficients, record, [n, steps.len()], ahead);
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
+    /// Before the last step, with `λ` and `ν`; the latter may be empty.
+    pub(crate) fn begin(&mut self, lambda: &[E], nu: &[E]) {
+        self.backward.start(lambda, nu);
+    }
+
+    /// `∇²(μ_iᵀ f)` at all stages of a step.
+    pub(crate) fn curvature<F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        coefficients: &Coefficients<E, S>,
+        n: usize,
+        step: &Step<M, E, S>,
+    ) {
+        let Self { backward, mu, entries, .. } = self;
+        for (equation, to) in mu.as_mut().iter_mut().enumerate() {
+            if let Some(mu) = backward.mu.as_ref().get(slot::<M>(equation)) {
+                *to = mu.map(|[mu]| mu);
+            }
+        }
+        work.place(coefficients, n, &step.x, &step.y);
+        if let Err(call) = E::side_by_side(Curvature::<M, E, S> { points: &work.points, mu, entries }) {
+            let Curvature { points, mu, entries } = call;
+            for i in 0..S {
+                M::hessian::<Strided<E, S>>(points.seen_from(i), mu.seen_from(i), entries.seen_from_mut(i));
+            }
+        }
+    }
+
+    /// `sum −= Σ_i D_iᵀ H_i D_i`, from zero at the last step of so many, with the linearisation of
+    /// this one `kept` or there. After the first one the result will be written, which may lie far
+    /// `ahead`.
+    pub(crate) fn subtract<F: Fallback>(
+        &mut self,
+        work: &mut Work<M, E, S, F>,
+        kept: Option<&Linearization<M, E, S, F>>,
+        coefficients: &Coefficients<E, S>,
+        record: &HessianStep<M, E, S, F>,
+        [n, count]: [usize; 2],
+        ahead: &[E],
+    ) {
+        let last = n + 1 == count;
+        let Self { g, sum, entries, .. } = self;
+        let (entries, d, sum) =
+            (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
+        if const { is_worth::<M, E, S>() } {
+            Back::<M, E, ArrayW<M, E>, S> {
+                coefficients,
+                entries,
+                d,
+                g,
+                sum: &mut *sum,
+                first: n == 0,
+                last,
+                ahead: if n == 0 { ahead } else { &[] },
+            }
+            .run(work, kept);
+        } else {
+            let g = g.as_mut();
+            dispatch(Subtract::<M, E, ArrayW<M, E>, S> {
+                entries,
+                d,
+                g,
+                sum: &mut *sum,
+                fresh: last,
+                model: PhantomData,
+            });
+        }
+        if const { !M::STRUCTURE.lone.is_empty() } {
+            dispatch(Lone::<M, E, ArrayW<M, E>, S> { entries, sum, model: PhantomData });
+        }
+    }
+}
+
+/// `∇²(μᵀ f)` at all stages in one call.
+struct Curvature<'a, M: Dae, E: Lanes, const S: usize> {
+    points: &'a Stages<ArrayV<M, [E; S]>, E, S>,
+    mu: &'a Stages<ArrayK<M, [E; S]>, E, S>,
+    entries: &'a mut Stages<M::Hessian<[E; S]>, E, S>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> SideBySide<E, S> for Curvature<'_, M, E, S> {
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [E; S]>>(self) {
+        M::hessian::<R>(self.points, self.mu, self.entries);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
+    /// The result, after the first step, and `more`: second derivatives of an integrand. Zero if
+    /// all of these are finite, else NaN.
+    pub(crate) fn collect(&mut self, more: Option<&[ArrayW<M, E>]>, result: &mut Hessian<M, E>) -> E {
+        let nx = M::Shape::NX;
+        let Self { backward, sum, .. } = self;
+        for (to, [from]) in result.first.grad_x0.as_mut_slice().iter_mut().zip(backward.lambda.as_ref()) {
+            *to = *from;
+        }
+        let mut gradient = backward.gradient.as_ref()[nx..].iter();
+        for (to, [from]) in result.first.grad_u.as_mut_slice().iter_mut().zip(&mut gradient) {
+            *to = *from;
+        }
+        for (to, [from]) in result.first.grad_p.as_mut_slice().iter_mut().zip(gradient) {
+            *to = *from;
+        }
+        Triangle::<M, E> { rows: sum.as_ref(), more }.write(result)
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
+    /// Writes the result, as [`HessianPass::collect`].
+    ///
+    /// # Errors
+    /// [`Error::Overflow`]
+    pub(crate) fn finish(
+        &mut self,
+        more: Option<&[ArrayW<M, T>]>,
+        result: &mut Hessian<M, T>,
+    ) -> Result<(), Error> {
+        let finite = self.collect(more, result).is_finite();
+        let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &result.first;
+        for values in [grad_x0.as_slice(), grad_u.as_slice(), grad_p.as_slice()] {
+            check_output(values, 0)?;
+        }
+        if finite {
+            return Ok(());
+        }
+        // Where one is not finite it is looked for.
+        for values in [
+            result.h_xx.as_slice(),
+            result.h_xu.as_slice(),
+            result.h_uu.as_slice(),
+            result.h_xp.as_slice(),
+            result.h_up.as_slice(),
+            result.h_pp.as_slice(),
+        ] {
+            check_output(values, 0)?;
+        }
+        Ok(())
+    }
+}

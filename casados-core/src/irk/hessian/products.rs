@@ -1,0 +1,198 @@
+//! `Σ_i D_iᵀ H_i D_i` over the stages of a step, with `H_i` sparse and symmetric: first `G = −H D`,
+//! a few columns at a time, then the lower triangle of `Dᵀ G`.
+//!
+//! In a panel of `D` the stages of a variable lie beside each other, or, where it is large,
+//! variables of a stage do: what is multiplied is then in the nearest cache.
+
+use super::sparse_product::multiply;
+use crate::irk::directions::{panel, panels};
+use crate::irk::forward::stage_rows::together;
+use crate::linalg::{Arithmetic, Kernel, is_long};
+use crate::model::Dae;
+use crate::scalar::Lanes;
+use crate::shape::Array;
+use core::marker::PhantomData;
+
+/// So many columns of `G` are there at a time: two panels, where registers are enough for their
+/// products, or one and what the adjoint makes of it (`matrix_adjoint`). In firmware memory is
+/// dearer than time.
+pub const COLUMNS: usize = if cfg!(feature = "std") { 16 } else { 8 };
+
+/// `sum −= Σ_i D_iᵀ H_i D_i`, the lower triangle, with `H_i` given by its own; a `fresh` sum begins
+/// with zero.
+pub struct Subtract<'a, M, E, R, const S: usize> {
+    pub entries: &'a [[E; S]],
+    pub d: &'a [E],
+    pub g: &'a mut [[[E; COLUMNS]; S]],
+    pub sum: &'a mut [R],
+    pub fresh: bool,
+    pub model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Subtract<'_, M, E, R, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        let mut start = 0;
+        if const { A::WIDE && size_of::<E>() <= 8 && COLUMNS == 16 } {
+            while start + 16 <= const { M::STRUCTURE.directions.len() } {
+                self.panels::<A, 8, 2>(start);
+                start += 16;
+            }
+        }
+        panels!(M::STRUCTURE.directions.len(), E, S, column from start, W => self.panels::<A, W, 1>(column));
+    }
+}
+
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Subtract<'_, M, E, R, S> {
+    /// `P` panels of `W` columns: all stages at a time, or pairs of them.
+    #[inline(always)]
+    fn panels<A: Arithmetic, const W: usize, const P: usize>(&mut self, column: usize) {
+        if const { together::<M, E, S>() } {
+            self.stages::<A, S, 1, W, P>(0, column);
+            return;
+        }
+        let mut stage = 0;
+        // Rows that go through their columns together fit the registers with pairs of stages, or
+        // with wider panels.
+        while const { W <= 4 } && stage + 2 <= S {
+            self.stages::<A, 1, 2, W, P>(stage, column);
+            stage += 2;
+        }
+        while stage < S {
+            self.stages::<A, 1, 1, W, P>(stage, column);
+            stage += 1;
+        }
+    }
+
+    /// `N` groups of `L` stages, which lie together, from a stage on.
+    #[inline(always)]
+    fn stages<A: Arithmetic, const L: usize, const N: usize, const W: usize, const P: usize>(
+        &mut self,
+        stage: usize,
+        column: usize,
+    ) {
+        let curved = M::STRUCTURE.curved.len();
+        let rows = curved * L;
+        let g = self.g.as_flattened_mut().as_flattened_mut().get_mut(..rows * N * P * W).unwrap_or_default();
+        let g = g.as_chunks_mut::<W>().0.as_chunks_mut::<P>().0;
+        multiply::<A, M, E, S, L, N, W, P>(self.entries, self.d, g.as_chunks_mut().0, stage, column);
+        for group in 0..N {
+            self.tiles::<A, W, P>(group * rows, rows, (stage + group * L) * curved, column);
+        }
+    }
+
+    /// `sum −= Dᵀ G` for some rows of panels of `−G`, from a first one on, which belong to rows of
+    /// `D` from another one on.
+    #[inline(always)]
+    fn tiles<A: Arithmetic, const W: usize, const P: usize>(
+        &mut self,
+        of_g: usize,
+        count: usize,
+        of_d: usize,
+        column: usize,
+    ) {
+        let all = M::STRUCTURE.curved.len() * S;
+        let g = self.g.as_flattened().as_flattened().as_chunks::<W>().0.as_chunks::<P>().0;
+        panels!(M::STRUCTURE.directions.len(), E, S, row, V => {
+            if row >= column {
+                let g = g.get(of_g..of_g + count).unwrap_or_default();
+                let d = panel::<E, V>(self.d, row, all).get(of_d..of_d + count).unwrap_or_default();
+                let (sum, fresh) = (&mut *self.sum, self.fresh && of_d == 0);
+                if const { size_of::<E>() > 8 && V > 2 && W <= 4 && A::WIDE } {
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
+                } else if const { size_of::<E>() > 8 && V > 2 } {
+                    tiles::<A, E, R, V, 2, 1, W, P>(d, g, sum, fresh, [row, column]);
+                } else if const { size_of::<E>() > 8 } {
+                    tiles::<A, E, R, V, V, 1, W, P>(d, g, sum, fresh, [row, column]);
+                } else if const { V > 4 && A::WIDE } {
+                    tiles::<A, E, R, V, 8, 1, W, P>(d, g, sum, fresh, [row, column]);
+                } else if const { V > 4 } {
+                    tiles::<A, E, R, V, 4, 1, W, P>(d, g, sum, fresh, [row, column]);
+                } else if const { V > 2 } {
+                    tiles::<A, E, R, V, 4, 2, W, P>(d, g, sum, fresh, [row, column]);
+                } else {
+                    tiles::<A, E, R, V, V, 4, W, P>(d, g, sum, fresh, [row, column]);
+                }
+            }
+        });
+    }
+}
+
+/// `sum −= Dᵀ G` for a panel of `D` and panels of `−G` that begin with a row and a column; each
+/// tile is in registers while it goes through all variables at all stages, in as many strands as
+/// hide how long an addition takes. Above the diagonal it writes what nobody reads.
+#[inline(always)]
+fn tiles<
+    A: Arithmetic,
+    E: Lanes,
+    R: Array<E>,
+    const V: usize,
+    const ROWS: usize,
+    const STRANDS: usize,
+    const W: usize,
+    const P: usize,
+>(
+    d: &[[E; V]],
+    g: &[[[E; W]; P]],
+    sum: &mut [R],
+    fresh: bool,
+    [row, column]: [usize; 2],
+) {
+    for t in 0..V / ROWS {
+        let mut strands = [[[[E::from_f64(0.0); W]; P]; ROWS]; STRANDS];
+        let ((d, last_d), (g, last_g)) = (d.as_chunks::<STRANDS>(), g.as_chunks::<STRANDS>());
+        for (d, g) in d.iter().zip(g) {
+            for ((tile, d), g) in strands.iter_mut().zip(d).zip(g) {
+                subtract_outer::<A, E, V, ROWS, W, P>(tile, d, g, t);
+            }
+        }
+        let Some((tile, others)) = strands.split_first_mut() else { return };
+        for (d, g) in last_d.iter().zip(last_g) {
+            subtract_outer::<A, E, V, ROWS, W, P>(tile, d, g, t);
+        }
+        for other in others {
+            let other = other.as_flattened().as_flattened();
+            for (to, from) in tile.as_flattened_mut().as_flattened_mut().iter_mut().zip(other) {
+                *to = *to + *from;
+            }
+        }
+        for (r, tile) in tile.iter().enumerate() {
+            let row = sum.get_mut(row + t * ROWS + r).and_then(|sum| sum.as_mut().get_mut(column..));
+            let columns = row.and_then(|row| row.as_chunks_mut::<W>().0.first_chunk_mut::<P>());
+            let Some(columns) = columns else { continue };
+            // In registers: of loops over single elements the compiler makes one over rows, which
+            // lie far apart.
+            for (columns, tile) in columns.iter_mut().zip(tile) {
+                let mut sum = if fresh { [E::from_f64(0.0); W] } else { *columns };
+                A::subtract_row(&mut sum, E::from_f64(1.0), tile);
+                *columns = sum;
+            }
+        }
+    }
+}
+
+/// `tile − d gᵀ`, of `ROWS` elements of `d`.
+#[inline(always)]
+fn subtract_outer<
+    A: Arithmetic,
+    E: Lanes,
+    const V: usize,
+    const ROWS: usize,
+    const W: usize,
+    const P: usize,
+>(
+    tile: &mut [[[E; W]; P]; ROWS],
+    d: &[E; V],
+    g: &[[E; W]; P],
+    t: usize,
+) {
+    let Some(d) = d.as_chunks::<ROWS>().0.get(t) else { return };
+    for (tile, &d) in tile.iter_mut().zip(d) {
+        for (tile, g) in tile.iter_mut().zip(g) {
+            A::subtract_row(tile, d, g);
+        }
+    }
+}

@@ -1,0 +1,231 @@
+//! `G = −H D`: the sparse second derivatives of a step times derivatives of its variables, a few
+//! columns at a time.
+
+use crate::irk::directions::panel;
+use crate::irk::forward::stage_rows::together;
+use crate::linalg::Arithmetic;
+use crate::model::{Dae, Term};
+use crate::scalar::Lanes;
+use crate::structure::MOST_ROWS;
+
+/// `G = −H D` at all stages in the panel that begins with a column; its rows lie as those of the
+/// panel do.
+#[inline(always)]
+pub(in crate::irk) fn multiply_panel<A: Arithmetic, M: Dae, E: Lanes, const S: usize, const W: usize>(
+    entries: &[[E; S]],
+    d: &[E],
+    g: &mut [[E; W]],
+    column: usize,
+) {
+    let g = g.as_chunks_mut::<1>().0;
+    if const { together::<M, E, S>() } {
+        multiply::<A, M, E, S, S, 1, W, 1>(entries, d, g.as_chunks_mut().0, 0, column);
+        return;
+    }
+    for stage in 0..S {
+        let g = g.get_mut(stage * M::STRUCTURE.curved.len()..).unwrap_or_default();
+        multiply::<A, M, E, S, 1, 1, W, 1>(entries, d, g.as_chunks_mut().0, stage, column);
+    }
+}
+
+/// `G = −H D` at `N` groups of `L` stages, from a stage on, in `P` panels from a column on.
+#[inline(always)]
+pub(in crate::irk) fn multiply<
+    A: Arithmetic,
+    M: Dae,
+    E: Lanes,
+    const S: usize,
+    const L: usize,
+    const N: usize,
+    const W: usize,
+    const P: usize,
+>(
+    entries: &[[E; S]],
+    d: &[E],
+    g: &mut [[[[E; W]; P]; L]],
+    stage: usize,
+    column: usize,
+) {
+    let curved = M::STRUCTURE.curved.len();
+    let mut of_d: [[&[[[E; W]; L]]; P]; N] = [[&[]; P]; N];
+    for (group, of_d) in of_d.iter_mut().enumerate() {
+        let first = stage + group * L;
+        for (p, of_d) in of_d.iter_mut().enumerate() {
+            let panel = panel::<E, W>(d, column + p * W, curved * S);
+            *of_d = panel.get(first * curved..(first + L) * curved).unwrap_or_default().as_chunks().0;
+        }
+    }
+    let mut terms = M::STRUCTURE.symmetric;
+    while let Some(first) = terms.first() {
+        let of = Multiply { entries, d: &of_d, stage };
+        terms = match first.rows {
+            3 if const { MOST_ROWS >= 3 } => of.rows::<A, M, 3>(terms, g),
+            2 if const { MOST_ROWS >= 2 } => of.rows::<A, M, 2>(terms, g),
+            _ => of.rows::<A, M, 1>(terms, g),
+        };
+    }
+}
+
+/// See [`multiply`].
+struct Multiply<'a, E, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize> {
+    entries: &'a [[E; S]],
+    d: &'a [[&'a [[[E; W]; L]]; P]; N],
+    stage: usize,
+}
+
+impl<E: Lanes, const S: usize, const L: usize, const N: usize, const W: usize, const P: usize>
+    Multiply<'_, E, S, L, N, W, P>
+{
+    /// `R` rows of `G` whose terms alternate; the terms of the others. What they are multiplied
+    /// with is fetched once for all of them, so many columns and stages at a time that it fits
+    /// registers beside them; of sixteen registers it seldom does.
+    #[inline(always)]
+    fn rows<A: Arithmetic, M: Dae, const R: usize>(
+        &self,
+        terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+    ) -> &'static [Term] {
+        if const { R == 1 || !A::WIDE && (size_of::<E>() > 8 || L > 2) } {
+            let mut others = terms;
+            for row in 0..R {
+                others = self.row::<A, M, R>(terms, g, row);
+            }
+            return others;
+        }
+        if const { size_of::<E>() > 8 && W > 4 } {
+            self.in_parts::<A, M, R, 1, 4>(terms, g)
+        } else if const { size_of::<E>() > 8 || A::WIDE && L % 2 == 1 } {
+            self.in_parts::<A, M, R, 1, W>(terms, g)
+        } else if const { A::WIDE } {
+            self.in_parts::<A, M, R, 2, W>(terms, g)
+        } else {
+            self.in_parts::<A, M, R, L, W>(terms, g)
+        }
+    }
+
+    /// One of `R` rows, at all stages.
+    #[inline(always)]
+    fn row<A: Arithmetic, M: Dae, const R: usize>(
+        &self,
+        mut terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+        row: usize,
+    ) -> &'static [Term] {
+        let mut packets = [[[[E::from_f64(0.0); W]; P]; L]; N];
+        let Some(&first) = terms.get(row) else { return &[] };
+        while let Some((now, rest)) = terms.split_first_chunk::<R>()
+            && let Some(term) = now.get(row)
+            && term.row == first.row
+        {
+            if let Some(values) = self.entries.get(term.entry as usize) {
+                for (group, (packet, of_d)) in packets.iter_mut().zip(self.d).enumerate() {
+                    for (p, d) in of_d.iter().enumerate() {
+                        let Some(d) = d.get(term.column as usize) else { continue };
+                        subtract_stages::<A, E, L, W, P>(packet, p, from(values, self.stage + group * L), d);
+                    }
+                }
+            }
+            terms = rest;
+        }
+        for (group, packet) in packets.iter().enumerate() {
+            if let Some(to) = g.get_mut(group * M::STRUCTURE.curved.len() + first.row as usize) {
+                *to = *packet;
+            }
+        }
+        terms
+    }
+
+    /// `R` rows, `K` stages and `C` columns at a time.
+    #[inline(always)]
+    fn in_parts<A: Arithmetic, M: Dae, const R: usize, const K: usize, const C: usize>(
+        &self,
+        terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+    ) -> &'static [Term] {
+        let mut others = terms;
+        for (group, of_d) in self.d.iter().enumerate() {
+            let g = g.get_mut(group * M::STRUCTURE.curved.len()..).unwrap_or_default();
+            for stage in 0..L / K {
+                for part in 0..W / C {
+                    let values = self.stage + group * L + stage * K;
+                    others = self.part::<A, R, K, C>(terms, g, of_d, [stage, part, values]);
+                }
+            }
+        }
+        others
+    }
+
+    #[inline(always)]
+    fn part<A: Arithmetic, const R: usize, const K: usize, const C: usize>(
+        &self,
+        mut terms: &'static [Term],
+        g: &mut [[[[E; W]; P]; L]],
+        of_d: &[&[[[E; W]; L]]; P],
+        [stage, part, of_values]: [usize; 3],
+    ) -> &'static [Term] {
+        let mut packets = [[[[E::from_f64(0.0); C]; P]; K]; R];
+        let Some((&rows, _)) = terms.split_first_chunk::<R>() else { return &[] };
+        while let Some((now, rest)) = terms.split_first_chunk::<R>()
+            && now[0].row == rows[0].row
+        {
+            let mut factors = [[[E::from_f64(0.0); C]; P]; K];
+            for (p, of_d) in of_d.iter().enumerate() {
+                let Some(d) = of_d.get(now[0].column as usize) else { continue };
+                let Some(d) = d.as_chunks::<K>().0.get(stage) else { continue };
+                for (factors, d) in factors.iter_mut().zip(d) {
+                    if let Some(d) = d.as_chunks::<C>().0.get(part) {
+                        factors[p] = *d;
+                    }
+                }
+            }
+            for (term, packets) in now.iter().zip(&mut packets) {
+                let Some(values) = self.entries.get(term.entry as usize) else { continue };
+                for ((packets, &value), factors) in
+                    packets.iter_mut().zip(from(values, of_values)).zip(&factors)
+                {
+                    for (packet, factors) in packets.iter_mut().zip(factors) {
+                        A::subtract_row(packet, value, factors);
+                    }
+                }
+            }
+            terms = rest;
+        }
+        for (term, packets) in rows.iter().zip(&packets) {
+            let Some(to) = g.get_mut(term.row as usize) else { continue };
+            let Some(to) = to.as_chunks_mut::<K>().0.get_mut(stage) else { continue };
+            for (to, packets) in to.as_flattened_mut().iter_mut().zip(packets.as_flattened()) {
+                if let Some(to) = to.as_chunks_mut::<C>().0.get_mut(part) {
+                    *to = *packets;
+                }
+            }
+        }
+        terms
+    }
+}
+
+/// `packet − values d` at `N` stages, in one of `P` panels.
+#[inline(always)]
+fn subtract_stages<A: Arithmetic, E: Lanes, const N: usize, const W: usize, const P: usize>(
+    packet: &mut [[[E; W]; P]; N],
+    p: usize,
+    values: &[E],
+    d: &[[E; W]; N],
+) {
+    if const { W == 1 && P == 1 }
+        && let Some(packet) = packet.as_flattened_mut().as_flattened_mut().first_chunk_mut::<N>()
+        && let (Some(values), Some(d)) = (values.first_chunk(), d.as_flattened().first_chunk())
+    {
+        // The stages of one column side by side.
+        A::subtract_products(packet, values, d);
+        return;
+    }
+    for ((packet, &value), d) in packet.iter_mut().zip(values).zip(d) {
+        A::subtract_row(&mut packet[p], value, d);
+    }
+}
+
+/// From one of them on.
+#[inline(always)]
+fn from<V>(all: &[V], first: usize) -> &[V] {
+    all.get(first..).unwrap_or_default()
+}

@@ -1,0 +1,209 @@
+//! An integrand at the stages of the steps, and what it adds to their adjoint; see
+//! [`quadrature`](crate::quadrature).
+//!
+//! With `g_i = h b_i ∇_v φ_i`:
+//!
+//! ```text
+//! Jᵀ μ = h (b ⊗ λ_{n+1}, 0) + (h Σ_i a_ij g_x,i, g_z,j)        λ_n += Σ_i g_x,i        λ_w += Σ_i g_w,i
+//! ```
+
+use super::adjoint::Backward;
+use super::driver::Parts;
+use super::forward::sweep::Sweep;
+use super::integrator::Integrator;
+use super::workspace::{Step, Work};
+use crate::error::{Error, Place};
+use crate::irk::coefficients::Coefficients;
+use crate::memory::{Fallback, Memory, WithAdjoint, WithForward, WithHessian};
+use crate::model::{ArrayW, Dae, VectorU, VectorX, VectorZ};
+use crate::quadrature::{Integrand, With};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+    /// The variables at a stage, which are in `points`, to where the integrand takes them from.
+    fn point_of<'a>(
+        &self,
+        stage: usize,
+        integrand: &'a mut dyn Integrand<M, T>,
+    ) -> &'a mut dyn Integrand<M, T> {
+        for (to, from) in integrand.point().0.iter_mut().zip(self.points.as_ref()) {
+            if let Some(from) = from.get(stage) {
+                *to = *from;
+            }
+        }
+        integrand
+    }
+
+    /// What the stages of a step add to the value.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    pub(crate) fn along_value(
+        &mut self,
+        coefficients: &Coefficients<T, S>,
+        n: usize,
+        step: &Step<M, T, S>,
+        integrand: &mut dyn Integrand<M, T>,
+    ) -> Result<(), Error> {
+        self.place(coefficients, n, &step.x, &step.y);
+        for (stage, b) in coefficients.b.iter().enumerate() {
+            let at = Place { step: n, stage, iteration: 0 };
+            self.point_of(stage, integrand).value(self.inputs.time.step * *b, at)?;
+        }
+        Ok(())
+    }
+
+    /// What they add to the right-hand side of the adjoint, and to what comes out of it.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    pub(crate) fn along_adjoint<const C: usize>(
+        &mut self,
+        coefficients: &Coefficients<T, S>,
+        n: usize,
+        step: &Step<M, T, S>,
+        backward: &mut Backward<M, T, S, C>,
+        integrand: &mut dyn Integrand<M, T>,
+    ) -> Result<(), Error> {
+        let (nx, nz, h) = (M::Shape::NX, M::Shape::NZ, self.inputs.time.step);
+        let (source, shift) = (backward.source.as_mut(), backward.shift.as_mut());
+        source.fill([T::ZERO; S]);
+        shift.fill(T::ZERO);
+        backward.sourced = true;
+        self.place(coefficients, n, &step.x, &step.y);
+        for (stage, (b, a)) in coefficients.b.iter().zip(&coefficients.a).enumerate() {
+            let at = Place { step: n, stage, iteration: 0 };
+            let gradient = self.point_of(stage, integrand).adjoint(h * *b, at)?;
+            let states = gradient.get(nx..2 * nx).unwrap_or_default();
+            for (source, g) in source.iter_mut().zip(states) {
+                for (source, a) in source.iter_mut().zip(a) {
+                    *source = *source + h * *a * *g;
+                }
+            }
+            let (algebraic, inputs) = gradient.split_at_checked(2 * nx + nz).unwrap_or_default();
+            for (source, g) in source.iter_mut().skip(nx).zip(algebraic.iter().skip(2 * nx)) {
+                source[stage] = *g;
+            }
+            for (shift, g) in shift.iter_mut().zip(states.iter().chain(inputs)) {
+                *shift = *shift + *g;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Parts<'_, M, T, S, F> {
+    /// What the stages of a step add to the value and its derivatives, with those of the stages.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteFunction`]
+    pub(crate) fn along_forward(
+        &mut self,
+        n: usize,
+        step: &Step<M, T, S>,
+        sweep: &Sweep<M, T, ArrayW<M, T>, S>,
+        second: bool,
+        integrand: &mut dyn Integrand<M, T>,
+    ) -> Result<(), Error> {
+        let Self { work, coefficients, .. } = self;
+        let h = work.inputs.time.step;
+        work.place(coefficients, n, &step.x, &step.y);
+        for (stage, b) in coefficients.b.iter().enumerate() {
+            let integrand = work.point_of(stage, integrand);
+            let variables = integrand.variables();
+            let (_, d) = integrand.point();
+            sweep.write_rows(coefficients, h, stage, variables, d);
+            integrand.forward(h * *b, second, Place { step: n, stage, iteration: 0 })?;
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, z, u, p, t) dt` with
+    /// those of the solution; see [`quadrature`](crate::quadrature).
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
+        With { integrator: self, integrand }
+    }
+}
+
+impl<'a, M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
+    With<'a, '_, Integrator<M, B, S, T, W>, Q>
+{
+    /// See [`Integrator::solve`]; the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
+        self.integrator.solve_along(x0, u, h, Some(self.integrand))
+    }
+
+    /// See [`Integrator::forward`]; the integral and its derivatives.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        self.integrator.forward_along(x0, u, h, Some(self.integrand))
+    }
+
+    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn adjoint(
+        self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&'a Adjoint<M, T>, Error>
+    where
+        W: WithAdjoint<1>,
+    {
+        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
+    }
+
+    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn hessian(
+        self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+    ) -> Result<&'a Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        self.integrator.hessian_along(x0, u, h, lambda, &[], Some(self.integrand))
+    }
+
+    /// See [`Integrator::hessian_with_z0`]; gradient and Hessian are those of `λᵀx + νᵀz₀` and the
+    /// integral.
+    ///
+    /// # Errors
+    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
+    pub fn hessian_with_z0(
+        self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        nu: &VectorZ<M, T>,
+    ) -> Result<&'a Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        self.integrator.hessian_along(x0, u, h, lambda, nu.as_slice(), Some(self.integrand))
+    }
+}

@@ -1,0 +1,240 @@
+//! The careful way: Newton's method with the current Jacobian in every iteration, the whole matrix
+//! pivoted, and every value looked at. It is taken where there is no plan of elimination, and where
+//! the fast way did not arrive: then it gives the solution, or says what is wrong.
+//!
+//! It has converged as soon as one of these holds, both of them invariant under scaling of
+//! equations and of variables:
+//! - the residual of every equation is at rounding level, `|f_r| ≤ 4 ε Σ_c |∂f_r/∂v_c v_c|`;
+//! - the increment that would come next, at most `θ/(1−θ) ‖Δ‖`, is below the tolerance.
+//!
+//! Where rounding errors of the model are larger than expected, residual and increments stop
+//! shrinking. Then it has converged too if either is small: more cannot be known.
+
+use crate::error::{Error, Place, Quantity};
+use crate::finite::not_finite;
+use crate::irk::coefficients::Coefficients;
+use crate::irk::workspace::Work;
+use crate::linalg::slot;
+use crate::memory::Fallback;
+use crate::model::{ArrayK, ArrayX, Dae, Pattern};
+use crate::options::{Jacobian, Newton};
+use crate::scalar::Real;
+use crate::statistics::Statistics;
+use bytemuck::Zeroable;
+
+/// Residuals below this many ε of their terms are rounding errors.
+const ROUNDING: f64 = 4.0;
+/// Residuals that no longer shrink are rounding errors of the model below this many ε of their
+/// terms.
+const NOISE: f64 = 256.0;
+
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+    /// Solves the stages of a step from the start values in `y`.
+    ///
+    /// # Errors
+    /// A value of the model that is not finite, a singular matrix, no convergence.
+    pub(crate) fn newton_pivoted(
+        &mut self,
+        coefficients: &Coefficients<T, S>,
+        options: &Newton,
+        step: usize,
+        x: &ArrayX<M, T>,
+        y: &mut ArrayK<M, [T; S]>,
+        statistics: &mut Statistics,
+    ) -> Result<(), Error> {
+        let (rounding, noise) = (T::from_f64(T::EPSILON * ROUNDING), T::from_f64(T::EPSILON * NOISE));
+        let tolerance = T::from_f64(options.tolerance).max(rounding);
+        let frozen = options.jacobian == Jacobian::Frozen;
+        let most = options.fixed_iterations.unwrap_or(options.max_iterations);
+        let test = options.fixed_iterations.is_none();
+        let mut last = Increment { size: T::ZERO, unknown: 0 };
+        let mut before = T::ZERO;
+        let mut iteration = 0;
+        self.validity.factors = false;
+        loop {
+            self.place(coefficients, step, x, y);
+            let current = !frozen || iteration == 0;
+            if current {
+                statistics.jacobians += 1;
+                self.evaluate_jacobian();
+            } else {
+                statistics.residuals += 1;
+                self.evaluate_residual();
+            }
+            self.check_model(step, iteration)?;
+            if test {
+                let (residual, equation, stage) = self.relative_residual();
+                let stuck = iteration > 1 && residual >= before;
+                before = residual;
+                // Start values that happen to be good are not yet as good as what one iteration
+                // makes of them.
+                if iteration > 0 && residual <= rounding || stuck && residual <= noise {
+                    return Ok(());
+                }
+                if iteration == most {
+                    return Err(Error::NotConverged {
+                        residual: residual.to_f64(),
+                        equation,
+                        unknown: unknown_name::<M>(last.unknown),
+                        increment: last.size.to_f64(),
+                        at: Place { step, stage, iteration },
+                        started: None,
+                    });
+                }
+            }
+            if current {
+                self.factor_pivoted(coefficients, step, iteration, statistics)?;
+            }
+            for (equation, f) in self.f.as_ref().iter().enumerate() {
+                if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
+                    *to = f.map(|f| [f]);
+                }
+            }
+            self.linear.solve((coefficients, self.inputs.time.step), &mut self.increment);
+            let increment = self.update(y);
+            iteration += 1;
+            statistics.iterations += 1;
+            if !increment.size.is_finite() {
+                return Err(Error::Overflow { step, index: increment.unknown });
+            }
+            let settled = || iteration > 1 && is_settled(increment.size, last.size, tolerance);
+            if test && (settled() || increment.size == T::ZERO) || !test && iteration == most {
+                return Ok(());
+            }
+            last = increment;
+        }
+    }
+
+    /// Factors of the Jacobian that is stored, the whole matrix pivoted.
+    ///
+    /// # Errors
+    /// [`Error::Singular`]
+    pub(crate) fn factor_pivoted(
+        &mut self,
+        coefficients: &Coefficients<T, S>,
+        step: usize,
+        iteration: usize,
+        statistics: &mut Statistics,
+    ) -> Result<(), Error> {
+        let h = self.inputs.time.step;
+        statistics.factorizations += 1;
+        statistics.dense += usize::from(!M::STRUCTURE.elimination.pivots.is_empty());
+        self.linear.factors.factor_dense(&self.linear.jacobian, &coefficients.a, h).map_err(|missing| {
+            match missing {
+                Some((unknown, stage)) => Error::Singular {
+                    unknown: unknown_name::<M>(unknown),
+                    at: Place { step, stage, iteration },
+                },
+                None => Error::NotPivoted { step },
+            }
+        })
+    }
+
+    /// # Errors
+    /// The first value of the model that is not finite: of the residual, which says more, or of the
+    /// Jacobian.
+    pub(crate) fn check_model(&self, step: usize, iteration: usize) -> Result<(), Error> {
+        let (f, jacobian) = (self.f.as_ref(), self.linear.jacobian.as_ref());
+        let error = |quantity, equation, stage, value| Error::NonFiniteModel {
+            quantity,
+            equation,
+            value,
+            at: Place { step, stage, iteration },
+        };
+        if let Some((index, value)) = not_finite(f.as_flattened()) {
+            return Err(error(Quantity::Residual, index / S, index % S, value));
+        }
+        if let Some((index, value)) = not_finite(jacobian.as_flattened()) {
+            return Err(error(Quantity::Jacobian, M::STRUCTURE.jacobian.at(index / S).0, index % S, value));
+        }
+        Ok(())
+    }
+
+    /// The largest residual relative to the magnitude of its terms, `|f_r| / Σ_c |∂f_r/∂v_c v_c|`,
+    /// and its equation and stage. Rounding errors of the model are a few ε of this, however
+    /// equations and variables are scaled.
+    pub(crate) fn relative_residual(&self) -> (T, usize, usize) {
+        let mut magnitude: ArrayK<M, [T; S]> = Zeroable::zeroed();
+        let Pattern { rows, columns } = M::STRUCTURE.jacobian;
+        for ((row, column), entry) in rows.iter().zip(columns).zip(self.linear.jacobian.as_ref()) {
+            let (magnitude, points) = (magnitude.as_mut(), self.points.as_ref());
+            let (Some(magnitude), Some(point)) =
+                (magnitude.get_mut(*row as usize), points.get(*column as usize))
+            else {
+                continue;
+            };
+            for ((magnitude, entry), point) in magnitude.iter_mut().zip(entry).zip(point) {
+                *magnitude = *magnitude + (*entry * *point).abs();
+            }
+        }
+        let mut largest = (T::ZERO, 0, 0);
+        for (equation, (f, magnitude)) in self.f.as_ref().iter().zip(magnitude.as_ref()).enumerate() {
+            for (stage, (f, magnitude)) in f.iter().zip(magnitude).enumerate() {
+                // A residual of zero is zero even where all terms are, and none is rounded finer
+                // than normal numbers are. Terms that overflow say nothing.
+                let relative = if *f == T::ZERO {
+                    T::ZERO
+                } else if magnitude.is_finite() {
+                    f.abs() / magnitude.max(T::from_f64(T::SMALLEST))
+                } else {
+                    T::ONE
+                };
+                if relative > largest.0 || !relative.is_finite() {
+                    largest = (relative, equation, stage);
+                }
+            }
+        }
+        largest
+    }
+
+    /// `y ← y − Δ`; the largest increment relative to the unknown, of which the largest stage
+    /// counts.
+    fn update(&self, y: &mut ArrayK<M, [T; S]>) -> Increment<T> {
+        let mut largest = Increment { size: T::ZERO, unknown: 0 };
+        for (unknown, (y, delta)) in y.as_mut().iter_mut().zip(self.increment.as_ref()).enumerate() {
+            let (mut size, mut change) = (T::ZERO, T::ZERO);
+            for (y, [delta]) in y.iter_mut().zip(delta) {
+                *y = *y - *delta;
+                size = y.abs().max(size);
+                if delta.abs() > change || !delta.is_finite() {
+                    change = delta.abs();
+                }
+            }
+            // No increment is none, also of zero; an unknown that became zero changed by all it
+            // was.
+            let relative = if change == T::ZERO {
+                T::ZERO
+            } else {
+                change / size.max(change).max(T::from_f64(T::SMALLEST))
+            };
+            if relative > largest.size || !relative.is_finite() {
+                largest = Increment { size: relative, unknown };
+            }
+        }
+        largest
+    }
+}
+
+/// Whether the increment that comes next is small enough, by how the last two shrank.
+fn is_settled<T: Real>(size: T, last: T, tolerance: T) -> bool {
+    let rate = size / last;
+    // With the current Jacobian it will be less, but how much less differs from unknown to unknown.
+    let next = rate / (T::ONE - rate) * size;
+    // A rate near one says nothing about the next increment.
+    let shrinks = rate + rate < T::ONE;
+    shrinks && next <= tolerance || !shrinks && size <= T::from_f64(T::STAGNATION)
+}
+
+/// The largest increment of an iteration.
+struct Increment<T> {
+    /// Relative to the unknown.
+    size: T,
+    unknown: usize,
+}
+
+/// Name of an unknown `(k, z)`: of `k` the state whose derivative it is.
+pub(crate) fn unknown_name<M: Dae>(unknown: usize) -> &'static str {
+    let (x, z) = (M::STRUCTURE.x, M::STRUCTURE.z);
+    let name = if unknown < x.len() { x.get(unknown) } else { z.get(unknown - x.len()) };
+    name.copied().unwrap_or("")
+}

@@ -1,0 +1,234 @@
+//! What an iteration of Newton's method does to the unknowns, and how far it went.
+
+use super::norm::{Followed, Measure};
+use super::norm::{part, part_mut};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic, slot};
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::scalar::Lanes;
+use crate::shape::{Plain, Shape};
+
+/// The residual in the slots of the equations; that of kinematic states is zero.
+pub(in crate::irk) struct PlaceResidual<'a, M: Dae, E: Plain, const S: usize> {
+    pub f: &'a ArrayK<M, [E; S]>,
+    pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for PlaceResidual<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        each_row::<A, _>(&mut self);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
+    const ROWS: usize = M::Shape::NK;
+    const INSTRUCTIONS: usize = 2 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, equation: usize) {
+        let slot = slot::<M>(equation);
+        if kinematic::<M>(slot).is_some() {
+            return;
+        }
+        if let (Some(to), Some(f)) = (self.increment.as_mut().get_mut(slot), self.f.as_ref().get(equation)) {
+            to.as_flattened_mut().copy_from_slice(f);
+        }
+    }
+}
+
+/// The largest residual, of what is a number.
+pub(in crate::irk) struct Largest<'a, E> {
+    pub residual: &'a [E],
+}
+
+impl<E: Lanes> Kernel for Largest<'_, E> {
+    type Number = E;
+    type Output = E;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E {
+        let mut largest = [E::from_f64(0.0); 8];
+        let (eights, rest) = self.residual.as_chunks::<8>();
+        for residuals in eights {
+            for (largest, residual) in largest.iter_mut().zip(residuals) {
+                *largest = residual.abs().max(*largest);
+            }
+        }
+        for (largest, residual) in largest.iter_mut().zip(rest) {
+            *largest = residual.abs().max(*largest);
+        }
+        let [a, b, c, d, e, f, g, h] = largest;
+        (a.max(b).max(c.max(d))).max(e.max(f).max(g.max(h)))
+    }
+}
+
+/// `y ← y − Δ`
+pub(in crate::irk) struct Subtract<'a, E, const S: usize> {
+    pub y: &'a mut [[E; S]],
+    pub increment: &'a [[[E; 1]; S]],
+}
+
+impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for (y, increment) in self.y.iter_mut().zip(self.increment) {
+            for (y, [delta]) in y.iter_mut().zip(increment) {
+                *y = *y - *delta;
+            }
+        }
+    }
+}
+
+/// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
+pub(in crate::irk) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
+    pub followed: &'a Followed<'a, M, E, S>,
+    pub x: &'a ArrayX<M, E>,
+    pub y: &'a mut ArrayK<M, [E; S]>,
+    pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
+    pub weights: &'a mut ArrayK<M, E>,
+    pub sizes: &'a mut ArrayK<M, E>,
+    pub active: E::Mask,
+    pub h: E,
+    pub floor: E,
+    pub tolerance: E,
+    pub full: bool,
+    /// Whether weights are to be found, and nothing is known of the increment before.
+    pub measure: bool,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
+    type Number = E;
+    type Output = (E, E);
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> (E, E) {
+        let Self { followed, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
+            self;
+        let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
+        if measure {
+            let (own_y, own) = (part_mut::<M, _>(y.as_mut()), part_mut::<M, _>(increment.as_mut()));
+            for (y, increment) in own_y.iter_mut().zip(own) {
+                subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
+            }
+            let measure = Measure::<M, E, S> { followed, x, y, increment, weights, sizes, h, floor };
+            return (measure.run::<A>(), infinite);
+        }
+        // Four unknowns side by side, and the rest one by one.
+        let (y, last_y) = part_mut::<M, _>(y.as_mut()).as_chunks_mut::<4>();
+        let (increments, last) = part_mut::<M, _>(increment.as_mut()).as_chunks_mut::<4>();
+        let (weights, last_weights) = part::<M, _>(weights.as_ref()).as_chunks::<4>();
+        let (sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
+        let mut some = Increments::none(tolerance, full);
+        for (((y, increments), weights), sizes) in y.iter_mut().zip(increments).zip(weights).zip(sizes) {
+            subtract(y, increments, active);
+            some.take(increments, weights, sizes);
+        }
+        let mut others = Increments::none(tolerance, full);
+        for (((y, increment), weight), size) in last_y.iter_mut().zip(last).zip(last_weights).zip(last_sizes)
+        {
+            let increment = core::array::from_mut(increment);
+            subtract(core::array::from_mut(y), increment, active);
+            others.take(increment, core::array::from_ref(weight), core::array::from_mut(size));
+        }
+        let ([largest, excess, sum], others) = (some.total(), others.total());
+        let (largest, excess, sum) = (largest.max(others[0]), excess.max(others[1]), sum + others[2]);
+        let number = E::le(sum.abs(), E::from_f64(f64::MAX));
+        (E::select(number, largest, sum), E::select(E::le(excess, zero), zero, infinite))
+    }
+}
+
+/// `y ← y − Δ` of some unknowns, in lanes that are `active`; in the others there is no increment. A
+/// single lane is, or it would not be here.
+#[inline(always)]
+fn subtract<E: Lanes, const S: usize, const N: usize>(
+    y: &mut [[E; S]; N],
+    increments: &mut [[[E; 1]; S]; N],
+    active: E::Mask,
+) {
+    // In registers: the optimiser cannot know that they do not overlap.
+    let (mut new, mut deltas) = (*y, *increments);
+    for (y, [delta]) in new.as_flattened_mut().iter_mut().zip(deltas.as_flattened_mut()) {
+        if const { E::LANES > 1 } {
+            *delta = E::select(active, *delta, E::from_f64(0.0));
+        }
+        *y = *y - *delta;
+    }
+    *y = new;
+    if const { E::LANES > 1 } {
+        *increments = deltas;
+    }
+}
+
+/// What is known of the increments of some unknowns, in `N` strands.
+struct Increments<E, const N: usize> {
+    largest: [E; N],
+    /// By how much one, and the one that is expected next, is too large; not positive if that is
+    /// below the tolerance.
+    excess: [E; N],
+    /// The sum of what is not a number is not a number, which a maximum may lose.
+    sum: [E; N],
+    tolerance: E,
+    full: bool,
+}
+
+impl<E: Lanes, const N: usize> Increments<E, N> {
+    #[inline(always)]
+    fn none(tolerance: E, full: bool) -> Self {
+        let zero = E::from_f64(0.0);
+        Self { largest: [zero; N], excess: [-tolerance; N], sum: [zero; N], tolerance, full }
+    }
+
+    /// Takes `N` unknowns into account, whose last increments had these sizes.
+    #[inline(always)]
+    fn take<const S: usize>(&mut self, increments: &[[[E; 1]; S]; N], weights: &[E; N], sizes: &mut [E; N]) {
+        let old = *sizes;
+        let (mut new, mut excess) = ([E::from_f64(0.0); N], [E::from_f64(0.0); N]);
+        // Stage by stage, so that what is done to unknowns is done to vectors.
+        #[allow(clippy::needless_range_loop)]
+        for i in 0..S {
+            for n in 0..N {
+                let [delta] = increments[n][i];
+                new[n] = delta.abs().max(new[n]);
+                self.sum[n] = self.sum[n] + delta;
+            }
+        }
+        for n in 0..N {
+            new[n] = new[n] * weights[n];
+        }
+        // `θ size/(1 − θ)` with `θ = size/old`, or `θ² size`, against the tolerance; divided only
+        // where it must be.
+        if self.full {
+            for n in 0..N {
+                let rate = new[n] / old[n];
+                excess[n] = new[n] * rate * rate - self.tolerance;
+            }
+        } else {
+            for n in 0..N {
+                excess[n] = new[n] * new[n] - self.tolerance * (old[n] - new[n]);
+            }
+        }
+        for n in 0..N {
+            // Where increments hardly shrink, nothing is expected but that the next one is as
+            // large.
+            let expected = excess[n].max(new[n] + new[n] - old[n]);
+            let own = new[n] - self.tolerance;
+            // The smaller one.
+            self.excess[n] = (-(-own).max(-expected)).max(self.excess[n]);
+            self.largest[n] = new[n].max(self.largest[n]);
+        }
+        *sizes = new;
+    }
+
+    /// The largest increment, the largest excess, the sum.
+    #[inline(always)]
+    fn total(&self) -> [E; 3] {
+        let (mut largest, mut excess, mut sum) = (E::from_f64(0.0), -self.tolerance, E::from_f64(0.0));
+        for n in 0..N {
+            largest = self.largest[n].max(largest);
+            excess = self.excess[n].max(excess);
+            sum = sum + self.sum[n];
+        }
+        [largest, excess, sum]
+    }
+}

@@ -1,0 +1,155 @@
+//! Which Jacobian Newton's method takes, and when it is renewed.
+//!
+//! One rule ([`Jacobian::Auto`]): the Jacobian of the last step or of the start values is kept as
+//! long as the iterations that are still expected with it cost less than a new one. How many that
+//! are is known from two increments by the same; of the first one, which begins far away with a
+//! Jacobian of its own, the residual that it leaves tells. A new one, with three stages or more, is
+//! shared by the stages: their mean, or that in their middle where they are not evaluated side by
+//! side. Its system is solved in the eigenbasis of the tableau, in numbers that may be
+//! [coarse](Lanes::Coarse): it costs a fraction of one with a Jacobian for each stage.
+
+use super::convergence::{Status, remaining};
+use crate::irk::workspace::Validity;
+use crate::model::Dae;
+use crate::options::Jacobian;
+use crate::scalar::Lanes;
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// The first shared Jacobian is that of start values, which may be far away: that increments grow
+/// with it is not its fault.
+const FAR: usize = 1;
+/// So often the shared Jacobian is renewed in a step before the stages' own are taken.
+const MEANS: usize = 3;
+
+/// So many iterations new factors still take themselves: by blocks, and of the shared Jacobian, with
+/// which increments never shrink quadratically. (With two, 17 masses had a factorisation more and
+/// 65 had two more, in one iteration less: 12 and 20 % more time.)
+const STILL: [f64; 2] = [2.0, 3.0];
+
+/// The state of the rule while a step is solved.
+pub(super) struct Policy<M, E, const S: usize> {
+    /// Whether every iteration has a Jacobian of its own.
+    pub full: bool,
+    simplified: bool,
+    adaptive: bool,
+    /// Whether stages may share a Jacobian.
+    may_share: bool,
+    /// Whether the factors that iterations take are those of the shared Jacobian.
+    pub shared: bool,
+    /// Whether the next iteration has new ones.
+    pub renew: bool,
+    /// Whether any were new in this step.
+    pub factored: bool,
+    /// Whether the residual that the first increment leaves is asked how good its Jacobian is.
+    pub asks: bool,
+    /// Whether start values are solutions but for their last digits.
+    near: bool,
+    renewals: usize,
+    of: PhantomData<(M, E)>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
+    /// The operations of an iteration with old factors: what is computed for all stages side by
+    /// side counts once.
+    const ITERATION: f64 = {
+        let blocks = M::STRUCTURE.elimination.slots.len() as f64;
+        M::STRUCTURE.operations.residual as f64 + blocks * S as f64 + 1.0
+    };
+
+    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in
+    /// the eigenbasis.
+    const RENEWAL: [f64; 2] = {
+        let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
+        let (s, inverses) = (S as f64, 4.0 * plan.pivots.len() as f64);
+        // A complex product is four real ones.
+        let jacobian = operations.residual_jacobian as f64;
+        // One for all stages, where they are not evaluated side by side.
+        let middle = if E::LANES > 1 { jacobian / s } else { jacobian };
+        let (products, terms) = (plan.products() + inverses, plan.assembly.len() as f64);
+        let of_blocks = (jacobian + (products + terms / s) * s * s) / Self::ITERATION;
+        [of_blocks, (middle + (products + terms) * 4.0) / Self::ITERATION]
+    };
+
+    /// The cost of a residual, in iterations.
+    const RESIDUAL: f64 = M::STRUCTURE.operations.residual as f64 / Self::ITERATION;
+
+    /// Whether factors by blocks cost no more than the iterations that they save where start values
+    /// are near: with mean Jacobians, which are renewed up to three times, it took 7 to 12 of them,
+    /// with blocks 4 or 5 (Robertson, Van der Pol, Oregonator, HIRES, Akzo Nobel).
+    const EXACT: bool = Self::RENEWAL[0] <= 10.0;
+
+    /// Before the first iteration, with factors that are valid for something or nothing.
+    #[inline(always)]
+    pub fn start(jacobian: Jacobian, may_share: bool, validity: Validity, near: bool) -> Self {
+        let (full, simplified) = (jacobian == Jacobian::Full, jacobian == Jacobian::Simplified);
+        let (adaptive, exact) = (jacobian.is_adaptive(), M::STRUCTURE.linear_in_state);
+        // Exact factors of the step before are the best there are, and cost nothing.
+        let shared = may_share && !validity.factors;
+        let near = cfg!(feature = "alloc") && Self::EXACT && near && shared;
+        let renew = if shared {
+            !validity.mean
+        } else if M::STRUCTURE.constant_matrix && validity.factors {
+            false
+        } else {
+            // Of linear equations every step has one matrix, which may be that of all steps.
+            full || exact || !(adaptive && validity.factors)
+        };
+        let asks = adaptive && renew && !near && !exact && !full && !M::STRUCTURE.constant_matrix;
+        let (factored, renewals, of) = (false, 0, PhantomData);
+        Self { full, simplified, adaptive, may_share, shared, renew, factored, asks, near, renewals, of }
+    }
+
+    /// Whether new factors are those of a shared Jacobian. Where it says too little about each of
+    /// the stages, their own Jacobians are taken.
+    #[inline(always)]
+    fn shares(&self) -> bool {
+        self.may_share && (self.simplified || self.renewals < MEANS)
+    }
+
+    /// The factors are renewed.
+    #[inline(always)]
+    pub fn renewed(&mut self) {
+        self.shared = self.shares() && !self.near;
+        self.renewals += usize::from(self.renew);
+        self.factored = true;
+    }
+
+    /// After an iteration that is not the last, whose factors may have been renewed `early`.
+    #[inline(always)]
+    pub fn after(&mut self, status: &Status, iteration: usize, early: bool) {
+        if iteration > 1 && self.renewals > FAR && status.grows {
+            // The shared one does not do.
+            self.renewals = MEANS;
+        }
+        // Those of a solution nearby do for all iterations, unless increments hardly shrink.
+        self.near &= !status.stuck;
+        // The first increment of new factors against the last of old ones does not tell how good
+        // the new ones are.
+        let fresh = early || self.renew && iteration > 1;
+        let slow = status.remaining > Self::expensive(self.shares()) && (!fresh || status.grows);
+        let exact = M::STRUCTURE.linear_in_state;
+        self.renew = !exact && (self.full || self.adaptive && !self.near && slow);
+    }
+
+    /// How many iterations new factors cost, with those that they take themselves.
+    #[inline(always)]
+    fn expensive(shared: bool) -> f64 {
+        STILL[usize::from(shared)] + Self::RENEWAL[usize::from(shared)]
+    }
+
+    /// Whether the residual that an increment leaves, as a part of the first one, lets so many
+    /// iterations be expected that new factors cost less. Where it leaves more than a sixteenth,
+    /// those of where it led to would soon be renewed as well. Where it leaves more than there was,
+    /// another increment by the same factors would be longer than the first, and may lead to
+    /// another root than Newton's method does.
+    pub fn leaves_much(&self, left: E, tolerance: f64) -> bool {
+        let cheap = usize::from(self.may_share);
+        let expensive = STILL[cheap] + Self::RESIDUAL + Self::RENEWAL[cheap];
+        let mut cell: E::Cell = Zeroable::zeroed();
+        left.store(&mut cell);
+        let lanes = || (0..E::LANES).map(|lane| E::lane(&cell, lane));
+        let slowest = lanes().filter(|&left| left < 1.0 / 16.0).fold(0.0, f64::max);
+        remaining(true, 1.0, slowest, tolerance) > expensive || lanes().any(|left| left >= 1.0)
+    }
+}

@@ -1,0 +1,210 @@
+//! How large an increment of Newton's method is, relative to the unknowns, and what that means for
+//! kinematic states.
+
+use crate::irk::kinematic::{count, is_any, minus_c, unknowns, velocity};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::scalar::{Lanes, Scalar};
+use crate::shape::Plain;
+
+/// The size of an increment relative to the unknowns as they are now.
+pub(in crate::irk) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
+    pub followed: &'a Followed<'a, M, E, S>,
+    pub x: &'a ArrayX<M, E>,
+    pub y: &'a ArrayK<M, [E; S]>,
+    pub increment: &'a ArrayK<M, [[E; 1]; S]>,
+    pub weights: &'a mut ArrayK<M, E>,
+    pub sizes: &'a mut ArrayK<M, E>,
+    pub h: E,
+    pub floor: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
+    type Number = E;
+    type Output = E;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> E {
+        let Self { followed, x, y, increment, weights, sizes, h, floor } = self;
+        let zero = E::from_f64(0.0);
+        // A change of ẋ below this much of x/h rounds to none in x.
+        let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
+        // Four unknowns side by side, and the rest one by one.
+        let (ys, last_ys) = part::<M, _>(y.as_ref()).as_chunks::<4>();
+        let (increments, last) = part::<M, _>(increment.as_ref()).as_chunks::<4>();
+        let (own_weights, last_weights) = part_mut::<M, _>(weights.as_mut()).as_chunks_mut::<4>();
+        let (own_sizes, last_sizes) = part_mut::<M, _>(sizes.as_mut()).as_chunks_mut::<4>();
+        let mut states = x.as_ref().get(const { unknowns::<M>().0 }..).unwrap_or_default();
+        let mut some = Relative { largest: [zero; 4], sum: [zero; 4], per_step };
+        for (((y, increments), weights), sizes) in ys.iter().zip(increments).zip(own_weights).zip(own_sizes) {
+            some.take(&mut states, y, increments, weights, sizes);
+        }
+        let mut others = Relative { largest: [zero], sum: [zero], per_step };
+        for (((y, increment), weight), size) in last_ys.iter().zip(last).zip(last_weights).zip(last_sizes) {
+            let (y, increment) = (core::array::from_ref(y), core::array::from_ref(increment));
+            let (weight, size) = (core::array::from_mut(weight), core::array::from_mut(size));
+            others.take(&mut states, y, increment, weight, size);
+        }
+        let most = size_of([some.total(), others.total()]);
+        if const { !is_any::<M>() } {
+            return most;
+        }
+        let mut norm = zero;
+        for a in followed.a {
+            let mut sum = zero;
+            for a in a {
+                sum = sum + a.abs();
+            }
+            norm = sum.max(norm);
+        }
+        let norm = E::from_f64(TYPICAL) * norm * h.abs();
+        let mut velocities =
+            Velocities::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
+        each_row::<A, _>(&mut velocities);
+        velocities.most
+    }
+}
+
+/// What is known of the relative size of the increments of some unknowns, in `N` strands.
+struct Relative<E, const N: usize> {
+    largest: [E; N],
+    /// What is not a number is not lost in a sum.
+    sum: [E; N],
+    per_step: E,
+}
+
+impl<E: Lanes, const N: usize> Relative<E, N> {
+    /// Takes `N` unknowns into account, of which those that are derivatives have these states.
+    #[inline(always)]
+    fn take<const S: usize>(
+        &mut self,
+        states: &mut &[E],
+        y: &[[E; S]; N],
+        increments: &[[[E; 1]; S]; N],
+        weights: &mut [E; N],
+        sizes: &mut [E; N],
+    ) {
+        let (zero, one, smallest) = (E::from_f64(0.0), E::from_f64(1.0), E::from_f64(E::SMALLEST));
+        let (mut scale, mut size, mut sum) = ([zero; N], [zero; N], [zero; N]);
+        if let Some((own, rest)) = states.split_first_chunk() {
+            (scale, *states) = (*own, rest);
+        } else {
+            for (scale, x) in scale.iter_mut().zip(core::mem::take(states)) {
+                *scale = *x;
+            }
+        }
+        for scale in &mut scale {
+            *scale = (scale.abs() * self.per_step).max(smallest);
+        }
+        // Stage by stage, so that what is done to unknowns is done to vectors.
+        #[allow(clippy::needless_range_loop)]
+        for i in 0..S {
+            for n in 0..N {
+                let [delta] = increments[n][i];
+                size[n] = delta.abs().max(size[n]);
+                scale[n] = y[n][i].abs().max(scale[n]);
+                sum[n] = sum[n] + delta;
+            }
+        }
+        for n in 0..N {
+            weights[n] = one / size[n].max(scale[n]);
+            sizes[n] = size[n] * weights[n];
+            self.sum[n] = self.sum[n] + sum[n] * weights[n];
+            self.largest[n] = sizes[n].max(self.largest[n]);
+        }
+    }
+
+    /// The largest, and the sum.
+    #[inline(always)]
+    fn total(&self) -> [E; 2] {
+        let (mut largest, mut sum) = (E::from_f64(0.0), E::from_f64(0.0));
+        for n in 0..N {
+            (largest, sum) = (self.largest[n].max(largest), sum + self.sum[n]);
+        }
+        [largest, sum]
+    }
+}
+
+/// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its
+/// change within the step.
+struct Velocities<'a, M: Dae, E: Plain, const S: usize> {
+    followed: &'a Followed<'a, M, E, S>,
+    x: &'a ArrayX<M, E>,
+    increment: &'a ArrayK<M, [[E; 1]; S]>,
+    weights: &'a mut ArrayK<M, E>,
+    sizes: &'a mut ArrayK<M, E>,
+    per_step: E,
+    /// `h ‖A‖`
+    norm: E,
+    /// The largest increment.
+    most: E,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
+    const ROWS: usize = count::<M>();
+    const INSTRUCTIONS: usize = 8;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Followed { jacobian, points, .. } = self.followed;
+        let Some(of) = kinematic::<M>(state) else { return };
+        let (Some(own), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
+            return;
+        };
+        let (weights, sizes) = (self.weights.as_mut(), self.sizes.as_mut());
+        let (Some(weight), Some(k)) = (weights.get_mut(own), points.as_ref().get(state)) else { return };
+        let bound = self.norm * minus_c.abs();
+        // At one stage it is large enough nearly always.
+        if !E::any(E::lt(*weight * k[0].abs(), bound)) {
+            return;
+        }
+        let smallest = E::from_f64(E::SMALLEST);
+        let mut size = match self.x.as_ref().get(state) {
+            Some(x) => (x.abs() * self.per_step).max(smallest),
+            None => smallest,
+        };
+        for k in k {
+            size = k.abs().max(size);
+        }
+        if let (Some(to), Some(increment)) = (sizes.get_mut(own), self.increment.as_ref().get(own)) {
+            *weight = (bound / size).max(*weight);
+            let mut largest = E::from_f64(0.0);
+            for [delta] in increment {
+                largest = delta.abs().max(largest);
+            }
+            *to = largest * *weight;
+            self.most = to.max(self.most);
+        }
+    }
+}
+
+/// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to
+/// half of the largest `Σ_j |a_ij| |Δ_j|` if they have one sign at all stages, and less if not.
+/// (With the bound itself 5 masses take an iteration more in each step than their own increments
+/// ask for.)
+const TYPICAL: f64 = 0.25;
+
+/// What increments of velocities are measured by too: `k_q` of [kinematic](crate::irk::kinematic)
+/// states.
+pub(in crate::irk) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
+    pub jacobian: &'a M::Jacobian<[E; S]>,
+    /// Where their `k` are.
+    pub points: &'a ArrayV<M, [E; S]>,
+    pub a: &'a [[E; S]; S],
+}
+
+/// What belongs to unknowns, as far as that is a part of it: kinematic states have no increments.
+#[inline(always)]
+pub(in crate::irk) fn part<M: Dae, T>(of: &[T]) -> &[T] {
+    of.get(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
+}
+
+#[inline(always)]
+pub(in crate::irk) fn part_mut<M: Dae, T>(of: &mut [T]) -> &mut [T] {
+    of.get_mut(const { unknowns::<M>().0 }..const { unknowns::<M>().1 }).unwrap_or_default()
+}
+
+/// The largest of two strands, or what is not a number.
+#[inline(always)]
+fn size_of<E: Lanes>([[a, sum], [b, other]]: [[E; 2]; 2]) -> E {
+    let total = sum + other;
+    E::select(E::le(total.abs(), E::from_f64(f64::MAX)), a.max(b), total)
+}

@@ -1,0 +1,91 @@
+//! What errors say about where Newton's method started.
+
+use super::dense_fallback::unknown_name;
+use crate::error::{Error, Started};
+use crate::finite::not_finite;
+use crate::irk::jacobian_entries::entries;
+use crate::irk::stages::initial_guess::InitialGuess;
+use crate::irk::workspace::Work;
+use crate::memory::Fallback;
+use crate::model::Dae;
+use crate::scalar::Real;
+use crate::shape::Shape;
+
+/// Values of an algebraic state at which an equation is tried that has none.
+const TRIED: [f64; 4] = [1.0, -1.0, 1e-3, 1e3];
+
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
+    /// The error of the first step, as [`Work::explain_from`] says; with a warm start as it is.
+    pub(in crate::irk) fn explain_start(&mut self, error: Error, from: &InitialGuess<'_, M, T, S>) -> Error {
+        let given = self.given;
+        match from {
+            InitialGuess::Nominal => self.explain_from(error, |unknown| M::START.get(unknown).copied()),
+            InitialGuess::Given => {
+                self.explain_from(error, |unknown| given.as_ref().get(unknown).map(|z| z.to_f64()))
+            }
+            InitialGuess::Zero => self.explain_from(error, |_| None),
+            InitialGuess::Previous(_) | InitialGuess::Solution(_) => error,
+        }
+    }
+
+    /// The error, with the algebraic state that led to it and its start value, which is zero if
+    /// there is none; of a model without any such state as it is.
+    #[cold]
+    pub(in crate::irk) fn explain_from(
+        &mut self,
+        error: Error,
+        start: impl Fn(usize) -> Option<f64>,
+    ) -> Error {
+        if const { M::Shape::NZ == 0 } {
+            return error;
+        }
+        let nx = M::Shape::NX;
+        let started =
+            |unknown| Started { unknown: unknown_name::<M>(unknown), value: start(unknown).unwrap_or(0.0) };
+        match error {
+            Error::NonFiniteModel { quantity, equation, value, at } => {
+                let Some(to_blame) = self.without_value(equation) else { return error };
+                let started = started(to_blame);
+                Error::NonFiniteStart { quantity, equation, value, started, at }
+            }
+            Error::NotConverged { residual, equation, unknown, increment, at, .. } => {
+                let own = (nx..M::Shape::NK).find(|index| unknown_name::<M>(*index) == unknown);
+                let own = own.or_else(|| Self::algebraic_of(equation).next());
+                Error::NotConverged { residual, equation, unknown, increment, at, started: own.map(started) }
+            }
+            other => other,
+        }
+    }
+
+    /// The algebraic states that occur in an equation, as unknowns.
+    fn algebraic_of(equation: usize) -> impl Iterator<Item = usize> {
+        let [_, _, begin, end, ..] = M::STRUCTURE.blocks;
+        let places = (begin..end).filter_map(|entry| M::STRUCTURE.jacobian.get(entry));
+        places.filter(move |place| place.0 == equation).map(|place| place.1.saturating_sub(M::Shape::NX))
+    }
+
+    /// The algebraic state for whose value an equation has none: with another one it has. The
+    /// points of the stages are left anywhere.
+    fn without_value(&mut self, equation: usize) -> Option<usize> {
+        Self::algebraic_of(equation).find(|unknown| {
+            let variable = unknown + M::Shape::NX;
+            let Some(start) = self.points.as_ref().get(variable).copied() else { return false };
+            let has_value = TRIED.iter().any(|value| {
+                self.place_point(variable, [T::from_f64(*value); S]);
+                self.evaluate_jacobian();
+                let jacobian = self.linear.jacobian.as_ref();
+                let mut row = entries(&M::STRUCTURE, jacobian, 0, jacobian.len()).filter(|e| e.0 == equation);
+                let residual = self.f.as_ref().get(equation);
+                residual.is_some_and(|f| not_finite(f).is_none()) && row.all(|e| not_finite(e.2).is_none())
+            });
+            self.place_point(variable, start);
+            has_value
+        })
+    }
+
+    fn place_point(&mut self, variable: usize, value: [T; S]) {
+        if let Some(point) = self.points.as_mut().get_mut(variable) {
+            *point = value;
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Sums of long runs: what a step rounds comes back in every step, and an orbit that returns to the
+//! same points collects the same errors. With [`Options::compensated`](crate::Options::compensated)
+//! four things are therefore not rounded to the digits of `x`:
+//!
+//! - `x` carries what was rounded off from it (E. Hairer, R. I. McLachlan, A. Razakarivony,
+//!   "Achieving Brouwer's law with implicit Runge-Kutta methods", BIT 48, 2008), and the change of
+//!   a step, `h Σ_i b_i k_i`, has twice the digits;
+//! - so have the sums of the stages, `ξ_i + δ_i = x + h Σ_j a_ij k_j`. The model sees `ξ_i`, and
+//!   `f_x δ_i` is added to its residual: the Jacobian of any iteration is good enough for that;
+//! - coefficients of a method that keeps quadratic invariants are those of a method that does so to
+//!   twice the digits, `b_i a_ij + b_j a_ji = b_i b_j`: a symplectic method whose order conditions
+//!   hold to rounding has no drift, one that is symplectic to rounding only has one that grows with
+//!   every step.
+//!
+//! What is left is the rounding of the model itself. Products are exact where the machine
+//! multiplies and adds in one instruction; elsewhere only sums are compensated.
+
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::dot;
+use crate::irk::jacobian_entries::entries;
+use crate::irk::workspace::Work;
+use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, moved, two_product};
+use crate::memory::Fallback;
+use crate::model::{ArrayK, ArrayX, Dae};
+use crate::scalar::{Field, Lanes, two_sum};
+use crate::shape::Shape;
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Writes `ξ_i`, and keeps `δ_i`, for [`correct_residual`](Self::correct_residual).
+    pub(crate) fn place_compensated(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+    ) {
+        let states = M::Shape::NX..2 * M::Shape::NX;
+        let [rest, _] = &mut self.probe;
+        dispatch(Place {
+            points: self.points.as_mut().get_mut(states.clone()).unwrap_or_default(),
+            beyond: rest.as_mut().get_mut(states).unwrap_or_default(),
+            x: x.as_ref(),
+            rest: self.rest.as_ref(),
+            y: y.as_ref(),
+            a: &coefficients.a,
+            b: &coefficients.b,
+            symplectic: coefficients.tableau.is_symplectic(),
+            h: self.inputs.time.step,
+        });
+    }
+
+    /// `f ← f + f_x δ`, with the Jacobian that is there.
+    pub(crate) fn correct_residual(&mut self) {
+        let (begin, end) = (M::Shape::NX, 2 * M::Shape::NX);
+        let (jacobian, [beyond, _]) = (self.linear.jacobian.as_ref(), &self.probe);
+        for (r, c, values) in entries(&M::STRUCTURE, jacobian, 0, M::STRUCTURE.jacobian.len()) {
+            if !(begin..end).contains(&c) {
+                continue;
+            }
+            if let (Some(f), Some(beyond)) = (self.f.as_mut().get_mut(r), beyond.as_ref().get(c)) {
+                for ((f, value), beyond) in f.iter_mut().zip(values).zip(beyond) {
+                    *f = *f + *value * *beyond;
+                }
+            }
+        }
+    }
+}
+
+struct Place<'a, E, const S: usize> {
+    points: &'a mut [[E; S]],
+    beyond: &'a mut [[E; S]],
+    x: &'a [E],
+    rest: &'a [E],
+    y: &'a [[E; S]],
+    a: &'a [[E; S]; S],
+    b: &'a [E; S],
+    symplectic: bool,
+    h: E,
+}
+
+impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { points, beyond, x, rest, y, a, b, symplectic, h } = self;
+        let more = if symplectic { conjugate::<A, E, S>(a, b) } else { [[E::from_f64(0.0); S]; S] };
+        let states = x.iter().zip(rest).zip(y);
+        for ((xi, beyond), ((&x, &rest), k)) in points.iter_mut().zip(beyond).zip(states) {
+            for ((xi, beyond), (a, more)) in xi.iter_mut().zip(beyond).zip(a.iter().zip(&more)) {
+                let [sum, lost] = dot_compensated::<A, E>(a.iter().zip(k));
+                [*xi, *beyond] = moved::<A, E>([x, rest], h, [sum, lost + dot(more, k)]);
+            }
+        }
+    }
+}
+
+/// What `A` needs beyond its digits for `b_i a_ij + b_j a_ji = b_i b_j`.
+#[inline(always)]
+fn conjugate<A: Arithmetic, E: Field, const S: usize>(a: &[[E; S]; S], b: &[E; S]) -> [[E; S]; S] {
+    let mut more = [[E::from_f64(0.0); S]; S];
+    for i in 0..S {
+        for j in 0..=i {
+            let [whole, rest] = two_product::<A, E>(b[i], b[j]);
+            let [above, rest_above] = two_product::<A, E>(b[i], a[i][j]);
+            let [below, rest_below] = two_product::<A, E>(b[j], a[j][i]);
+            let [part, lost] = two_sum(whole, -above);
+            let missing = (part - below) + (lost + (rest - rest_above - rest_below));
+            let half = missing * E::from_f64(0.5);
+            more[i][j] = half / b[i];
+            more[j][i] = half / b[j];
+        }
+    }
+    more
+}
+
+/// `x + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
+pub(in crate::irk) struct Advance<'a, E, const S: usize> {
+    pub x: &'a mut [E],
+    pub rest: &'a mut [E],
+    pub y: &'a [[E; S]],
+    pub b: &'a [E; S],
+    pub h: E,
+}
+
+impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { x, rest, y, b, h } = self;
+        for ((x, rest), k) in x.iter_mut().zip(rest).zip(y) {
+            [*x, *rest] = moved::<A, E>([*x, *rest], h, dot_compensated::<A, E>(b.iter().zip(k)));
+        }
+    }
+}

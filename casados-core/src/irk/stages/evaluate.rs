@@ -1,0 +1,270 @@
+//! The model at the stages of a step.
+//!
+//! Every variable, equation and entry of the Jacobian has its values at all stages side by side:
+//! where the machine has registers of that many numbers, one call of the model computes them all.
+
+use crate::irk::coefficients::Coefficients;
+use crate::irk::coefficients::stage_values;
+use crate::irk::kinematic::{self, are_together, derivative, unknowns};
+use crate::irk::stage_array::Stages;
+use crate::irk::workspace::{Times, Work};
+use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row};
+use crate::memory::Fallback;
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
+use crate::scalar::{Lanes, SideBySide, Strided};
+use crate::shape::{Matrix, Plain, Shape};
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Writes `u` and `p`, which are the same at all points of an interval.
+    pub(crate) fn place_inputs(&mut self) {
+        let u = 2 * M::Shape::NX + M::Shape::NZ;
+        let inputs = self.inputs.u.as_slice().iter().chain(self.inputs.p.as_slice());
+        for (point, input) in self.points.as_mut()[u..].iter_mut().zip(inputs) {
+            *point = [*input; S];
+        }
+    }
+
+    /// Writes `(k_i, ξ_i, z_i, t_i)` with `ξ_i = x + h Σ_j a_ij k_j`.
+    #[inline]
+    pub(crate) fn place(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+    ) {
+        let Coefficients { a, c, .. } = coefficients;
+        let (jacobian, time) = (&self.linear.jacobian, self.inputs.time);
+        dispatch(Place::<M, E, S, false> { points: &mut self.points, jacobian, x, y, a, c, time, step });
+    }
+
+    /// The same, with the `k_i` of [kinematic](crate::irk::kinematic) states as they follow from
+    /// others, whatever is in their places.
+    #[inline]
+    pub(crate) fn place_unknowns(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+    ) {
+        if const { !kinematic::is_any::<M>() } {
+            return self.place(coefficients, step, x, y);
+        }
+        let Coefficients { a, c, .. } = coefficients;
+        let (jacobian, time) = (&self.linear.jacobian, self.inputs.time);
+        dispatch(Place::<M, E, S, true> { points: &mut self.points, jacobian, x, y, a, c, time, step });
+    }
+
+    /// The residual at all stages.
+    pub(crate) fn evaluate_residual(&mut self) {
+        self.evaluate::<false>();
+    }
+
+    /// The residual and the Jacobian at all stages.
+    pub(crate) fn evaluate_jacobian(&mut self) {
+        self.evaluate::<true>();
+        self.complete();
+    }
+
+    /// The residual at all stages, which may be there, and one Jacobian for all of them: that in
+    /// their middle. Of a single lane it is that of each, as its stages are evaluated side by side
+    /// where a machine can: the mean of those is taken.
+    pub(crate) fn evaluate_middle(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        step: usize,
+        x: &ArrayX<M, E>,
+        y: &ArrayK<M, [E; S]>,
+        residual: bool,
+    ) {
+        if const { E::LANES == 1 } || self.alike {
+            self.evaluate::<true>();
+            if const { E::LANES == 1 } {
+                self.complete();
+            }
+            return;
+        }
+        dispatch(Middle::<M, E, S> { points: &mut self.points });
+        self.at_stage::<true>(0);
+        self.first_only = true;
+        self.place_unknowns(coefficients, step, x, y);
+        if residual {
+            self.at_stage::<false>(0);
+        } else {
+            self.evaluate_residual();
+        }
+    }
+
+    /// The Jacobian at all stages, if it is there for the first one only.
+    pub(crate) fn complete(&mut self) {
+        if core::mem::take(&mut self.first_only) {
+            dispatch(Spread { cells: self.linear.jacobian.as_mut() });
+        }
+    }
+
+    #[inline(always)]
+    fn evaluate<const JACOBIAN: bool>(&mut self) {
+        // Of stages that are all alike one is evaluated.
+        let alike = core::mem::take(&mut self.alike);
+        let Self { points, f, linear, first_only, .. } = self;
+        if JACOBIAN {
+            *first_only = false;
+        }
+        let call = Evaluate::<M, E, S, JACOBIAN> { points, f, jacobian: &mut linear.jacobian };
+        if E::side_by_side(call).is_err() {
+            for i in 0..if alike { 1 } else { S } {
+                self.at_stage::<JACOBIAN>(i);
+            }
+            if alike {
+                dispatch(Spread { cells: self.f.as_mut() });
+                self.first_only |= JACOBIAN;
+            }
+        }
+    }
+
+    /// The residual, and the Jacobian if it is asked for, at a stage.
+    #[inline(always)]
+    fn at_stage<const JACOBIAN: bool>(&mut self, i: usize) {
+        let Self { points, f, linear, .. } = self;
+        let (point, f) = (points.seen_from(i), f.seen_from_mut(i));
+        if JACOBIAN {
+            M::residual_jacobian::<Strided<E, S>>(point, f, linear.jacobian.seen_from_mut(i));
+        } else {
+            M::residual::<Strided<E, S>>(point, f);
+        }
+    }
+}
+
+/// The mean of the stages in place of the first one. (Inputs are the same at all of them.)
+struct Middle<'a, M: Dae, E: Plain, const S: usize> {
+    points: &'a mut ArrayV<M, [E; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Middle<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let points = self.points.as_mut();
+        let (own, rest) = points.split_at_mut((2 * M::Shape::NX + M::Shape::NZ).min(points.len()));
+        let share = E::from_f64(const { 1.0 / S as f64 });
+        for stages in own.iter_mut().chain(rest.last_mut()) {
+            let mut total = stages[0];
+            for &stage in &stages[1..] {
+                total = total + stage;
+            }
+            stages[0] = share * total;
+        }
+    }
+}
+
+/// What was computed at the first stage, for all of them.
+struct Spread<'a, E, const S: usize> {
+    cells: &'a mut [[E; S]],
+}
+
+impl<E: Lanes, const S: usize> Kernel for Spread<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        for cell in self.cells {
+            *cell = [cell[0]; S];
+        }
+    }
+}
+
+/// `f`, and its Jacobian if it is asked for, at all stages in one call.
+struct Evaluate<'a, M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> {
+    points: &'a Stages<ArrayV<M, [E; S]>, E, S>,
+    f: &'a mut Stages<ArrayK<M, [E; S]>, E, S>,
+    jacobian: &'a mut Stages<M::Jacobian<[E; S]>, E, S>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const JACOBIAN: bool> SideBySide<E, S>
+    for Evaluate<'_, M, E, S, JACOBIAN>
+{
+    #[inline(always)]
+    fn call<R: Lanes<Cell = [E; S]>>(self) {
+        if JACOBIAN {
+            M::residual_jacobian::<R>(self.points, self.f, self.jacobian);
+        } else {
+            M::residual::<R>(self.points, self.f);
+        }
+    }
+}
+
+/// See [`Work::place`] and [`Work::place_unknowns`].
+struct Place<'a, M: Dae, E: Plain, const S: usize, const UNKNOWNS: bool> {
+    points: &'a mut ArrayV<M, [E; S]>,
+    jacobian: &'a M::Jacobian<[E; S]>,
+    x: &'a ArrayX<M, E>,
+    y: &'a ArrayK<M, [E; S]>,
+    a: &'a [[E; S]; S],
+    c: &'a [E; S],
+    time: Times<E>,
+    step: usize,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const UNKNOWNS: bool> Kernel for Place<'_, M, E, S, UNKNOWNS> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { points, jacobian, x, y, a, c, time, step } = self;
+        let (points, x, y) = (points.as_mut(), x.as_ref(), y.as_ref());
+        let (h, nx) = (time.step, x.len());
+        if let Some(t) = points.last_mut() {
+            let start = E::from_whole(step);
+            for (t, &c) in t.iter_mut().zip(c) {
+                *t = time.start + h * (start + c);
+            }
+        }
+        if y.len() < nx || points.len() < nx + y.len() {
+            return;
+        }
+        let minus_ha = coupling(a, h);
+        // Of kinematic states, which are most often the first or the last, there is nothing to
+        // copy.
+        let (first, end) = if UNKNOWNS { const { unknowns::<M>() } } else { (0, y.len()) };
+        let k = first..nx.min(end).max(first);
+        let (xdot, rest) = points.split_at_mut(nx);
+        let (xi, rest) = rest.split_at_mut(nx);
+        rest[..y.len() - nx].copy_from_slice(&y[nx..]);
+        let own_x = x.get(k.clone()).unwrap_or_default().iter();
+        let (own_xdot, own_xi) = (xdot.get_mut(k.clone()), xi.get_mut(k.clone()));
+        let places = own_xdot.unwrap_or_default().iter_mut().zip(own_xi.unwrap_or_default());
+        let own_y = y.get(k.clone()).unwrap_or_default();
+        for ((((xdot, xi), &x), state), k) in places.zip(own_x).zip(k).zip(own_y) {
+            if !(UNKNOWNS && (const { !are_together::<M>() }) && linalg::kinematic::<M>(state).is_some()) {
+                (*xdot, *xi) = (*k, stage_values::<A, E, S>(x, &minus_ha, k));
+            }
+        }
+        if UNKNOWNS {
+            each_row::<A, _>(&mut Reconstruct::<M, E, S> { points, jacobian, x, minus_ha });
+        }
+    }
+}
+
+/// Kinematic states and their derivatives, once their velocities are there.
+struct Reconstruct<'a, M: Dae, E: Plain, const S: usize> {
+    points: &'a mut [[E; S]],
+    jacobian: &'a M::Jacobian<[E; S]>,
+    x: &'a [E],
+    minus_ha: Block<E, S>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtRow for Reconstruct<'_, M, E, S> {
+    const ROWS: usize = kinematic::count::<M>();
+    const INSTRUCTIONS: usize = 3 * S;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, state: usize) {
+        let Some(k) = derivative::<M, E, S>(state, self.jacobian, self.points) else { return };
+        let (Some(&x), Some(xdot)) = (self.x.get(state), self.points.get_mut(state)) else { return };
+        *xdot = k;
+        if let Some(xi) = self.points.get_mut(M::Shape::NX + state) {
+            *xi = stage_values::<A, E, S>(x, &self.minus_ha, &k);
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Where Newton's method starts: the unknowns of the stages before its first iteration.
+
+use crate::irk::coefficients::Coefficients;
+use crate::irk::workspace::{Step, Work};
+use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::memory::Fallback;
+use crate::model::{ArrayK, Dae};
+use crate::scalar::{Field, Lanes};
+use crate::shape::{Shape, assign};
+
+/// Where the unknowns of the stages start.
+pub(crate) enum InitialGuess<'a, M: Dae, E: Lanes, const S: usize> {
+    /// At the start values of the model.
+    Nominal,
+    Zero,
+    Given,
+    Previous(&'a [Step<M, E, S>]),
+    /// These are solutions.
+    Solution(&'a [Step<M, E, S>]),
+}
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// Start values of the stages of step `n`: after the first one the polynomial of the step
+    /// before, continued, or if that is not worth much its algebraic states.
+    pub(crate) fn start(
+        &mut self,
+        coefficients: &Coefficients<E, S>,
+        from: &InitialGuess<'_, M, E, S>,
+        n: usize,
+        before: Option<&Step<M, E, S>>,
+        y: &mut ArrayK<M, [E; S]>,
+    ) {
+        self.alike = false;
+        match (from, before, &coefficients.next) {
+            (InitialGuess::Previous(record) | InitialGuess::Solution(record), ..) => {
+                if let Some(record) = record.get(n) {
+                    assign(y, &record.y);
+                }
+            }
+            (_, Some(before), Some(next)) => {
+                dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
+            }
+            (InitialGuess::Nominal | InitialGuess::Zero, ..) => {
+                y.as_mut().fill([E::from_f64(0.0); S]);
+                self.alike = M::STRUCTURE.autonomous;
+                if matches!(from, InitialGuess::Nominal) {
+                    for (y, start) in y.as_mut().iter_mut().zip(M::START) {
+                        *y = [E::from_f64(*start); S];
+                    }
+                    self.alike &= const { starts_at_rest::<M>() };
+                }
+            }
+            (InitialGuess::Given, ..) => {
+                for (y, given) in y.as_mut().iter_mut().zip(self.given.as_ref()) {
+                    *y = [*given; S];
+                }
+            }
+        }
+        if coefficients.next.is_none()
+            && !matches!(from, InitialGuess::Previous(_) | InitialGuess::Solution(_))
+        {
+            stay(before, y);
+        }
+    }
+}
+
+/// Algebraic states as at the last stage of the step before: on its branch.
+pub(in crate::irk) fn stay<M: Dae, E: Lanes, const S: usize>(
+    before: Option<&Step<M, E, S>>,
+    y: &mut ArrayK<M, [E; S]>,
+) {
+    let Some(before) = before else { return };
+    for (y, before) in y.as_mut().iter_mut().zip(before.y.as_ref()).skip(M::Shape::NX) {
+        if let Some(&last) = before.last() {
+            *y = [last; S];
+        }
+    }
+}
+
+/// Whether every `ẋ` starts at zero: then states are the same at all stages.
+const fn starts_at_rest<M: Dae>() -> bool {
+    let mut unknown = 0;
+    while unknown < M::Shape::NX && unknown < M::START.len() {
+        if M::START[unknown] != 0.0 {
+            return false;
+        }
+        unknown += 1;
+    }
+    true
+}
+
+/// The polynomial through the stages at those of the next step.
+struct Continue<'a, E, const S: usize> {
+    from: &'a [[E; S]],
+    next: &'a [[E; S]; S],
+    to: &'a mut [[E; S]],
+}
+
+impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let zero = E::from_f64(0.0);
+        // By columns: the stages of an unknown are a vector.
+        let mut next = [[zero; S]; S];
+        for (i, row) in self.next.iter().enumerate() {
+            for (column, &l) in next.iter_mut().zip(row) {
+                column[i] = -l;
+            }
+        }
+        for (to, from) in self.to.iter_mut().zip(self.from) {
+            let mut sum = [zero; S];
+            for (column, &value) in next.iter().zip(from) {
+                for (sum, &element) in sum.iter_mut().zip(column) {
+                    *sum = A::subtract(*sum, element, value);
+                }
+            }
+            *to = sum;
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! What is remembered about steps, and the memory that all calls work in.
+
+use super::stage_array::Stages;
+use crate::linalg::{Factors, MeanFactors};
+use crate::memory::{Fallback, fallback::Pivoting};
+use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
+use crate::result::{Dense, Nominal};
+use crate::scalar::{Lanes, Strided};
+use crate::shape::{Aligned, Plain, assign};
+use bytemuck::Zeroable;
+
+/// `Copy` without the bounds of a derive.
+macro_rules! copy {
+    ([$($generics:tt)*] $type:ty) => {
+        impl<$($generics)*> Clone for $type {
+            fn clone(&self) -> Self {
+                *self
+            }
+        }
+        impl<$($generics)*> Copy for $type {}
+    };
+}
+pub(crate) use copy;
+
+/// One step: all that is needed to find out anything else about it.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Step<M: Dae, T: Plain, const S: usize> {
+    /// The state at its start.
+    pub(crate) x: ArrayX<M, T>,
+    /// The unknowns `(k, z)` at its stages.
+    pub(crate) y: Aligned<ArrayK<M, [T; S]>>,
+}
+
+/// What a call was given, besides the state at its start.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(crate) struct Inputs<M: Dae, T: Plain> {
+    pub u: VectorU<M, T>,
+    pub p: VectorP<M, T>,
+    pub time: Times<T>,
+}
+
+/// Where an interval is.
+#[derive(Clone, Copy, Zeroable)]
+pub(crate) struct Times<T> {
+    /// Its start.
+    pub start: T,
+    /// Its length.
+    pub interval: T,
+    /// The length of one of its steps.
+    pub step: T,
+}
+
+/// The linearisation of the stages of a step.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(crate) struct Linearization<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
+    /// Entries of the Jacobian of the model, each at all stages.
+    pub jacobian: Aligned<Stages<M::Jacobian<[T; S]>, T, S>>,
+    /// Factors of the Newton matrix.
+    pub factors: Factors<M, T, S, F>,
+}
+
+/// The memory that every call works in.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
+    /// The solution of the last call.
+    pub(crate) result: Nominal<M, T>,
+    /// The solution at the last time that was asked for.
+    pub(crate) dense: Dense<M, T>,
+    /// What the last call was given.
+    pub(crate) inputs: Inputs<M, T>,
+    /// What the last successful call was given.
+    pub(crate) kept: Inputs<M, T>,
+    /// Parameters as they were set.
+    pub(crate) parameters: VectorP<M, T>,
+    /// Start values as they were given.
+    pub(crate) given: ArrayK<M, T>,
+    /// The state at the start of the step, then at its end.
+    pub(crate) x: ArrayX<M, T>,
+    /// What was rounded off from it, if sums are compensated.
+    pub(crate) rest: ArrayX<M, T>,
+    /// Variables of the model, each at all stages.
+    pub(crate) points: Aligned<Stages<ArrayV<M, [T; S]>, T, S>>,
+    /// The residual at all stages.
+    pub(crate) f: Aligned<Stages<ArrayK<M, [T; S]>, T, S>>,
+    /// The residual in the slots of the equations, then the increment.
+    pub(crate) increment: Aligned<ArrayK<M, [[T; 1]; S]>>,
+    /// Reciprocals of the sizes of the unknowns, which increments are measured by.
+    pub(crate) weights: ArrayK<M, T>,
+    /// The sizes of the last increments.
+    pub(crate) sizes: ArrayK<M, T>,
+    pub(crate) linear: Linearization<M, T, S, F>,
+    /// Factors of the mean Jacobian of the stages, which iterations take where that is cheaper.
+    pub(crate) mean: F::Place<MeanFactors<M, T, S>>,
+    /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While
+    /// stages are solved with compensated sums, what they are beyond their digits.
+    pub(crate) probe: [Aligned<ArrayV<M, [T; S]>>; 2],
+    pub(crate) terms: Aligned<ArrayK<M, [T; S]>>,
+    /// What the factors that are there are good for.
+    pub(crate) validity: Validity,
+    /// Whether the constant entries of the Jacobian are there.
+    pub(crate) ready: bool,
+    /// Whether start values are solutions but for their last digits.
+    pub(crate) near: bool,
+    /// Whether the model has the same values at all stages when it is evaluated next.
+    pub(crate) alike: bool,
+    /// Whether its Jacobian, the same at all stages, is there for the first one only.
+    pub(crate) first_only: bool,
+}
+
+/// What factors that are there are good for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Zeroable)]
+pub(crate) struct Validity {
+    /// They belong to this call, and to its size of steps.
+    pub factors: bool,
+    /// Those of the mean Jacobian do.
+    pub mean: bool,
+    /// How fast Newton's method converged with them, `θ`; zero if it is not known.
+    pub rate: f64,
+}
+
+copy!([M: Dae, T: Plain, const S: usize] Step<M, T, S>);
+copy!([M: Dae, T: Plain] Inputs<M, T>);
+copy!([M: Dae, T: Plain, const S: usize, F: Fallback] Linearization<M, T, S, F>);
+copy!([M: Dae, T: Lanes, const S: usize, F: Fallback] Work<M, T, S, F>);
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Linearization<M, E, S, F> {
+    /// Copies what holds.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        assign(&mut self.jacobian, &other.jacobian);
+        self.factors.copy_from(&other.factors);
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
+    /// The linearisation of a step that was remembered, or else the one that is here.
+    pub(crate) fn linear<'a>(
+        &'a self,
+        kept: Option<&'a Linearization<M, E, S, F>>,
+    ) -> &'a Linearization<M, E, S, F> {
+        kept.unwrap_or(&self.linear)
+    }
+
+    /// To be called before anything else.
+    pub(crate) fn prepare(&mut self) {
+        if !self.ready {
+            for stage in 0..S {
+                M::jacobian_constants::<Strided<E, S>>(self.linear.jacobian.seen_from_mut(stage));
+            }
+            self.ready = true;
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! What kernels multiply and subtract with: rounded twice, or once where a machine has the
+//! instruction.
+
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+use crate::scalar::Known;
+use crate::scalar::{Field, transposed};
+
+/// An s×s matrix, column after column.
+pub type Block<E, const S: usize> = [[E; S]; S];
+
+/// How `t − a b` is computed.
+pub trait Arithmetic {
+    /// Whether it rounds once: it is that of machines that matter, which loops become straight
+    /// lines for.
+    const FUSED: bool = false;
+    /// Whether numbers side by side fill the registers of AVX-512.
+    const WIDE: bool = false;
+    /// `t − a b`
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E;
+    /// `target − left · right`
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_blocks<E: Field, const S: usize>(
+        target: &mut Block<E, S>,
+        left: &Block<E, S>,
+        right: &Block<E, S>,
+    ) {
+        for (target, right) in target.iter_mut().zip(right) {
+            Self::subtract_columns(target, left, right);
+        }
+    }
+    /// `target − block · x`
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
+        for (column, &x) in block.iter().zip(x) {
+            for (target, &element) in target.iter_mut().zip(column) {
+                *target = Self::subtract(*target, element, x);
+            }
+        }
+    }
+    /// `target − factor · row`
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
+        for (target, &element) in target.iter_mut().zip(row) {
+            *target = Self::subtract(*target, factor, element);
+        }
+    }
+    /// `target = block`, in as few instructions as the numbers will be read in: until all that it
+    /// wants has arrived in the nearest cache, a wider one would wait.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
+        *target = *block;
+    }
+    /// Rows as columns.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
+        transposed(rows)
+    }
+    /// `target − a b`, element by element
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
+        for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
+            *target = Self::subtract(*target, a, b);
+        }
+    }
+}
+
+/// Rounded twice.
+#[cfg(any(test, not(target_arch = "aarch64")))]
+pub struct Separate;
+
+#[cfg(any(test, not(target_arch = "aarch64")))]
+impl Arithmetic for Separate {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E {
+        t - a * b
+    }
+}
+
+/// Rounded once, in one instruction. Kernels are run with it by [`dispatch`] alone, where the
+/// machine has the instructions; so it says that these are [`Known`]. On numbers side by side in
+/// registers as `WIDE` as those of AVX-512 are, or half as wide.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+pub struct Fused<const WIDE: bool>;
+
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+impl<const WIDE: bool> Arithmetic for Fused<WIDE> {
+    const FUSED: bool = true;
+    const WIDE: bool = WIDE;
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract<E: Field>(t: E, a: E, b: E) -> E {
+        t.subtract_product(a, b)
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_blocks<E: Field, const S: usize>(
+        target: &mut Block<E, S>,
+        left: &Block<E, S>,
+        right: &Block<E, S>,
+    ) {
+        E::subtract_blocks(target, left, right, Known::<WIDE>::here());
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_columns<E: Field, const S: usize>(target: &mut [E; S], block: &Block<E, S>, x: &[E; S]) {
+        E::subtract_columns(target, block, x, Known::<WIDE>::here());
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_row<E: Field, const W: usize>(target: &mut [E; W], factor: E, row: &[E; W]) {
+        E::subtract_row(target, factor, row, Known::<WIDE>::here());
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn write<E: Field, const S: usize>(target: &mut Block<E, S>, block: &Block<E, S>) {
+        E::write_block(target, block, Known::<WIDE>::here());
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn transposed<E: Field, const N: usize>(rows: &[[E; N]; N]) -> [[E; N]; N] {
+        E::transposed(rows, Known::<WIDE>::here())
+    }
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn subtract_products<E: Field, const W: usize>(target: &mut [E; W], a: &[E; W], b: &[E; W]) {
+        E::subtract_products(target, a, b, Known::<WIDE>::here());
+    }
+}

@@ -1,0 +1,143 @@
+//! Kernels compiled for every machine, and for those that multiply and add in one instruction:
+//! AVX2, AVX-512.
+//!
+//! A plain x86-64 binary must run on machines without AVX2 and FMA. So a kernel is generic over its
+//! [`Arithmetic`], everything in it is inlined, and [`dispatch`] enters it through a function that
+//! is compiled for the better machine if this is one. Results differ by rounding only.
+
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+use super::arithmetic::Arithmetic;
+#[cfg(target_arch = "x86_64")]
+use crate::scalar::lanes::{Level, level};
+#[cfg(target_arch = "x86_64")]
+use core::mem::ManuallyDrop;
+
+/// A computation that is worth being compiled for the machine it runs on.
+pub trait Kernel {
+    /// What it computes with.
+    type Number;
+    /// Its result.
+    type Output;
+    /// Whether it is long: AVX-512 then takes fewer instructions, as it multiplies by numbers that
+    /// are still in memory.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
+    const WIDE: bool = false;
+    /// To be `#[inline(always)]`, with everything that it calls.
+    fn run<A: Arithmetic>(self) -> Self::Output;
+}
+
+/// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
+/// side by side: with all kernels in one the aircraft would take a tenth longer.
+///
+/// Those with instructions that not every machine has find the kernel where it was made: it is made
+/// of pointers, one after the other, and a copy would be made of two at a time, which the processor
+/// waits for until both have arrived in the nearest cache. (Calls of the pendulum took up to a
+/// fifth more.)
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod compiled {
+    pub mod base {
+        use super::super::Kernel;
+        use crate::linalg::kernel::arithmetic::Separate;
+
+        // Never inlined beside others, so that callers are small. Where it is the only one, the
+        // optimiser is to see from outside that nothing in it panics.
+        #[cfg_attr(feature = "std", inline(never))]
+        #[cfg_attr(not(feature = "std"), inline(always))]
+        pub fn run<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run::<Separate>()
+        }
+    }
+
+    pub mod avx2 {
+        use super::super::Kernel;
+        use crate::linalg::kernel::arithmetic::Fused;
+        use core::mem::ManuallyDrop;
+
+        /// # Safety
+        /// Nobody else may take the kernel.
+        #[target_feature(enable = "avx2,fma")]
+        pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
+            // SAFETY: the caller's promise; and nobody drops it.
+            unsafe { ManuallyDrop::take(kernel) }.run::<Fused<false>>()
+        }
+    }
+
+    pub mod avx512 {
+        use super::super::Kernel;
+        use crate::linalg::kernel::arithmetic::Fused;
+        use core::mem::ManuallyDrop;
+
+        /// # Safety
+        /// Nobody else may take the kernel.
+        #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
+        pub unsafe fn run<K: Kernel>(kernel: &mut ManuallyDrop<K>) -> K::Output {
+            // SAFETY: the caller's promise; and nobody drops it.
+            unsafe { ManuallyDrop::take(kernel) }.run::<Fused<true>>()
+        }
+    }
+}
+
+/// Runs a kernel as this machine does it best.
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    use compiled::{avx2, avx512, base};
+    // Numbers that are registers, which are aligned to themselves, need what these are made of, and
+    // nothing else. Of other kernels short ones are up to a tenth faster without AVX-512; and
+    // unoptimised programs, where each copy of a kernel is much to compile and none is fast, have
+    // the one copy that runs everywhere.
+    if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
+        return base::run(kernel);
+    }
+    // One of those that follow takes it, and nobody after that.
+    let mut kernel = ManuallyDrop::new(kernel);
+    if const { align_of::<K::Number>() > 32 } {
+        // SAFETY: the other condition of calling a function with target features is that the
+        // machine has them. Numbers are `Real`, registers, or made of such, and no type of a user's
+        // can be any of these (`Lanes` is sealed). So what is aligned like this is made of
+        // registers of AVX-512, with which drivers compute only after detection; see the head of
+        // `lanes`.
+        unsafe { avx512::run(&mut kernel) }
+    } else if const { align_of::<K::Number>() == 32 && !K::WIDE } {
+        // SAFETY: the same of AVX2.
+        unsafe { avx2::run(&mut kernel) }
+    } else if const { align_of::<K::Number>() == 32 } {
+        match level() {
+            // SAFETY: `level` says what the machine has.
+            Level::Avx512 => unsafe { avx512::run(&mut kernel) },
+            // SAFETY: as above.
+            _ => unsafe { avx2::run(&mut kernel) },
+        }
+    } else if const { K::WIDE } {
+        match level() {
+            // SAFETY: `level` says what the machine has.
+            Level::Avx512 => unsafe { avx512::run(&mut kernel) },
+            // SAFETY: as above.
+            Level::Avx2 => unsafe { avx2::run(&mut kernel) },
+            _ => base::run(ManuallyDrop::into_inner(kernel)),
+        }
+    } else {
+        match level() {
+            // SAFETY: as above.
+            Level::Avx512 | Level::Avx2 => unsafe { avx2::run(&mut kernel) },
+            _ => base::run(ManuallyDrop::into_inner(kernel)),
+        }
+    }
+}
+
+/// Runs a kernel as this machine does it best: every 64-bit Arm multiplies and adds in one
+/// instruction.
+#[cfg(target_arch = "aarch64")]
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Fused<false>>()
+}
+
+/// Runs a kernel in the way that every machine has.
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Separate>()
+}

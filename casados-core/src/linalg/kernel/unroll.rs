@@ -1,0 +1,212 @@
+//! Loops over the constant tables of a model, as straight lines where they are short.
+//!
+//! The optimiser sees through constant tables only where indices are constants too. In a straight
+//! line addresses of blocks and rows are part of the instructions; in a loop most instructions of a
+//! small block are spent on finding it: a solve with the blocks of two stages takes a fifth of the
+//! instructions.
+
+use crate::linalg::kernel::arithmetic::Arithmetic;
+use crate::model::{Dae, Pivot, Supernode, Update};
+
+// Where nothing is optimised straight lines would only be long, and in firmware memory is dearer
+// than time.
+#[cfg(any(test, all(feature = "std", not(debug_assertions))))]
+mod lines;
+
+/// Whether there are lines at all.
+const WANTED: bool = cfg!(all(feature = "std", not(debug_assertions)));
+
+/// So many rows are left to the optimiser to unroll.
+const CHUNK: usize = 8;
+
+/// So many chunks, and so many pivots, can be written one after the other.
+const MOST: usize = 48;
+
+/// They are not longer than so many instructions: they share the nearest cache, and take long to
+/// compile.
+const MOST_INSTRUCTIONS: usize = 2000;
+
+/// So much longer they may be where each step has so few instructions that a loop would spend most
+/// of its time on finding what it is about: rows of `FEW`, and updates of blocks of one number.
+/// (The aircraft with four stages takes 2 to 6 % less. Lines of solves would be another 1 %, and a
+/// third of the time to compile it.)
+const LONGER: usize = 2;
+const FEW: usize = 8;
+
+/// What is done with each row of a table.
+pub trait AtRow {
+    /// The rows of the table.
+    const ROWS: usize;
+    /// About how many instructions each takes.
+    const INSTRUCTIONS: usize;
+    /// To be `#[inline(always)]`.
+    fn at<A: Arithmetic>(&mut self, row: usize);
+    /// So many of the first rows need only what [`simple`](Self::simple) does.
+    const SIMPLE: usize = 0;
+    /// What a loop does with these instead, without branches. To be `#[inline(always)]`.
+    #[inline(always)]
+    fn simple(&mut self, _row: usize) {}
+}
+
+/// Whether the rows of a table are a straight line.
+pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
+    let most = if V::INSTRUCTIONS <= FEW { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
+    WANTED && A::FUSED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= most
+}
+
+/// All rows of a table.
+#[inline(always)]
+pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
+    if const { is_short::<A, V>() } {
+        #[cfg(all(feature = "std", not(debug_assertions)))]
+        return lines::each_row::<A, V>(visit);
+    }
+    for row in 0..V::SIMPLE {
+        visit.simple(row);
+    }
+    for row in V::SIMPLE..V::ROWS {
+        visit.at::<A>(row);
+    }
+}
+
+/// What is done at each pivot of a plan.
+pub trait AtPivot {
+    /// About how many instructions that takes for each block of the factors, or for each update of
+    /// one.
+    const INSTRUCTIONS: usize;
+    /// Whether it is done for each update, or for each block.
+    const UPDATES: bool = false;
+    /// Whether it looks at the pivots that follow, on the way from the last to the first.
+    const OTHERS: bool = false;
+    /// With the pivots that follow in the plan. To be `#[inline(always)]`.
+    fn at<A: Arithmetic>(
+        &mut self,
+        pivot: &'static Pivot,
+        others: &'static [Pivot],
+        updates: &'static [Update],
+    );
+}
+
+/// From the first pivot to the last.
+#[inline(always)]
+pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    if const { is_short_plan::<A, M, V>() } {
+        #[cfg(all(feature = "std", not(debug_assertions)))]
+        return lines::from_first::<A, M, V>(visit);
+    }
+    let (mut pivots, mut updates) = (M::STRUCTURE.elimination.pivots, M::STRUCTURE.elimination.updates);
+    while let Some((pivot, others)) = pivots.split_first() {
+        let Some((own, rest)) = updates.split_at_checked(updates_of(pivot)) else { return };
+        (pivots, updates) = (others, rest);
+        visit.at::<A>(pivot, others, own);
+    }
+}
+
+/// From the last pivot to the first, without updates; with those that follow where they are asked
+/// for.
+#[inline(always)]
+pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    if const { is_short_plan::<A, M, V>() } {
+        #[cfg(all(feature = "std", not(debug_assertions)))]
+        return lines::from_last::<A, M, V>(visit);
+    }
+    let all = M::STRUCTURE.elimination.pivots;
+    // The optimiser makes a straight line of a loop over indices where a plan is short, as in
+    // firmware, but not of one that goes backwards through a slice, which is faster where it stays
+    // a loop.
+    if const { !V::OTHERS && cfg!(feature = "std") } {
+        for pivot in all.iter().rev() {
+            visit.at::<A>(pivot, &[], &[]);
+        }
+        return;
+    }
+    let mut index = all.len();
+    while index > 0 {
+        index -= 1;
+        if let Some((pivot, others)) = all.get(index..).and_then(|pivots| pivots.split_first()) {
+            visit.at::<A>(pivot, others, &[]);
+        }
+    }
+}
+
+/// Whether pivots of a [supernode](Supernode) are taken together. In firmware each is one of its
+/// own.
+pub const GROUPED: bool = cfg!(feature = "std");
+
+/// What is done at each supernode of a plan.
+pub trait AtSupernode {
+    /// About how many instructions that takes for each block of the factors.
+    const INSTRUCTIONS: usize;
+    /// With all of its pivots. To be `#[inline(always)]`.
+    fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]);
+}
+
+/// At the turn of its first pivot.
+struct AtFirst<'a, V>(&'a mut V);
+
+impl<V: AtSupernode> AtPivot for AtFirst<'_, V> {
+    const INSTRUCTIONS: usize = V::INSTRUCTIONS;
+    const OTHERS: bool = true;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, others: &'static [Pivot], _: &'static [Update]) {
+        if const { !GROUPED } {
+            return self.0.at::<A, 1>([pivot]);
+        }
+        match (pivot.supernode, others) {
+            (4, [second, third, fourth, ..]) => self.0.at::<A, 4>([pivot, second, third, fourth]),
+            (3, [second, third, ..]) => self.0.at::<A, 3>([pivot, second, third]),
+            (2, [second, ..]) => self.0.at::<A, 2>([pivot, second]),
+            (1, _) => self.0.at::<A, 1>([pivot]),
+            _ => {}
+        }
+    }
+}
+
+/// From the first supernode to the last.
+#[inline(always)]
+pub fn supernodes_from_first<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+    if const { !GROUPED || is_short_plan::<A, M, AtFirst<'_, V>>() } {
+        return from_first::<A, M, _>(&mut AtFirst(visit));
+    }
+    for supernode in M::STRUCTURE.elimination.supernodes {
+        at_supernode::<A, M, V>(visit, supernode);
+    }
+}
+
+/// From the last supernode to the first.
+#[inline(always)]
+pub fn supernodes_from_last<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V) {
+    if const { !GROUPED || is_short_plan::<A, M, AtFirst<'_, V>>() } {
+        return from_last::<A, M, _>(&mut AtFirst(visit));
+    }
+    for supernode in M::STRUCTURE.elimination.supernodes.iter().rev() {
+        at_supernode::<A, M, V>(visit, supernode);
+    }
+}
+
+#[inline(always)]
+fn at_supernode<A: Arithmetic, M: Dae, V: AtSupernode>(visit: &mut V, supernode: &'static Supernode) {
+    let pivots = M::STRUCTURE.elimination.pivots.get(supernode.first as usize..);
+    if let Some((pivot, others)) = pivots.and_then(|pivots| pivots.split_first()) {
+        AtFirst(visit).at::<A>(pivot, others, &[]);
+    }
+}
+
+/// Whether kernels that go through all blocks of a plan are long.
+#[cfg_attr(not(target_arch = "x86_64"), allow(dead_code))] // Nobody asks elsewhere.
+pub const fn is_long<M: Dae, const S: usize>() -> bool {
+    M::STRUCTURE.elimination.slots.len() * S * S > 250
+}
+
+const fn is_short_plan<A: Arithmetic, M: Dae, V: AtPivot>() -> bool {
+    let plan = &M::STRUCTURE.elimination;
+    let few = V::UPDATES && V::INSTRUCTIONS <= FEW;
+    let most = if few { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
+    let count = if V::UPDATES { plan.updates.len() } else { plan.slots.len() };
+    WANTED && A::FUSED && plan.pivots.len() <= MOST && count * V::INSTRUCTIONS <= most
+}
+
+/// How many blocks a pivot updates.
+const fn updates_of(pivot: &Pivot) -> usize {
+    ((pivot.upper - pivot.block - 1) * (pivot.end - pivot.upper)) as usize
+}

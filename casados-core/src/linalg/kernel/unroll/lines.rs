@@ -1,0 +1,124 @@
+//! The lines themselves: an expression for each row or pivot.
+//!
+//! The compiler looks at all of them for each function that goes this way, short or not, and finds
+//! their constants: without optimisation that took most of its time.
+#![cfg_attr(any(debug_assertions, not(feature = "std")), allow(dead_code))] // Tests only.
+
+use super::{AtPivot, AtRow, CHUNK, updates_of};
+use crate::linalg::kernel::arithmetic::Arithmetic;
+use crate::model::{Dae, Elimination, Pivot, Update};
+use core::marker::PhantomData;
+
+/// One expression for each number from zero on, or down to zero.
+macro_rules! forwards {
+    ($each:ident!($($arguments:tt)*)) => {
+        $each!($($arguments)*: 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23
+            24 25 26 27 28 29 30 31 32 33 34 35 36 37 38 39 40 41 42 43 44 45 46 47)
+    };
+}
+macro_rules! backwards {
+    ($each:ident!($($arguments:tt)*)) => {
+        $each!($($arguments)*: 47 46 45 44 43 42 41 40 39 38 37 36 35 34 33 32 31 30 29 28 27 26 25 24
+            23 22 21 20 19 18 17 16 15 14 13 12 11 10 9 8 7 6 5 4 3 2 1 0)
+    };
+}
+
+/// A chunk of rows.
+macro_rules! chunk {
+    ($A:ty, $V:ty, $visit:ident: $($n:literal)*) => {
+        $(if const { $n * CHUNK < <$V>::ROWS } {
+            for row in $n * CHUNK..const { smaller(($n + 1) * CHUNK, <$V>::ROWS) } {
+                $visit.at::<$A>(row);
+            }
+        })*
+    };
+}
+
+const fn smaller(a: usize, b: usize) -> usize {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+pub fn each_row<A: Arithmetic, V: AtRow>(visit: &mut V) {
+    forwards!(chunk!(A, V, visit));
+}
+
+/// A pivot.
+macro_rules! pivot {
+    ($A:ty, $M:ty, $visit:ident: $($n:literal)*) => {
+        $(if Nth::<$M, $n>::EXISTS && let Some((pivot, others, updates)) = Nth::<$M, $n>::PIVOT {
+            $visit.at::<$A>(pivot, others, updates);
+        })*
+    };
+}
+
+/// A pivot of a plan by its number: found once for each model, and not once more for each function
+/// that goes through its pivots.
+struct Nth<M, const N: usize>(PhantomData<M>);
+
+impl<M: Dae, const N: usize> Nth<M, N> {
+    const EXISTS: bool = Self::PIVOT.is_some();
+    const PIVOT: Option<At> = nth(&M::STRUCTURE.elimination, N);
+}
+
+/// A pivot, those that follow, and its updates.
+type At = (&'static Pivot, &'static [Pivot], &'static [Update]);
+
+const fn nth(plan: &Elimination, n: usize) -> Option<At> {
+    if n >= plan.pivots.len() {
+        return None;
+    }
+    let (mut begin, mut index) = (0, 0);
+    while index < n {
+        begin += updates_of(&plan.pivots[index]);
+        index += 1;
+    }
+    let pivot = &plan.pivots[n];
+    let updates = plan.updates.split_at(begin).1.split_at(updates_of(pivot)).0;
+    Some((pivot, plan.pivots.split_at(n + 1).1, updates))
+}
+
+#[inline(always)]
+pub fn from_first<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    forwards!(pivot!(A, M, visit));
+}
+
+#[inline(always)]
+pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
+    backwards!(pivot!(A, M, visit));
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::super::MOST;
+    use super::*;
+    use crate::linalg::kernel::arithmetic::Separate;
+    use alloc::vec::Vec;
+
+    /// Writes down where it comes by.
+    struct Path<const ROWS: usize>(Vec<usize>);
+
+    impl<const ROWS: usize> AtRow for Path<ROWS> {
+        const ROWS: usize = ROWS;
+        const INSTRUCTIONS: usize = 1;
+        fn at<A: Arithmetic>(&mut self, row: usize) {
+            self.0.push(row);
+        }
+    }
+
+    fn rows<const ROWS: usize>() {
+        let mut path = Path::<ROWS>(Vec::new());
+        each_row::<Separate, _>(&mut path);
+        assert_eq!(path.0, (0..ROWS).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_line_has_every_row_once() {
+        rows::<0>();
+        rows::<1>();
+        rows::<8>();
+        rows::<9>();
+        rows::<{ MOST * CHUNK - 1 }>();
+        rows::<{ MOST * CHUNK }>();
+    }
+}

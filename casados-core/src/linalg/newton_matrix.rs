@@ -1,0 +1,265 @@
+//! Factors of the Newton matrix `J_ij = δ_ij [f_ẋ,i | f_z,i] + h a_ij [f_x,i | 0]`.
+
+use super::block::coupling;
+use super::dense_lu::Dense;
+use super::kernel::dispatch::{Kernel, dispatch};
+use super::kernel::unroll::{AtRow, each_row};
+use super::kernel::vector::axpy;
+use super::sparse_lu::factor::{self, Planned};
+use super::sparse_lu::solve;
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::memory::{Fallback, Kept, fallback::Pivoting};
+use crate::model::{ArrayK, Dae, Kinematic};
+use crate::scalar::{Field, Lanes, Real};
+use crate::shape::{Aligned, Array, Plain, Shape, assign};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// The row of right-hand sides that belongs to an equation: that of the unknown whose pivot it is.
+#[inline(always)]
+pub fn slot<M: Dae>(equation: usize) -> usize {
+    match M::STRUCTURE.elimination.slot_of_equation.get(equation) {
+        Some(&slot) => slot as usize,
+        None => equation,
+    }
+}
+
+/// What is known of the state of a slot, if it is [kinematic](Kinematic).
+#[inline(always)]
+pub const fn kinematic<M: Dae>(slot: usize) -> Option<&'static Kinematic> {
+    let kinematic = M::STRUCTURE.elimination.kinematic;
+    if slot < kinematic.len() && kinematic[slot].equation != Kinematic::NONE {
+        Some(&kinematic[slot])
+    } else {
+        None
+    }
+}
+
+/// The factors, by the plan or dense.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct Factors<M: Dae, T: Plain, const S: usize, F: Fallback = Pivoting> {
+    blocks: Aligned<M::Factors<Block<T, S>>>,
+    /// Memory that is touched only where the plan is not good enough.
+    dense: F::Place<Dense<M, T, S>>,
+    /// Whether the dense factors are the ones that hold.
+    is_dense: bool,
+}
+
+impl<M: Dae, T: Plain, const S: usize, F: Fallback> Clone for Factors<M, T, S, F> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, T: Plain, const S: usize, F: Fallback> Copy for Factors<M, T, S, F> {}
+
+impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Factors<M, E, S, F> {
+    /// Factors by the plan, of the matrix of these Jacobian entries, each with its value at all
+    /// stages. A pivot that vanishes leaves elements that are not finite.
+    pub fn factor_by_plan(&mut self, jacobian: &M::Jacobian<[E; S]>, a: &[[E; S]; S], h: E) {
+        self.is_dense = false;
+        let blocks = &mut self.blocks;
+        dispatch(Assemble::<M, E, S> { jacobian, a, h, blocks });
+        factor::factor::<M, E, S>(blocks.as_mut());
+    }
+
+    /// Solves `J X = B` in place, all columns of `B` at once; equations are in their slots. Rows of
+    /// kinematic states stay.
+    pub fn solve<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        match self.dense() {
+            Some(dense) => dense.solve(b),
+            None => solve::solve(self.planned(), b.as_mut()),
+        }
+    }
+
+    /// Solves `Jᵀ X = B` in place, all columns of `B` at once; the solution has equations in their
+    /// slots. Rows of kinematic states stay.
+    pub fn solve_transposed<R: Array<E>>(&self, b: &mut ArrayK<M, [R; S]>) {
+        match self.dense() {
+            Some(dense) => dense.solve_transposed(b),
+            None => solve::solve_transposed(self.planned(), b.as_mut()),
+        }
+    }
+
+    /// The factors by the plan.
+    pub fn planned(&self) -> Planned<'_, M, E, S> {
+        Planned { model: PhantomData, blocks: self.blocks.as_ref() }
+    }
+
+    /// Whether the factors that are there are those of the plan.
+    pub fn is_planned(&self) -> bool {
+        self.dense().is_none()
+    }
+
+    /// The factors of the whole matrix, if they are the ones that hold.
+    #[inline(always)]
+    fn dense(&self) -> Option<&Dense<M, E, S>> {
+        self.dense.get().filter(|_| self.is_dense)
+    }
+
+    /// Copies what holds.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.is_dense = other.is_dense;
+        if let (Some(to), Some(from)) = (self.dense.get_mut(), other.dense()) {
+            assign(to, from);
+        } else {
+            assign(&mut self.blocks, &other.blocks);
+        }
+    }
+}
+
+/// All blocks of the Newton matrix, each written once.
+struct Assemble<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    a: &'a [[E; S]; S],
+    h: E,
+    blocks: &'a mut M::Factors<Block<E, S>>,
+}
+
+impl<M: Dae, E: Field + Plain, const S: usize> Kernel for Assemble<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, a, h, blocks } = self;
+        let coupling = coupling(a, h);
+        let mut square = [[E::from_f64(0.0); S]; S];
+        if const { !M::STRUCTURE.elimination.dependents.is_empty() } {
+            A::subtract_blocks(&mut square, &coupling, &coupling);
+        }
+        each_row::<A, _>(&mut Rows::<M, E, S> { jacobian, coupling, square, blocks });
+    }
+}
+
+/// See [`Assemble`].
+struct Rows<'a, M: Dae, E: Plain, const S: usize> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// `−hA`
+    coupling: Block<E, S>,
+    /// `−(hA)²`
+    square: Block<E, S>,
+    blocks: &'a mut M::Factors<Block<E, S>>,
+}
+
+impl<M: Dae, E: Field + Plain, const S: usize> AtRow for Rows<'_, M, E, S> {
+    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
+    const INSTRUCTIONS: usize = 2 + 2 * S * if size_of::<E>() > 8 { S } else { 1 };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let plan = &M::STRUCTURE.elimination;
+        let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
+        let Some(of) = plan.assembly.get(row) else { return };
+        if const { factor::begins_with_update::<M, E>() } && of.is_fill() {
+            return;
+        }
+        let Some(to) = blocks.get_mut(of.block as usize) else { return };
+        let mut block = if of.first { [[E::from_f64(0.0); S]; S] } else { *to };
+        // An index that marks what is not there lies outside of the Jacobian.
+        if let Some(&(mut values)) = jacobian.get(of.entry as usize) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
+                for value in &mut values {
+                    *value = -(*value * minus_c[0]);
+                }
+            }
+            if of.order == 0 {
+                for (stage, (column, &value)) in block.iter_mut().zip(&values).enumerate() {
+                    column[stage] = column[stage] + value;
+                }
+            } else {
+                let power = if of.order == 1 { &self.coupling } else { &self.square };
+                for (column, power) in block.iter_mut().zip(power) {
+                    A::subtract_products(column, &values, power);
+                }
+            }
+        }
+        *to = block;
+    }
+    /// Fill.
+    #[inline(always)]
+    fn simple(&mut self, row: usize) {
+        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        if const { factor::begins_with_update::<M, E>() } {
+            return;
+        }
+        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
+            *block = [[E::from_f64(0.0); S]; S];
+        }
+    }
+}
+
+impl<M: Dae, T: Real, const S: usize, F: Fallback> Factors<M, T, S, F> {
+    /// By pivoting the whole matrix, with the row of each equation in its slot.
+    ///
+    /// # Errors
+    /// The unknown and the stage for which there is no pivot; nothing if there is no memory for it.
+    pub fn factor_dense(
+        &mut self,
+        jacobian: &M::Jacobian<[T; S]>,
+        a: &[[T; S]; S],
+        h: T,
+    ) -> Result<(), Option<(usize, usize)>> {
+        let Some(dense) = self.dense.get_mut() else { return Err(None) };
+        self.is_dense = true;
+        dense.clear();
+        let square = {
+            let mut square = [[T::ZERO; S]; S];
+            for (to, row) in square.iter_mut().zip(a) {
+                for (&factor, a) in row.iter().zip(a) {
+                    axpy(factor, a, to);
+                }
+            }
+            square
+        };
+        each_entry::<M, _>(jacobian.as_ref(), |place, values, minus_c| {
+            let c = minus_c.and_then(|minus_c| minus_c.first()).map_or(T::ONE, |&minus_c| -minus_c);
+            for (stage, &value) in values.iter().enumerate() {
+                let (r, column, value) = (place.slot, place.column, c * value);
+                match place.order {
+                    0 => dense.add(r, column, stage, value),
+                    1 => dense.add_row(r, column, stage, h * value, &a[stage]),
+                    _ => dense.add_row(r, column, stage, h * h * value, &square[stage]),
+                }
+            }
+        });
+        // Their rows stay.
+        for state in (0..M::Shape::NX).filter(|&state| kinematic::<M>(state).is_some()) {
+            (0..S).for_each(|stage| dense.add(state, state, stage, T::ONE));
+        }
+        dense.factor().map_err(Some)
+    }
+}
+
+/// Where an entry of the Jacobian goes in a whole matrix, which has kinematic states, but nothing
+/// in their columns.
+pub struct InDense {
+    /// The row.
+    pub slot: usize,
+    /// The unknown.
+    pub column: usize,
+    /// It multiplies so many factors `hA`.
+    pub order: u32,
+}
+
+/// The entries of `f_ẋ`, `f_x` and `f_z`, but for those of equations of kinematic states, each with
+/// `−c` if it belongs to such a state.
+pub fn each_entry<M: Dae, V: Copy>(jacobian: &[V], mut at: impl FnMut(InDense, &V, Option<&V>)) {
+    let (pattern, blocks, nx) = (M::STRUCTURE.jacobian, M::STRUCTURE.blocks, M::STRUCTURE.x.len());
+    for (e, values) in jacobian.iter().enumerate().take(blocks[3]) {
+        let (r, c) = pattern.at(e);
+        let slot = slot::<M>(r);
+        if kinematic::<M>(slot).is_some() {
+            continue;
+        }
+        let (column, order) =
+            (if e < blocks[1] { c } else { c - nx }, u32::from((blocks[1]..blocks[2]).contains(&e)));
+        match kinematic::<M>(column) {
+            None => at(InDense { slot, column, order }, values, None),
+            Some(of) if (of.velocity as usize) < 2 * nx => {
+                let place = InDense { slot, column: of.velocity as usize - nx, order: order + 1 };
+                at(place, values, jacobian.get(of.entry as usize));
+            }
+            Some(_) => {}
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Block elimination by a plan that was made before the program runs.
+//!
+//! The Newton matrix `M` has one s×s block for each structural non-zero. In the order of the plan
+//!
+//! ```text
+//! M = (I + L) (P + U)        L_ik = B_ik P_k⁻¹,   B_ij ← B_ij − L_ik B_kj
+//! ```
+//!
+//! with pivot blocks `P` on the diagonal (their inverses are stored), `L` below and `U` above.
+//! Everything is indexed by *slots*: a slot is an unknown, and also the equation that determines it
+//! in the plan. So right-hand side and solution share one array, and no permutation is ever
+//! applied.
+//!
+//! Where the plan is short its loops are unrolled (`kernel::unroll`). In longer ones the compiler
+//! does not look into the tables of the plan; elements are fetched with `get`, whose never-taken
+//! exit costs nothing beside a block and leaves no panic in the program.
+
+use crate::linalg::block::{inverse, product};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
+use crate::linalg::kernel::unroll::{AtPivot, from_first, is_long};
+use crate::model::{Dae, Pivot, Update};
+use crate::scalar::Field;
+use core::marker::PhantomData;
+
+/// What a matrix is eliminated by.
+pub struct Planned<'a, M, E, const S: usize> {
+    pub model: PhantomData<M>,
+    /// `P⁻¹`, `L`, `U`.
+    pub blocks: &'a [Block<E, S>],
+}
+
+impl<M, E, const S: usize> Clone for Planned<'_, M, E, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M, E, const S: usize> Copy for Planned<'_, M, E, S> {}
+
+/// Factorises in place: `blocks` holds the matrix (fill zero, unless it
+/// [begins with its first update](begins_with_update)) and afterwards `P⁻¹`, `L`, `U`. A pivot
+/// block that is singular leaves elements that are not finite.
+pub fn factor<M: Dae, E: Field, const S: usize>(blocks: &mut [Block<E, S>]) {
+    dispatch(Factor::<M, E, S> { blocks, model: PhantomData });
+}
+
+/// See [`factor`].
+pub(in crate::linalg) struct Factor<'a, M, E, const S: usize> {
+    pub blocks: &'a mut [Block<E, S>],
+    pub model: PhantomData<M>,
+}
+
+impl<M: Dae, E: Field, const S: usize> Kernel for Factor<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(mut self) {
+        if has_all::<M, _>(self.blocks) {
+            from_first::<A, M, _>(&mut self);
+        }
+    }
+}
+
+impl<M: Dae, E: Field, const S: usize> AtPivot for Factor<'_, M, E, S> {
+    const INSTRUCTIONS: usize = 4 + S * S * S / if size_of::<E>() > 8 { 1 } else { 2 };
+    const UPDATES: bool = true;
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], updates: &'static [Update]) {
+        let blocks = &mut *self.blocks;
+        if !pivot.identity {
+            let Some(block) = blocks.get_mut(pivot.block as usize) else { return };
+            let inverse = inverse::<A, E, S>(block);
+            A::write(block, &inverse);
+            for block in blocks.get_mut(pivot.lower()).into_iter().flatten() {
+                *block = product::<A, E, S>(block, &inverse);
+            }
+        }
+        let mut updates = updates.iter();
+        // Small blocks go to registers: the optimiser cannot know that nothing here overlaps.
+        if const { S <= 2 } {
+            for lower in pivot.lower() {
+                let Some(&lower) = blocks.get(lower) else { continue };
+                for (upper, target) in pivot.upper().zip(&mut updates) {
+                    let Some(&upper) = blocks.get(upper) else { continue };
+                    if let Some(block) = blocks.get_mut(target.block as usize) {
+                        update::<A, M, E, S>(block, target, &lower, &upper);
+                    }
+                }
+            }
+            return;
+        }
+        // What is updated comes later.
+        let Some((own, later)) = blocks.split_at_mut_checked(pivot.end as usize) else { return };
+        for lower in pivot.lower() {
+            let Some(&lower) = own.get(lower) else { continue };
+            for (upper, target) in pivot.upper().zip(&mut updates) {
+                let (upper, block) = (own.get(upper), later.get_mut((target.block - pivot.end) as usize));
+                if let (Some(upper), Some(block)) = (upper, block) {
+                    update::<A, M, E, S>(block, target, &lower, upper);
+                }
+            }
+        }
+    }
+}
+
+/// `block − lower · upper`
+#[inline(always)]
+fn update<A: Arithmetic, M: Dae, E: Field, const S: usize>(
+    block: &mut Block<E, S>,
+    target: &Update,
+    lower: &Block<E, S>,
+    upper: &Block<E, S>,
+) {
+    if const { begins_with_update::<M, E>() } && target.first {
+        let mut sum = [[E::from_f64(0.0); S]; S];
+        A::subtract_blocks(&mut sum, lower, upper);
+        *block = sum;
+        return;
+    }
+    A::subtract_blocks(block, lower, upper);
+}
+
+/// Whether fill begins with its first update. Of plain numbers it begins with zero, which is less
+/// work than to ask; and where it is little.
+pub const fn begins_with_update<M: Dae, E>() -> bool {
+    let plan = &M::STRUCTURE.elimination;
+    align_of::<E>() > 8 && 8 * plan.fill() >= plan.slots.len()
+}
+
+/// Always; but the optimiser then knows their number, and with it how often loops over constant
+/// tables go round.
+#[inline(always)]
+pub fn has_all<M: Dae, B>(blocks: &[B]) -> bool {
+    blocks.len() == M::STRUCTURE.elimination.slots.len()
+}
+
+/// The blocks of a range, each with the slot at its other end.
+#[inline(always)]
+pub fn beside<'a, M: Dae, E, const S: usize>(
+    factors: Planned<'a, M, E, S>,
+    range: core::ops::Range<usize>,
+) -> impl Iterator<Item = (&'a Block<E, S>, usize)> {
+    let slots = M::STRUCTURE.elimination.slots.get(range.clone()).unwrap_or_default();
+    factors.blocks.get(range).unwrap_or_default().iter().zip(slots.iter().map(|&slot| slot as usize))
+}

@@ -1,0 +1,81 @@
+//! Packets of right-hand sides, between memory and registers.
+
+use crate::linalg::block::{Packet, subtract};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::scalar::Field;
+use crate::shape::{Array, Plain};
+
+/// Of a slot that there is: who asks has compared it, so that nothing has to be chosen here.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub fn load<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &[[R; S]],
+    slot: usize,
+    column: usize,
+) -> Packet<E, S, W> {
+    let mut packet = [[E::from_f64(0.0); W]; S];
+    if let Some(row) = rows.get(slot) {
+        for (packet, row) in packet.iter_mut().zip(row) {
+            if let Some(columns) = row.as_ref().get(column..).and_then(|columns| columns.first_chunk()) {
+                *packet = *columns;
+            }
+        }
+    }
+    packet
+}
+
+/// `packet − block · other`, with the other in the memory.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub fn subtract_of<A: Arithmetic, E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    packet: &mut Packet<E, S, W>,
+    block: &Block<E, S>,
+    other: &[R; S],
+    column: usize,
+) {
+    if const { W == 1 || size_of::<E>() <= 8 } {
+        let other = load(core::slice::from_ref(other), 0, column);
+        subtract::<A, E, S, W>(packet, block, &other);
+        return;
+    }
+    for (elements, other) in block.iter().zip(other) {
+        let Some(other) = other.as_ref().get(column..).and_then(|columns| columns.first_chunk()) else {
+            continue;
+        };
+        for (&element, packet) in elements.iter().zip(packet.iter_mut()) {
+            A::subtract_row(packet, element, other);
+        }
+    }
+}
+
+/// In loops: a closure would be compiled for every machine.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub fn is_zero<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &[[R; S]],
+    slot: usize,
+    column: usize,
+) -> bool {
+    for row in rows.get(slot).into_iter().flatten() {
+        for element in row.as_ref().get(column..).unwrap_or_default().iter().take(W) {
+            if *element != E::from_f64(0.0) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub fn store<E: Field + Plain, R: Array<E>, const S: usize, const W: usize>(
+    rows: &mut [[R; S]],
+    slot: usize,
+    column: usize,
+    packet: &Packet<E, S, W>,
+) {
+    if let Some(row) = rows.get_mut(slot) {
+        for (packet, row) in packet.iter().zip(row) {
+            let columns = row.as_mut().get_mut(column..).and_then(|columns| columns.first_chunk_mut());
+            if let Some(columns) = columns {
+                *columns = *packet;
+            }
+        }
+    }
+}

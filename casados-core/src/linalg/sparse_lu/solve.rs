@@ -1,0 +1,330 @@
+//! Right-hand sides by the factors of a plan (`factor`): down through `I + L`, up through `P + U`,
+//! and both transposed.
+//!
+//! Of plain numbers a pivot is subtracted from all rows below it, which so do not wait for each
+//! other. Where one column fills registers, what is added to a row is added in them instead, and
+//! stored once.
+
+use super::factor::{Planned, beside, has_all};
+use super::micro_panel::{is_zero, load, store, subtract_of};
+use crate::linalg::block::{Packet, negate, subtract};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
+use crate::linalg::kernel::prefetch::Ahead;
+use crate::linalg::kernel::unroll::{AtPivot, from_first, from_last, is_long};
+use crate::model::{Dae, Pivot, Update};
+use crate::scalar::Field;
+use crate::shape::{Array, Plain, Shape};
+use core::marker::PhantomData;
+
+/// Solves two systems for all columns, eight, four, two and one at a time; of numbers that are
+/// registers themselves two at a time, or the packet of all stages would not fit them.
+macro_rules! packets {
+    ($first:ty, $second:ty: $solve:expr) => {{
+        let Solve { factors, rows } = $solve;
+        let mut column = 0;
+        if const { size_of::<E>() <= 8 } {
+            while column + 8 <= R::LEN {
+                sweeps::<A, M, E, R, S, 8, $first, $second>(factors, rows, column, &mut ());
+                column += 8;
+            }
+            if column + 4 <= R::LEN {
+                sweeps::<A, M, E, R, S, 4, $first, $second>(factors, rows, column, &mut ());
+                column += 4;
+            }
+        }
+        while column + 2 <= R::LEN {
+            sweeps::<A, M, E, R, S, 2, $first, $second>(factors, rows, column, &mut ());
+            column += 2;
+        }
+        if column < R::LEN {
+            sweeps::<A, M, E, R, S, 1, $first, $second>(factors, rows, column, &mut ());
+        }
+    }};
+}
+
+/// Solves `M X = R` in place. A row of `rows` holds the `s` stages of a slot, each with all
+/// columns.
+///
+/// Columns are taken in packets that fit registers, each through the whole elimination: a packet of
+/// all rows stays in the nearest cache.
+pub fn solve<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
+    dispatch(Solve::<M, E, R, S> { factors, rows });
+}
+
+struct Solve<'a, M, E, R, const S: usize> {
+    factors: Planned<'a, M, E, S>,
+    rows: &'a mut [[R; S]],
+}
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for Solve<'_, M, E, R, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        packets!(Down, Up: self);
+    }
+}
+
+/// Solves `Mᵀ X = R` in place.
+pub fn solve_transposed<M: Dae, E: Field + Plain, R: Array<E>, const S: usize>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+) {
+    dispatch(SolveTransposed(Solve { factors, rows }));
+}
+
+struct SolveTransposed<'a, M, E, R, const S: usize>(Solve<'a, M, E, R, S>);
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTransposed<'_, M, E, R, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, S>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        packets!(TransposedDown, TransposedUp: self.0);
+    }
+}
+
+/// Who is present while packets are solved. What is here is to be `#[inline(always)]`.
+pub trait Viewer<E, const S: usize, const W: usize> {
+    /// Sees an unknown that has just been found, but not of a transposed system.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn see<A: Arithmetic>(&mut self, _slot: usize, _packet: &Packet<E, S, W>) {}
+    /// A pivot of the second system is done.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn pass(&mut self) {}
+}
+
+/// Nobody.
+impl<E, const S: usize, const W: usize> Viewer<E, S, W> for () {}
+
+/// Who asks for memory meanwhile, line by line.
+impl<E, const S: usize, const W: usize> Viewer<E, S, W> for Ahead<'_, E> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn pass(&mut self) {
+        self.next();
+    }
+}
+
+/// Solves two triangular systems in place for `W` columns, inside of a kernel. What is solved
+/// through the second is shown to somebody, while it is in registers.
+#[inline(always)]
+pub fn sweeps<
+    A: Arithmetic,
+    M: Dae,
+    E: Field + Plain,
+    R: Array<E>,
+    const S: usize,
+    const W: usize,
+    First: System,
+    Second: System,
+>(
+    factors: Planned<'_, M, E, S>,
+    rows: &mut [[R; S]],
+    column: usize,
+    viewer: &mut impl Viewer<E, S, W>,
+) {
+    if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
+        return;
+    }
+    let viewer_of_first = &mut ();
+    let mut first = Along::<First, Sweep<'_, M, E, R, (), S, W>>(
+        Sweep { factors, rows, column, viewer: viewer_of_first },
+        PhantomData,
+    );
+    from_first::<A, M, _>(&mut first);
+    let rows = first.0.rows;
+    let mut second =
+        Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, viewer }, PhantomData);
+    from_last::<A, M, _>(&mut second);
+}
+
+/// `W` columns of right-hand sides on their way.
+pub struct Sweep<'a, M, E, R, V, const S: usize, const W: usize> {
+    pub factors: Planned<'a, M, E, S>,
+    pub rows: &'a mut [[R; S]],
+    pub column: usize,
+    /// Of what is solved through `P + U`.
+    pub viewer: &'a mut V,
+}
+
+/// A triangular system.
+pub trait System {
+    /// What is done at a pivot.
+    fn at<
+        A: Arithmetic,
+        M: Dae,
+        E: Field + Plain,
+        R: Array<E>,
+        V: Viewer<E, S, W>,
+        const S: usize,
+        const W: usize,
+    >(
+        sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+        pivot: &'static Pivot,
+    );
+}
+
+/// A way through a system.
+struct Along<Y, T>(T, PhantomData<Y>);
+
+impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
+    AtPivot for Along<Y, Sweep<'_, M, E, R, V, S, W>>
+{
+    const INSTRUCTIONS: usize = {
+        let columns = if size_of::<E>() > 8 { W } else { W.div_ceil(4) };
+        4 + if W == 1 && size_of::<E>() <= 8 { S } else { S * S * columns }
+    };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], _: &'static [Update]) {
+        Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot);
+        self.0.viewer.pass();
+    }
+}
+
+/// One of the systems, of which each has its own instructions.
+macro_rules! system {
+    ($(#[$text:meta])* $name:ident: $what:ident) => {
+        $(#[$text])*
+        pub struct $name;
+
+        impl System for $name {
+            #[inline(always)]
+            fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>(
+                sweep: &mut Sweep<'_, M, E, R, V, S, W>,
+                pivot: &'static Pivot,
+            ) {
+                sweep.$what::<A>(pivot);
+            }
+        }
+    };
+}
+
+system!(
+    /// `I + L`
+    Down: down
+);
+system!(
+    /// `P + U`
+    Up: up
+);
+system!(
+    /// `(P + U)ᵀ`
+    TransposedDown: transposed_down
+);
+system!(
+    /// `(I + L)ᵀ`
+    TransposedUp: transposed_up
+);
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
+    Sweep<'_, M, E, R, V, S, W>
+{
+    #[inline(always)]
+    fn down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        // What is added to a row is added in registers where one column fills them.
+        if const { align_of::<E>() > 8 && goes_by_rows::<M>(size_of::<Block<E, S>>()) } {
+            self.down_by_rows::<A>(pivot);
+        } else {
+            self.down_by_columns::<A>(pivot);
+        }
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn down_by_columns<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column, .. } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() {
+            return;
+        }
+        // Directions that have not reached this unknown, as at the start of an interval. Of
+        // registers the memory is asked: a packet of which single elements are looked at is not
+        // kept in registers. Of numbers the packet is, all of it at once: one after the other in
+        // memory took up to 7 % of a call more (chains of 3 and 5 masses).
+        if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
+            return;
+        }
+        let packet = load::<E, R, S, W>(rows, slot, *column);
+        if const { W > 1 && size_of::<E>() <= 8 }
+            && packet.as_flattened().iter().all(|element| *element == E::from_f64(0.0))
+        {
+            return;
+        }
+        for (block, other) in beside(*factors, pivot.lower()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            subtract::<A, E, S, W>(&mut target, block, &packet);
+            store(rows, other, *column, &target);
+        }
+    }
+
+    /// What pivots before this one subtract from its row.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn down_by_rows<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column, .. } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() || pivot.left().is_empty() {
+            return;
+        }
+        let mut packet = load(rows, slot, *column);
+        for left in M::STRUCTURE.elimination.left.get(pivot.left()).unwrap_or_default() {
+            let (block, other) = (factors.blocks.get(left.block as usize), rows.get(left.slot as usize));
+            let (Some(block), Some(other)) = (block, other) else { continue };
+            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+        }
+        store(rows, slot, *column, &packet);
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column, viewer } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        for (block, other) in beside(*factors, pivot.upper()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let Some(other) = rows.get(other) else { continue };
+            subtract_of::<A, E, R, S, W>(&mut packet, block, other, *column);
+        }
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            // Of one number the inverse: the packet then stays in its registers.
+            if const { S == 1 } {
+                let mut inverse = *inverse;
+                negate(&mut inverse);
+                subtract::<A, E, S, W>(&mut solution, &inverse, &packet);
+            } else {
+                negate(&mut packet);
+                subtract::<A, E, S, W>(&mut solution, inverse, &packet);
+            }
+            packet = solution;
+        }
+        store(rows, pivot.slot as usize, *column, &packet);
+        viewer.see::<A>(pivot.slot as usize, &packet);
+    }
+}
+
+/// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in
+/// another column. Of large blocks that the second cache holds the processor fetches some columns
+/// ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
+/// aircraft, with up to nineteen blocks in a row, 6 % more.
+const fn goes_by_rows<M: Dae>(block: usize) -> bool {
+    let pivots = M::STRUCTURE.elimination.pivots;
+    let (mut longest, mut index) = (0, 0);
+    while index < pivots.len() {
+        let left = pivots[index].left[1] - pivots[index].left[0];
+        longest = if left > longest { left } else { longest };
+        index += 1;
+    }
+    block <= 256 || longest <= 8
+}

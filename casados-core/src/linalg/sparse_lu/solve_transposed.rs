@@ -1,0 +1,109 @@
+//! Right-hand sides by the transposed factors of a plan: what is done at a pivot on the way through
+//! `(P + U)ᵀ` and `(I + L)ᵀ`.
+//!
+//! A row of `(I + L)ᵀ` is a column of `L`, so that on the way back what is added to a row is added
+//! in registers, and stored once. Packets take two blocks at a time, so that additions need not
+//! wait for each other.
+
+use super::factor::{Planned, beside};
+use super::micro_panel::{load, store};
+use super::solve::Sweep;
+use crate::linalg::block::{negate, subtract_transposed};
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::model::{Dae, Pivot};
+use crate::scalar::Field;
+use crate::shape::{Array, Plain};
+
+impl<M: Dae, E: Field + Plain, R: Array<E>, V, const S: usize, const W: usize> Sweep<'_, M, E, R, V, S, W> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(in crate::linalg) fn transposed_down<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column, .. } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        if let (false, Some(inverse)) = (pivot.identity, factors.blocks.get(pivot.block as usize)) {
+            let mut solution = [[E::from_f64(0.0); W]; S];
+            negate(&mut packet);
+            subtract_transposed::<A, E, S, W>(&mut solution, inverse, &packet);
+            packet = solution;
+            store(rows, pivot.slot as usize, *column, &packet);
+        }
+        for (block, other) in beside(*factors, pivot.upper()) {
+            if other >= rows.len() {
+                continue;
+            }
+            let mut target = load(rows, other, *column);
+            subtract_transposed::<A, E, S, W>(&mut target, block, &packet);
+            store(rows, other, *column, &target);
+        }
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(in crate::linalg) fn transposed_up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        // Where nothing is optimised this would only take long to compile.
+        if const { W > 1 && size_of::<E>() <= 8 && A::FUSED } {
+            return self.transposed_up_in_strands::<A>(pivot);
+        }
+        let Self { factors, rows, column, .. } = self;
+        if pivot.slot as usize >= rows.len() {
+            return;
+        }
+        let mut packet = load::<E, R, S, W>(rows, pivot.slot as usize, *column);
+        for index in pivot.lower().rev() {
+            let Some((block, other)) = one(*factors, index) else { continue };
+            if other >= rows.len() {
+                continue;
+            }
+            let other = load(rows, other, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+        }
+        store(rows, pivot.slot as usize, *column, &packet);
+    }
+
+    /// Two blocks at a time, in a sum each: an addition to one does not wait for that to the other.
+    #[inline(always)]
+    fn transposed_up_in_strands<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
+        let Self { factors, rows, column, .. } = self;
+        let slot = pivot.slot as usize;
+        if slot >= rows.len() || pivot.lower().is_empty() {
+            return;
+        }
+        let mut slots = M::STRUCTURE.elimination.slots.get(pivot.lower()).unwrap_or_default();
+        let mut blocks = factors.blocks.get(pivot.lower()).unwrap_or_default();
+        let mut packet = load::<E, R, S, W>(rows, slot, *column);
+        let mut strand = [[E::from_f64(0.0); W]; S];
+        while let Some((rest, [block, last])) = blocks.split_last_chunk()
+            && let Some((rest_of_slots, &[other, of_last])) = slots.split_last_chunk()
+        {
+            (blocks, slots) = (rest, rest_of_slots);
+            if of_last as usize >= rows.len() || other as usize >= rows.len() {
+                continue;
+            }
+            let of_last = load(rows, of_last as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, last, &of_last);
+            let other = load(rows, other as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut strand, block, &other);
+        }
+        if let ([block], &[other]) = (blocks, slots)
+            && (other as usize) < rows.len()
+        {
+            let other = load(rows, other as usize, *column);
+            subtract_transposed::<A, E, S, W>(&mut packet, block, &other);
+        }
+        for (row, strand) in packet.iter_mut().zip(&strand) {
+            A::subtract_row(row, E::from_f64(-1.0), strand);
+        }
+        store(rows, slot, *column, &packet);
+    }
+}
+
+/// One block, with the slot at its other end.
+#[inline(always)]
+fn one<'a, M: Dae, E, const S: usize>(
+    factors: Planned<'a, M, E, S>,
+    index: usize,
+) -> Option<(&'a Block<E, S>, usize)> {
+    let &slot = M::STRUCTURE.elimination.slots.get(index)?;
+    Some((factors.blocks.get(index)?, slot as usize))
+}

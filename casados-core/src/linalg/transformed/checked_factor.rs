@@ -1,0 +1,190 @@
+//! Factors in the eigenbasis of the tableau that say whether they hold, with whole matrices pivoted
+//! where they do not: what steps of variable size iterate with.
+
+use super::complex::Complex;
+use crate::linalg::dense_lu::Dense;
+use crate::linalg::kernel::arithmetic::{Arithmetic, Block};
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
+use crate::linalg::newton_matrix::{each_entry, kinematic, slot};
+use crate::linalg::sparse_lu::factor::{self, Planned};
+use crate::linalg::sparse_lu::solve;
+use crate::model::{ArrayK, Dae};
+use crate::scalar::Real;
+use crate::shape::{Aligned, Plain, Shape};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// So many eigenvalues there may be, of complex conjugate ones one.
+const LANES: usize = 4;
+
+/// The parts of a number for each of them.
+pub const PARTS: usize = 2 * LANES;
+
+/// A right-hand side or a solution of the systems of all eigenvalues, one row for each slot.
+pub type Rows<M, T> = ArrayK<M, [[Complex<T, PARTS>; 1]; 1]>;
+
+/// Factors of `[f_ẋ + hμ_l f_x | f_z]` for all eigenvalues.
+#[derive(Zeroable)]
+#[zeroable(bound = "T: Zeroable")]
+pub struct EigenFactors<M: Dae, T: Plain> {
+    blocks: Aligned<M::Factors<[[Complex<T, PARTS>; 1]; 1]>>,
+    /// The Jacobian, and `hμ`: what kinematic states are eliminated by.
+    jacobian: M::Jacobian<T>,
+    scale: Complex<T, PARTS>,
+    /// Memory that is touched only where the plan is not good enough: real and imaginary part as
+    /// two stages.
+    dense: [Dense<M, T, 2>; LANES],
+    is_dense: bool,
+    pivoted: bool,
+}
+
+impl<M: Dae, T: Real> EigenFactors<M, T> {
+    /// Whether the plan is in use, so that pivoting may give better factors.
+    pub fn is_planned(&self) -> bool {
+        !self.pivoted && !M::STRUCTURE.elimination.pivots.is_empty()
+    }
+
+    /// From now on, whether every matrix is to be pivoted.
+    pub fn set_pivoted(&mut self, pivoted: bool) {
+        self.pivoted = pivoted;
+    }
+
+    /// Factors of the matrices of a Jacobian. Whether those of the plan hold, if there is one.
+    ///
+    /// # Errors
+    /// The unknown for which there is no pivot.
+    pub fn factor(
+        &mut self,
+        jacobian: &M::Jacobian<T>,
+        values: &Complex<T, PARTS>,
+        h: T,
+    ) -> Result<bool, usize> {
+        let scale = values.scaled(h);
+        (self.jacobian, self.scale) = (*jacobian, scale);
+        self.is_dense = !(self.is_planned() && self.factor_by_plan(jacobian, &scale));
+        if self.is_dense {
+            self.factor_dense(jacobian, &scale)?;
+        }
+        Ok(!self.is_dense || M::STRUCTURE.elimination.pivots.is_empty())
+    }
+
+    /// By the plan; whether that went well.
+    fn factor_by_plan(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> bool {
+        let blocks = self.blocks.as_mut();
+        dispatch(Assemble::<M, T> { jacobian: jacobian.as_ref(), scale, blocks, model: PhantomData })
+    }
+
+    /// By pivoting whole matrices.
+    fn factor_dense(&mut self, jacobian: &M::Jacobian<T>, scale: &Complex<T, PARTS>) -> Result<(), usize> {
+        let square = *scale * *scale;
+        for (l, dense) in self.dense.iter_mut().enumerate() {
+            dense.clear();
+            each_entry::<M, _>(jacobian.as_ref(), |place, &value, minus_c| {
+                let (r, c, value) =
+                    (place.slot, place.column, minus_c.map_or(value, |&minus_c| -(minus_c * value)));
+                let (re, im) = match place.order {
+                    0 => (T::ONE, T::ZERO),
+                    1 => scale.get(l),
+                    _ => square.get(l),
+                };
+                dense.add_row(r, c, 0, value, &[re, -im]);
+                dense.add_row(r, c, 1, value, &[im, re]);
+            });
+            // Their rows stay.
+            for state in (0..M::Shape::NX).filter(|&state| kinematic::<M>(state).is_some()) {
+                (0..2).for_each(|part| dense.add(state, state, part, T::ONE));
+            }
+            dense.factor().map_err(|(unknown, _)| unknown)?;
+        }
+        Ok(())
+    }
+
+    /// Solves all systems in place; equations are in their slots.
+    pub fn solve(&self, rows: &mut Rows<M, T>) {
+        self.eliminate(rows);
+        if self.is_dense {
+            self.solve_dense(rows);
+        } else {
+            let blocks = self.blocks.as_ref();
+            let factors = Planned::<M, _, 1> { model: PhantomData, blocks };
+            solve::solve(factors, rows.as_mut());
+        }
+        self.reconstruct(rows);
+    }
+
+    /// `b_r ← b_r − (f_q̇ + hμ f_q) b_q` for each kinematic state `q`.
+    fn eliminate(&self, rows: &mut Rows<M, T>) {
+        for dependent in M::STRUCTURE.elimination.dependents {
+            let (entry, [[own]]) = (dependent.entry as usize, rows[dependent.state as usize]);
+            let own = if entry < M::STRUCTURE.blocks[1] { own } else { self.scale * own };
+            let [[to]] = &mut rows[slot::<M>(M::STRUCTURE.jacobian.at(entry).0)];
+            *to = *to - own.scaled(self.jacobian[entry]);
+        }
+    }
+
+    /// `y_q = b_q + c hμ y_v`
+    fn reconstruct(&self, rows: &mut Rows<M, T>) {
+        let nx = M::Shape::NX;
+        for state in 0..M::STRUCTURE.elimination.kinematic.len() {
+            let Some(of) = kinematic::<M>(state) else { continue };
+            if (of.velocity as usize) < 2 * nx {
+                let [[velocity]] = rows[of.velocity as usize - nx];
+                let [[to]] = &mut rows[state];
+                *to = *to - (self.scale * velocity).scaled(self.jacobian[of.entry as usize]);
+            }
+        }
+    }
+
+    fn solve_dense(&self, rows: &mut Rows<M, T>) {
+        let mut parts: ArrayK<M, [[T; 1]; 2]> = Zeroable::zeroed();
+        for (l, dense) in self.dense.iter().enumerate() {
+            for (part, [[row]]) in parts.as_mut().iter_mut().zip(rows.as_ref()) {
+                let (re, im) = row.get(l);
+                *part = [[re], [im]];
+            }
+            dense.solve(&mut parts);
+            for ([[re], [im]], [[row]]) in parts.as_ref().iter().zip(rows.as_mut()) {
+                row.set(l, (*re, *im));
+            }
+        }
+    }
+}
+
+/// The matrices and their factors; whether these are finite.
+struct Assemble<'a, M, T> {
+    jacobian: &'a [T],
+    scale: &'a Complex<T, PARTS>,
+    blocks: &'a mut [Block<Complex<T, PARTS>, 1>],
+    model: PhantomData<M>,
+}
+
+impl<M: Dae, T: Real> Kernel for Assemble<'_, M, T> {
+    type Number = T;
+    type Output = bool;
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) -> bool {
+        let Self { jacobian, scale, blocks, .. } = self;
+        let plan = &M::STRUCTURE.elimination;
+        let square = *scale * *scale;
+        for of in plan.assembly {
+            let Some([[to]]) = blocks.get_mut(of.block as usize) else { continue };
+            let mut element = if of.first { Complex::zero() } else { *to };
+            // An index that marks what is not there lies outside of the Jacobian.
+            if let Some(&(mut value)) = jacobian.get(of.entry as usize) {
+                if let Some(&minus_c) = jacobian.get(of.by as usize) {
+                    value = -(minus_c * value);
+                }
+                element = match of.order {
+                    0 => element.plus(value),
+                    1 => element + scale.scaled(value),
+                    _ => element + square.scaled(value),
+                };
+            }
+            *to = element;
+        }
+        factor::Factor::<M, _, 1> { blocks, model: PhantomData }.run::<A>();
+        // A pivot that vanishes leaves infinite elements or NaN.
+        let pivots = plan.pivots.iter().filter_map(|pivot| blocks.get(pivot.block as usize));
+        pivots.fold(true, |finite, [[element]]| finite & element.is_finite())
+    }
+}

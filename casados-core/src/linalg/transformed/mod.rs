@@ -1,0 +1,12 @@
+//! Stages that share one Jacobian: smaller systems in the [eigenbasis](basis) of the tableau, of
+//! [complex](complex) numbers. [Shared factors](shared_factor) of iterations that need not be exact
+//! are [solved](shared_solve) supernode by supernode; steps of variable size have
+//! [factors that are checked](checked_factor).
+
+pub mod basis;
+#[cfg(feature = "alloc")]
+pub mod checked_factor;
+pub mod complex;
+mod number;
+pub mod shared_factor;
+mod shared_solve;

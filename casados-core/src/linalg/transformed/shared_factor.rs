@@ -1,0 +1,157 @@
+//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau, of
+//! [coarse](Lanes::Coarse) numbers: increments that they give are corrected by the next iteration
+//! in any case.
+
+use super::basis::Eigenbasis;
+use super::complex::Complex;
+use super::number::{Number, coarse};
+use super::shared_solve::Solve;
+use crate::linalg::kernel::arithmetic::Arithmetic;
+use crate::linalg::kernel::dispatch::{Kernel, dispatch};
+use crate::linalg::kernel::unroll::{AtRow, each_row};
+use crate::linalg::sparse_lu::factor;
+use crate::model::{ArrayK, Dae};
+use crate::scalar::Lanes;
+use crate::shape::Aligned;
+use bytemuck::Zeroable;
+
+/// Factors of the mean Jacobian of the stages for all eigenvalues, by the plan: what an iteration
+/// takes that need not be exact.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub struct MeanFactors<M: Dae, E: Lanes, const S: usize> {
+    blocks: Aligned<M::Factors<[[Number<E, S>; 1]; 1]>>,
+    rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Clone for MeanFactors<M, E, S> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Dae, E: Lanes, const S: usize> Copy for MeanFactors<M, E, S> {}
+
+impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
+    /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
+    /// there for the `first_only` of stages that are alike, but not of a single lane.
+    pub fn factor(
+        &mut self,
+        jacobian: &M::Jacobian<[E; S]>,
+        first_only: bool,
+        basis: &Eigenbasis<E, S, S>,
+        h: E,
+    ) {
+        let blocks = &mut self.blocks;
+        let values = &basis.values;
+        if const { E::LANES > 1 } && first_only {
+            dispatch(AssembleMean::<M, E, S, true> { jacobian, values, h, blocks });
+        } else {
+            dispatch(AssembleMean::<M, E, S, false> { jacobian, values, h, blocks });
+        }
+        factor::factor::<M, _, 1>(self.blocks.as_mut());
+    }
+
+    /// Solves the Newton system of the stages: what is in the rows of the solution that belong to
+    /// kinematic states stays there.
+    pub fn solve(
+        &mut self,
+        basis: &Eigenbasis<E, S, S>,
+        f: &ArrayK<M, [E; S]>,
+        solution: &mut ArrayK<M, [[E; 1]; S]>,
+    ) {
+        let Self { blocks, rows } = self;
+        let (blocks, rows) =
+            (blocks.as_ref().as_flattened().as_flattened(), rows.as_mut().as_flattened_mut());
+        dispatch(Solve::<M, E, S> { basis, f, blocks, rows: rows.as_flattened_mut(), solution });
+    }
+}
+
+/// `Σ c f (hμ)^order` of the mean Jacobian, each block written once.
+struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// The eigenvalues `μ`.
+    values: &'a Complex<E, S>,
+    h: E,
+    blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
+    for AssembleMean<'_, M, E, S, FIRST_ONLY>
+{
+    type Number = E;
+    type Output = ();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { jacobian, values, h, blocks } = self;
+        let (scale, share) = (values.scaled(h), E::from_f64(Rows::<M, E, S, FIRST_ONLY>::SHARE));
+        let scales = [scale.scaled(share), (scale * scale).scaled(share)].map(coarse);
+        each_row::<A, _>(&mut Rows::<M, E, S, FIRST_ONLY> { jacobian, scales, blocks });
+    }
+}
+
+/// See [`AssembleMean`].
+struct Rows<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+    jacobian: &'a M::Jacobian<[E; S]>,
+    /// `hμ` and `(hμ)²` of what is added up.
+    scales: [Number<E, S>; 2],
+    blocks: &'a mut M::Factors<[[Number<E, S>; 1]; 1]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> AtRow for Rows<'_, M, E, S, FIRST_ONLY> {
+    const ROWS: usize = M::STRUCTURE.elimination.assembly.len();
+    const SIMPLE: usize = M::STRUCTURE.elimination.fill();
+    const INSTRUCTIONS: usize = S + 2 + 2 * if size_of::<E>() > 8 { S } else { S.div_ceil(4) };
+    #[inline(always)]
+    fn at<A: Arithmetic>(&mut self, row: usize) {
+        let plan = &M::STRUCTURE.elimination;
+        let (jacobian, blocks) = (self.jacobian.as_ref(), self.blocks.as_mut());
+        let Some(of) = plan.assembly.get(row) else { return };
+        if const { factor::begins_with_update::<M, Number<E, S>>() } && of.is_fill() {
+            return;
+        }
+        let Some([[to]]) = blocks.get_mut(of.block as usize) else { return };
+        let [scale, square] = self.scales;
+        let mut element = if of.first { Complex::zero() } else { *to };
+        // An index that marks what is not there lies outside of the Jacobian.
+        if let Some(mut value) = jacobian.get(of.entry as usize).map(Self::total) {
+            if let Some(minus_c) = jacobian.get(of.by as usize) {
+                value = -(minus_c[0] * value);
+            }
+            element = match of.order {
+                0 => element.plus((E::from_f64(Self::SHARE) * value).coarse()),
+                1 => element + scale.scaled(value.coarse()),
+                _ => element + square.scaled(value.coarse()),
+            };
+        }
+        *to = element;
+    }
+    /// Fill.
+    #[inline(always)]
+    fn simple(&mut self, row: usize) {
+        let Some(of) = M::STRUCTURE.elimination.assembly.get(row) else { return };
+        if const { factor::begins_with_update::<M, Number<E, S>>() } {
+            return;
+        }
+        if let Some(block) = self.blocks.as_mut().get_mut(of.block as usize) {
+            *block = [[Complex::zero()]];
+        }
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Rows<'_, M, E, S, FIRST_ONLY> {
+    /// The mean is so much of what is added up.
+    const SHARE: f64 = if FIRST_ONLY { 1.0 } else { 1.0 / S as f64 };
+
+    /// The sum over the stages.
+    #[inline(always)]
+    fn total(stages: &[E; S]) -> E {
+        if FIRST_ONLY {
+            return stages[0];
+        }
+        let mut total = E::from_f64(0.0);
+        for &stage in stages {
+            total = total + stage;
+        }
+        total
+    }
+}

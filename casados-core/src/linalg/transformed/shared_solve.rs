@@ -1,0 +1,143 @@
+//! Solves by factors of the mean Jacobian, from equations to unknowns: what takes equations to the
+//! eigenbasis and unknowns back goes on while each row waits for the one before it.
+//!
+//! Supernode by supernode: an unknown that several rows ask for is looked up once for all of them,
+//! and what a row is made of stays in registers.
+
+use super::basis::Eigenbasis;
+use super::complex::Complex;
+use super::number::{Number, coarse};
+use crate::linalg::kernel::arithmetic::Arithmetic;
+use crate::linalg::kernel::dispatch::Kernel;
+use crate::linalg::kernel::unroll::{AtSupernode, is_long, supernodes_from_first, supernodes_from_last};
+use crate::model::{ArrayK, Dae, Pivot};
+use crate::scalar::Lanes;
+
+/// From equations through `I + L` to rows in the eigenbasis, and through `P + U` to unknowns.
+pub struct Solve<'a, M: Dae, E: Lanes, const S: usize> {
+    pub basis: &'a Eigenbasis<E, S, S>,
+    pub f: &'a ArrayK<M, [E; S]>,
+    /// `P⁻¹`, `L`, `U`.
+    pub blocks: &'a [Number<E, S>],
+    /// Memory for a row of each slot.
+    pub rows: &'a mut [Number<E, S>],
+    pub solution: &'a mut ArrayK<M, [[E; 1]; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> Kernel for Solve<'_, M, E, S> {
+    type Number = E;
+    type Output = ();
+    const WIDE: bool = is_long::<M, 1>();
+    #[inline(always)]
+    fn run<A: Arithmetic>(self) {
+        let Self { basis, f, blocks, rows, solution } = self;
+        if blocks.len() != M::STRUCTURE.elimination.slots.len() || rows.len() != f.as_ref().len() {
+            return;
+        }
+        let mut down = Down::<M, E, S> { basis: *basis, f, blocks, rows };
+        supernodes_from_first::<A, M, _>(&mut down);
+        let mut up = Up::<M, E, S> { basis: *basis, blocks, rows: down.rows, solution };
+        supernodes_from_last::<A, M, _>(&mut up);
+    }
+}
+
+/// Instructions for each block: two to fetch it, two products.
+const PER_BLOCK: usize = 5;
+
+/// See [`Solve`].
+struct Down<'a, M: Dae, E: Lanes, const S: usize> {
+    basis: Eigenbasis<E, S, S>,
+    f: &'a ArrayK<M, [E; S]>,
+    blocks: &'a [Number<E, S>],
+    rows: &'a mut [Number<E, S>],
+}
+
+/// See [`Solve`].
+struct Up<'a, M: Dae, E: Lanes, const S: usize> {
+    basis: Eigenbasis<E, S, S>,
+    blocks: &'a [Number<E, S>],
+    rows: &'a mut [Number<E, S>],
+    solution: &'a mut ArrayK<M, [[E; 1]; S]>,
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Down<'_, M, E, S> {
+    const INSTRUCTIONS: usize = PER_BLOCK;
+    #[inline(always)]
+    fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
+        let mut sums = [Complex::zero(); P];
+        for (sum, pivot) in sums.iter_mut().zip(pivots) {
+            if let Some(f) = self.f.as_ref().get(pivot.equation as usize) {
+                *sum = coarse(self.basis.split::<A>(f));
+            }
+        }
+        for left in M::STRUCTURE.elimination.left.get(pivots[0].left()).unwrap_or_default() {
+            // Blocks of their rows lie one after the other.
+            let blocks = self.blocks.get(left.block as usize..).and_then(|blocks| blocks.first_chunk::<P>());
+            let (Some(blocks), Some(row)) = (blocks, self.rows.get(left.slot as usize)) else { continue };
+            for (sum, block) in sums.iter_mut().zip(blocks) {
+                *sum = A::subtract(*sum, *block, *row);
+            }
+        }
+        for (index, pivot) in pivots.into_iter().enumerate() {
+            let sum = sums[index];
+            let below = self.blocks.get(pivot.block as usize..).unwrap_or_default();
+            // So many that the optimiser writes them one after the other.
+            #[allow(clippy::needless_range_loop)]
+            for other in index + 1..P {
+                if let Some(block) = below.get(other - index) {
+                    sums[other] = A::subtract(sums[other], *block, sum);
+                }
+            }
+            if let Some(row) = self.rows.get_mut(pivot.slot as usize) {
+                *row = sum;
+            }
+        }
+    }
+}
+
+impl<M: Dae, E: Lanes, const S: usize> AtSupernode for Up<'_, M, E, S> {
+    const INSTRUCTIONS: usize = PER_BLOCK;
+    #[inline(always)]
+    fn at<A: Arithmetic, const P: usize>(&mut self, pivots: [&'static Pivot; P]) {
+        let beside = pivots[P - 1].upper();
+        let slots = M::STRUCTURE.elimination.slots.get(beside).unwrap_or_default();
+        let (mut sums, mut own): (_, [&[Number<E, S>]; P]) = ([Complex::zero(); P], [&[]; P]);
+        let mut triangle = own;
+        for (index, pivot) in pivots.into_iter().enumerate() {
+            let (row, blocks) = (self.rows.get(pivot.slot as usize), self.blocks.get(pivot.upper as usize..));
+            let (Some(row), Some((blocks, others))) =
+                (row, blocks.and_then(|blocks| blocks.split_at_checked(slots.len())))
+            else {
+                return;
+            };
+            (sums[index], own[index], triangle[index]) = (*row, blocks, others);
+        }
+        for (index, &slot) in slots.iter().enumerate() {
+            let Some(row) = self.rows.get(slot as usize) else { continue };
+            for (sum, own) in sums.iter_mut().zip(own) {
+                if let Some(block) = own.get(index) {
+                    *sum = A::subtract(*sum, *block, *row);
+                }
+            }
+        }
+        for index in (0..P).rev() {
+            let pivot = pivots[index];
+            if let (false, Some(inverse)) = (pivot.identity, self.blocks.get(pivot.block as usize)) {
+                sums[index] = A::subtract(Complex::zero(), -*inverse, sums[index]);
+            }
+            let (sum, slot) = (sums[index], pivot.slot as usize);
+            for (other, triangle) in sums[..index].iter_mut().zip(triangle) {
+                if let Some(block) = triangle.get(P - 1 - index) {
+                    *other = A::subtract(*other, *block, sum);
+                }
+            }
+            if let Some(row) = self.rows.get_mut(slot) {
+                *row = sum;
+            }
+            if let Some(solution) = self.solution.as_mut().get_mut(slot) {
+                let sum = Complex { parts: sum.parts.map(E::fine) };
+                solution.as_flattened_mut().copy_from_slice(&self.basis.join::<A>(&sum));
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What an implicit integrator does where the planned elimination is not good enough.
+
+use super::{Absent, Inside, Stored, sealed};
+
+/// It pivots the whole matrix. With three stages or more it has memory for the mean Jacobian of
+/// the stages too, which Newton's method takes where iterations are not fixed.
+#[derive(Clone, Copy, Debug)]
+pub struct Pivoting;
+
+/// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no
+/// other worst case than the usual one. Neither the whole matrix nor the mean Jacobian of the
+/// stages has any memory or any code: for firmware with fixed iterations.
+///
+/// ```
+/// # use casados_core::{Dae, Error, Gauss, Inline, Irk, memory::fallback, mode};
+/// type Whole<M> = Irk<M, Gauss<4>, f64, Inline<mode::Forward>>;
+/// type Lean<M> = Irk<M, Gauss<4>, f64, Inline<mode::Forward, 1, fallback::Refusing>>;
+/// fn saved<M: Dae>() -> usize {
+///     Whole::<M>::SIZE - Lean::<M>::SIZE
+/// }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Refusing;
+
+/// [`Pivoting`] or [`Refusing`].
+pub trait Fallback: sealed::Sealed + 'static {
+    /// A place for what only the fallback needs.
+    type Place<V: Stored + Copy>: Kept<V>;
+    /// Whether there is one.
+    const KEPT: bool;
+}
+
+/// A place that has a value, or has none.
+pub trait Kept<V>: Stored + Copy {
+    /// The value.
+    fn get(&self) -> Option<&V>;
+    /// The value, to be written.
+    fn get_mut(&mut self) -> Option<&mut V>;
+}
+
+impl sealed::Sealed for Pivoting {}
+impl Fallback for Pivoting {
+    type Place<V: Stored + Copy> = Inside<V>;
+    const KEPT: bool = true;
+}
+impl sealed::Sealed for Refusing {}
+impl Fallback for Refusing {
+    type Place<V: Stored + Copy> = Absent;
+    const KEPT: bool = false;
+}
+
+impl<V: Stored + Copy> Kept<V> for Inside<V> {
+    #[inline(always)]
+    fn get(&self) -> Option<&V> {
+        Some(&self.0)
+    }
+    #[inline(always)]
+    fn get_mut(&mut self) -> Option<&mut V> {
+        Some(&mut self.0)
+    }
+}
+impl<V> Kept<V> for Absent {
+    #[inline(always)]
+    fn get(&self) -> Option<&V> {
+        None
+    }
+    #[inline(always)]
+    fn get_mut(&mut self) -> Option<&mut V> {
+        None
+    }
+}

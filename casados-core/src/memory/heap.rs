@@ -1,0 +1,120 @@
+//! Memory on the heap: each place is allocated, zeroed, when it is needed first.
+
+use super::{
+    Family, Memory, Stored, WithAdjoint, WithDirectional, WithForward, WithHessian, fallback, sealed,
+};
+use crate::error::Error;
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+use bytemuck::allocation::{try_zeroed_box, try_zeroed_slice_box};
+use core::any::Any;
+
+/// Memory on the heap: allocated when it is needed first.
+#[derive(Clone, Copy, Debug)]
+pub struct Heap;
+
+/// A value on the heap.
+#[derive(Debug)]
+pub struct Allocated<V>(Option<Box<V>>);
+
+/// Values on the heap, one for each step.
+#[derive(Debug)]
+pub struct AllocatedTape<V>(Option<Box<[V]>>);
+
+/// Values on the heap, one of each type that was asked for: types differ in the number of
+/// seeds.
+#[derive(Debug, Default)]
+pub struct AllocatedByType(Vec<Box<dyn Any + Send + Sync>>);
+
+impl<V> Default for Allocated<V> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+impl<V> Default for AllocatedTape<V> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+fn allocate<V: Stored>() -> Result<Box<V>, Error> {
+    try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes: size_of::<V>() })
+}
+
+impl<V: Stored> Allocated<V> {
+    fn open(&mut self) -> Result<&mut V, Error> {
+        if self.0.is_none() {
+            self.0 = Some(allocate()?);
+        }
+        self.0.as_deref_mut().ok_or(Error::OutOfMemory { bytes: size_of::<V>() })
+    }
+}
+
+impl<V: Stored> AllocatedTape<V> {
+    fn open(&mut self, steps: usize) -> Result<&mut [V], Error> {
+        let error = Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) };
+        if self.0.is_none() {
+            self.0 = Some(try_zeroed_slice_box(steps).map_err(|()| error)?);
+        }
+        self.0.as_deref_mut().ok_or(error)
+    }
+}
+
+impl AllocatedByType {
+    fn open<V: Stored>(&mut self) -> Result<&mut V, Error> {
+        let error = Error::OutOfMemory { bytes: size_of::<V>() };
+        let index = match self.0.iter().position(|value| (**value).is::<V>()) {
+            Some(index) => index,
+            None => {
+                let value: Box<V> = allocate()?;
+                self.0.try_reserve(1).map_err(|_| error)?;
+                self.0.push(value);
+                self.0.len() - 1
+            }
+        };
+        self.0.get_mut(index).and_then(|value| value.downcast_mut()).ok_or(error)
+    }
+}
+
+impl sealed::Sealed for Heap {}
+
+impl Memory for Heap {
+    type Nominal<V: Stored> = Allocated<V>;
+    type Tape<V: Stored> = AllocatedTape<V>;
+    type Forward<V: Stored> = Allocated<V>;
+    type Directional<V: Family> = AllocatedByType;
+    type Adjoint<V: Family> = AllocatedByType;
+    type Hessian<V: Stored> = Allocated<V>;
+    type HessianTape<V: Stored> = AllocatedTape<V>;
+    type Fallback = fallback::Pivoting;
+    const STEPS: usize = usize::MAX;
+    fn nominal<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
+        place.open()
+    }
+    fn tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
+        place.open(steps)
+    }
+}
+impl WithForward for Heap {
+    fn forward<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
+        place.open()
+    }
+}
+impl<const C: usize> WithDirectional<C> for Heap {
+    fn directional<V: Family>(place: &mut AllocatedByType) -> Result<&mut V::Of<C>, Error> {
+        place.open()
+    }
+}
+impl<const C: usize> WithAdjoint<C> for Heap {
+    fn adjoint<V: Family>(place: &mut AllocatedByType) -> Result<&mut V::Of<C>, Error> {
+        place.open()
+    }
+}
+impl WithHessian for Heap {
+    fn hessian<V: Stored>(place: &mut Allocated<V>) -> Result<&mut V, Error> {
+        place.open()
+    }
+    fn hessian_tape<V: Stored>(place: &mut AllocatedTape<V>, steps: usize) -> Result<&mut [V], Error> {
+        place.open(steps)
+    }
+}
