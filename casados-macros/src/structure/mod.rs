@@ -4,7 +4,7 @@
 mod elimination;
 mod facts;
 mod index;
-pub mod kinematic;
+mod kinematic;
 mod samples;
 mod supernodes;
 pub mod tables;
@@ -15,8 +15,8 @@ use crate::graph::{self, Degree, Entry, Node};
 use crate::language::{Model, Sampling, Variables};
 pub use elimination::Plan;
 pub use facts::Facts;
-pub use kinematic::Kinematic;
-pub use samples::Position;
+use kinematic::Kinematic;
+use samples::Position;
 use std::collections::{BTreeSet, HashSet};
 use tables::Tables;
 
@@ -69,15 +69,11 @@ pub struct Analysis {
     pub elimination: Elimination,
 }
 
-/// The order in which the Newton matrix is eliminated, and what its blocks are made of.
+/// The order in which the Newton matrix is eliminated.
 pub struct Elimination {
     /// The pivots in order, with the places of all blocks.
     pub plan: Plan,
-    /// The structural non-zeros of the Newton matrix, without kinematic states.
-    pub positions: Vec<Position>,
-    /// The kinematic states.
-    pub kinematic: Vec<Kinematic>,
-    /// What the engine is given of all that.
+    /// What the engine is given of it.
     pub tables: Tables,
 }
 
@@ -166,16 +162,23 @@ fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
     Derivatives { jacobian, blocks, constant, gradient, hessian, linear, operations }
 }
 
-/// Plans the elimination of the Newton matrix.
-fn elimination(
+/// The kinematic states, and the structural non-zeros of the Newton matrix without them.
+fn newton_matrix(
     model: &Model,
-    jacobian: &[(u32, u32, Node)],
+    jacobian: &[Entry],
     blocks: [usize; 6],
     trivial: &[u32],
-) -> Elimination {
-    let Variables { x, z, u, p } = &model.variables;
-    let (nx, kinematic) = (x.len() as u32, kinematic::find(model, (jacobian, blocks), trivial));
+) -> (Vec<Kinematic>, Vec<Position>) {
+    let nx = model.variables.x.len() as u32;
+    let kinematic = kinematic::find(model, (jacobian, blocks), trivial);
     let positions = kinematic::condense(nx, &kinematic, samples::pattern(jacobian, blocks, nx));
+    (kinematic, positions)
+}
+
+/// Plans the elimination of the Newton matrix.
+fn elimination(model: &Model, jacobian: &[Entry], blocks: [usize; 6], trivial: &[u32]) -> Elimination {
+    let Variables { x, z, u, p } = &model.variables;
+    let (kinematic, positions) = newton_matrix(model, jacobian, blocks, trivial);
     let mut samplings = model.samplings.clone();
     samplings.resize(2 * x.len() + z.len() + u.len() + p.len() + 1, Sampling::default());
     let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
@@ -191,7 +194,7 @@ fn elimination(
     };
     let identity: Vec<bool> = plan.ranges.iter().map(is_identity).collect();
     let tables = tables::of(&plan, &positions, &identity, &kinematic, [model.residual.len(), x.len()]);
-    Elimination { plan, positions, kinematic, tables }
+    Elimination { plan, tables }
 }
 
 /// As many equations as unknowns.

@@ -1,8 +1,15 @@
 //! Which states are kinematic, and what the Newton matrix is without them.
 
-use super::super::{Elimination, samples::Term};
-use super::{accepted, model, mul, sub};
+use super::super::kinematic::Kinematic;
+use super::super::newton_matrix;
+use super::super::samples::{Position, Term};
+use super::{Analysis, accepted, model, mul, sub};
 use crate::graph::{Graph, Node, Unary};
+
+fn found(analysis: &Analysis) -> (Vec<Kinematic>, Vec<Position>) {
+    let Analysis { model, derivatives, facts, .. } = analysis;
+    newton_matrix(model, &derivatives.jacobian, derivatives.blocks, &facts.trivial)
+}
 
 /// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial
 /// as well.
@@ -26,7 +33,7 @@ fn kinematic_states() {
         }))
     };
     let kinematic = |own: Row, second: Option<Row>, other: Row| {
-        let found = analysis(own, second, other).elimination.kinematic;
+        let (found, _) = found(&analysis(own, second, other));
         found.into_iter().map(|of| (of.state, of.entry, of.velocity, of.dependents)).collect::<Vec<_>>()
     };
     let sine: Row = |g, v| g.unary(Unary::Sin, v[4]);
@@ -61,7 +68,8 @@ fn kinematic_states() {
         assert_eq!(found.iter().map(|of| of.0).collect::<Vec<_>>(), [0]);
     }
     // The others are the unknowns of the plan: the column of q is a part of that of its velocity.
-    let Elimination { plan, positions, .. } = analysis(|_, v| v[5], None, sine).elimination;
+    let analysis = analysis(|_, v| v[5], None, sine);
+    let ((_, positions), plan) = (found(&analysis), &analysis.elimination.plan);
     assert!(plan.pivots.len() == 3 && !plan.pivots.iter().any(|pivot| pivot.0 == 0 || pivot.1 == 0));
     let of_velocity = positions.iter().find(|position| (position.row, position.column) == (2, 1));
     let terms = of_velocity.map(|position| position.terms.clone());
@@ -76,6 +84,6 @@ fn no_velocity_is_kinematic() {
     let analysis = accepted(model([4, 0, 1, 0], |g, v| {
         vec![sub(g, v[0], v[5]), sub(g, v[1], v[6]), sub(g, v[2], v[7]), sub(g, v[3], v[8])]
     }));
-    let found: Vec<_> = analysis.elimination.kinematic.iter().map(|of| (of.state, of.velocity)).collect();
+    let found: Vec<_> = found(&analysis).0.iter().map(|of| (of.state, of.velocity)).collect();
     assert_eq!(found, [(0, 5), (2, 7)]);
 }
