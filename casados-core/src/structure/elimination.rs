@@ -9,25 +9,34 @@
 #[derive(Clone, Copy, Debug)]
 pub struct Elimination {
     /// The pivots in order.
+    /// Read by factorisation and substitution.
     pub pivots: &'static [Pivot],
     /// For each block the slot at its other end: of `L` that of its equation, of `U` that of its
     /// unknown.
+    /// Read by substitution.
     pub slots: &'static [u32],
     /// For each pivot the blocks of `L` in its row.
+    /// Read by substitution, row by row.
     pub left: &'static [Left],
     /// For each pivot, for each block of its `L`, for each block of its `U`: the block that is
     /// updated.
+    /// Read by factorisation.
     pub updates: &'static [Update],
     /// What blocks are made of before elimination, those of a kind one after the other, fill first.
+    /// Read by the assembly of Newton matrices.
     pub assembly: &'static [Assembly],
     /// For each equation its slot; of a [kinematic](Kinematic) state its own.
+    /// Read where right-hand sides are written.
     pub slot_of_equation: &'static [u32],
     /// The pivots, supernode by supernode.
+    /// Read by substitution of several columns.
     pub supernodes: &'static [Supernode],
     /// For each state whether it is kinematic, and what it follows from; empty if none is.
+    /// Read by the reconstruction of kinematic states.
     pub kinematic: &'static [Kinematic],
     /// The entries of `f_ẋ` and `f_x` by which other equations depend on kinematic states, state by
     /// state.
+    /// Read by right-hand sides and assembly through kinematic states.
     pub dependents: &'static [Dependent],
 }
 

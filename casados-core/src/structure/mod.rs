@@ -25,57 +25,76 @@ pub struct Structure {
     pub p: &'static [&'static str],
     /// Non-zeros of the Jacobian: equation, variable. In order of the blocks
     /// `f_ẋ, f_x, f_z, f_u, f_p`, within each by row, then by column.
+    /// Read by everything that meets entries of the Jacobian.
     pub jacobian: Pattern,
     /// Where each of the five blocks begins in `jacobian`, and its end.
+    /// Read with `jacobian`.
     pub blocks: [usize; 6],
     /// The entries of `f_x, f_z, f_u, f_p`, column by column: what [`by_column`] makes of them.
+    /// Read by right-hand sides of derivatives.
     pub by_column: &'static [u32],
     /// Entries of the Jacobian that are constant.
+    /// Read by [`Dae::describe`](crate::Dae::describe).
     pub constant: &'static [bool],
     /// Non-zeros of the lower triangle of `∇²(μᵀ f)`: variable ≥ variable.
+    /// Read by second derivatives of one stage.
     pub hessian: Pattern,
     /// Equations that are linear in `(ẋ, x, z, u, p)` jointly: they have no second derivatives.
+    /// Read by [`Dae::describe`](crate::Dae::describe).
     pub linear: &'static [bool],
     /// The entries of `f_ẋ`, `f_x` and `f_z` do not depend on `(ẋ, x, z)`; on `u`, `p` and `t` they
     /// may. The residual is then affine in the stages' unknowns: one iteration of Newton's method
     /// is exact.
+    /// Read by Newton's method.
     pub linear_in_state: bool,
     /// Those entries do not depend on `t` either: nothing in the Newton matrix changes within an
     /// interval but with the size of the steps. One factorisation then serves all steps of an
     /// interval, and all intervals of the same `u` and `p`.
+    /// Read by the Jacobian update policy.
     pub constant_matrix: bool,
     /// Nothing depends on `t`: stages at the same point have the same values.
+    /// Read by initial guesses.
     pub autonomous: bool,
     /// Equations whose entries in `f_ẋ`, `f_x` and `f_z` are constant. Their rows of the Newton
     /// matrix depend on the step size and the tableau only, so that they are assembled once; and
     /// one exact iteration of Newton's method satisfies these equations to rounding.
+    /// Read by [`Dae::describe`](crate::Dae::describe).
     pub constant_rows: &'static [bool],
     /// Equations `c ẋ_j + c′ v + c″(t) = 0` with constant `c` and `c′`, where `v` is any variable
     /// but a derivative, or none: `q̇ = v`. They can be solved for `k_j` by hand, whatever the
     /// point. Ascending.
+    /// Read by [`Dae::describe`](crate::Dae::describe).
     pub trivial: &'static [u32],
     /// States that influence nobody: no equation depends on `x_j`, only on `ẋ_j`. Their columns of
     /// the Newton matrix are `f_ẋ` alone, their columns of `dk/dx₀` are zero, and their multipliers
     /// pass through an interval unchanged. Ascending.
+    /// Read by [`Dae::describe`](crate::Dae::describe).
     pub quadratures: &'static [u32],
     /// Directions `w = (x₀, u, p)` that an equation depends on, as indices into `w`, ascending. For
     /// the others the stages have no derivative: the column of `dx₊/dw` is `e_j` for the state `j`
     /// and zero for a control or a parameter, and rows and columns of second derivatives are zero.
+    /// Read by the forward sweep and by second derivatives: their columns.
     pub directions: &'static [u32],
     /// For each direction its position in `directions`, or [`NO_COLUMN`]: what [`columns`] makes of
     /// them.
+    /// Read where results are written.
     pub column_of_direction: &'static [u32],
     /// Variables that occur in the pattern of the Hessian, ascending, less those of `lone`: only
     /// their rows of `D_i` enter second derivatives.
+    /// Read by second derivatives: their stage sensitivities.
     pub curved: &'static [u32],
     /// The whole of the symmetric matrix whose lower triangle is `hessian`: what [`symmetric`]
     /// makes of it.
+    /// Read by the product of the Hessian with stage sensitivities.
     pub symmetric: &'static [Term],
     /// Controls and parameters that occur in the Hessian's diagonal only.
+    /// Read by second derivatives: sums on the diagonal.
     pub lone: &'static [Lone],
     /// Numbers of arithmetic operations.
+    /// Read by [`Structure::cost`] and the Jacobian update policy.
     pub operations: Operations,
     /// How the Newton matrix is eliminated.
+    /// Read by `linalg`.
     pub elimination: Elimination,
 }
 

@@ -4,13 +4,13 @@ use crate::language::{Sampling, Variables};
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute says anything. `is_curved`
-/// tells whether equations may be nonlinear in an unknown `(ẋ, z)`.
+/// The constants `Dae::START` and `Dae::RANGES`, as far as the attribute says anything.
+/// `is_nonlinear` tells whether equations may be nonlinear in an unknown `(ẋ, z)`.
 pub fn write(
     krate: &syn::Path,
     variables: &Variables,
     samplings: &[Sampling],
-    is_curved: impl Fn(usize) -> bool,
+    is_nonlinear: impl Fn(usize) -> bool,
 ) -> TokenStream {
     let (nx, nz) = (variables.x.len(), variables.z.len());
     let sampling = |variable: usize| samplings.get(variable).copied().unwrap_or_default();
@@ -18,7 +18,7 @@ pub fn write(
     // then `x₀` at all stages.
     let starts: Vec<f64> = (0..nx + nz)
         .map(|unknown| match unknown {
-            derivative if derivative < nx && !is_curved(derivative) => 0.0,
+            derivative if derivative < nx && !is_nonlinear(derivative) => 0.0,
             derivative if derivative < nx => start(sampling(derivative)),
             algebraic => start(sampling(nx + algebraic)),
         })

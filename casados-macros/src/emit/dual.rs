@@ -1,9 +1,9 @@
 //! Dual models: `Dae` by the arithmetic of dual numbers at run time.
 
 use super::domain;
-use crate::language::Form;
 use crate::language::dual::{Argument, Model};
 use crate::language::signature::Role;
+use crate::language::{Form, Variables};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
@@ -28,37 +28,48 @@ pub fn documentation(model: &Model) -> TokenStream {
     quote!(#(#documentation)* #separator #[doc = #text])
 }
 
+/// Numbers of a dense model.
+struct Sizes {
+    nx: usize,
+    nz: usize,
+    nu: usize,
+    np: usize,
+    /// Equations,
+    nk: usize,
+    /// variables,
+    nv: usize,
+    /// directions,
+    nw: usize,
+    /// entries of the Jacobian,
+    nj: usize,
+    /// entries of the Hessian.
+    nh: usize,
+}
+
+impl Sizes {
+    fn of(Variables { x, z, u, p }: &Variables) -> Self {
+        let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
+        let (nk, nv, nw) = (nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np);
+        Self { nx, nz, nu, np, nk, nv, nw, nj: nk * (nv - 1), nh: (nv - 1) * nv / 2 }
+    }
+
+    /// The type of the dimensions.
+    fn shape(&self, krate: &syn::Path) -> TokenStream {
+        let &Self { nx, nz, nu, np, nk, nv, nw, .. } = self;
+        let numbers = [nx, nz, nu, np, nk, nv, nw].map(Literal::usize_unsuffixed);
+        quote!(#krate::Dims<#(#numbers),*>)
+    }
+}
+
 /// Writes the implementations for one model.
 pub fn write(model: &Model) -> TokenStream {
-    let Model { form, name, function, instance, variables, krate, generics, .. } = model;
-    let [nx, nz, nu, np] = [&variables.x, &variables.z, &variables.u, &variables.p].map(Vec::len);
-    let (nk, nv, nw) = (nx + nz, 2 * nx + nz + nu + np + 1, nx + nu + np);
-    let (nj, nh) = (nk * (nv - 1), (nv - 1) * nv / 2);
-    let mut begin = 0;
-    let blocks = [nx, nx, nz, nu, np, 0].map(|width| {
-        let block = Literal::usize_unsuffixed(begin);
-        begin += nk * width;
-        block
-    });
-    let starts = [0, nx, 2 * nx, 2 * nx + nz, 2 * nx + nz + nu, nv - 1];
-    let arguments = model.arguments.iter().map(|argument| self::argument(argument, starts));
-    let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lcurved, lterms] =
-        [nx, nz, nu, np, nk, nv, nw, nj, nh, nv - 1, (nv - 1) * (nv - 1)].map(Literal::usize_unsuffixed);
-    let [first, linputs] = [nk * nx, nk * (nx + nz + nu + np)].map(Literal::usize_unsuffixed);
+    let Model { form, name, instance, variables, krate, .. } = model;
+    let sizes = Sizes::of(variables);
     let values = instance.iter().map(|instance| Literal::u64_unsuffixed(instance.value));
     let ty = if instance.is_empty() { quote!(#name) } else { quote!(#name<#(#values),*>) };
-    let text = name.to_string();
-    let crate::language::Variables { x, z, u, p } = variables;
-
-    let domain = domain::write(krate, &model.variables, &model.samplings, |_| true);
-    let call = quote!(#function::<#(#generics),*>(#(#arguments),*));
-    let returned = if model.scalar { quote!([#call]) } else { quote!(::core::convert::Into::into(#call)) };
-    let value = match form {
-        Form::Dae | Form::Function => quote!(casados_value),
-        Form::Ode => quote!(casados_variable(casados_row) - casados_value),
-    };
+    let (dual_model, dae) = (dual_model(model, &sizes, &ty), dae(model, &sizes, &ty));
     let ode = (*form == Form::Ode).then(|| {
-        let rows = (0..nx).map(Literal::usize_unsuffixed);
+        let rows = (0..sizes.nx).map(Literal::usize_unsuffixed);
         quote! {
             #[automatically_derived]
             impl #krate::Ode for #ty {
@@ -66,9 +77,25 @@ pub fn write(model: &Model) -> TokenStream {
             }
         }
     });
+    quote! {
+        const _: () = { #dual_model #dae #ode };
+    }
+}
+
+/// The call of the function, over any dual number.
+fn dual_model(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
+    let Model { form, function, krate, generics, .. } = model;
+    let &Sizes { nx, nz, nu, nv, .. } = sizes;
+    let starts = [0, nx, 2 * nx, 2 * nx + nz, 2 * nx + nz + nu, nv - 1];
+    let arguments = model.arguments.iter().map(|argument| self::argument(argument, starts));
+    let call = quote!(#function::<#(#generics),*>(#(#arguments),*));
+    let returned = if model.scalar { quote!([#call]) } else { quote!(::core::convert::Into::into(#call)) };
+    let value = match form {
+        Form::Dae | Form::Function => quote!(casados_value),
+        Form::Ode => quote!(casados_variable(casados_row) - casados_value),
+    };
     let equations = Literal::usize_unsuffixed(model.equations);
     quote! {
-        const _: () = {
             #[automatically_derived]
             impl #krate::dual::DualModel for #ty {
                 fn evaluate<CasadosT>(
@@ -89,20 +116,89 @@ pub fn write(model: &Model) -> TokenStream {
                     &PASSES
                 }
             }
+    }
+}
 
-            #[automatically_derived]
-            impl #krate::Dae for #ty {
-                type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
-                type Jacobian<T: #krate::shape::Plain> = [T; #lj];
-                type Hessian<T: #krate::shape::Plain> = [T; #lh];
-                type Factors<B: #krate::shape::Plain> = [B; 0];
-                #domain
-                const STRUCTURE: #krate::model::Structure = {
+fn dae(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
+    let Model { variables, krate, .. } = model;
+    let &Sizes { nk, nv, nj, nh, .. } = sizes;
+    let [lk, lv, lj, lh] = [nk, nv, nj, nh].map(Literal::usize_unsuffixed);
+    let shape = sizes.shape(krate);
+    let domain = domain::write(krate, variables, &model.samplings, |_| true);
+    let structure = structure(model, sizes);
+    quote! {
+        #[automatically_derived]
+        impl #krate::Dae for #ty {
+            type Shape = #shape;
+            type Jacobian<T: #krate::shape::Plain> = [T; #lj];
+            type Hessian<T: #krate::shape::Plain> = [T; #lh];
+            type Factors<B: #krate::shape::Plain> = [B; 0];
+            #domain
+            const STRUCTURE: #krate::model::Structure = {
                     const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::dual::jacobian_pattern::<
-                        #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>,
+                        #shape,
                         #lj,
                     >();
                     const HESSIAN: ([u32; #lh], [u32; #lh]) = #krate::dual::hessian_pattern();
+                    #structure
+            };
+
+                fn residual<CasadosS: #krate::Lanes>(variables: &[CasadosS::Cell; #lv], residual: &mut [CasadosS::Cell; #lk]) {
+                    #krate::dual::residual::<Self, CasadosS>(variables, residual);
+                }
+
+                fn jacobian_constants<CasadosS: #krate::Lanes>(_: &mut [CasadosS::Cell; #lj]) {}
+
+                fn residual_jacobian<CasadosS: #krate::Lanes>(
+                    variables: &[CasadosS::Cell; #lv],
+                    residual: &mut [CasadosS::Cell; #lk],
+                    jacobian: &mut [CasadosS::Cell; #lj],
+                ) {
+                    #krate::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
+                }
+
+                fn tangent<CasadosS: #krate::Lanes>(
+                    variables: &[#krate::scalar::Tangent<CasadosS>; #lv],
+                    residual: &mut [#krate::scalar::Tangent<CasadosS>; #lk],
+                ) {
+                    #krate::dual::tangent::<Self, CasadosS>(variables, residual);
+                }
+
+                fn adjoint<CasadosS: #krate::Lanes>(
+                    variables: &[CasadosS::Cell; #lv],
+                    seeds: &[CasadosS::Cell; #lk],
+                    gradient: &mut [CasadosS::Cell; #lv],
+                ) {
+                    #krate::dual::adjoint::<Self, CasadosS>(variables, seeds, gradient);
+                }
+
+                fn hessian<CasadosS: #krate::Lanes>(
+                    variables: &[CasadosS::Cell; #lv],
+                    seeds: &[CasadosS::Cell; #lk],
+                    hessian: &mut [CasadosS::Cell; #lh],
+                ) {
+                    #krate::dual::hessian::<Self, CasadosS>(variables, seeds, hessian);
+                }
+        }
+    }
+}
+
+/// The structure of a model of which nothing is known: everything is dense.
+fn structure(model: &Model, sizes: &Sizes) -> TokenStream {
+    let Model { name, variables, krate, .. } = model;
+    let &Sizes { nx, nz, nu, np, nk, nv, nw, nj, .. } = sizes;
+    let mut begin = 0;
+    let blocks = [nx, nx, nz, nu, np, 0].map(|width| {
+        let block = Literal::usize_unsuffixed(begin);
+        begin += nk * width;
+        block
+    });
+    let [lk, lw, lj, lcurved, lterms] =
+        [nk, nw, nj, nv - 1, (nv - 1) * (nv - 1)].map(Literal::usize_unsuffixed);
+    let [first, linputs] = [nk * nx, nk * (nx + nz + nu + np)].map(Literal::usize_unsuffixed);
+    let text = name.to_string();
+    let Variables { x, z, u, p } = variables;
+    quote! {
                     #krate::model::Structure {
                         name: #text,
                         x: &[#(#x),*],
@@ -144,48 +240,6 @@ pub fn write(model: &Model) -> TokenStream {
                         },
                         elimination: #krate::model::Elimination::NONE,
                     }
-                };
-
-                fn residual<CasadosS: #krate::Lanes>(variables: &[CasadosS::Cell; #lv], residual: &mut [CasadosS::Cell; #lk]) {
-                    #krate::dual::residual::<Self, CasadosS>(variables, residual);
-                }
-
-                fn jacobian_constants<CasadosS: #krate::Lanes>(_: &mut [CasadosS::Cell; #lj]) {}
-
-                fn residual_jacobian<CasadosS: #krate::Lanes>(
-                    variables: &[CasadosS::Cell; #lv],
-                    residual: &mut [CasadosS::Cell; #lk],
-                    jacobian: &mut [CasadosS::Cell; #lj],
-                ) {
-                    #krate::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
-                }
-
-                fn tangent<CasadosS: #krate::Lanes>(
-                    variables: &[#krate::scalar::Tangent<CasadosS>; #lv],
-                    residual: &mut [#krate::scalar::Tangent<CasadosS>; #lk],
-                ) {
-                    #krate::dual::tangent::<Self, CasadosS>(variables, residual);
-                }
-
-                fn adjoint<CasadosS: #krate::Lanes>(
-                    variables: &[CasadosS::Cell; #lv],
-                    seeds: &[CasadosS::Cell; #lk],
-                    gradient: &mut [CasadosS::Cell; #lv],
-                ) {
-                    #krate::dual::adjoint::<Self, CasadosS>(variables, seeds, gradient);
-                }
-
-                fn hessian<CasadosS: #krate::Lanes>(
-                    variables: &[CasadosS::Cell; #lv],
-                    seeds: &[CasadosS::Cell; #lk],
-                    hessian: &mut [CasadosS::Cell; #lh],
-                ) {
-                    #krate::dual::hessian::<Self, CasadosS>(variables, seeds, hessian);
-                }
-            }
-
-            #ode
-        };
     }
 }
 

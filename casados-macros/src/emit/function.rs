@@ -9,21 +9,25 @@ use quote::quote;
 
 /// Writes the implementations for one function.
 pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
-    let FunctionAnalysis { model, derivatives, time } = analysis;
+    let FunctionAnalysis { model, derivatives, time, .. } = analysis;
+    let code = code::module(model, derivatives, &FUNCTION, Some(time))?;
+    // Constants from outside are an argument: the module of the code sees no name of the user's.
+    let c = (!model.opaque.is_empty()).then(|| quote!(&C,));
+    let (function, graph_function) = (self::function(analysis, &c), graph_function(model, &c));
+    Ok(code::enclose(model, &quote!(#code #function #graph_function)))
+}
+
+fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream {
+    let FunctionAnalysis { model, derivatives, .. } = analysis;
     let Derivatives { jacobian, hessian, .. } = derivatives;
-    let Model { variables, opaque, krate, residual, .. } = model;
+    let Model { variables, krate, residual, .. } = model;
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let [nk, nv, nw] = dimensions(variables);
-    let (code, ty) = (code::module(model, derivatives, &FUNCTION, Some(time))?, ty(model));
     let numbers = [nx, nz, nu, np, nk, nv, nw, residual.len(), jacobian.len(), hessian.len(), nv - 1];
     let [lx, lz, lu, lp, lk, lv, lw, ly, lj, lh, last] = numbers.map(Literal::usize_unsuffixed);
-    let structure = structure::of_function(analysis);
-    // Constants from outside are an argument: the module of the code sees no name of the user's.
-    let c = (!opaque.is_empty()).then(|| quote!(&C,));
-    let implementations = quote! {
-        #code
-
+    let (ty, structure) = (ty(model), structure::of_function(analysis));
+    quote! {
         #[automatically_derived]
         impl #krate::Function for #ty {
             type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
@@ -70,7 +74,14 @@ pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
                 code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
+    }
+}
 
+/// Functions over any scalar, of slices.
+fn graph_function(model: &Model, c: &Option<TokenStream>) -> TokenStream {
+    let (krate, ty, [_, nv, _]) = (&model.krate, ty(model), dimensions(&model.variables));
+    let last = Literal::usize_unsuffixed(nv - 1);
+    quote! {
         #[automatically_derived]
         impl #krate::GraphFunction for #ty {
             fn value_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_y: &mut [S]) {
@@ -88,6 +99,5 @@ pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
                 }
             }
         }
-    };
-    Ok(code::enclose(model, &implementations))
+    }
 }

@@ -6,6 +6,7 @@ mod divisor;
 mod documentation;
 mod domain;
 mod dual;
+mod elimination;
 mod function;
 mod model;
 mod routine;

@@ -9,47 +9,27 @@ use quote::quote;
 
 /// Writes the implementations for one model.
 pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
-    let Analysis { model, derivatives, explicit, .. } = analysis;
+    let Analysis { model, derivatives, .. } = analysis;
+    let code = code::module(model, derivatives, &MODEL, None)?;
+    // Constants from outside are an argument: the module of the code sees no name of the user's.
+    let c = (!model.opaque.is_empty()).then(|| quote!(&C,));
+    let (dae, graph_dae, ode) = (dae(analysis, &c), graph_dae(model, &c), ode(analysis));
+    Ok(code::enclose(model, &quote!(#code #dae #graph_dae #ode)))
+}
+
+fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
+    let Analysis { model, derivatives, .. } = analysis;
     let Derivatives { jacobian, hessian, .. } = derivatives;
-    let Model { variables, opaque, krate, .. } = model;
+    let Model { variables, krate, .. } = model;
     let Variables { x, z, u, p } = variables;
     let [nx, nz, nu, np] = [x, z, u, p].map(Vec::len);
     let [nk, nv, nw] = dimensions(variables);
     let (nj, nh, nb) = (jacobian.len(), hessian.len(), analysis.elimination.plan.blocks.len());
-    let (code, ty) = (code::module(model, derivatives, &MODEL, None)?, ty(model));
     let [lx, lz, lu, lp, lk, lv, lw, lj, lh, lb, time] =
         [nx, nz, nu, np, nk, nv, nw, nj, nh, nb, nv - 1].map(Literal::usize_unsuffixed);
-    let structure = structure::write(analysis);
-    // Nonlinear in the unknowns, whatever the states are.
-    let unknown = |variable: u32| match variable as usize {
-        derivative if derivative < nx => Some(derivative),
-        algebraic => (algebraic >= 2 * nx && algebraic < 2 * nx + nz).then(|| algebraic - nx),
-    };
-    let domain = domain::write(krate, variables, &model.samplings, |of| {
-        hessian.iter().any(|&(row, column, _)| {
-            let (row, column) = (unknown(row), unknown(column));
-            row.is_some() && column.is_some() && (row == Some(of) || column == Some(of))
-        })
-    });
-    // Constants from outside are an argument: the module of the code sees no name of the user's.
-    let c = (!opaque.is_empty()).then(|| quote!(&C,));
-
-    let finite = |rows: &&Vec<(u32, f64)>| rows.iter().all(|row| row.1.is_finite());
-    let ode = explicit.as_ref().filter(finite).map(|rows| {
-        let rows = rows.iter().map(|&(row, coefficient)| {
-            let row = Literal::u32_unsuffixed(row);
-            quote!((#row, #coefficient))
-        });
-        quote! {
-            #[automatically_derived]
-            impl #krate::Ode for #ty {
-                const ROWS: &'static [(u32, f64)] = &[#(#rows),*];
-            }
-        }
-    });
-    let implementations = quote! {
-        #code
-
+    let (ty, structure) = (ty(model), structure::write(analysis));
+    let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
+    quote! {
         #[automatically_derived]
         impl #krate::Dae for #ty {
             type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
@@ -94,7 +74,14 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
                 code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
+    }
+}
 
+/// Functions over any scalar, of slices.
+fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
+    let (krate, ty, [_, nv, _]) = (&model.krate, ty(model), dimensions(&model.variables));
+    let time = Literal::usize_unsuffixed(nv - 1);
+    quote! {
         #[automatically_derived]
         impl #krate::GraphDae for #ty {
             fn residual_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_f: &mut [S]) {
@@ -112,8 +99,24 @@ pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
                 }
             }
         }
+    }
+}
 
-        #ode
-    };
-    Ok(code::enclose(model, &implementations))
+/// Of an explicit model its rows.
+fn ode(analysis: &Analysis) -> Option<TokenStream> {
+    let Analysis { model, explicit, .. } = analysis;
+    let (krate, ty) = (&model.krate, ty(model));
+    let finite = |rows: &&Vec<(u32, f64)>| rows.iter().all(|row| row.1.is_finite());
+    explicit.as_ref().filter(finite).map(|rows| {
+        let rows = rows.iter().map(|&(row, coefficient)| {
+            let row = Literal::u32_unsuffixed(row);
+            quote!((#row, #coefficient))
+        });
+        quote! {
+            #[automatically_derived]
+            impl #krate::Ode for #ty {
+                const ROWS: &'static [(u32, f64)] = &[#(#rows),*];
+            }
+        }
+    })
 }

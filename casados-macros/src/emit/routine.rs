@@ -2,7 +2,7 @@
 
 use super::chunk::{self, Chunk, Plan};
 use super::divisor;
-use super::schedule::{self, Step};
+use super::schedule::{self, Step, Values};
 use super::together::{self, Function};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 use crate::language::Variables;
@@ -11,9 +11,6 @@ use std::fmt::Write;
 
 /// The most statements of one function. The pieces of a longer routine are not inlined: a compiler
 /// takes longer over all of them in one, and spills more registers there than the calls cost.
-/// Measured with 4687 operations in `f64`, `rustc -O`, compile time and time of one evaluation:
-/// `inline(never)` 4.5 s and 1270 ns; no attribute 5.8 to 7.6 s and 1345 to 1702 ns;
-/// `inline(always)` 9.6 to 16.8 s and 1720 to 2466 ns.
 const LIMIT: usize = 500;
 
 /// A function to be written.
@@ -113,6 +110,16 @@ impl Writer<'_> {
         let _ = writeln!(text, "#[inline(always)]\nfn run(self) {{\nlet Self({}) = self;", names.join(", "));
         let steps = &steps[piece.steps.clone()];
 
+        self.loads(text, steps, piece);
+        for &step in steps {
+            self.step(text, step);
+            self.spills(text, step, piece);
+        }
+        text.push_str("}\n}\n");
+    }
+
+    /// What a piece reads: variables, seeds, and values of the pieces before it.
+    fn loads(&self, text: &mut String, steps: &[Step], piece: &Chunk) {
         let read = steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step));
         let (mut variables, mut seeds) = (BTreeSet::new(), BTreeSet::new());
         for node in read {
@@ -136,65 +143,69 @@ impl Writer<'_> {
                 let _ = writeln!(text, "let v{name} = w[{slot}];");
             }
         }
-        for &step in steps {
-            match step {
-                Step::Compute(node) => {
-                    let _ = writeln!(text, "let {} = {};", self.atom(node), self.expression(node));
-                }
-                Step::SinCos(sin, cos) => {
-                    let argument = self.graph.op(sin).operands().map(|a| self.atom(a)).next();
-                    let _ = writeln!(
-                        text,
-                        "let ({}, {}) = {}.sin_cos();",
-                        self.atom(sin),
-                        self.atom(cos),
-                        argument.unwrap_or_default()
-                    );
-                }
-                Step::Together(values) => {
-                    let values: Vec<_> = values.into_iter().flatten().collect();
-                    let function =
-                        values.first().and_then(|&values| together::function_of(self.graph, values));
-                    let Some(function) = function else { continue };
-                    let list = |nodes: &mut dyn Iterator<Item = Node>| {
-                        let atoms: Vec<String> = nodes.map(|node| self.atom(node)).collect();
-                        format!("[{}]", atoms.join(", "))
-                    };
-                    let results: Vec<_> = values
-                        .iter()
-                        .map(|(node, other)| list(&mut [*node].into_iter().chain(*other)))
-                        .collect();
-                    let arguments: Vec<_> =
-                        values.iter().map(|(node, _)| list(&mut self.graph.op(*node).operands())).collect();
-                    let function = match function {
-                        Function::Unary(function) => unary(function),
-                        Function::Binary(function) => binary(function),
-                        Function::SinCos => "sin_cos",
-                    };
-                    let _ = writeln!(
-                        text,
-                        "let [{}] = S::together::<elementary::{function}, _, _, _>([{}]);",
-                        results.join(", "),
-                        arguments.join(", ")
-                    );
-                }
-                Step::Store(output) => {
-                    let (array, index, node) = &self.routine.stores[output];
-                    let _ = writeln!(text, "S::store({}, &mut {array}[{index}]);", self.atom(*node));
-                }
+    }
+
+    /// One statement.
+    fn step(&self, text: &mut String, step: Step) {
+        match step {
+            Step::Compute(node) => {
+                let _ = writeln!(text, "let {} = {};", self.atom(node), self.expression(node));
             }
-            for node in chunk::computed(step) {
-                let Some(slot) = piece.spills.get(&node) else { continue };
-                let atom = self.atom(node);
-                if self.is_condition(node) {
-                    let _ =
-                        writeln!(text, "w[{slot}] = S::select({atom}, S::from_f64(1.0), S::from_f64(0.0));");
-                } else {
-                    let _ = writeln!(text, "w[{slot}] = {atom};");
-                }
+            Step::SinCos(sin, cos) => {
+                let argument = self.graph.op(sin).operands().map(|a| self.atom(a)).next();
+                let _ = writeln!(
+                    text,
+                    "let ({}, {}) = {}.sin_cos();",
+                    self.atom(sin),
+                    self.atom(cos),
+                    argument.unwrap_or_default()
+                );
+            }
+            Step::Together(values) => self.together(text, values),
+            Step::Store(output) => {
+                let (array, index, node) = &self.routine.stores[output];
+                let _ = writeln!(text, "S::store({}, &mut {array}[{index}]);", self.atom(*node));
             }
         }
-        text.push_str("}\n}\n");
+    }
+
+    /// The same function of several arguments.
+    fn together(&self, text: &mut String, values: [Option<Values>; 4]) {
+        let values: Vec<_> = values.into_iter().flatten().collect();
+        let function = values.first().and_then(|&values| together::function_of(self.graph, values));
+        let Some(function) = function else { return };
+        let list = |nodes: &mut dyn Iterator<Item = Node>| {
+            let atoms: Vec<String> = nodes.map(|node| self.atom(node)).collect();
+            format!("[{}]", atoms.join(", "))
+        };
+        let results: Vec<_> =
+            values.iter().map(|(node, other)| list(&mut [*node].into_iter().chain(*other))).collect();
+        let arguments: Vec<_> =
+            values.iter().map(|(node, _)| list(&mut self.graph.op(*node).operands())).collect();
+        let function = match function {
+            Function::Unary(function) => unary(function),
+            Function::Binary(function) => binary(function),
+            Function::SinCos => "sin_cos",
+        };
+        let _ = writeln!(
+            text,
+            "let [{}] = S::together::<elementary::{function}, _, _, _>([{}]);",
+            results.join(", "),
+            arguments.join(", ")
+        );
+    }
+
+    /// Values that later pieces read.
+    fn spills(&self, text: &mut String, step: Step, piece: &Chunk) {
+        for node in chunk::computed(step) {
+            let Some(slot) = piece.spills.get(&node) else { continue };
+            let atom = self.atom(node);
+            if self.is_condition(node) {
+                let _ = writeln!(text, "w[{slot}] = S::select({atom}, S::from_f64(1.0), S::from_f64(0.0));");
+            } else {
+                let _ = writeln!(text, "w[{slot}] = {atom};");
+            }
+        }
     }
 
     fn is_condition(&self, node: Node) -> bool {

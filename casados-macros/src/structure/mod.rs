@@ -4,9 +4,10 @@
 mod elimination;
 mod facts;
 mod index;
-pub mod kinematic;
+mod kinematic;
 mod samples;
-pub mod supernodes;
+mod supernodes;
+pub mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -14,9 +15,10 @@ use crate::graph::{self, Degree, Entry, Node};
 use crate::language::{Model, Sampling, Variables};
 pub use elimination::Plan;
 pub use facts::Facts;
-pub use kinematic::Kinematic;
-pub use samples::{Position, Term};
-use std::collections::HashSet;
+use kinematic::Kinematic;
+use samples::Position;
+use std::collections::{BTreeSet, HashSet};
+use tables::Tables;
 
 /// The derivatives of a model or of a function of its variables.
 pub struct Derivatives {
@@ -45,6 +47,8 @@ pub struct FunctionAnalysis {
     pub derivatives: Derivatives,
     /// `∂y/∂t`, of the outputs that depend on the time.
     pub time: Vec<(u32, Node)>,
+    /// The variables that an output depends on, ascending.
+    pub used: Vec<u32>,
 }
 
 /// A model with its derivatives and its structure.
@@ -55,22 +59,22 @@ pub struct Analysis {
     pub derivatives: Derivatives,
     /// What lets the engine leave work out.
     pub facts: Facts,
+    /// Unknowns `(ẋ, z)` in which an equation may be nonlinear.
+    pub nonlinear: Vec<bool>,
+    /// How many entries the whole of the Hessian has in rows of nonlinear variables.
+    pub symmetric: usize,
     /// For an explicit model: for each state its row and coefficient.
     pub explicit: Option<Vec<(u32, f64)>>,
     /// How the Newton matrix is eliminated.
     pub elimination: Elimination,
 }
 
-/// The order in which the Newton matrix is eliminated, and what its blocks are made of.
+/// The order in which the Newton matrix is eliminated.
 pub struct Elimination {
     /// The pivots in order, with the places of all blocks.
     pub plan: Plan,
-    /// The structural non-zeros of the Newton matrix, without kinematic states.
-    pub positions: Vec<Position>,
-    /// Pivots that are the identity, whatever the step size and the point.
-    pub identity: Vec<bool>,
-    /// The kinematic states.
-    pub kinematic: Vec<Kinematic>,
+    /// What the engine is given of it.
+    pub tables: Tables,
 }
 
 /// Numbers of operations of one evaluation; an elementary function is one.
@@ -96,8 +100,11 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     let facts =
         facts::find(&model.graph, &model.residual, (jacobian, *blocks, constant), hessian, linear, ends);
     let explicit = explicit(&model, jacobian, ends);
+    let nonlinear = nonlinear(hessian, ends);
+    let curved = hessian.iter().filter(|entry| facts.curved.contains(&entry.0));
+    let symmetric = curved.map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum();
     let elimination = elimination(&model, jacobian, *blocks, &facts.trivial);
-    Ok(Analysis { model, derivatives, facts, explicit, elimination })
+    Ok(Analysis { model, derivatives, facts, nonlinear, symmetric, explicit, elimination })
 }
 
 /// Derives everything about a function.
@@ -107,7 +114,8 @@ pub fn analyse_function(mut model: Model) -> FunctionAnalysis {
     let time = ends[4];
     let rows = graph::jacobian(&mut model.graph, &model.residual, time + 1);
     let time = rows.into_iter().filter(|entry| entry.1 == time).map(|entry| (entry.0, entry.2)).collect();
-    FunctionAnalysis { model, derivatives, time }
+    let used: BTreeSet<u32> = derivatives.jacobian.iter().map(|entry| entry.1).collect();
+    FunctionAnalysis { model, derivatives, time, used: used.into_iter().collect() }
 }
 
 /// Where each of the blocks `(ẋ, x, z, u, p)` ends among the variables.
@@ -154,16 +162,23 @@ fn differentiate(model: &mut Model, ends: [u32; 5]) -> Derivatives {
     Derivatives { jacobian, blocks, constant, gradient, hessian, linear, operations }
 }
 
-/// Plans the elimination of the Newton matrix.
-fn elimination(
+/// The kinematic states, and the structural non-zeros of the Newton matrix without them.
+fn newton_matrix(
     model: &Model,
-    jacobian: &[(u32, u32, Node)],
+    jacobian: &[Entry],
     blocks: [usize; 6],
     trivial: &[u32],
-) -> Elimination {
-    let Variables { x, z, u, p } = &model.variables;
-    let (nx, kinematic) = (x.len() as u32, kinematic::find(model, (jacobian, blocks), trivial));
+) -> (Vec<Kinematic>, Vec<Position>) {
+    let nx = model.variables.x.len() as u32;
+    let kinematic = kinematic::find(model, (jacobian, blocks), trivial);
     let positions = kinematic::condense(nx, &kinematic, samples::pattern(jacobian, blocks, nx));
+    (kinematic, positions)
+}
+
+/// Plans the elimination of the Newton matrix.
+fn elimination(model: &Model, jacobian: &[Entry], blocks: [usize; 6], trivial: &[u32]) -> Elimination {
+    let Variables { x, z, u, p } = &model.variables;
+    let (kinematic, positions) = newton_matrix(model, jacobian, blocks, trivial);
     let mut samplings = model.samplings.clone();
     samplings.resize(2 * x.len() + z.len() + u.len() + p.len() + 1, Sampling::default());
     let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
@@ -174,12 +189,12 @@ fn elimination(
         let position = positions.iter().find(|p| (p.row, p.column) == (row, column));
         position.filter(|_| !updated.contains(&block))
     };
-    let identity: Vec<bool> = plan
-        .ranges
-        .iter()
-        .map(|&[block, ..]| original(block).is_some_and(|p| samples::is_identity(&model.graph, jacobian, p)))
-        .collect();
-    Elimination { plan, positions, identity, kinematic }
+    let is_identity = |&[block, ..]: &[u32; 3]| {
+        original(block).is_some_and(|position| samples::is_identity(&model.graph, jacobian, position))
+    };
+    let identity: Vec<bool> = plan.ranges.iter().map(is_identity).collect();
+    let tables = tables::of(&plan, &positions, &identity, &kinematic, [model.residual.len(), x.len()]);
+    Elimination { plan, tables }
 }
 
 /// As many equations as unknowns.
@@ -200,6 +215,21 @@ fn check_length(model: &Model) -> syn::Result<()> {
     let message =
         format!("the residual has {} where the model needs {unknowns}", plural(equations, "equation"));
     Err(syn::Error::new(span, message))
+}
+
+/// Whether the Hessian has an entry for two unknowns of which it is one, whatever the states are.
+fn nonlinear(hessian: &[Entry], [nx, end_x, end_z, ..]: [u32; 5]) -> Vec<bool> {
+    let unknown = |variable: u32| match variable {
+        derivative if derivative < nx => Some(derivative as usize),
+        algebraic => (end_x..end_z).contains(&algebraic).then(|| (algebraic - nx) as usize),
+    };
+    let mut nonlinear = vec![false; (nx + end_z - end_x) as usize];
+    for &(row, column, _) in hessian {
+        if let (Some(row), Some(column)) = (unknown(row), unknown(column)) {
+            (nonlinear[row], nonlinear[column]) = (true, true);
+        }
+    }
+    nonlinear
 }
 
 /// For each state its row and the constant coefficient of its derivative, if every row has exactly

@@ -1,4 +1,9 @@
-use super::{Analysis, Elimination, Facts, Term, analyse};
+//! Models whose graphs are built by hand, and what is found out about them.
+
+mod index;
+mod kinematic;
+
+use super::{Analysis, Facts, analyse};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
 use crate::language::{Model, Sampling, Variables};
 use proc_macro2::Span;
@@ -30,6 +35,13 @@ fn refusal(model: Model) -> String {
         Ok(_) => panic!("the model was accepted"),
         Err(error) => error.to_string(),
     }
+}
+
+const END: &str = ": the model is not of index 1";
+
+fn reason(model: Model) -> String {
+    let message = refusal(model);
+    message.split(END).next().unwrap_or_default().to_string()
 }
 
 fn accepted(model: Model) -> Analysis {
@@ -197,102 +209,6 @@ fn squares_of_what_is_a_multiple_of_others() {
     assert_eq!((together.curved, together.lone), (vec![0, 1, 2, 3, 5], Vec::new()));
 }
 
-/// `q̇` of a state or a control, and three equations that feel `q`; the second one may be trivial
-/// as well.
-#[test]
-fn kinematic_states() {
-    type Row = fn(&mut Graph, &[Node]) -> Node;
-    let analysis = |own: Row, second: Option<Row>, other: Row| {
-        accepted(model([4, 0, 1, 0], move |g, v| {
-            let first = own(g, v);
-            let mut f = vec![sub(g, v[0], first)];
-            for derivative in &v[1..4] {
-                let (force, product) = (other(g, v), mul(g, v[5], v[6]));
-                let (rest, product) = (sub(g, *derivative, force), mul(g, product, v[7]));
-                f.push(sub(g, rest, product));
-            }
-            if let Some(second) = second {
-                let second = second(g, v);
-                f[1] = sub(g, v[1], second);
-            }
-            f
-        }))
-    };
-    let kinematic = |own: Row, second: Option<Row>, other: Row| {
-        let found = analysis(own, second, other).elimination.kinematic;
-        found.into_iter().map(|of| (of.state, of.entry, of.velocity, of.dependents)).collect::<Vec<_>>()
-    };
-    let sine: Row = |g, v| g.unary(Unary::Sin, v[4]);
-    // Behind four entries of f_ẋ (0, 5); three equations feel q.
-    assert_eq!(kinematic(|_, v| v[5], None, sine), [(0, 4, 5, vec![5, 9, 13])]);
-    // The control, behind the entries of f_x.
-    assert_eq!(kinematic(|_, v| v[8], None, sine), [(0, 16, 8, vec![4, 8, 12])]);
-    // Nobody feels q.
-    assert_eq!(kinematic(|_, v| v[5], None, |_, v| v[8]), [(0, 4, 5, vec![])]);
-    // The equation varies; it has a constant; a function of time.
-    assert_eq!(kinematic(|_, v| v[4], None, sine), []);
-    let shifted: Row = |g, v| {
-        let constant = g.constant(-0.5);
-        sub(g, v[5], constant)
-    };
-    assert_eq!(kinematic(shifted, None, sine), []);
-    let timed: Row = |g, v| {
-        let time = g.unary(Unary::Sin, v[9]);
-        sub(g, v[5], time)
-    };
-    assert_eq!(kinematic(timed, None, sine), []);
-    // The others feel its derivative: behind seven entries of f_ẋ.
-    let with_derivative: Row = |g, v| {
-        let sine = g.unary(Unary::Sin, v[4]);
-        sub(g, sine, v[0])
-    };
-    let dependents = vec![1, 3, 5, 8, 12, 16];
-    assert_eq!(kinematic(|_, v| v[5], None, with_derivative), [(0, 7, 5, dependents)]);
-    // One of two that follow each other, or of a row of them.
-    for second in [(|_, v| v[4]) as Row, |_, v| v[6], |_, v| v[8]] {
-        let found = kinematic(|_, v| v[5], Some(second), sine);
-        assert_eq!(found.iter().map(|of| of.0).collect::<Vec<_>>(), [0]);
-    }
-    // The others are the unknowns of the plan: the column of q is a part of that of its velocity.
-    let Elimination { plan, positions, .. } = analysis(|_, v| v[5], None, sine).elimination;
-    assert!(plan.pivots.len() == 3 && !plan.pivots.iter().any(|pivot| pivot.0 == 0 || pivot.1 == 0));
-    let of_velocity = positions.iter().find(|position| (position.row, position.column) == (2, 1));
-    let terms = of_velocity.map(|position| position.terms.clone());
-    let (own, through) = (Term { entry: 10, by: None, order: 1 }, Term { entry: 9, by: Some(4), order: 2 });
-    assert_eq!(terms, Some(vec![own, through]));
-}
-
-/// Of a row of four that follow one another, the last of them a control, every other one: as many
-/// as there can be.
-#[test]
-fn no_velocity_is_kinematic() {
-    let analysis = accepted(model([4, 0, 1, 0], |g, v| {
-        vec![sub(g, v[0], v[5]), sub(g, v[1], v[6]), sub(g, v[2], v[7]), sub(g, v[3], v[8])]
-    }));
-    let found: Vec<_> = analysis.elimination.kinematic.iter().map(|of| (of.state, of.velocity)).collect();
-    assert_eq!(found, [(0, 5), (2, 7)]);
-}
-
-#[test]
-fn number_of_equations() {
-    assert_eq!(
-        refusal(model([2, 1, 0, 0], |_, v| vec![v[0], v[1]])),
-        "the residual has 2 equations where the model needs 3 (2 states and 1 algebraic state)"
-    );
-    assert_eq!(
-        refusal(model([1, 0, 0, 0], |_, v| vec![v[0], v[1]])),
-        "the residual has 2 equations where the model needs 1 (one per state)"
-    );
-    assert!(refusal(model([1, 0, 0, 0], |_, _| Vec::new())).contains("0 equations"));
-}
-
-const END: &str = ": the model is not of index 1";
-
-fn reason(model: Model) -> String {
-    let message = refusal(model);
-    message.split(END).next().unwrap_or_default().to_string()
-}
-
 /// `ẋ − x z₀ − z₁ = 0`, `(u − 30) z₀ + 2 z₁ = 1`, `2 z₀ + 3 z₁ = u`: at `u = 30` the coefficient of
 /// `z₀` vanishes, which nobody can know without a word about `u`.
 #[test]
@@ -321,82 +237,6 @@ fn nominal_values_and_ranges_decide_about_pivots() {
     assert!(!at(1, 1, &known(Some(30.0), Some((0.0, 60.0)))));
     assert!(!at(1, 1, &known(None, Some((29.9, 30.1)))));
     assert!(at(1, 1, &known(Some(-5.0), Some((-6.0, 6.0)))));
-}
-
-/// The pendulum in Cartesian coordinates: the multiplier is in no equation that it could be
-/// determined from.
-#[test]
-fn index_three() {
-    let pendulum = |g: &mut Graph, v: &[Node]| {
-        let (dx, x, z) = (&v[0..4], &v[4..8], v[8]);
-        let (fx, fy) = (mul(g, z, x[0]), mul(g, z, x[1]));
-        let (xx, yy) = (mul(g, x[0], x[0]), mul(g, x[1], x[1]));
-        let square = g.binary(Binary::Add, xx, yy);
-        let one = g.constant(1.0);
-        vec![
-            sub(g, dx[0], x[2]),
-            sub(g, dx[1], x[3]),
-            sub(g, dx[2], fx),
-            sub(g, dx[3], fy),
-            sub(g, square, one),
-        ]
-    };
-    assert_eq!(
-        reason(model([4, 1, 0, 0], pendulum)),
-        "equation 4 contains neither a derivative nor an algebraic state; `xdot[2]`, `xdot[3]` and `z[0]` are \
-         determined only by equations 2 and 3"
-    );
-}
-
-#[test]
-fn over_and_underdetermined() {
-    // Two equations for ẋ₀, none for z₀.
-    let twice = |g: &mut Graph, v: &[Node]| vec![sub(g, v[0], v[1]), sub(g, v[1], v[0])];
-    assert_eq!(
-        reason(model([1, 1, 0, 0], twice)),
-        "equations 0 and 1 determine only `xdot[0]`; `z[0]` is determined by no equation"
-    );
-    // The matching exists only through an entry that cancels.
-    let cancels = |g: &mut Graph, v: &[Node]| {
-        let sum = g.binary(Binary::Add, v[0], v[1]);
-        let (rest, first) = (sub(g, sum, v[1]), sub(g, v[0], v[2]));
-        vec![first, rest]
-    };
-    assert!(reason(model([2, 0, 0, 0], cancels)).starts_with("equations 0 and 1 determine only `xdot[0]`"));
-    // Two separate parts, each named on its own.
-    let two = |g: &mut Graph, v: &[Node]| {
-        vec![sub(g, v[0], v[4]), sub(g, v[0], v[5]), sub(g, v[1], v[4]), sub(g, v[1], v[5])]
-    };
-    assert_eq!(
-        reason(model([4, 0, 0, 0], two)),
-        "equations 0 and 1 determine only `xdot[0]`; equations 2 and 3 determine only `xdot[1]`; `xdot[2]` is \
-         determined by no equation; `xdot[3]` is determined by no equation"
-    );
-}
-
-/// The matching needs an augmenting path along all equations: equation i has ẋᵢ and ẋᵢ₋₁, the last
-/// one only the last but one.
-#[test]
-fn long_augmenting_path() {
-    let n = 300;
-    let chain = |closed: bool| {
-        model([n, 0, 0, 0], move |g, v| {
-            (0..n)
-                .map(
-                    |i| if i == n - 1 { v[0] } else { sub(g, v[i], v[i + usize::from(closed || i + 2 < n)]) },
-                )
-                .collect()
-        })
-    };
-    assert!(accepted(chain(true)).explicit.is_none());
-    assert!(reason(chain(false)).contains("`xdot[299]` is determined by no equation"));
-}
-
-#[test]
-fn derivatives_of_named_states() {
-    let mut model = model([1, 1, 0, 0], |g, v| vec![sub(g, v[1], v[2]), v[2]]);
-    model.variables.x[0] = "cart.position".into();
-    assert!(reason(model).contains("the derivative of `cart.position` is determined by no equation"));
 }
 
 #[test]
