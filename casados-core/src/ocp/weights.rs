@@ -5,9 +5,9 @@ use crate::function::{Function, MatrixYY};
 use crate::scalar::Real;
 use crate::shape::Outputs;
 
-/// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of its
-/// diagonal: then the pivots of `W + δ diag(W)` are positive, but for outputs without weights. If
-/// none are `coupled`, there is the diagonal alone.
+/// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of
+/// its diagonal: then the pivots of `W + δ diag(W)` are positive, but for outputs without weights.
+/// If none are `coupled`, there is the diagonal alone.
 ///
 /// # Errors
 /// [`OcpError::InvalidWeight`]
