@@ -218,7 +218,13 @@ fn mistakes_are_errors() {
     );
     assert_eq!(horizon.solve(&x0, &[], &[]).unwrap_err(), Error::Intervals { controls: 0, ends: 0 });
     let error = horizon.solve(&x0, &[u, u], &[2.0, 1.0]).unwrap_err();
-    assert_eq!(error, Error::OutsideInterval { t: 2.0, start: 0.0, end: 1.0 });
+    assert_eq!(error, Error::Unordered { index: 0, t: 2.0, before: 0.0, end: 1.0 });
+    assert_eq!(
+        error.to_string(),
+        "the times are not in order: element 0 is 2, and not between the one before it, 0, and the end, 1"
+    );
+    let times = horizon.integrator().solve_at(&x0, &u, 1.0, &[0.5, 0.2], |_, _| ());
+    assert_eq!(times.unwrap_err(), Error::Unordered { index: 1, t: 0.2, before: 0.5, end: 1.0 });
     assert_eq!(horizon.freeze().unwrap_err(), Error::NoResult);
     assert_eq!(horizon.dense(0.5).unwrap_err(), Error::NoResult);
     horizon.solve(&x0, &[u, u], &[1.0, 2.0]).unwrap();

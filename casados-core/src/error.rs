@@ -153,6 +153,18 @@ pub enum Error {
         /// End of the interval.
         end: f64,
     },
+    /// Times of a list, ends of intervals or those of outputs, that are not in order: each lies
+    /// between the one before it and the end.
+    Unordered {
+        /// Which one of the list.
+        index: usize,
+        /// The time.
+        t: f64,
+        /// The time before it, or the start.
+        before: f64,
+        /// The end.
+        end: f64,
+    },
     /// More events than are allowed: each comes sooner after the one before, or without end.
     TooManyEvents {
         /// The time that was reached.
@@ -409,6 +421,11 @@ impl fmt::Display for Error {
             Error::OutsideInterval { t, start, end } => {
                 write!(f, "t = {t} is outside the interval from {start} to {end} of the last call")
             }
+            Error::Unordered { index, t, before, end } => write!(
+                f,
+                "the times are not in order: element {index} is {t}, and not between the one before it, {before}, and the \
+                 end, {end}"
+            ),
             Error::TooManyEvents { t, events } => {
                 write!(f, "t = {t} was reached after {events} events, and more are not allowed")
             }

@@ -60,7 +60,7 @@ macro_rules! solve {
         let options = Options { steps: $steps, newton, ..Default::default() };
         let batch = Batch::<Chain<$nx>, Gauss<$stages>>::new(options)?;
         let mut ocp = chain_problem::problem!($nx, rest.clone(), x0, Shooting::new(batch));
-        let mut sqp = HeapSqp::new(&ocp)?;
+        let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
         let mut best: Option<Outcome> = None;
         for _ in 0..REPETITIONS {
             ocp.guess(&rest, &[0.0; 3])?;

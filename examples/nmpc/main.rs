@@ -104,7 +104,7 @@ fn pendulum(picture: &mut Picture) -> Result<(), Box<dyn Error>> {
     ocp.fix_initial_state(x.as_slice())?.bound("u", .., -80.0, 80.0)?;
     ocp.guess(x.as_slice(), &[0.0])?;
     // The first plan is a solution; from then on there is one iteration in each sample.
-    HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     let mut controller = HeapRealTime::new(ocp)?;
     let mut plant = Irk::<Pendulum, Gauss<4>>::new(Options { steps: 4, ..Default::default() })?;
     let (mut latency, mut angle, mut force) = (Latency::default(), Vec::new(), Vec::new());
@@ -147,7 +147,7 @@ fn chain(picture: &mut Picture) -> Result<(), Box<dyn Error>> {
     let mut ocp = chain_problem::problem!(9, rest.clone(), x0, Shooting::new(batch));
     // Disturbances know no walls: it is soft.
     ocp.soften("x", .., 1e3, 1e3)?;
-    HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     let mut controller = HeapRealTime::new(ocp)?;
     let mut plant = Irk::<Chain<NX>, Gauss<4>>::new(Options { steps: 2, ..Default::default() })?;
     let mut x = SVector::<f64, NX>::from_column_slice(&record.list("x0")?);

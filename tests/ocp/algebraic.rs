@@ -158,7 +158,7 @@ fn the_same_solutions() -> Test {
     macro_rules! solved {
         ($ocp:expr) => {{
             let mut ocp = $ocp;
-            let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+            let mut sqp = HeapSqp::new(&ocp)?;
             sqp.options.globalisation = casados::ocp::Globalisation::Merit;
             (sqp.options.tolerance, sqp.options.max_iterations) = (1e-10, 60);
             sqp.qp_solver.options.tolerance = 1e-12;
@@ -305,7 +305,7 @@ macro_rules! motor_problem {
             .path_constraints(Constraint::<Heat>::new([f64::NEG_INFINITY], [1.2]))
             .on(Horizon::uniform(N, 0.2))?;
         ocp.fix_initial_state(&MOTOR_X0)?.guess(&MOTOR_X0, &[0.0])?.set_parameters(.., &[MOTOR_P])?;
-        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        let mut sqp = HeapSqp::new(&ocp)?;
         (sqp.options.tolerance, sqp.options.qp_accuracy) = (1e-11, 0.0);
         sqp.qp_solver.options.tolerance = 1e-13;
         (ocp, sqp)

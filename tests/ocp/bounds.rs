@@ -1,7 +1,7 @@
 //! Bounds and constraints of every kind, against solutions that are known.
 
 use crate::Test;
-use casados::ocp::{Constraint, Exact, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+use casados::ocp::{Constraint, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
 use casados::prelude::*;
 use casados::qp::residuals;
 
@@ -39,7 +39,7 @@ fn a_constraint_at_the_end() -> Test {
     ocp.guess(&[0.1, 0.2], &[0.0; 2])?;
     // The constraint bends more than the cost: without its second derivatives full steps would go
     // back and forth.
-    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    let mut sqp = HeapSqp::new(&ocp)?;
     sqp.options.tolerance = 1e-8;
     let outcome = sqp.solve(&mut ocp)?;
     assert!(outcome.is_converged(), "{}{outcome}", sqp.log());
@@ -68,7 +68,7 @@ fn soft_bounds() -> Test {
         ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[3.0, 0.0])?;
         ocp.bound("x[0]", 1..=1, f64::NEG_INFINITY, 1.0)?.soften("x[0]", 1..=1, linear, quadratic)?;
         ocp.guess(&[0.0; 2], &[0.0; 2])?;
-        let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+        let outcome = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
         assert!(outcome.is_converged());
         let x = ocp.stage(1)?.x[0];
         assert!((x - 1.0 - expected).abs() < 1e-6, "{x} {expected}");
@@ -95,7 +95,7 @@ fn constraints_of_the_path() -> Test {
         .on(Horizon::uniform(n, 1.0))?;
     ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[3.0, 0.0])?;
     ocp.guess(&[0.0; 2], &[0.0; 2])?;
-    let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    let outcome = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     assert!(outcome.is_converged());
     // 7 intervals to 2, which is as far as the path may go, the last one 0.5 beyond.
     let before = ocp.stage(n - 1)?;
@@ -106,7 +106,7 @@ fn constraints_of_the_path() -> Test {
     }
     // Bounds of stages may be changed.
     ocp.set_path_bounds(n - 1..n, &[-infinity, -0.5, -0.5], &[1.0, 0.5, 0.5])?;
-    let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    let outcome = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     assert!(outcome.is_converged());
     assert!((ocp.stage(n)?.x[0] - 1.5).abs() < 1e-5);
     Ok(())

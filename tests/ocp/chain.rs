@@ -36,7 +36,7 @@ macro_rules! solves {
             let record = Record::load($file)?;
             let mut ocp = problem!($nx, &record, batch!($nx, $stages, $steps));
             let solver = Condensing::new(5, HeapInteriorPoint::new());
-            let mut sqp = HeapSqp::with_solver(&ocp, solver)?;
+            let mut sqp = HeapSqp::with_solver(&ocp, solver)?.gauss_newton();
             let outcome = sqp.solve(&mut ocp)?;
             println!("{}{outcome}", sqp.log());
             assert!(outcome.is_converged());
@@ -56,6 +56,23 @@ solves!(seven_masses, "ocp/chain_7.json", 33, 2 x 2, "objective_gl2x2", 7);
 solves!(three_masses_order_eight, "ocp/chain_3.json", 9, 4 x 4, "objective_gl4x4", 6);
 solves!(seven_masses_order_eight, "ocp/chain_7.json", 33, 4 x 4, "objective_gl4x4", 7);
 
+/// A solver of QPs whose own tolerances are relative, and larger than what is asked for: it is told
+/// what is needed.
+#[test]
+#[cfg(feature = "clarabel")]
+fn clarabel_is_as_accurate_as_needed() -> Test {
+    let record = Record::load("ocp/chain_6.json")?;
+    let mut ocp = problem!(27, &record, batch!(27, 2, 2));
+    let mut sqp = HeapSqp::with_solver(&ocp, casados::qp::Clarabel::new())?.gauss_newton();
+    sqp.options.tolerance = 1e-9;
+    let outcome = sqp.solve(&mut ocp)?;
+    println!("{}{outcome}", sqp.log());
+    assert!(outcome.is_converged(), "{outcome}");
+    let expected = record.number("objective_gl2x2")?;
+    assert!((outcome.objective - expected).abs() < 1e-8 * expected, "{}", outcome.objective);
+    Ok(())
+}
+
 /// The whole trajectory, where there is one.
 macro_rules! follows {
     ($name:ident, $file:literal, $nx:literal) => {
@@ -63,7 +80,7 @@ macro_rules! follows {
         fn $name() -> Test {
             let record = Record::load($file)?;
             let mut ocp = problem!($nx, &record, batch!($nx, 2, 2));
-            let mut sqp = HeapSqp::new(&ocp)?;
+            let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
             sqp.qp_solver.options.tolerance = 1e-10;
             sqp.options.tolerance = 1e-9;
             assert!(sqp.solve(&mut ocp)?.is_converged());
@@ -118,7 +135,7 @@ fn line_searches_lead_to_the_same_solution() -> Test {
     let expected = record.number("objective_gl2x2")?;
     for globalisation in [Globalisation::Merit, Globalisation::Filter] {
         let mut ocp = problem!(9, &record, batch!(9, 2, 2));
-        let mut sqp = HeapSqp::new(&ocp)?;
+        let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
         sqp.options.globalisation = globalisation;
         let outcome = sqp.solve(&mut ocp)?;
         println!("{globalisation:?}\n{}{outcome}", sqp.log());
@@ -136,10 +153,10 @@ fn single_intervals_give_the_same() -> Test {
     let options = Options { steps: 2, ..Default::default() };
     let mut objectives = Vec::new();
     let mut ocp = problem!(9, &record, Irk::<Chain<9>, Gauss<2>>::new(options)?);
-    objectives.push(HeapSqp::new(&ocp)?.solve(&mut ocp)?);
+    objectives.push(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?);
     type Small = Irk<Chain<9>, Gauss<2>, f64, Inline<casados::mode::Forward, 2>>;
     let mut ocp = problem!(9, &record, Small::inline(options)?);
-    objectives.push(HeapSqp::new(&ocp)?.solve(&mut ocp)?);
+    objectives.push(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?);
     for outcome in objectives {
         assert!(outcome.is_converged() && outcome.iterations == 6);
         assert!((outcome.objective - expected).abs() < 1e-8 * expected);
@@ -166,7 +183,7 @@ fn the_solution_satisfies_conditions_that_are_computed_independently() -> Test {
     const NX: usize = 9;
     let record = Record::load("ocp/chain_3.json")?;
     let mut ocp = problem!(9, &record, batch!(9, 2, 2));
-    let mut sqp = HeapSqp::new(&ocp)?;
+    let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     assert!(sqp.solve(&mut ocp)?.is_converged());
     let rest = record.vector::<NX>("xrest")?;
     let mut irk = Irk::<Chain<NX>, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?;

@@ -54,7 +54,7 @@ fn regulator() -> Test {
         .terminal_cost(LeastSquaresCost::<PositionAndSpeed>::new(&end))
         .on(Horizon::uniform(n, 0.1))?;
     ocp.fix_initial_state(&[1.0, -0.5])?.guess(&[0.0; 2], &[0.0])?;
-    let mut sqp = HeapSqp::new(&ocp)?;
+    let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     let outcome = sqp.solve(&mut ocp)?;
     // It is a QP.
     assert!(outcome.is_converged() && outcome.iterations == 1);
@@ -122,7 +122,7 @@ fn shortest_time() -> Test {
         ocp.bound("x[0]", n..=n, 4.0, 4.0)?.bound("x[1]", n..=n, 0.0, 0.0)?;
         ocp.bound("x[2]", .., 0.1, 20.0)?.bound("u", .., -1.0, 1.0)?;
         ocp.guess(&[2.0, 1.0, 5.0], &[0.0])?;
-        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        let mut sqp = HeapSqp::new(&ocp)?;
         sqp.options.globalisation = globalisation;
         sqp.options.tolerance = 1e-8;
         let outcome = sqp.solve(&mut ocp)?;
@@ -160,7 +160,7 @@ fn integral_costs() -> Test {
     let squares = LeastSquares::<Deviation>::new(&Matrix2::identity());
     let mut ocp = Problem::new(Along::new(irk()?, squares)).on(Horizon::uniform(n, h))?;
     ocp.fix_initial_state(&x0)?.guess(&x0, &[0.0])?;
-    let first = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    let first = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     // It is a QP.
     assert!(first.is_converged() && first.iterations == 1);
 
@@ -214,7 +214,7 @@ fn parameters_and_times_are_those_of_the_stage() -> Test {
     for (k, p) in p.iter().enumerate() {
         ocp.set_parameters(k..=k, &[*p])?;
     }
-    let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    let outcome = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
     assert!(outcome.is_converged());
     let mut x = 1.0;
     for (k, stage) in ocp.iterate().stages().enumerate() {
@@ -238,5 +238,34 @@ fn single_precision() -> Test {
     let outcome = sqp.solve(&mut ocp)?;
     assert!(outcome.is_converged(), "{outcome}");
     assert!((ocp.stage(0)?.u[0] + 0.5).abs() < 1e-3);
+    Ok(())
+}
+
+#[function]
+fn squares(x: f64, u: f64) -> f64 {
+    x + u * u - u
+}
+
+#[function]
+fn state(x: f64, _u: f64) -> f64 {
+    x
+}
+
+/// Curvature that is in the dynamics alone: `x_N = x₀ + Σ u_k² − u_k` is smallest at `u_k = ½`,
+/// where it is `x₀ − N/4`. The solver that is made without more words finds it; the Hessian of
+/// Gauss and Newton is zero, and has no minimum to go to.
+#[test]
+fn default_hessians_are_exact() -> Test {
+    const INTERVALS: usize = 4;
+    let mut ocp = Problem::new(Map::<Squares, f64>::new())
+        .terminal_cost(GeneralCost::<State>::new())
+        .on(Horizon::uniform(INTERVALS, 1.0))?;
+    ocp.fix_initial_state(&[3.0])?.guess(&[3.0], &[0.2])?;
+    let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+    assert!(outcome.is_converged(), "{outcome}");
+    assert!((outcome.objective - (3.0 - INTERVALS as f64 / 4.0)).abs() < 1e-9, "{outcome}");
+    for stage in 0..INTERVALS {
+        assert!((ocp.stage(stage)?.u[0] - 0.5).abs() < 1e-6);
+    }
     Ok(())
 }

@@ -231,7 +231,7 @@ fn swing_up() -> Test {
             .on(Horizon::uniform(30, 0.1))?;
         ocp.fix_initial_state(&[0.0, 0.0])?.bound("u", .., -2.0, 2.0)?;
         ocp.bound("x[0]", 30..=30, 1.0, 1.0)?.guess(&[0.5, 0.0], &[0.0])?;
-        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        let mut sqp = HeapSqp::new(&ocp)?;
         sqp.options.globalisation = globalisation;
         let outcome = sqp.solve(&mut ocp)?;
         println!("{}{outcome}", sqp.log());

@@ -2,9 +2,10 @@
 
 use crate::Test;
 use casados::ocp::{
-    Constraint, GeneralCost, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Part, Problem,
+    Constraint, GeneralCost, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Part, Problem,
 };
 use casados::prelude::*;
+use casados::qp::StageDims;
 
 #[function]
 fn next(x: [f64; 2], u: [f64; 1], p: [f64; 1]) -> [f64; 2] {
@@ -47,17 +48,25 @@ fn names() -> Test {
     Ok(())
 }
 
+/// The text of an error.
+fn text<V>(result: Result<V, OcpError>) -> String {
+    result.err().map(|error| error.to_string()).unwrap_or_default()
+}
+
 #[test]
 fn stages() -> Test {
     let mut ocp = problem!();
-    let error = |result: Result<(), OcpError>| result.err().map(|error| error.to_string());
     assert_eq!(
-        error(ocp.bound("x", 2..=4, 0.0, 1.0).map(|_| ())).as_deref(),
-        Some("there is no stage 4: the bounds of the states are at stages 0 to 3")
+        text(ocp.bound("x", 2..=4, 0.0, 1.0)),
+        "there is no stage 4: the bounds of the states are at stages 0 to 3"
     );
     assert_eq!(
-        error(ocp.bound("u", 3..=3, 0.0, 1.0).map(|_| ())).as_deref(),
-        Some("there is no stage 3: the bounds of the controls are at stages 0 to 2")
+        text(ocp.bound("u", 3..=3, 0.0, 1.0)),
+        "there is no stage 3: the bounds of the controls are at stages 0 to 2"
+    );
+    assert_eq!(
+        text(ocp.bound("u", 3.., 0.0, 1.0)),
+        "there is no stage 3: the bounds of the controls are at stages 0 to 2"
     );
     assert!(matches!(
         ocp.set_reference(3..=3, &[0.0; 2]),
@@ -65,6 +74,75 @@ fn stages() -> Test {
     ));
     assert!(matches!(ocp.guess_stage(4, &[0.0; 2], &[]), Err(OcpError::NoSuchStage { stage: 4, .. })));
     assert!(matches!(ocp.stage(4), Err(OcpError::NoSuchStage { stage: 4, stages: 4, .. })));
+    for end in [usize::MAX, usize::MAX - 1, 5] {
+        assert!(matches!(ocp.bound("x", 0..=end, 0.0, 1.0), Err(OcpError::NoSuchStage { stages: 4, .. })));
+        assert!(matches!(ocp.bound("x", end.., 0.0, 1.0), Err(OcpError::NoSuchStage { stages: 4, .. })));
+    }
+    Ok(())
+}
+
+/// A range without a stage sets nothing, which nobody means.
+#[test]
+#[allow(clippy::reversed_empty_ranges)]
+fn ranges_without_stages() -> Test {
+    let mut ocp = problem!();
+    assert_eq!(
+        text(ocp.bound("x", 2..2, 0.0, 1.0)),
+        "there is no stage in 2..2: the bounds of the states are at stages 0 to 3, and a range begins before it \
+         ends, as `2..4` and `2..=3` do"
+    );
+    let empty =
+        |result: Result<(), OcpError>| matches!(result, Err(OcpError::EmptyRange { start: 2, end: 2, .. }));
+    assert!(empty(ocp.bound("u", 2..=1, 0.0, 1.0).map(|_| ())));
+    assert!(empty(ocp.bound("x[0]", .., 0.0, 1.0)?.soften("x[0]", 2..2, 1.0, 0.0).map(|_| ())));
+    assert!(empty(ocp.set_path_bounds(2..2, &[0.0], &[1.0]).map(|_| ())));
+    assert!(empty(ocp.set_parameters(2..2, &[0.0]).map(|_| ())));
+    assert!(empty(ocp.set_reference(2..2, &[0.0; 2]).map(|_| ())));
+    assert!(matches!(ocp.bound("x", 3..1, 0.0, 1.0), Err(OcpError::EmptyRange { start: 3, end: 1, .. })));
+    assert!(matches!(ocp.bound("x", ..0, 0.0, 1.0), Err(OcpError::EmptyRange { start: 0, end: 0, .. })));
+    Ok(())
+}
+
+/// Only a bound can be made soft.
+#[test]
+fn softening_without_bounds() -> Test {
+    let mut ocp = problem!();
+    assert_eq!(
+        text(ocp.soften("x[1]", 1.., 1e3, 0.0)),
+        "`x[1]` has no bound at stages 1 to 3 that could be soft: call `bound` before `soften`"
+    );
+    ocp.bound("x[0]", 2..=2, 0.0, f64::INFINITY)?;
+    assert!(matches!(ocp.soften("x", ..2, 1e3, 0.0), Err(OcpError::NoBound { start: 0, end: 2, .. })));
+    assert!(matches!(ocp.soften("u", .., 1e3, 0.0), Err(OcpError::NoBound { start: 0, end: 3, .. })));
+    ocp.soften("x", 1.., 1e3, 0.0)?;
+    // Of a state that is given there is no bound.
+    ocp.bound("x", .., 0.0, 1.0)?.fix_initial_state(&[1.0; 2])?;
+    assert!(matches!(ocp.soften("x", ..1, 1e3, 0.0), Err(OcpError::NoBound { .. })));
+    Ok(())
+}
+
+/// A state that is given stays what it is where its bounds were soft before.
+#[test]
+fn initial_states_are_hard() -> Test {
+    let mut ocp = problem!();
+    ocp.set_parameters(.., &[0.1])?.guess(&[1.0; 2], &[0.0])?;
+    // Half a unit of violation would cost less than the way from there.
+    ocp.bound("x", .., -2.0, 2.0)?.soften("x", .., 1e-3, 0.0)?.fix_initial_state(&[1.5, 1.0])?;
+    assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    for (x, x0) in ocp.stage(0)?.x.iter().zip([1.5, 1.0]) {
+        assert!((x - x0).abs() < 1e-6, "{x} instead of {x0}");
+    }
+    Ok(())
+}
+
+/// Bounds of an initial state that is said to be free afterwards count.
+#[test]
+fn bounds_before_the_initial_state_is_free() -> Test {
+    let mut ocp = problem!();
+    ocp.bound("x[0]", .., 0.25, 2.0)?.free_initial_state();
+    ocp.set_parameters(.., &[0.1])?.guess(&[1.0; 2], &[0.0])?;
+    assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    assert!(ocp.stage(0)?.x[0] > 0.25 - 1e-6, "{}", ocp.stage(0)?.x[0]);
     Ok(())
 }
 
@@ -73,35 +151,73 @@ fn values() -> Test {
     let mut ocp = problem!();
     assert!(matches!(
         ocp.bound("x[1]", 2.., 1.0, 0.0),
-        Err(OcpError::CrossedBounds { part: Part::StateBounds, stage: 2, index: 1, lower: 1.0, upper: 0.0 })
+        Err(OcpError::CrossedBounds {
+            part: Part::StateBounds,
+            stage: 2,
+            name: "x[1]",
+            index: 1,
+            lower: 1.0,
+            upper: 0.0
+        })
     ));
-    assert!(matches!(
-        ocp.bound("u", .., f64::NAN, 0.0),
-        Err(OcpError::InvalidValue { part: Part::ControlBounds, .. })
-    ));
+    assert_eq!(
+        text(ocp.bound("x[1]", 2.., 1.0, 0.0)),
+        "stage 2: the lower bound 1 of `x[1]` is above the upper bound 0"
+    );
+    assert_eq!(
+        text(ocp.bound("u", .., f64::NAN, 0.0)),
+        "stage 0: a bound of `u[0]` is NaN: it has to be a number, or -inf below and inf above where there is none"
+    );
     assert!(matches!(
         ocp.bound("u", .., f64::INFINITY, f64::INFINITY),
-        Err(OcpError::InvalidValue { part: Part::ControlBounds, .. })
+        Err(OcpError::InvalidValue { part: Part::ControlBounds, name: "u[0]", .. })
     ));
-    assert!(matches!(
-        ocp.soften("u", .., -1.0, 0.0),
-        Err(OcpError::InvalidValue { part: Part::Penalty, value: -1.0, .. })
-    ));
-    assert!(matches!(
-        ocp.set_path_bounds(1.., &[2.0], &[1.0]),
-        Err(OcpError::CrossedBounds { part: Part::PathBounds, stage: 1, index: 0, .. })
-    ));
-    assert!(matches!(
-        ocp.set_reference(1.., &[0.0, f64::NAN]),
-        Err(OcpError::InvalidValue { part: Part::Reference, stage: 1, index: 1, .. })
-    ));
+    ocp.bound("u", .., -1.0, 1.0)?;
+    assert_eq!(
+        text(ocp.soften("u", .., -1.0, 0.0)),
+        "stage 0: a penalty of `u[0]` is -1: it has to be from 0 on, and finite if it is quadratic"
+    );
+    for (linear, quadratic) in [(f64::NAN, 0.0), (1.0, -1.0), (1.0, f64::INFINITY), (1.0, f64::NAN)] {
+        assert!(matches!(
+            ocp.soften("u", .., linear, quadratic),
+            Err(OcpError::InvalidValue { part: Part::Penalty, name: "u[0]", .. })
+        ));
+    }
+    assert_eq!(
+        text(ocp.set_path_bounds(1.., &[2.0], &[1.0])),
+        "stage 1: the lower bound 2 of output 0 of `Root` is above the upper bound 1"
+    );
+    assert_eq!(
+        text(ocp.set_reference(1.., &[0.0, f64::NAN])),
+        "stage 1: the reference of output 1 of `Output` is NaN: it has to be finite"
+    );
+    assert_eq!(
+        text(ocp.set_parameters(1.., &[f64::INFINITY])),
+        "stage 1: `p[0]` is inf: it has to be finite"
+    );
+    assert_eq!(
+        text(ocp.fix_initial_state(&[0.0, f64::NAN])),
+        "the initial value of `x[1]` is NaN: it has to be finite"
+    );
+    assert_eq!(
+        text(ocp.guess_stage(2, &[0.0; 2], &[f64::NAN])),
+        "stage 2: `u[0]` is NaN: it has to be finite"
+    );
+    Ok(())
+}
+
+#[test]
+fn lengths() -> Test {
+    let mut ocp = problem!();
+    assert_eq!(text(ocp.fix_initial_state(&[0.0])), "the initial state has 1 element instead of 2");
     assert!(matches!(
         ocp.fix_initial_state(&[0.0; 3]),
         Err(OcpError::Length { part: Part::InitialState, stage: 0, expected: 2, found: 3 })
     ));
+    assert_eq!(text(ocp.set_parameters(.., &[])), "stage 0: the parameters have 0 elements instead of 1");
     assert!(matches!(
-        ocp.set_parameters(.., &[]),
-        Err(OcpError::Length { part: Part::Parameters, expected: 1, found: 0, .. })
+        ocp.set_path_bounds(.., &[0.0], &[]),
+        Err(OcpError::Length { part: Part::PathBounds, expected: 1, found: 0, .. })
     ));
     assert!(matches!(
         ocp.guess_stage(3, &[0.0; 2], &[0.0]),
@@ -127,13 +243,45 @@ fn what_is_missing() -> Test {
 #[test]
 fn horizons() {
     let problem = |horizon| Problem::new(Map::<Next, f64>::new()).on(horizon).map(|_| ());
-    assert!(matches!(problem(Horizon::uniform(0, 0.1)), Err(OcpError::Missing { part: Part::Times, .. })));
+    for horizon in [Horizon::uniform(0, 0.1), Horizon::nodes(&[]), Horizon::nodes(&[1.0])] {
+        assert_eq!(
+            text(problem(horizon)),
+            "the horizon has no interval: `Horizon::uniform` takes one at least, `Horizon::nodes` two times"
+        );
+    }
     assert!(matches!(problem(Horizon::uniform(3, 0.0)), Err(OcpError::Times { interval: 0, .. })));
     assert!(matches!(problem(Horizon::uniform(3, f64::NAN)), Err(OcpError::Times { .. })));
+    assert!(matches!(problem(Horizon::uniform(3, f64::MAX)), Err(OcpError::Times { interval: 1, .. })));
     assert!(matches!(
         problem(Horizon::nodes(&[0.0, 0.2, 0.1])),
         Err(OcpError::Times { interval: 1, start: 0.2, end: 0.1 })
     ));
+}
+
+/// Sizes that no memory has: errors, and lengths that say so.
+#[test]
+fn absurd_sizes() {
+    type Small = Problem<Map<Next, f64>, LeastSquaresCost<Output>>;
+    type Solver<'a> = casados::ocp::Sqp<(), casados::ocp::Exact, f64, &'a [StageDims], &'a mut [f64]>;
+    let problem =
+        || Problem::new(Map::<Next, f64>::new()).stage_cost(LeastSquaresCost::<Output>::diagonal(&[1.0; 2]));
+    let few = Small::dims::<f64, 2>();
+    for intervals in [usize::MAX, usize::MAX - 1, usize::MAX / 64, 1 << 50] {
+        let horizon = Horizon::uniform(intervals, 0.1);
+        assert!(matches!(problem().on(horizon), Err(OcpError::OutOfMemory { .. })), "{intervals}");
+        assert!(matches!(
+            problem().on_horizon(horizon, &few, &mut []),
+            Err(OcpError::Length { part: Part::Dimensions, found: 2, .. })
+        ));
+    }
+    for [nx, nu, ng] in
+        [[usize::MAX; 3], [1 << 40, 1 << 40, 0], [0, 0, usize::MAX / 2], [0, usize::MAX / 3, 1]]
+    {
+        let dims = [StageDims::new(nx, nu, ng), StageDims::new(nx, 0, ng)];
+        assert_eq!(Small::memory::<f64>(&dims), usize::MAX);
+        assert_eq!(Solver::memory::<Small>(&dims), usize::MAX);
+        assert!(Solver::in_memory::<Small>((), &dims, &mut [0.0; 9]).is_err());
+    }
 }
 
 /// Functions of what does not exist where they are evaluated.
@@ -160,6 +308,34 @@ fn functions_without_a_value() -> Test {
         Err(OcpError::NonFiniteFunction { function: "Root", stage: 2, output: 0, .. })
     ));
     assert_eq!(ocp.stage(2)?.x, [-1.0, 0.0]);
+    Ok(())
+}
+
+/// A derivative that is not finite where there is a value, by its names.
+#[test]
+fn functions_without_a_derivative() -> Test {
+    let mut ocp = problem!();
+    ocp.fix_initial_state(&[1.0; 2])?.set_parameters(.., &[0.1])?.guess(&[1.0; 2], &[0.0])?;
+    ocp.guess_stage(2, &[0.0; 2], &[0.0])?;
+    let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: another guess, or bounds that keep \
+                    away from there, may help";
+    assert_eq!(text(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)), expected);
+    let mut controller = HeapRealTime::new(ocp)?;
+    assert_eq!(text(controller.prepare()?.feedback(&[1.0; 2])), expected);
+    Ok(())
+}
+
+/// An iterate that is not finite, wherever that comes from.
+#[test]
+fn iterates_that_are_not_finite() -> Test {
+    let mut ocp = problem!();
+    ocp.fix_initial_state(&[1.0; 2])?.set_parameters(.., &[0.1])?.guess(&[1.0; 2], &[0.0])?;
+    let mut sqp = HeapSqp::new(&ocp)?;
+    let place = ocp.iterate_mut().stage_mut(1).ok_or("no stage")?;
+    (place.dynamics[1], place.g_upper[0]) = (f64::NAN, f64::NAN);
+    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `x[1]` is NaN: it has to be finite");
+    ocp.iterate_mut().stage_mut(1).ok_or("no stage")?.dynamics[1] = 0.0;
+    assert_eq!(text(sqp.solve(&mut ocp)), "stage 1: a multiplier of `Root` is NaN: it has to be finite");
     Ok(())
 }
 

@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Constraint, Exact, Formulation, GeneralCost, Globalisation, HeapOcp, HeapSqp, Horizon, Map, OcpError,
-    Outcome, Part, Problem, SecondOrder, SqpOptions, Status,
+    Constraint, Formulation, GeneralCost, Globalisation, HeapOcp, HeapSqp, Horizon, Map, OcpError, Outcome,
+    Part, Problem, SecondOrder, SqpOptions, Status,
 };
 use casados::prelude::*;
 use casados::qp::Side;
@@ -65,7 +65,7 @@ macro_rules! car {
 fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
     ocp: &mut HeapOcp<P>,
 ) -> Result<Outcome, Box<dyn std::error::Error>> {
-    let mut sqp = HeapSqp::new(ocp)?.exact(Exact::default());
+    let mut sqp = HeapSqp::new(ocp)?;
     let outcome = sqp.solve(ocp)?;
     println!("{}{outcome}", sqp.log());
     // The bounds are as hard as they were, whatever happened.
@@ -157,7 +157,7 @@ fn limits_of_iterations_are_no_infeasibility() -> Test {
     for most in [50.0, 1.0] {
         for limit in [0, 1, 2] {
             let mut ocp = car!(most);
-            let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+            let mut sqp = HeapSqp::new(&ocp)?;
             sqp.options.max_iterations = limit;
             let status = sqp.solve(&mut ocp)?.status;
             assert_eq!(status, Status::MaxIterations);
@@ -239,7 +239,7 @@ fn quadrotor_between_cylinders() -> Test {
         (stage.x[0], stage.x[7], stage.x[13]) = (6.0 * k as f64 / n as f64, 2.0, 3.0);
         stage.u.fill(9.81 / 4.0);
     }
-    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    let mut sqp = HeapSqp::new(&ocp)?;
     let outcome = sqp.solve(&mut ocp)?;
     println!("{}{outcome}", sqp.log());
     assert!(outcome.is_converged() && outcome.iterations <= 40, "{outcome}");
@@ -273,7 +273,7 @@ fn full_steps_to_nowhere_are_shortened() -> Test {
             .terminal_cost(GeneralCost::<Barrier>::new())
             .on(Horizon::uniform(1, 1.0))?;
         ocp.fix_initial_state(&[3.0])?.guess(&[3.0], &[0.0])?;
-        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        let mut sqp = HeapSqp::new(&ocp)?;
         assert_eq!(sqp.options.globalisation, Globalisation::Merit);
         sqp.options.globalisation = globalisation;
         match sqp.solve(&mut ocp) {
@@ -303,7 +303,7 @@ fn options_are_validated() -> Test {
     let mut ocp = car!(50.0);
     for (expected, change, values) in bad {
         for &wrong in values {
-            let mut sqp = HeapSqp::new(&ocp)?;
+            let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
             change(&mut sqp.options, wrong);
             match sqp.solve(&mut ocp) {
                 Err(error @ OcpError::InvalidOption { name, value, .. }) => {
@@ -321,7 +321,7 @@ fn options_are_validated() -> Test {
 #[test]
 fn any_number_of_iterations_is_a_limit() -> Test {
     let mut ocp = car!(50.0);
-    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    let mut sqp = HeapSqp::new(&ocp)?;
     sqp.options.max_iterations = usize::MAX;
     assert!(sqp.solve(&mut ocp)?.is_converged());
     Ok(())

@@ -32,7 +32,7 @@ fn out_of_reach() -> Test {
             .on(Horizon::uniform(3, 1.0))?;
         ocp.fix_initial_state(&[0.0])?.bound("u", .., -1.0, 1.0)?.bound("x", 3..=3, 5.0, 6.0)?;
         ocp.guess(&[0.0], &[0.0])?;
-        let mut sqp = HeapSqp::new(&ocp)?;
+        let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
         sqp.options.elastic = elastic;
         let outcome = sqp.solve(&mut ocp)?;
         println!("{}{outcome}", sqp.log());
@@ -67,7 +67,7 @@ fn infeasible_on_the_way() -> Test {
             .terminal_constraints(Constraint::<Square>::new([1.0], [f64::INFINITY]))
             .on(Horizon::uniform(2, 1.0))?;
         ocp.fix_initial_state(&[0.1])?.bound("x", .., -2.0, 2.0)?.guess(&[0.1], &[0.0])?;
-        let mut sqp = HeapSqp::new(&ocp)?;
+        let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
         sqp.options.globalisation = globalisation;
         let outcome = sqp.solve(&mut ocp)?;
         println!("{}{outcome}", sqp.log());
@@ -86,7 +86,7 @@ fn observers_may_stop() -> Test {
         .terminal_constraints(Constraint::<Square>::new([1.0], [f64::INFINITY]))
         .on(Horizon::uniform(2, 1.0))?;
     ocp.fix_initial_state(&[0.1])?.guess(&[0.1], &[0.0])?;
-    let mut sqp = HeapSqp::new(&ocp)?;
+    let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     let mut seen = 0;
     let outcome = sqp.solve_observed(&mut ocp, &mut |row| {
         assert_eq!(row.iteration, seen);

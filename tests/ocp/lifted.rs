@@ -12,7 +12,7 @@ use casados::prelude::*;
 /// Solves a problem to `1e-9` by Gauss-Newton steps, or by those of its exact Hessian.
 macro_rules! solve {
     ($ocp:ident, $exact:literal) => {{
-        let mut sqp = HeapSqp::new(&$ocp)?;
+        let mut sqp = HeapSqp::new(&$ocp)?.gauss_newton();
         sqp.qp_solver.options.tolerance = 1e-10;
         sqp.options.tolerance = 1e-9;
         let outcome =

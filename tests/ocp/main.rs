@@ -19,7 +19,9 @@ mod guesses;
 mod infeasible;
 mod ipm;
 mod lifted;
+mod options;
 mod real_time;
 mod sensitivities;
+mod weights;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

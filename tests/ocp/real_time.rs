@@ -44,7 +44,7 @@ const X0: [f64; 2] = [0.8, 0.4];
 #[test]
 fn converges_to_the_solution() -> Test {
     let mut ocp = problem()?;
-    let mut sqp = HeapSqp::new(&ocp)?;
+    let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
     sqp.options.globalisation = Globalisation::FullStep;
     assert_eq!(sqp.solve(&mut ocp)?.status, Status::Converged);
     let mut controller = HeapRealTime::new(problem()?)?;

@@ -43,7 +43,7 @@ fn differences_of_solutions() -> Test {
     ocp.fix_initial_state(&x0)?.bound("u", .., -2.0, 2.0)?.guess(&x0, &[0.0])?;
     ocp.bound("x[0]", 4.., f64::NEG_INFINITY, 0.1)?.soften("x[0]", 4.., 0.1, 2.0)?;
     let exact = Exact { convexification: Convexification::None };
-    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    let mut sqp = HeapSqp::new(&ocp)?;
     sqp.options.globalisation = casados::ocp::Globalisation::Merit;
     (sqp.options.tolerance, sqp.options.max_iterations) = (1e-9, 100);
     sqp.qp_solver.options.tolerance = 1e-11;
@@ -110,7 +110,7 @@ fn linear_problems() -> Test {
     let mut result = Sensitivities::new(&ocp)?;
     assert!(matches!(ocp.differentiate(GaussNewton::default(), &mut result), Err(OcpError::Missing { .. })));
     ocp.fix_initial_state(&x0)?.guess(&[0.0; 2], &[0.0])?;
-    assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    assert!(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?.is_converged());
     ocp.differentiate(GaussNewton::default(), &mut result)?;
     for (k, stage) in ocp.iterate().stages().enumerate() {
         let (dx, gain) = (result.dx(k), result.gain(k));
@@ -194,7 +194,7 @@ macro_rules! solved {
         if !$p.is_empty() {
             ocp.set_parameters(.., &$p)?;
         }
-        let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+        let mut sqp = HeapSqp::new(&ocp)?;
         sqp.options.globalisation = casados::ocp::Globalisation::Merit;
         (sqp.options.tolerance, sqp.options.max_iterations) = (1e-10, 100);
         sqp.qp_solver.options.tolerance = 1e-12;

@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::qp::{
-    Field, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, Qp, QpError, QpSolver, Solution,
-    StageDims, Start,
+    Condensing, Field, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, Qp, QpError, QpSolver,
+    Solution, StageDims, Start,
 };
 
 const DIMS: [StageDims; 3] = [StageDims::new(2, 1, 1), StageDims::new(2, 1, 1), StageDims::new(2, 0, 0)];
@@ -174,6 +174,68 @@ fn options() -> Test {
     let mut solution = HeapSolution::new(unbounded.dims())?;
     let found = solver.solve(unbounded.view(), Start::Cold, solution.view_mut());
     assert!(matches!(found, Err(QpError::Stalled { .. })), "{found:?}");
+    Ok(())
+}
+
+/// Settings of clarabel are checked and count in every call; those of the call before do not.
+#[cfg(feature = "clarabel")]
+#[test]
+fn clarabel_settings() -> Test {
+    use casados::qp::Clarabel;
+    type Change = fn(&mut Clarabel, f64);
+    let cases: [(&str, Change, &[f64]); 6] = [
+        ("tol_gap_abs", |c, v| c.settings.tol_gap_abs = v, &[f64::NAN, -1.0, f64::INFINITY]),
+        ("tol_gap_rel", |c, v| c.settings.tol_gap_rel = v, &[f64::NAN, -1.0, f64::INFINITY]),
+        ("tol_feas", |c, v| c.settings.tol_feas = v, &[f64::NAN, 0.0, f64::INFINITY]),
+        ("tol_ktratio", |c, v| c.settings.tol_ktratio = v, &[f64::NAN, 0.0]),
+        ("time_limit", |c, v| c.settings.time_limit = v, &[f64::NAN, 0.0]),
+        ("max_step_fraction", |c, v| c.settings.max_step_fraction = v, &[f64::NAN, 0.0, 1.0]),
+    ];
+    let qp = problem()?;
+    let mut solution = HeapSolution::new(qp.dims())?;
+    for (expected, change, values) in cases {
+        for &wrong in values {
+            let mut solver = Clarabel::new();
+            solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+            change(&mut solver, wrong);
+            let found = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+            assert!(
+                matches!(found, Err(QpError::InvalidOption { name, .. }) if name == expected),
+                "{expected} {wrong}: {found:?}"
+            );
+        }
+    }
+    let mut solver = Clarabel::new();
+    let iterations = solver.solve(qp.view(), Start::Cold, solution.view_mut())?.iterations;
+    assert!(iterations > 2);
+    solver.settings.max_iter = 2;
+    let found = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+    assert!(matches!(found, Err(QpError::MaxIterations { iterations: 2, .. })), "{found:?}");
+    solver.settings.max_iter = 100;
+    // This one holds for the life of a solver: a new one is made.
+    solver.settings.equilibrate_enable = false;
+    solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    Ok(())
+}
+
+/// Blocks without intervals condense nothing, those that are longer than the horizon all of it.
+#[test]
+fn blocks_of_any_length() -> Test {
+    let qp = problem()?;
+    let mut expected = HeapSolution::new(qp.dims())?;
+    HeapInteriorPoint::new().solve(qp.view(), Start::Cold, expected.view_mut())?;
+    for block in [0, usize::MAX] {
+        let mut solution = HeapSolution::new(qp.dims())?;
+        let mut solver = Condensing::new(block, HeapInteriorPoint::new());
+        solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        for (found, expected) in solution.stages().zip(expected.stages()) {
+            for (found, expected) in found.u.iter().zip(expected.u) {
+                // Both are within tolerances of 1e-8 of the solution of a problem whose Hessian is
+                // no less than one.
+                assert!((found - expected).abs() < 1e-7, "{block}: {found} instead of {expected}");
+            }
+        }
+    }
     Ok(())
 }
 

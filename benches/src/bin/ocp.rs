@@ -83,8 +83,8 @@ macro_rules! row {
         let options = Options { steps: $steps, newton, ..Default::default() };
         let batch = || Batch::<Chain<$nx>, Gauss<$stages>>::new(options);
         let mut ocp = chain_problem::problem!($nx, rest.clone(), x0, Shooting::new(batch()?));
-        let mut riccati = HeapSqp::new(&ocp)?;
-        let mut condensed = HeapSqp::with_solver(&ocp, Condensing::new(5, HeapInteriorPoint::new()))?;
+        let mut riccati = HeapSqp::new(&ocp)?.gauss_newton();
+        let mut condensed = HeapSqp::with_solver(&ocp, Condensing::new(5, HeapInteriorPoint::new()))?.gauss_newton();
         let outcome = riccati.solve(&mut ocp)?;
         let (mut whole, mut whole_condensed, mut linear) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
         let mut request = json!({

@@ -250,8 +250,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// not be remembered for it.
     ///
     /// # Errors
-    /// See [`Integrator`]; [`Error::OutsideInterval`] of a time that is outside or before the one
-    /// that precedes it.
+    /// See [`Integrator`]; [`Error::Unordered`] of a time that is outside or before the one that
+    /// precedes it.
     pub fn solve_at(
         &mut self,
         x0: &VectorX<M, T>,
@@ -264,10 +264,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         check(Argument::T, times)?;
         let (start, end) = (self.start, self.end(h)?);
         let mut before = start;
-        for t in times {
+        for (index, t) in times.iter().enumerate() {
             if !inside(*t, before, end) {
-                let (t, start, end) = (t.to_f64(), before.to_f64(), end.to_f64());
-                return Err(Error::OutsideInterval { t, start, end });
+                let (t, before, end) = (t.to_f64(), before.to_f64(), end.to_f64());
+                return Err(Error::Unordered { index, t, before, end });
             }
             before = *t;
         }

@@ -46,8 +46,8 @@ use bytemuck::Zeroable;
 ///
 /// # Errors
 /// Of every call: those of [`Integrator`]; [`Error::Intervals`] if there is not one control for
-/// each interval; [`Error::OutsideInterval`] if the ends are not in order, or not those of the
-/// steps that are kept.
+/// each interval; [`Error::Unordered`] if the ends are not in order, [`Error::OutsideInterval`] if
+/// they are not those of the steps that are kept.
 pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
     integrator: Integrator<M, B, T>,
     segments: Vec<Segment<M, T>>,
@@ -392,11 +392,11 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         let start = self.integrator.start;
         let last = ends.last().copied().unwrap_or(start);
         let mut before = start;
-        for (u, end) in controls.iter().zip(ends) {
+        for (index, (u, end)) in controls.iter().zip(ends).enumerate() {
             check(Argument::U, u.as_slice())?;
             if !inside(*end, before, last) {
-                let (t, start, end) = (end.to_f64(), before.to_f64(), last.to_f64());
-                return Err(Error::OutsideInterval { t, start, end });
+                let (t, before, end) = (end.to_f64(), before.to_f64(), last.to_f64());
+                return Err(Error::Unordered { index, t, before, end });
             }
             before = *end;
         }

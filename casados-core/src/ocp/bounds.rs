@@ -1,5 +1,6 @@
-//! Bounds by name, and checks of bounds.
+//! Bounds by name, parameters and references.
 
+use super::check::{Labels, first, range};
 use super::data::split;
 use super::dynamics::{Dynamics, Names};
 use super::error::{ConstraintName, OcpError, Part, Text};
@@ -9,100 +10,7 @@ use super::{constraint::Constraints, cost::Cost};
 use crate::qp::{BoundsMut, Field, QpError, Side, StageDims};
 use crate::scalar::Real;
 use crate::shape::Shape;
-use core::ops::{Bound, Range, RangeBounds};
-
-/// # Errors
-/// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
-pub(super) fn check<T: Real>(
-    part: Part,
-    stage: usize,
-    index: usize,
-    lower: T,
-    upper: T,
-) -> Result<(), OcpError> {
-    let infinity = T::from_f64(f64::INFINITY);
-    if lower <= upper && lower < infinity && upper > -infinity {
-        return Ok(());
-    }
-    let (lower, upper) = (lower.to_f64(), upper.to_f64());
-    Err(if lower.is_nan() || lower == f64::INFINITY {
-        OcpError::InvalidValue { part, stage, index, value: lower }
-    } else if upper.is_nan() || upper == f64::NEG_INFINITY {
-        OcpError::InvalidValue { part, stage, index, value: upper }
-    } else {
-        OcpError::CrossedBounds { part, stage, index, lower, upper }
-    })
-}
-
-/// A linear penalty may be infinite: then the bound is hard.
-///
-/// # Errors
-/// [`OcpError::InvalidValue`]
-pub(super) fn check_penalty<T: Real>(
-    stage: usize,
-    index: usize,
-    linear: T,
-    quadratic: T,
-) -> Result<(), OcpError> {
-    let part = Part::Penalty;
-    let is_penalty = linear >= T::ZERO;
-    if !is_penalty {
-        return Err(OcpError::InvalidValue { part, stage, index, value: linear.to_f64() });
-    }
-    if !(quadratic >= T::ZERO && quadratic.is_finite()) {
-        return Err(OcpError::InvalidValue { part, stage, index, value: quadratic.to_f64() });
-    }
-    Ok(())
-}
-
-/// # Errors
-/// [`OcpError::InvalidValue`]
-pub(super) fn check_finite<T: Real>(part: Part, stage: usize, values: &[T]) -> Result<(), OcpError> {
-    match crate::irk::not_finite(values) {
-        None => Ok(()),
-        Some((index, value)) => Err(OcpError::InvalidValue { part, stage, index, value }),
-    }
-}
-
-/// # Errors
-/// [`OcpError::Length`], [`OcpError::InvalidValue`]
-pub(super) fn check_vector<T: Real>(
-    part: Part,
-    stage: usize,
-    values: &[T],
-    expected: usize,
-) -> Result<(), OcpError> {
-    if values.len() != expected {
-        return Err(OcpError::Length { part, stage, expected, found: values.len() });
-    }
-    check_finite(part, stage, values)
-}
-
-/// A range of stages, of which there are so many.
-///
-/// # Errors
-/// [`OcpError::NoSuchStage`]
-pub(super) fn range(
-    part: Part,
-    stages: &impl RangeBounds<usize>,
-    count: usize,
-) -> Result<Range<usize>, OcpError> {
-    let start = match stages.start_bound() {
-        Bound::Included(&start) => start,
-        Bound::Excluded(&start) => start.saturating_add(1),
-        Bound::Unbounded => 0,
-    };
-    let end = match stages.end_bound() {
-        Bound::Included(&end) => end.saturating_add(1),
-        Bound::Excluded(&end) => end,
-        Bound::Unbounded => count,
-    };
-    if end > count || start > end {
-        let stage = if end > count { end.saturating_sub(1) } else { start };
-        return Err(OcpError::NoSuchStage { part, stage, stages: count });
-    }
-    Ok(start..end)
-}
+use core::ops::{Range, RangeBounds};
 
 /// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
 pub(super) fn means(name: &str, variable: &str) -> bool {
@@ -116,37 +24,57 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         <P::Dynamics as Dynamics<T>>::NAMES
     }
 
+    /// Where a name means states, and where it means controls: a part is left out of which it means
+    /// nothing.
+    ///
+    /// # Errors
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
+    fn find(&self, name: &str, stages: &impl RangeBounds<usize>) -> Result<[Range<usize>; 2], OcpError> {
+        let known = self.names();
+        let find = |part, names: &[&str], count| match names.iter().any(|variable| means(name, variable)) {
+            true => range(part, stages, count),
+            false => Ok(0..0),
+        };
+        let of_states = find(Part::StateBounds, known.x, self.intervals() + 1)?;
+        let of_controls = find(Part::ControlBounds, known.u, self.intervals())?;
+        if of_states.is_empty() && of_controls.is_empty() {
+            return Err(OcpError::UnknownName { name: Text::new(name), known });
+        }
+        Ok([of_states, of_controls])
+    }
+
     /// Does something to the bounds of every variable that a name means.
     fn each(
         &mut self,
         name: &str,
-        stages: &impl RangeBounds<usize>,
-        mut change: impl FnMut(&mut BoundsMut<'_, T>, usize),
-    ) -> Result<(), OcpError> {
+        [of_states, of_controls]: [Range<usize>; 2],
+        mut visit: impl FnMut(&mut BoundsMut<'_, T>, usize),
+    ) {
         let known = self.names();
-        let fixed = self.initial == Initial::Fixed;
-        let mut found = false;
-        for (part, names, count) in [
-            (Part::StateBounds, known.x, self.intervals() + 1),
-            (Part::ControlBounds, known.u, self.intervals()),
-        ] {
-            let indices = || names.iter().enumerate().filter(|(_, variable)| means(name, variable));
-            if indices().next().is_none() {
-                continue;
+        // Of a state that is given there is nothing to be bounded.
+        let first = usize::from(self.initial == Initial::Fixed);
+        for (k, mut stage) in self.qp.stages_mut().enumerate() {
+            let mut visit_all = |bounds: &mut BoundsMut<'_, T>, names: &[&str]| {
+                let variables = names.iter().enumerate().filter(|(_, variable)| means(name, variable));
+                variables.for_each(|(index, _)| visit(bounds, index));
+            };
+            if k >= first && of_states.contains(&k) {
+                visit_all(&mut stage.x_bounds_mut(), known.x);
             }
-            found = true;
-            let range = range(part, stages, count)?;
-            for (k, mut stage) in self.qp.stages_mut().enumerate() {
-                // Of a state that is given there is nothing to be bounded.
-                if !range.contains(&k) || (k == 0 && fixed && part == Part::StateBounds) {
-                    continue;
-                }
-                let mut bounds =
-                    if part == Part::StateBounds { stage.x_bounds_mut() } else { stage.u_bounds_mut() };
-                indices().for_each(|(index, _)| change(&mut bounds, index));
+            if of_controls.contains(&k) {
+                visit_all(&mut stage.u_bounds_mut(), known.u);
             }
         }
-        if found { Ok(()) } else { Err(OcpError::UnknownName { name: Text::new(name), known }) }
+    }
+
+    /// What the first variable that a name means is called, from some stage on.
+    fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
+        let known = self.names();
+        let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
+        match position(known.x) {
+            Some(index) => (Labels::states::<P, T>(Part::StateBounds, stage), index),
+            None => (Labels::controls::<P, T>(Part::ControlBounds, stage), position(known.u).unwrap_or(0)),
+        }
     }
 
     /// Bounds of a state or control, or of all of them that a name means (`u` means `u[0]`, `u[1]`,
@@ -154,8 +82,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// none. While the initial state is fixed, bounds of states do not touch stage 0.
     ///
     /// # Errors
-    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::CrossedBounds`],
-    /// [`OcpError::InvalidValue`]
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]: then no bound is changed.
     pub fn bound(
         &mut self,
         name: &str,
@@ -163,17 +91,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         lower: T,
         upper: T,
     ) -> Result<&mut Self, OcpError> {
-        let known = self.names();
-        let control = known.u.iter().position(|variable| means(name, variable));
-        let state = known.x.iter().position(|variable| means(name, variable));
-        let part = if state.is_some() { Part::StateBounds } else { Part::ControlBounds };
-        let first = match stages.start_bound() {
-            Bound::Included(&start) => start,
-            Bound::Excluded(&start) => start.saturating_add(1),
-            Bound::Unbounded => 0,
-        };
-        check(part, first, state.or(control).unwrap_or(0), lower, upper)?;
-        self.each(name, &stages, |bounds, index| bounds.set(index, lower, upper))?;
+        let found = self.find(name, &stages)?;
+        let (labels, index) = self.labels(name, first(&stages));
+        labels.check_bounds(index, lower, upper)?;
+        self.each(name, found, |bounds, index| bounds.set(index, lower, upper));
         Ok(self)
     }
 
@@ -181,7 +102,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// `linear · e + ½ quadratic · e²`. An infinite linear penalty makes them hard again.
     ///
     /// # Errors
-    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::InvalidValue`]
+    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::InvalidValue`]; [`OcpError::NoBound`] if nothing that the name means has a bound
+    /// at these stages. Then no penalty is changed.
     pub fn soften(
         &mut self,
         name: &str,
@@ -189,16 +112,27 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         linear: T,
         quadratic: T,
     ) -> Result<&mut Self, OcpError> {
-        check_penalty(0, 0, linear, quadratic)?;
-        self.each(name, &stages, |bounds, index| bounds.soften(index, linear, quadratic))?;
+        let found = self.find(name, &stages)?;
+        let (labels, index) = self.labels(name, first(&stages));
+        labels.check_penalty(index, linear, quadratic)?;
+        let mut is_bounded = false;
+        self.each(name, found.clone(), |bounds, index| {
+            let is_finite = |bounds: &[T]| bounds.get(index).is_some_and(|bound| bound.is_finite());
+            is_bounded |= is_finite(bounds.lower) || is_finite(bounds.upper);
+        });
+        if !is_bounded {
+            let [start, end] = [first(&stages), found.iter().map(|range| range.end).max().unwrap_or(0)];
+            return Err(OcpError::NoBound { name: Text::new(name), start, end });
+        }
+        self.each(name, found, |bounds, index| bounds.soften(index, linear, quadratic));
         Ok(self)
     }
 
     /// Bounds of the path constraints at some stages.
     ///
     /// # Errors
-    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::CrossedBounds`],
-    /// [`OcpError::InvalidValue`]
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`]
     pub fn set_path_bounds(
         &mut self,
         stages: impl RangeBounds<usize>,
@@ -226,14 +160,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         lower: &[T],
         upper: &[T],
     ) -> Result<&mut Self, OcpError> {
-        for bounds in [lower, upper] {
-            if bounds.len() != rows {
-                let (stage, found) = (stages.start, bounds.len());
-                return Err(OcpError::Length { part, stage, expected: rows, found });
-            }
-        }
+        let labels = Labels::constraints::<P, T>(part, stages.start);
+        labels.check_length(lower, rows)?;
+        labels.check_length(upper, rows)?;
         for (index, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
-            check(part, stages.start, index, lower, upper)?;
+            labels.check_bounds(index, lower, upper)?;
         }
         let intervals = self.intervals();
         let data = split::<P, T>(self.data.as_mut(), intervals);
@@ -251,17 +182,19 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn fix_initial_state(&mut self, x0: &[T]) -> Result<&mut Self, OcpError> {
-        check_vector(Part::InitialState, 0, x0, P::Shape::NX)?;
+        Labels::states::<P, T>(Part::InitialState, 0).check_vector(x0, P::Shape::NX)?;
         self.qp.fix_initial_state(x0)?;
         self.initial = Initial::Fixed;
         Ok(self)
     }
 
-    /// The state at the start is free; it may be bounded like any other.
+    /// The state at the start is free; it may be bounded like any other. If it was fixed, it has no
+    /// bounds until it is given new ones.
     pub fn free_initial_state(&mut self) -> &mut Self {
+        let was_fixed = self.initial == Initial::Fixed;
         self.initial = Initial::Free;
         let infinity = T::from_f64(f64::INFINITY);
-        if let Some(mut stage) = self.qp.stage_mut(0) {
+        if was_fixed && let Some(mut stage) = self.qp.stage_mut(0) {
             let bounds = stage.x_bounds_mut();
             bounds.lower.fill(-infinity);
             bounds.upper.fill(infinity);
@@ -278,7 +211,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// Parameters of some nodes; the last node has parameters for terminal cost and constraints.
     ///
     /// # Errors
-    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::InvalidValue`]
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::InvalidValue`]
     pub fn set_parameters(
         &mut self,
         stages: impl RangeBounds<usize>,
@@ -286,7 +220,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<&mut Self, OcpError> {
         let intervals = self.intervals();
         let range = range(Part::Parameters, &stages, intervals + 1)?;
-        check_vector(Part::Parameters, range.start, p, P::Shape::NP)?;
+        Labels::parameters::<P, T>(range.start).check_vector(p, P::Shape::NP)?;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         for k in range {
             crate::qp::assign(crate::qp::part_mut(data.p, k * P::Shape::NP, P::Shape::NP), p);
@@ -297,7 +231,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// The reference of the stage cost at some stages; zero if never set.
     ///
     /// # Errors
-    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::InvalidValue`]
+    /// [`OcpError::Length`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
+    /// [`OcpError::InvalidValue`]
     pub fn set_reference(
         &mut self,
         stages: impl RangeBounds<usize>,
@@ -305,7 +240,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ) -> Result<&mut Self, OcpError> {
         let (intervals, length) = (self.intervals(), P::StageCost::REFERENCES);
         let range = range(Part::Reference, &stages, intervals)?;
-        check_vector(Part::Reference, range.start, reference, length)?;
+        Labels::references::<P, T>(Part::Reference, range.start).check_vector(reference, length)?;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         for k in range {
             crate::qp::assign(crate::qp::part_mut(data.references, k * length, length), reference);
@@ -319,7 +254,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn set_terminal_reference(&mut self, reference: &[T]) -> Result<&mut Self, OcpError> {
         let (intervals, length) = (self.intervals(), P::TerminalCost::REFERENCES);
-        check_vector(Part::TerminalReference, intervals, reference, length)?;
+        Labels::references::<P, T>(Part::TerminalReference, intervals).check_vector(reference, length)?;
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let begin = intervals * P::StageCost::REFERENCES;
         crate::qp::assign(crate::qp::part_mut(data.references, begin, length), reference);
@@ -349,5 +284,36 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             _ => None,
         }
+    }
+
+    /// The derivative that makes a QP one without values.
+    pub(super) fn derivative(&self, error: &QpError) -> Option<OcpError> {
+        let QpError::InvalidValue { field, stage, index, value } = *error else { return None };
+        let known = self.names();
+        let (nx, nu) = (known.x.len(), known.u.len());
+        let rows = match field {
+            Field::A | Field::B | Field::Q => nx,
+            Field::C | Field::D if stage == self.intervals() => P::Terminal::ROWS,
+            Field::C | Field::D => P::Path::ROWS,
+            Field::R | Field::S => nu,
+            Field::GradientX | Field::GradientU => 1,
+            _ => return None,
+        };
+        let (row, column) = (index.checked_rem(rows)?, index.checked_div(rows)?);
+        let (list, by) = match field {
+            Field::A | Field::Q => (known.x, known.x),
+            Field::B => (known.x, known.u),
+            Field::R => (known.u, known.u),
+            Field::S => (known.u, known.x),
+            Field::C | Field::GradientX => (&[][..], known.x),
+            _ => (&[][..], known.u),
+        };
+        let (of, output) = match field {
+            Field::C | Field::D if stage == self.intervals() => P::Terminal::name(row),
+            Field::C | Field::D => P::Path::name(row),
+            _ => (list.get(row).copied().unwrap_or(""), 0),
+        };
+        let by = by.get(column).copied().unwrap_or("");
+        Some(OcpError::NonFiniteDerivative { field, stage, of, output, by, value })
     }
 }

@@ -1,5 +1,6 @@
 //! Constraints at the nodes.
 
+use super::check::Labels;
 use super::error::{OcpError, Part};
 use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
@@ -182,13 +183,13 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
 
     fn check(&self, there: There) -> Result<(), OcpError> {
         let part = if there.u { Part::PathBounds } else { Part::TerminalBounds };
-        for (index, (&lower, &upper)) in self.lower.as_ref().iter().zip(self.upper.as_ref()).enumerate() {
-            super::bounds::check(part, 0, index, lower, upper)?;
+        let labels = Labels { part, stage: there.stage, name: <Self as Constraints<F::Shape, T>>::name };
+        let Self { lower, upper, linear, quadratic, .. } = self;
+        for (index, (&lower, &upper)) in lower.as_ref().iter().zip(upper.as_ref()).enumerate() {
+            labels.check_bounds(index, lower, upper)?;
         }
-        for (index, (&linear, &quadratic)) in
-            self.linear.as_ref().iter().zip(self.quadratic.as_ref()).enumerate()
-        {
-            super::bounds::check_penalty(0, index, linear, quadratic)?;
+        for (index, (&linear, &quadratic)) in linear.as_ref().iter().zip(quadratic.as_ref()).enumerate() {
+            labels.check_penalty(index, linear, quadratic)?;
         }
         there.check::<F>()
     }

@@ -21,9 +21,24 @@ pub trait Cost<S: Shape, T: Real> {
     /// Whether it depends on what is there only, and has weights that make sense.
     ///
     /// # Errors
-    /// [`OcpError::NotThere`], [`OcpError::InvalidValue`]
+    /// [`OcpError::NotThere`], [`OcpError::InvalidWeight`]
     #[doc(hidden)]
     fn check(&self, there: There) -> Result<(), OcpError>;
+
+    /// Whether its weights, which may be changed after it was checked, make sense.
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidWeight`]
+    #[doc(hidden)]
+    fn check_weights(&self) -> Result<(), OcpError> {
+        Ok(())
+    }
+
+    /// The function of an element of the reference, and which of its outputs it is.
+    #[doc(hidden)]
+    fn name(reference: usize) -> (&'static str, usize) {
+        ("", reference)
+    }
 
     /// The value at a point.
     ///
@@ -102,6 +117,16 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     fn check(&self, there: There) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
+    }
+    fn check_weights(&self) -> Result<(), OcpError> {
+        self.0.check_weights()?;
+        self.1.check_weights()
+    }
+    fn name(reference: usize) -> (&'static str, usize) {
+        match reference.checked_sub(A::REFERENCES) {
+            None => A::name(reference),
+            Some(reference) => B::name(reference),
+        }
     }
     fn value(&mut self, v: &S::ArrayV<T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
         let (first, second) = reference.split_at_checked(A::REFERENCES).unwrap_or_default();

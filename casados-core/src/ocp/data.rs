@@ -69,9 +69,9 @@ const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 11] {
 /// How many numbers it takes.
 pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usize {
     let mut rest: &[usize] = &lengths::<P, T>(intervals);
-    let mut sum = 0;
+    let mut sum = 0_usize;
     while let Some((&first, others)) = rest.split_first() {
-        sum += first;
+        sum = sum.saturating_add(first);
         rest = others;
     }
     sum

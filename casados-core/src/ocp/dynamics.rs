@@ -190,6 +190,14 @@ pub trait Dynamics<T: Real> {
     /// Whether [`Step::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
 
+    /// Whether weights of integral costs make sense.
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidWeight`]
+    fn check(&self) -> Result<(), OcpError> {
+        Ok(())
+    }
+
     /// The ends of all intervals, and integral costs.
     ///
     /// # Errors
@@ -206,7 +214,8 @@ pub trait Dynamics<T: Real> {
 /// Dynamics with second derivatives.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no second derivatives",
-    note = "integrators with `Heap` or `Inline<mode::Hessian>` memory have them"
+    note = "integrators with `Heap` or `Inline<mode::Hessian>` memory have them",
+    note = "sequential quadratic programming needs none after `Sqp::gauss_newton`"
 )]
 pub trait SecondOrder<T: Real>: Dynamics<T> {
     /// The ends of all intervals, their first derivatives, and `∇²(πᵀφ + νᵀζ + integral)` with the

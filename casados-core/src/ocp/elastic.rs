@@ -18,16 +18,16 @@ pub(super) struct Worst {
 
 /// How many numbers remember the linear penalties.
 pub(super) const fn memory(dims: &[StageDims]) -> usize {
-    let (mut length, mut rest) = (0, dims);
+    let (mut length, mut rest) = (0_usize, dims);
     while let Some((first, others)) = rest.split_first() {
-        length += 2 * rows(*first);
+        length = length.saturating_add(rows(*first).saturating_mul(2));
         rest = others;
     }
     length
 }
 
 const fn rows(dims: StageDims) -> usize {
-    dims.nx + dims.nu + dims.ng
+    dims.nx.saturating_add(dims.nu).saturating_add(dims.ng)
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {

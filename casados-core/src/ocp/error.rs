@@ -1,8 +1,8 @@
-//! Every mistake in a problem, and what can go wrong where it is evaluated.
+//! Every mistake in a problem, and what can go wrong where it is evaluated; `messages` say it.
 
 use super::dynamics::Names;
 use crate::error::Error;
-use crate::qp::{QpError, Side};
+use crate::qp::{Field, QpError, Side};
 use core::fmt;
 
 /// A part of a problem.
@@ -15,6 +15,8 @@ pub enum Part {
     States,
     /// Controls.
     Controls,
+    /// Multipliers.
+    Multipliers,
     /// Parameters.
     Parameters,
     /// The state at the start.
@@ -23,8 +25,6 @@ pub enum Part {
     Reference,
     /// Reference of the terminal cost.
     TerminalReference,
-    /// Weights of a cost.
-    Weights,
     /// Bounds of states.
     StateBounds,
     /// Bounds of controls.
@@ -109,6 +109,26 @@ pub enum OcpError {
         /// How many stages have such a part.
         stages: usize,
     },
+    /// A range of stages that has none.
+    EmptyRange {
+        /// What was to be set.
+        part: Part,
+        /// Where the range begins.
+        start: usize,
+        /// Before which stage it ends.
+        end: usize,
+        /// How many stages have such a part.
+        stages: usize,
+    },
+    /// Bounds were to be made soft, and there are none.
+    NoBound {
+        /// The states or controls.
+        name: Text,
+        /// The first stage.
+        start: usize,
+        /// The stage behind the last one.
+        end: usize,
+    },
     /// A length is not what the problem asks for.
     Length {
         /// What is too short or too long.
@@ -120,16 +140,29 @@ pub enum OcpError {
         /// The length that was given.
         found: usize,
     },
-    /// A number is infinite or NaN and must not be, or a penalty or weight is negative.
+    /// A number is infinite or NaN and must not be, or a penalty is negative.
     InvalidValue {
         /// Of what.
         part: Part,
         /// The stage.
         stage: usize,
-        /// The element.
+        /// The state, control, parameter or function.
+        name: &'static str,
+        /// The element, or the output of the function.
         index: usize,
         /// Its value.
         value: f64,
+    },
+    /// The weights of a least-squares cost are no symmetric, positive semidefinite matrix.
+    InvalidWeight {
+        /// The function.
+        function: &'static str,
+        /// The row and the column: two of its outputs.
+        outputs: [usize; 2],
+        /// The weight.
+        value: f64,
+        /// What it has to be.
+        allowed: &'static str,
     },
     /// Times of nodes do not increase.
     Times {
@@ -146,7 +179,9 @@ pub enum OcpError {
         part: Part,
         /// The stage.
         stage: usize,
-        /// The element.
+        /// The state, control or function.
+        name: &'static str,
+        /// The element, or the output of the function.
         index: usize,
         /// Its lower bound.
         lower: f64,
@@ -178,6 +213,23 @@ pub enum OcpError {
         stage: usize,
         /// Which of its outputs, or zero of a sum.
         output: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A derivative is not finite where everything has a value: there is no QP.
+    NonFiniteDerivative {
+        /// Where it is in the QP: `A`, `B` of dynamics, `C`, `D` of constraints, gradients of
+        /// costs; `Q`, `R`, `S` are second derivatives.
+        field: Field,
+        /// The stage.
+        stage: usize,
+        /// What is differentiated: a state at the end of the interval or a constraint; or the first
+        /// variable of a second derivative.
+        of: &'static str,
+        /// The output of a constraint; zero of others.
+        output: usize,
+        /// The variable.
+        by: &'static str,
         /// The value.
         value: f64,
     },
@@ -213,111 +265,6 @@ impl From<QpError> for OcpError {
         match error {
             QpError::OutOfMemory { bytes } => Self::OutOfMemory { bytes },
             error => Self::Qp(error),
-        }
-    }
-}
-
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Times => "the nodes",
-            Self::States => "the states",
-            Self::Controls => "the controls",
-            Self::Parameters => "the parameters",
-            Self::InitialState => "the initial state",
-            Self::Reference => "the reference of the stage cost",
-            Self::TerminalReference => "the reference of the terminal cost",
-            Self::Weights => "the weights",
-            Self::StateBounds => "the bounds of the states",
-            Self::ControlBounds => "the bounds of the controls",
-            Self::PathBounds => "the bounds of the path constraints",
-            Self::TerminalBounds => "the bounds of the terminal constraints",
-            Self::Penalty => "the penalties",
-            Self::Dimensions => "the dimensions of the stages",
-            Self::Memory => "the memory",
-        })
-    }
-}
-
-impl fmt::Display for ConstraintName {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let side = match self.side {
-            Side::Lower => "lower",
-            Side::Upper => "upper",
-        };
-        write!(f, "the {side} bound of `{}`", self.name)?;
-        if matches!(self.part, Part::PathBounds | Part::TerminalBounds) {
-            write!(f, " (output {})", self.output)?;
-        }
-        write!(f, " at stage {}", self.stage)
-    }
-}
-
-impl fmt::Display for OcpError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::UnknownName { name, known } => {
-                write!(f, "`{}` has no state or control `{}`: its states are", known.model, name.as_str())?;
-                list(f, known.x)?;
-                f.write_str(", its controls")?;
-                list(f, known.u)
-            }
-            Self::NoSuchStage { part, stage, stages } => {
-                write!(f, "there is no stage {stage}: {part} are at stages 0 to {}", stages.saturating_sub(1))
-            }
-            Self::Length { part, stage, expected, found } => {
-                write!(f, "stage {stage}: {part} have {found} elements instead of {expected}")
-            }
-            Self::InvalidValue { part, stage, index, value } => {
-                write!(f, "stage {stage}: element {index} of {part} is {value}")
-            }
-            Self::Times { interval, start, end } => {
-                write!(
-                    f,
-                    "interval {interval} goes from {start} to {end}: times of nodes are finite and increase"
-                )
-            }
-            Self::CrossedBounds { part, stage, index, lower, upper } => {
-                write!(f, "stage {stage}: element {index} of {part} is from {lower} to {upper}")
-            }
-            Self::Missing { part: Part::InitialState, .. } => f.write_str(
-                "nothing is said about the initial state: call `fix_initial_state` or `free_initial_state`",
-            ),
-            Self::Missing { part, stage } => write!(f, "stage {stage}: {part} were never set"),
-            Self::NotThere { function, variable, terminal } => {
-                write!(f, "`{function}` depends on `{variable}`, which does not exist ")?;
-                f.write_str(if *terminal { "at the end of the horizon" } else { "at the nodes" })
-            }
-            Self::NonFiniteFunction { function, stage, output, value } => {
-                write!(f, "stage {stage}: output {output} of `{function}` is {value}")
-            }
-            Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
-            Self::Periodic => {
-                f.write_str("states are periodic: `Ipm` solves such problems, this solver does not")
-            }
-            Self::InvalidOption { name, value, allowed } => {
-                write!(f, "the option `{name}` is {value}: it has to be {allowed}")
-            }
-            Self::Qp(error) => error.fmt(f),
-            Self::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
-        }
-    }
-}
-
-fn list(f: &mut fmt::Formatter<'_>, names: &[&str]) -> fmt::Result {
-    for (i, name) in names.iter().enumerate() {
-        let comma = if i == 0 { "" } else { "," };
-        write!(f, "{comma} `{name}`")?;
-    }
-    Ok(())
-}
-
-impl core::error::Error for OcpError {
-    fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
-        match self {
-            Self::Integration { error, .. } => Some(error),
-            Self::Qp(error) => Some(error),
-            _ => None,
         }
     }
 }

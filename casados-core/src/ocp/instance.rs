@@ -1,6 +1,6 @@
 //! A problem on a horizon, with its data, its iterate and its QP.
 
-use super::bounds::{check_finite, check_vector};
+use super::check::Labels;
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::data::{self, Data, split};
@@ -56,8 +56,9 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
     /// The problem on a horizon, with memory on the heap.
     ///
     /// # Errors
-    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`],
-    /// [`OcpError::InvalidValue`], [`OcpError::OutOfMemory`]
+    /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
+    /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`],
+    /// [`OcpError::OutOfMemory`]
     #[cfg(feature = "alloc")]
     pub fn on<T: Real>(self, horizon: Horizon<'_, T>) -> Result<HeapOcp<Self, T>, OcpError>
     where
@@ -92,23 +93,24 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         dims
     }
 
-    /// How many numbers a problem takes.
+    /// How many numbers a problem takes; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory<T: Real>(dims: &[StageDims]) -> usize
     where
         Self: Formulation<T>,
     {
         Qp::<T, (), ()>::memory(dims)
-            + Solution::<T, (), ()>::memory(dims)
-            + data::length::<Self, T>(dims.len().saturating_sub(1))
+            .saturating_add(Solution::<T, (), ()>::memory(dims))
+            .saturating_add(data::length::<Self, T>(dims.len().saturating_sub(1)))
     }
 
     /// The problem on a horizon, in given memory of at least [`Problem::memory`] numbers; `dims`
     /// are [`Problem::dims`].
     ///
     /// # Errors
-    /// [`OcpError::Times`], [`OcpError::NotThere`], [`OcpError::CrossedBounds`],
-    /// [`OcpError::InvalidValue`]; [`OcpError::Length`] if memory or dimensions do not fit.
+    /// [`OcpError::Missing`] if there is no interval; [`OcpError::Times`], [`OcpError::NotThere`],
+    /// [`OcpError::InvalidWeight`], [`OcpError::CrossedBounds`], [`OcpError::InvalidValue`];
+    /// [`OcpError::Length`] if memory or dimensions do not fit.
     #[allow(clippy::type_complexity)]
     pub fn on_horizon<'a, T: Real>(
         self,
@@ -120,8 +122,8 @@ impl<D, L, E, G, H> Problem<D, L, E, G, H> {
         Self: Formulation<T>,
     {
         let intervals = horizon.intervals();
-        if dims.len() != intervals + 1 {
-            let (part, expected) = (Part::Dimensions, intervals + 1);
+        let (part, expected) = (Part::Dimensions, intervals.saturating_add(1));
+        if dims.len() != expected {
             return Err(OcpError::Length { part, stage: 0, expected, found: dims.len() });
         }
         for (stage, &dims) in dims.iter().enumerate() {
@@ -155,12 +157,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if intervals == 0 {
             return Err(OcpError::Missing { part: Part::Times, stage: 0 });
         }
-        let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
+        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
         let z = P::Dynamics::ALGEBRAIC;
-        stage_cost.check(There { z, u: true })?;
-        terminal_cost.check(There { z: false, u: false })?;
-        path.check(There { z, u: true })?;
-        terminal.check(There { z: false, u: false })?;
+        let (inside, at_end) =
+            (There { z, u: true, stage: 0 }, There { z: false, u: false, stage: intervals });
+        dynamics.check()?;
+        stage_cost.check(inside)?;
+        terminal_cost.check(at_end)?;
+        path.check(inside)?;
+        terminal.check(at_end)?;
         let Data { times, p, lower, upper, references, .. } = split::<P, T>(data.as_mut(), intervals);
         horizon.write(times)?;
         // Parameters that nobody sets are found in this way.
@@ -256,8 +261,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Length`], [`OcpError::InvalidValue`]
     pub fn guess(&mut self, x: &[T], u: &[T]) -> Result<&mut Self, OcpError> {
-        check_vector(Part::States, 0, x, P::Shape::NX)?;
-        check_vector(Part::Controls, 0, u, P::Shape::NU)?;
+        Labels::states::<P, T>(Part::States, 0).check_vector(x, P::Shape::NX)?;
+        Labels::controls::<P, T>(Part::Controls, 0).check_vector(u, P::Shape::NU)?;
         for k in 0..=self.intervals() {
             self.guess_stage(k, x, if k < self.intervals() { u } else { &[] })?;
         }
@@ -274,8 +279,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Some(place) = self.iterate.stage_mut(stage) else {
             return Err(OcpError::NoSuchStage { part: Part::States, stage, stages: last + 1 });
         };
-        check_vector(Part::States, stage, x, place.x.len())?;
-        check_vector(Part::Controls, stage, u, place.u.len())?;
+        Labels::states::<P, T>(Part::States, stage).check_vector(x, place.x.len())?;
+        Labels::controls::<P, T>(Part::Controls, stage).check_vector(u, place.u.len())?;
         assign(place.x, x);
         assign(place.u, u);
         for multipliers in [
@@ -292,11 +297,16 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(self)
     }
 
-    /// Finds what was never set, and an iterate that is not finite.
+    /// Finds what was never set, weights of costs that make no sense, and an iterate that is not
+    /// finite.
     ///
     /// # Errors
-    /// [`OcpError::Missing`], [`OcpError::InvalidValue`]
-    pub fn check(&self) -> Result<(), OcpError> {
+    /// [`OcpError::Missing`], [`OcpError::InvalidWeight`], [`OcpError::InvalidValue`]
+    pub fn check(&mut self) -> Result<(), OcpError> {
+        let Problem { dynamics, stage_cost, terminal_cost, .. } = self.problem.parts();
+        dynamics.check()?;
+        stage_cost.check_weights()?;
+        terminal_cost.check_weights()?;
         if self.initial == Initial::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
@@ -306,9 +316,27 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let stage = index.checked_div(np).unwrap_or(0);
             return Err(OcpError::Missing { part: Part::Parameters, stage });
         }
+        let last = self.intervals();
         for (stage, point) in self.iterate.stages().enumerate() {
-            check_finite(Part::States, stage, point.x)?;
-            check_finite(Part::Controls, stage, point.u)?;
+            Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
+            Labels::controls::<P, T>(Part::Controls, stage).check_finite(point.u)?;
+            let part = Part::Multipliers;
+            for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
+                Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
+            }
+            for multipliers in [point.u_lower, point.u_upper] {
+                Labels::controls::<P, T>(part, stage).check_finite(multipliers)?;
+            }
+            let of_constraints = Labels {
+                part,
+                ..Labels::constraints::<P, T>(
+                    if stage == last { Part::TerminalBounds } else { Part::PathBounds },
+                    stage,
+                )
+            };
+            for multipliers in [point.g_lower, point.g_upper] {
+                of_constraints.check_finite(multipliers)?;
+            }
         }
         Ok(())
     }

@@ -1,8 +1,9 @@
 //! Least-squares costs at the nodes.
 
 use super::cost::{At, Cost};
-use super::error::{OcpError, Part};
+use super::error::OcpError;
 use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
+use super::weights;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
 use crate::scalar::Real;
@@ -19,6 +20,8 @@ use core::ops::Range;
 #[zeroable(bound = "")]
 pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
     weights: MatrixYY<F, T>,
+    /// Zero if they are weights.
+    invalid: usize,
     /// Zero if `W` is diagonal.
     coupled: usize,
     y: ArrayY<F, T>,
@@ -28,7 +31,9 @@ pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
 }
 
 impl<F: Function, T: Real> LeastSquaresCost<F, T> {
-    /// With the weights `W`, which are symmetric.
+    /// With the weights `W`, a symmetric, positive semidefinite matrix.
+    ///
+    /// Others are refused by `Problem::on` and by every linearisation: [`OcpError::InvalidWeight`].
     #[must_use]
     pub fn new(weights: &MatrixYY<F, T>) -> Self {
         let mut cost: Self = Zeroable::zeroed();
@@ -37,7 +42,7 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
         cost
     }
 
-    /// With a weight for each output.
+    /// With a weight for each output, from zero on.
     #[must_use]
     pub fn diagonal(weights: &ArrayY<F, T>) -> Self {
         let mut matrix: MatrixYY<F, T> = Zeroable::zeroed();
@@ -47,12 +52,13 @@ impl<F: Function, T: Real> LeastSquaresCost<F, T> {
         Self::new(&matrix)
     }
 
-    /// Other weights.
+    /// Other weights, as those of [`LeastSquaresCost::new`].
     pub fn set_weights(&mut self, weights: &MatrixYY<F, T>) {
         let elements = || (0..F::Outputs::NY).flat_map(|i| (0..i).map(move |j| (i, j)));
         self.coupled =
             usize::from(elements().any(|(i, j)| weights[(i, j)] != T::ZERO || weights[(j, i)] != T::ZERO));
         self.weights = *weights;
+        self.invalid = usize::from(weights::check::<F, T>(weights, self.coupled != 0).is_err());
     }
 
     /// `μ = W (y − r)`, and `½ (y − r)ᵀ μ`.
@@ -93,13 +99,19 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
     const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {
-        for (index, value) in self.weights.as_slice().iter().enumerate() {
-            if !value.is_finite() {
-                let value = value.to_f64();
-                return Err(OcpError::InvalidValue { part: Part::Weights, stage: 0, index, value });
-            }
-        }
+        self.check_weights()?;
         there.check::<F>()
+    }
+
+    fn check_weights(&self) -> Result<(), OcpError> {
+        match self.invalid {
+            0 => Ok(()),
+            _ => weights::check::<F, T>(&self.weights, self.coupled != 0),
+        }
+    }
+
+    fn name(reference: usize) -> (&'static str, usize) {
+        (F::STRUCTURE.name, reference)
     }
 
     fn value(&mut self, v: &ArrayV<F, T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
@@ -116,7 +128,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
     ) -> Result<T, OcpError> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         let value = self.square(reference, at.stage)?;
-        let Self { weights, coupled, y, mu, jacobian, hessian } = self;
+        let Self { weights, coupled, y, mu, jacobian, hessian, .. } = self;
         let mut square = Square::<F, T> { weights, y, jacobian, at, terms: &mut *terms };
         if *coupled == 0 {
             dispatch(square);

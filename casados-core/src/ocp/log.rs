@@ -1,9 +1,7 @@
 //! What happened, as data.
 
 use super::elastic::Worst;
-use super::error::ConstraintName;
-#[cfg(feature = "alloc")]
-use super::error::OcpError;
+use super::error::{ConstraintName, OcpError};
 use super::instance::Ocp;
 use super::problem::Formulation;
 use crate::qp::{QpError, Residuals, StageDims};
@@ -187,12 +185,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// The status of a run whose QP or Newton's equations have no solution.
-    pub(super) fn status_of_error(&self, error: QpError) -> Status {
+    ///
+    /// # Errors
+    /// [`OcpError::NonFiniteDerivative`] if there is no such QP.
+    pub(super) fn status_of_error(&self, error: QpError) -> Result<Status, OcpError> {
         match (self.infeasible(&error), error) {
             (Some(constraint), QpError::Infeasible { violation, .. }) => {
-                Status::InfeasibleQp { constraint, violation }
+                Ok(Status::InfeasibleQp { constraint, violation })
             }
-            _ => Status::QpFailed(error),
+            _ => self.derivative(&error).map_or(Ok(Status::QpFailed(error)), Err),
         }
     }
 }

@@ -18,7 +18,7 @@
 //! it:
 //!
 //! ```text
-//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        GaussNewton: JᵀWJ of least squares alone; Exact: all of it, regularised where a QP is not convex
+//! B_k ≈ ∇²_(x,u) [l + πᵀφ + (λ_u − λ_l)ᵀ g]        Exact, the default: all of it, regularised where a QP is not convex; GaussNewton: JᵀWJ of least squares alone
 //! QP at (x̄, ū): variables (x, u), data φ − A x̄ − B ū, …, solution the next iterate
 //! ```
 //!
@@ -49,6 +49,7 @@
 
 mod algebraic;
 mod bounds;
+mod check;
 mod constraint;
 mod convexify;
 mod cost;
@@ -66,6 +67,7 @@ mod least_squares;
 mod linearise;
 mod log;
 mod map;
+mod messages;
 mod point;
 mod problem;
 mod real_time;
@@ -76,6 +78,7 @@ mod shooting;
 mod single;
 mod sqp;
 mod transfer;
+mod weights;
 
 pub use constraint::{Constraint, Constraints};
 pub use convexify::Convexification;

@@ -64,6 +64,8 @@ pub struct There {
     pub(super) z: bool,
     /// Controls: not at the end of the horizon.
     pub(super) u: bool,
+    /// The first stage of these.
+    pub(super) stage: usize,
 }
 
 impl There {

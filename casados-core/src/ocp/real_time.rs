@@ -195,13 +195,16 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: A
     /// Solves the QP with this state at its start.
     ///
     /// # Errors
-    /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::Qp`]
+    /// [`OcpError::Length`], [`OcpError::InvalidValue`], [`OcpError::NonFiniteDerivative`],
+    /// [`OcpError::Qp`]
     pub fn feedback(self, x0: &[T]) -> Result<Feedback<'a, T>, OcpError> {
         let Self { qp_solver, ocp, solution, warm } = self;
         ocp.fix_initial_state(x0)?;
         solution.copy_from(&ocp.iterate);
         let start = if *warm { Start::Warm } else { Start::Cold };
-        let statistics = qp_solver.solve(ocp.qp(), start, solution.view_mut())?;
+        let statistics = qp_solver
+            .solve(ocp.qp(), start, solution.view_mut())
+            .map_err(|error| ocp.derivative(&error).unwrap_or_else(|| error.into()))?;
         *warm = true;
         core::mem::swap(&mut ocp.iterate, solution);
         Ok(Feedback { u: ocp.stage(0)?.u, statistics })

@@ -40,6 +40,14 @@ impl<I, Q> Along<I, Q> {
 
 /// What is an integral cost.
 pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
+    /// Whether its weights make sense.
+    ///
+    /// # Errors
+    /// [`OcpError::InvalidWeight`]
+    #[doc(hidden)]
+    fn check(&self) -> Result<(), OcpError> {
+        Ok(())
+    }
     /// Before every interval.
     #[doc(hidden)]
     fn prepare(&mut self);
@@ -49,6 +57,9 @@ pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
 }
 
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for LeastSquares<F, T> {
+    fn check(&self) -> Result<(), OcpError> {
+        super::weights::check::<F, T>(&self.weights, true)
+    }
     fn prepare(&mut self) {}
     fn terms(&self) -> IntegralTerms<'_, T> {
         IntegralTerms {
@@ -145,6 +156,9 @@ macro_rules! single {
             const NAMES: Names = names::<M>();
             const ALGEBRAIC: bool = true;
 
+            fn check(&self) -> Result<(), OcpError> {
+                self.integral.check()
+            }
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 let Self { integrator, integral } = self;
                 for (k, interval) in nodes.iter().enumerate() {

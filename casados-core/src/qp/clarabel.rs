@@ -19,15 +19,27 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, S
 /// cones, and shares no code with it. Every start is cold. Its symbolic factorisation is kept as
 /// long as the elements that are not zero stay the same.
 ///
+/// Its tolerances are relative to the sizes of terms, and one of the two for the duality gap is
+/// enough. A caller that measures residuals otherwise, as sequential quadratic programming does,
+/// says what it needs ([`QpSolver::refine`]): then a part of that is asked for, and what satisfies
+/// the settings is accepted.
+///
 /// Of an infeasible problem it names the constraint with the largest multiplier in the certificate,
 /// and a violation that at least one constraint must have.
 pub struct Clarabel {
-    /// Clarabel's own options.
+    /// Clarabel's own options, which may be changed between calls.
     pub settings: DefaultSettings<f64>,
     /// Constraints beyond those of the QP. They are checked when a problem is solved.
     pub cones: Vec<SecondOrderCone>,
+    /// What the caller needs; infinite if nobody said so.
+    needed: f64,
     kept: Option<Kept>,
 }
+
+/// The part of a needed residual that Clarabel is asked for, as its own are relative to terms whose
+/// size is not known beforehand, and the least that is asked for.
+const PART: f64 = 1e-2;
+const LEAST: f64 = 1e-13;
 
 /// A solver and the pattern that it is for.
 struct Kept {
@@ -55,7 +67,58 @@ impl Clarabel {
             tol_feas: 1e-9,
             ..DefaultSettings::default()
         };
-        Self { settings, cones: Vec::new(), kept: None }
+        Self { settings, cones: Vec::new(), needed: f64::INFINITY, kept: None }
+    }
+
+    /// # Errors
+    /// [`QpError::InvalidOption`]
+    fn check_settings(&self) -> Result<(), QpError> {
+        let s = &self.settings;
+        let (none, some) = (|value: f64| value >= 0.0 && value.is_finite(), |value: f64| value > 0.0);
+        let is_gap = s.tol_gap_abs > 0.0 || s.tol_gap_rel > 0.0;
+        for (name, value, is_valid, allowed) in [
+            (
+                "tol_gap_abs",
+                s.tol_gap_abs,
+                none(s.tol_gap_abs) && is_gap,
+                "from 0, finite, and above if tol_gap_rel is 0",
+            ),
+            ("tol_gap_rel", s.tol_gap_rel, none(s.tol_gap_rel), "from 0, finite"),
+            ("tol_feas", s.tol_feas, none(s.tol_feas) && some(s.tol_feas), "above 0, finite"),
+            ("tol_infeas_abs", s.tol_infeas_abs, none(s.tol_infeas_abs), "from 0, finite"),
+            ("tol_infeas_rel", s.tol_infeas_rel, none(s.tol_infeas_rel), "from 0, finite"),
+            ("tol_ktratio", s.tol_ktratio, none(s.tol_ktratio) && some(s.tol_ktratio), "above 0, finite"),
+            ("time_limit", s.time_limit, some(s.time_limit), "above 0"),
+            (
+                "max_step_fraction",
+                s.max_step_fraction,
+                some(s.max_step_fraction) && s.max_step_fraction < 1.0,
+                "between 0 and 1",
+            ),
+        ] {
+            if !is_valid {
+                return Err(QpError::InvalidOption { name, value, allowed });
+            }
+        }
+        Ok(())
+    }
+
+    /// The settings, with the tolerances that the caller needs. Those of the settings are then what
+    /// is accepted where these are not reached.
+    fn refined(&self) -> DefaultSettings<f64> {
+        let mut settings = self.settings.clone();
+        let asked = (PART * self.needed).max(LEAST);
+        if asked < f64::INFINITY {
+            let s = &mut settings;
+            for (tolerance, reduced) in [
+                (&mut s.tol_gap_abs, &mut s.reduced_tol_gap_abs),
+                (&mut s.tol_gap_rel, &mut s.reduced_tol_gap_rel),
+                (&mut s.tol_feas, &mut s.reduced_tol_feas),
+            ] {
+                (*reduced, *tolerance) = (*tolerance, tolerance.min(asked));
+            }
+        }
+        settings
     }
 
     fn check_cones(&self, qp: QpView<'_, f64>) -> Result<(), QpError> {
@@ -104,14 +167,16 @@ impl Clarabel {
             let equal = |a: &CscMatrix<f64>, b: &CscMatrix<f64>| a.colptr == b.colptr && a.rowval == b.rowval;
             equal(&kept.p, &p) && equal(&kept.k, &k) && (kept.k.m, &kept.cones) == (k.m, &cones)
         };
-        let updated =
-            self.kept.as_mut().filter(|kept| same(kept)).is_some_and(|kept| {
-                kept.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
-            });
+        let settings = self.refined();
+        // Settings that hold for the life of a solver are refused, and make a new one.
+        let updated = self.kept.as_mut().filter(|kept| same(kept)).is_some_and(|kept| {
+            kept.solver.update_settings(settings.clone()).is_ok()
+                && kept.solver.update_data(&p.nzval, &sparse.q, &k.nzval, &sparse.b).is_ok()
+        });
         if !updated {
             // What clarabel checks here are the dimensions, which are right by construction, and
             // the user's settings.
-            let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, self.settings.clone());
+            let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, settings);
             let invalid =
                 QpError::InvalidValue { field: Field::Settings, stage: 0, index: 0, value: f64::NAN };
             self.kept = Some(Kept { solver: solver.map_err(|_| invalid)?, p, k, cones });
@@ -144,6 +209,10 @@ fn matrix(triplets: &Triplets, rows: usize, columns: usize) -> CscMatrix<f64> {
 }
 
 impl QpSolver<f64> for Clarabel {
+    fn refine(&mut self, tolerance: f64) {
+        self.needed = if tolerance > 0.0 { tolerance } else { f64::INFINITY };
+    }
+
     fn solve(
         &mut self,
         qp: QpView<'_, f64>,
@@ -152,7 +221,9 @@ impl QpSolver<f64> for Clarabel {
     ) -> Result<Statistics, QpError> {
         check(qp)?;
         solution.fits(qp)?;
+        self.check_settings()?;
         self.check_cones(qp)?;
+        let is_refined = self.needed.is_finite();
         let (solver, sparse) = self.prepare(Sparse::new(qp, &self.cones))?;
         solver.solve();
         let found = &solver.solution;
@@ -187,7 +258,8 @@ impl QpSolver<f64> for Clarabel {
         };
         let objective = found.obj_val;
         match found.status {
-            SolverStatus::Solved => Ok(Statistics {
+            SolverStatus::AlmostSolved if !is_refined => Err(QpError::Stalled { iterations, residuals }),
+            SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(Statistics {
                 iterations,
                 factorisations: iterations,
                 residuals,

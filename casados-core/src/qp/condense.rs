@@ -67,7 +67,8 @@ enum Kind {
 }
 
 impl<T: Real, S> Condensing<T, S> {
-    /// A solver for blocks of `block` intervals. With one interval nothing is condensed.
+    /// A solver for blocks of `block` intervals. With one interval, or zero, nothing is condensed;
+    /// with as many as there are, or more, one state is left.
     #[must_use]
     pub fn new(block: usize, solver: S) -> Self {
         let (dims, old, rows, origins, work) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -481,6 +482,9 @@ impl<T: Real> Registers<T> for Expand<'_, '_, T> {
 impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
     fn relax(&mut self, tolerance: f64) {
         self.solver.relax(tolerance);
+    }
+    fn refine(&mut self, tolerance: f64) {
+        self.solver.refine(tolerance);
     }
 
     fn solve(

@@ -463,7 +463,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     pub(super) fn data_mut(&mut self) -> &mut [T] {
         self.memory.as_mut()
     }
-    /// `x₀`, by two equal bounds of every component.
+    /// `x₀`, by two equal bounds of every component, which are hard.
     ///
     /// # Errors
     /// [`QpError::Dimension`]
@@ -476,6 +476,9 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         }
         assign(bounds.lower, x0);
         assign(bounds.upper, x0);
+        for penalties in [bounds.lower_linear, bounds.upper_linear] {
+            penalties.fill(T::from_f64(f64::INFINITY));
+        }
         Ok(())
     }
 }

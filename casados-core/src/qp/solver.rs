@@ -35,4 +35,11 @@ pub trait QpSolver<T> {
     fn relax(&mut self, tolerance: f64) {
         let _ = tolerance;
     }
+
+    /// Asks for solutions that are good enough for residuals below a tolerance in the problem whose
+    /// steps they are, which may be less than options say. A solver whose solutions are always
+    /// good enough, or as good as they get, does nothing.
+    fn refine(&mut self, tolerance: f64) {
+        let _ = tolerance;
+    }
 }

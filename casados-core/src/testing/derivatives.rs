@@ -103,7 +103,7 @@ pub fn check_pattern<M: Dae>(points: &Points<M>) -> Report {
 
 /// The points with their numbers, and seeds `μ` in `[-1, 1]` for each.
 fn samples<M: Dae>(points: &Points<M>) -> impl Iterator<Item = (usize, ArrayV<M, f64>, Vec<f64>)> {
-    points.list().into_iter().enumerate().map(|(number, v)| {
+    points.iter().enumerate().map(|(number, v)| {
         let mut random = Random::new(number as u64 + 1);
         (number, v, (0..M::Shape::NK).map(|_| random.symmetric()).collect())
     })

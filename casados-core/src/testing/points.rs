@@ -55,56 +55,74 @@ impl<M: Dae> Points<M> {
 
     /// The range of all variables.
     #[must_use]
-    pub fn all(self, range: RangeInclusive<f64>) -> Self {
-        self.block(0, M::Shape::NV, &range)
+    pub fn all(mut self, range: RangeInclusive<f64>) -> Self {
+        self.ranges.fill((*range.start(), *range.end()));
+        self
     }
     /// The range of `ẋ[i]`.
+    ///
+    /// # Panics
+    /// If there is no such derivative. So do the others.
     #[must_use]
+    #[track_caller]
     pub fn xdot(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.block(i, 1, &range)
+        self.element("xdot", (0, M::Shape::NX), i, &range)
     }
     /// The range of `x[i]`.
     #[must_use]
+    #[track_caller]
     pub fn x(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.block(M::Shape::NX + i, 1, &range)
+        self.element("x", (M::Shape::NX, M::Shape::NX), i, &range)
     }
     /// The range of `z[i]`.
     #[must_use]
+    #[track_caller]
     pub fn z(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.block(2 * M::Shape::NX + i, 1, &range)
+        self.element("z", (2 * M::Shape::NX, M::Shape::NZ), i, &range)
     }
     /// The range of `u[i]`.
     #[must_use]
+    #[track_caller]
     pub fn u(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.block(2 * M::Shape::NX + M::Shape::NZ + i, 1, &range)
+        self.element("u", (2 * M::Shape::NX + M::Shape::NZ, M::Shape::NU), i, &range)
     }
     /// The range of `p[i]`.
     #[must_use]
+    #[track_caller]
     pub fn p(self, i: usize, range: RangeInclusive<f64>) -> Self {
-        self.block(2 * M::Shape::NX + M::Shape::NZ + M::Shape::NU + i, 1, &range)
+        let first = 2 * M::Shape::NX + M::Shape::NZ + M::Shape::NU;
+        self.element("p", (first, M::Shape::NP), i, &range)
     }
     /// The range of `t`.
     #[must_use]
     pub fn t(self, range: RangeInclusive<f64>) -> Self {
-        self.block(M::Shape::NV - 1, 1, &range)
+        self.element("t", (M::Shape::NV - 1, 1), 0, &range)
     }
 
-    fn block(mut self, first: usize, count: usize, range: &RangeInclusive<f64>) -> Self {
-        self.ranges[first..first + count].fill((*range.start(), *range.end()));
+    #[track_caller]
+    fn element(
+        mut self,
+        name: &str,
+        (first, count): (usize, usize),
+        i: usize,
+        range: &RangeInclusive<f64>,
+    ) -> Self {
+        let model = M::STRUCTURE.name;
+        assert!(i < count, "there is no {name}[{i}]: `{model}` has {count} of them");
+        self.ranges[first + i] = (*range.start(), *range.end());
         self
     }
 
-    /// The points, the given ones first.
-    pub(super) fn list(&self) -> Vec<ArrayV<M, f64>> {
+    /// The points, the given ones first; random ones are drawn one by one.
+    pub(super) fn iter(&self) -> impl Iterator<Item = ArrayV<M, f64>> {
         let mut random = Random::new(self.seed);
-        let mut points = self.given.clone();
-        points.extend((0..self.count).map(|_| {
+        let draw = move |_| {
             <ArrayV<M, f64> as Array<f64>>::from_fn(|i| {
                 let (low, high) = self.ranges[i];
                 low + (high - low) * random.unit()
             })
-        }));
-        points
+        };
+        self.given.iter().copied().chain((0..self.count).map(draw))
     }
 }
 

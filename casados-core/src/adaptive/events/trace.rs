@@ -178,7 +178,9 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         place_inputs::<M, T>(self.v.as_mut().as_mut(), u, &parameters);
         let count = self.events.len();
         self.signs.clear();
-        self.signs.try_reserve(count).map_err(|_| Error::OutOfMemory { bytes: count * size_of::<f64>() })?;
+        self.signs
+            .try_reserve(count)
+            .map_err(|_| Error::OutOfMemory { bytes: count.saturating_mul(size_of::<f64>()) })?;
         let mut slope = None;
         for index in 0..count {
             let Some(event) = self.events.get(index).copied() else { break };

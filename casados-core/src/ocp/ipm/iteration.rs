@@ -76,7 +76,7 @@ where
         }
         let direction = match self.direction(ocp, capacity, state, here, row) {
             Ok(direction) => direction,
-            Err(error) => return Ok(Some(ocp.status_of_error(error))),
+            Err(error) => return ocp.status_of_error(error).map(Some),
         };
         row.times.qp = watch.lap();
         let Self { options, trial, best, numbers, indices, work, .. } = self;

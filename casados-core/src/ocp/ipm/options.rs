@@ -20,8 +20,8 @@ pub struct IpmOptions {
     pub max_iterations: usize,
     /// The first barrier parameter `μ`. Default 0.1.
     pub start_mu: f64,
-    /// Bounds are left by this at the start, relative to their size and to the room between them.
-    /// Default 1e-2.
+    /// Bounds are left by this at the start, relative to their size and to the room between them;
+    /// at most 0.5. Default 1e-2.
     pub bound_push: f64,
     /// Whether slacks and multipliers begin at those of the iterate. Default false.
     pub warm_start: bool,
@@ -60,13 +60,17 @@ impl IpmOptions {
             ("tolerance", self.tolerance),
             ("acceptable_tolerance", self.acceptable_tolerance),
             ("start_mu", self.start_mu),
-            ("bound_push", self.bound_push),
-            ("warm_push", self.warm_push),
             ("elastic_penalty", self.elastic_penalty),
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(OcpError::InvalidOption { name, value, allowed: "positive and finite" });
+            }
+        }
+        // Two bounds push from both sides.
+        for (name, value) in [("bound_push", self.bound_push), ("warm_push", self.warm_push)] {
+            if !(value > 0.0 && value <= 0.5) {
+                return Err(OcpError::InvalidOption { name, value, allowed: "above 0 and at most 0.5" });
             }
         }
         Ok(())

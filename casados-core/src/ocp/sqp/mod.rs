@@ -1,7 +1,7 @@
 //! Sequential quadratic programming.
 //!
 //! ```text
-//! linearise at (x̄, ū)  →  QP with the Hessian of Gauss and Newton, or the exact one  →  step
+//! linearise at (x̄, ū)  →  QP with the exact Hessian, or that of Gauss and Newton  →  step
 //! ```
 //!
 //! | | |
@@ -31,8 +31,12 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 
-/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`GaussNewton`]
-/// or [`Exact`].
+/// Sequential quadratic programming with the solver `S` of QPs and the Hessian `C`: [`Exact`], or
+/// [`GaussNewton`] after [`Sqp::gauss_newton`].
+///
+/// Exact Hessians converge whatever the costs are. That of Gauss and Newton is cheaper, needs no
+/// second derivatives of dynamics, and converges about as fast where costs are least squares whose
+/// residuals are small at the solution, as in tracking; elsewhere it may not converge at all.
 ///
 /// Memory is made for one problem, of whose dimensions all others are to be.
 pub struct Sqp<S, C, T, D, M> {
@@ -59,11 +63,11 @@ pub struct Sqp<S, C, T, D, M> {
 
 /// Sequential quadratic programming with its memory on the heap.
 #[cfg(feature = "alloc")]
-pub type HeapSqp<S = HeapInteriorPoint, C = GaussNewton, T = f64> = Sqp<S, C, T, Vec<StageDims>, Vec<T>>;
+pub type HeapSqp<S = HeapInteriorPoint, C = Exact, T = f64> = Sqp<S, C, T, Vec<StageDims>, Vec<T>>;
 
 #[cfg(feature = "alloc")]
-impl<T: Real> HeapSqp<HeapInteriorPoint<T>, GaussNewton, T> {
-    /// For a problem, with the library's own solver of QPs and the Hessian of Gauss and Newton.
+impl<T: Real> HeapSqp<HeapInteriorPoint<T>, Exact, T> {
+    /// For a problem, with the library's own solver of QPs and exact Hessians.
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -73,8 +77,9 @@ impl<T: Real> HeapSqp<HeapInteriorPoint<T>, GaussNewton, T> {
 }
 
 #[cfg(feature = "alloc")]
-impl<S, T: Real> HeapSqp<S, GaussNewton, T> {
-    /// For a problem, with a solver of QPs, such as [`Condensing`](crate::qp::Condensing).
+impl<S, T: Real> HeapSqp<S, Exact, T> {
+    /// For a problem, with exact Hessians and a solver of QPs, such as
+    /// [`Condensing`](crate::qp::Condensing).
     ///
     /// # Errors
     /// [`OcpError::OutOfMemory`]
@@ -90,7 +95,7 @@ impl<S, T: Real> HeapSqp<S, GaussNewton, T> {
         work.resize(length, T::ZERO);
         Ok(Self {
             options: SqpOptions::new::<T>(),
-            curvature: GaussNewton::default(),
+            curvature: Exact::default(),
             qp_solver,
             solution: Solution::new(dims)?,
             trial: Solution::new(dims)?,
@@ -111,10 +116,20 @@ impl<S, C, T: Real> HeapSqp<S, C, T> {
     }
 }
 
-impl<S, T: Real, D, M> Sqp<S, GaussNewton, T, D, M> {
-    /// The same with the Hessian of the Lagrangian.
+impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
+    /// The same with the Hessian of the Lagrangian, and another way to make it convex.
     #[must_use]
     pub fn exact(self, curvature: Exact) -> Sqp<S, Exact, T, D, M> {
+        self.with(curvature)
+    }
+
+    /// The same with the Hessian of Gauss and Newton.
+    #[must_use]
+    pub fn gauss_newton(self) -> Sqp<S, GaussNewton, T, D, M> {
+        self.with(GaussNewton::default())
+    }
+
+    fn with<N>(self, curvature: N) -> Sqp<S, N, T, D, M> {
         Sqp {
             options: self.options,
             curvature,
@@ -130,11 +145,14 @@ impl<S, T: Real, D, M> Sqp<S, GaussNewton, T, D, M> {
     }
 }
 
-impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
-    /// How many numbers it takes for a problem.
+impl<'a, S, T: Real> Sqp<S, Exact, T, &'a [StageDims], &'a mut [T]> {
+    /// How many numbers it takes for a problem; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory<P: Formulation<T>>(dims: &[StageDims]) -> usize {
-        4 * Solution::<T, (), ()>::memory(dims) + super::linearise::ends::<P, T>(dims) + elastic::memory(dims)
+        Solution::<T, (), ()>::memory(dims)
+            .saturating_mul(4)
+            .saturating_add(super::linearise::ends::<P, T>(dims))
+            .saturating_add(elastic::memory(dims))
     }
 
     /// For problems of these dimensions, in given memory of [`Sqp::memory`] numbers.
@@ -157,7 +175,7 @@ impl<'a, S, T: Real> Sqp<S, GaussNewton, T, &'a [StageDims], &'a mut [T]> {
         let (weights, work) = rest.split_at_mut_checked(length).unwrap_or_default();
         Ok(Self {
             options: SqpOptions::new::<T>(),
-            curvature: GaussNewton::default(),
+            curvature: Exact::default(),
             qp_solver,
             solution: Solution::in_memory(dims, solution)?,
             trial: Solution::in_memory(dims, trial)?,

@@ -77,6 +77,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.fits(self.solution.dims())?;
         ocp.is_uncoupled()?;
         self.options.check()?;
+        self.qp_solver.refine(self.options.tolerance);
         let mut state = State {
             search: Search::new(),
             elastic: false,
@@ -176,7 +177,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 state.best_iteration = *row;
                 return Ok(Some(ocp.status_of_worst(&worst)));
             }
-            Err(error) => return Ok(Some(ocp.status_of_error(error))),
+            Err(error) => return ocp.status_of_error(error).map(Some),
         }
         let taken = if self.options.globalisation == Globalisation::FullStep {
             core::mem::swap(&mut ocp.iterate, &mut self.solution);

@@ -63,3 +63,24 @@ fn points_outside_of_the_domain_do_not_pass() {
     let report = check_derivatives::<Example<NO_FAULT>>(&Points::random(3).all(1e4..=1e5));
     assert!(!report.passed(), "{report}");
 }
+
+/// The next block of variables is not what is meant.
+#[test]
+#[should_panic = "there is no x[1]: `example` has 1 of them"]
+fn ranges_of_states_that_are_not_there() {
+    let _ = Points::<Example<NO_FAULT>>::random(1).x(1, 0.0..=1.0);
+}
+
+#[test]
+#[should_panic = "there is no p[18446744073709551615]: `example` has 1 of them"]
+fn ranges_of_absurd_indices() {
+    let _ = Points::<Example<NO_FAULT>>::random(1).p(usize::MAX, 0.0..=1.0);
+}
+
+/// Nobody holds all points at once.
+#[test]
+fn points_are_drawn_one_by_one() {
+    let some: Vec<_> = Points::<Example<NO_FAULT>>::random(usize::MAX).iter().take(3).collect();
+    let same: Vec<_> = Points::<Example<NO_FAULT>>::random(3).iter().collect();
+    assert_eq!(some, same);
+}
