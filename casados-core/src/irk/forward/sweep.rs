@@ -180,27 +180,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     pub(in crate::irk) fn dy_mut(&mut self) -> &mut [R] {
         self.dy.as_mut().as_flattened_mut()
     }
-
-    /// Solves by the factors of the whole matrix, column by column.
-    fn solve_columns<D: Directions<E>, F: Fallback>(&mut self, work: &mut Work<M, E, S, F>) {
-        let Work { increment, linear, .. } = work;
-        let rows = M::Shape::NK;
-        let dy = R::flat_mut(self.dy.as_mut().as_flattened_mut());
-        panels!(D::COUNT, E, S, column, W => {
-            let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
-            for c in 0..W {
-                for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {
-                    *to = from.map(|row| [row[c]]);
-                }
-                linear.factors.solve(increment);
-                for (to, from) in packets.iter_mut().zip(increment.as_ref()) {
-                    for (to, [from]) in to.iter_mut().zip(from) {
-                        to[c] = *from;
-                    }
-                }
-            }
-        });
-    }
 }
 
 /// See [`Sweep::start`].

@@ -22,9 +22,8 @@ const FAR: usize = 1;
 /// So often the shared Jacobian is renewed in a step before the stages' own are taken.
 const MEANS: usize = 3;
 
-/// So many iterations new factors still take themselves: by blocks, and of the shared Jacobian, with
-/// which increments never shrink quadratically. (With two, 17 masses had a factorisation more and
-/// 65 had two more, in one iteration less: 12 and 20 % more time.)
+/// So many iterations new factors still take themselves: by blocks, and of the shared Jacobian,
+/// with which increments never shrink quadratically.
 const STILL: [f64; 2] = [2.0, 3.0];
 
 /// The state of the rule while a step is solved.
