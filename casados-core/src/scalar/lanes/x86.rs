@@ -6,11 +6,11 @@
 use super::functions::{Call, CallWithEight, CallWithFour};
 use core::arch::x86_64::*;
 
-// SAFETY of every `unsafe` of this file and its modules: the one condition of calling these intrinsics is that the
-// machine has the instructions. SSE2 is part of x86-64. A register of AVX2 or AVX-512 is computed
-// with only after detection, as the head of `lanes` says. Loads and stores, which take pointers,
-// are made on references to arrays that are as large as what is read or written, and ask for no
-// alignment.
+// SAFETY of every `unsafe` of this file and its modules: the one condition of calling these
+// intrinsics is that the machine has the instructions. SSE2 is part of x86-64. A register of AVX2
+// or AVX-512 is computed with only after detection, as the head of `lanes` says. Loads and stores,
+// which take pointers, are made on references to arrays that are as large as what is read or
+// written, and ask for no alignment.
 
 /// Functions of one intrinsic each.
 macro_rules! wrap {
