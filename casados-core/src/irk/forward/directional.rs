@@ -68,7 +68,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         let end = (n + 1 == count).then(|| Single { matrix: result.dx.as_mut_slice(), rows: nx });
         let outputs = &mut Outputs { curved: None, end, distant: false };
         if !sweep.step(work, of, outputs) && work.linear.factors.is_planned() {
-            work.factor_pivoted(coefficients, n, 0, statistics)?;
+            work.factor_dense(coefficients, n, 0, statistics)?;
             sweep.repeat(work, of, outputs);
         }
         let nz = M::Shape::NZ;

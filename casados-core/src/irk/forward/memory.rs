@@ -139,7 +139,7 @@ impl<M: Dae, T: Real, const S: usize> ForwardPass<M, T, S> {
         }
         let of = at.linearized(None, coefficients);
         if !good && work.linear.factors.is_planned() {
-            work.factor_pivoted(coefficients, at.n, 0, statistics)?;
+            work.factor_dense(coefficients, at.n, 0, statistics)?;
             self.sweep.repeat(work, of, &mut at.outputs(curved, to));
         }
         if const { REFINED } {

@@ -11,7 +11,7 @@ use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::Forward;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Visitor, coupling, dispatch, each_row, is_long,
     is_short, sweeps,
 };
 use crate::memory::Fallback;
@@ -279,7 +279,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
-    /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model
+    /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
     /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
         let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
@@ -287,8 +287,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
     }
 
     /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
-    /// cache, and registers are few. (Chains of 5 masses took 3 % more otherwise; where numbers are
-    /// registers it takes 2 to 4 % less to see them when they are found.)
+    /// cache, and registers are few.
     const fn sums_late<A: Arithmetic>() -> bool {
         size_of::<E>() <= 8 && Self::is_small::<A>()
     }
@@ -306,8 +305,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
                 _ => Ahead(&[]),
             };
             let sums = &mut *self.sums;
-            let viewer = &mut Summed { sums, minus_weights, ahead };
-            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, viewer);
+            let visitor = &mut Summed { sums, minus_weights, ahead };
+            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
         }
         self.after::<A, W>(column, minus_weights, shared);
     }
@@ -352,7 +351,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         if late {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
             for (slot, packet) in dy.iter().enumerate() {
-                sums.see::<A>(slot, packet);
+                sums.on_solved::<A>(slot, packet);
             }
         } else {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);
