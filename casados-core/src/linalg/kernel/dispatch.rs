@@ -84,8 +84,9 @@ mod compiled {
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     use compiled::{avx2, avx512, base};
     // Numbers that are registers, which are aligned to themselves, need what these are made of, and
-    // nothing else. Of other kernels short ones are faster without AVX-512; and unoptimised programs, where each copy of a kernel is much to compile and none is fast, have
-    // the one copy that runs everywhere.
+    // nothing else. Of other kernels short ones are faster without AVX-512; and unoptimised
+    // programs, where each copy of a kernel is much to compile and none is fast, have the one copy
+    // that runs everywhere.
     if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
         return base::run(kernel);
     }
