@@ -21,9 +21,9 @@ mod single;
 mod strided;
 mod tangent;
 
-#[doc(hidden)]
 pub use field::Field;
 pub(crate) use field::{transposed, two_sum};
+#[doc(hidden)]
 pub use float::Float;
 #[doc(hidden)]
 pub use lanes::functions as elementary;

@@ -5,8 +5,11 @@
 //! [`Arithmetic`], everything in it is inlined, and [`dispatch`] enters it through a function that
 //! is compiled for the better machine if this is one. Results differ by rounding only.
 
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use super::arithmetic::Arithmetic;
+#[cfg(target_arch = "aarch64")]
+use super::arithmetic::Fused;
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+use super::arithmetic::Separate;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::lanes::{Level, level};
 #[cfg(target_arch = "x86_64")]

@@ -20,8 +20,8 @@
 //! gives. Elementary functions are those of [`functions`], with the bounds that are listed there.
 #![allow(dead_code)]
 
-#[cfg(feature = "alloc")]
 mod blocks;
+#[cfg(feature = "alloc")]
 mod cache;
 pub mod functions;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
@@ -35,10 +35,11 @@ mod together;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+use core::sync::atomic::{AtomicU8, Ordering};
+
+pub(crate) use blocks::blocks;
 #[cfg(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))]
 #[allow(unused_imports)]
-pub(crate) use blocks::blocks;
-use core::sync::atomic::{AtomicU8, Ordering};
 pub use register::*;
 
 /// Whether there are any registers of several numbers.
