@@ -79,9 +79,9 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send {
     /// The same with a number for each lane.
     type Wide<E: Lanes<Cell: AsRef<[T]>>>: Wide<E, Self>;
 
-    /// Bytes of the factors, where Newton's method takes those of the `mean` Jacobian or not, and
+    /// Bytes of the factors, where Newton's method takes those of the `shared` Jacobian or not, and
     /// of their right-hand sides.
-    fn working_set<E: Lanes, const S: usize>(mean: bool) -> usize;
+    fn working_set<E: Lanes, const S: usize>(shared: bool) -> usize;
 
     /// For several intervals at once.
     fn together<E: Lanes<Cell: AsRef<[T]>>, const S: usize>(
@@ -102,9 +102,9 @@ macro_rules! answer {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
 
-            fn working_set<E: Lanes, const S: usize>(mean: bool) -> usize {
+            fn working_set<E: Lanes, const S: usize>(shared: bool) -> usize {
                 // Derivatives take the factors of each stage in any case.
-                let factors = if mean && const { $columns == 0 } {
+                let factors = if shared && const { $columns == 0 } {
                     size_of::<M::Factors<[E::Coarse; S]>>()
                 } else {
                     size_of::<M::Factors<[[E; S]; S]>>()

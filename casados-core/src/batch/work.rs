@@ -26,21 +26,19 @@ use core::marker::PhantomData;
 
 /// Groups whose factors and right-hand sides need more of the second-level cache are smaller, or
 /// computed one interval after the other: what does not lie in it is fetched from afar again and
-/// again. Measured: of half a megabyte (AVX2, chains of masses, s = 4) 290 kB were faster side by
-/// side, 480 kB slower; of one megabyte (AVX-512) 0.9 MB still were, by a third (the aircraft, 7
-/// masses).
+/// again.
 const WORKING_SET: f64 = 7.0 / 8.0;
 
 /// How many intervals are computed together: as many as the widest register has whose group fits
 /// into the cache.
 pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton) -> usize {
-    let mean = S > 2
+    let shared = S > 2
         && options.fixed_iterations.is_none()
         && options.jacobian.is_adaptive()
         && !M::STRUCTURE.linear_in_state;
     let mut most = MOST_LANES;
     loop {
-        match T::widest(most, Fits::<M, R, S> { mean, of: PhantomData }) {
+        match T::widest(most, Fits::<M, R, S> { shared, of: PhantomData }) {
             Ok((lanes, true)) => return lanes,
             Ok((lanes, false)) => most = lanes.saturating_sub(1),
             Err(_) => return 1,
@@ -50,15 +48,15 @@ pub fn width<M: Dae, T: Real, R: Answer<M, T>, const S: usize>(options: &Newton)
 
 /// The lanes of a register, and whether they are to be used.
 struct Fits<M, R, const S: usize> {
-    /// Whether Newton's method takes the mean Jacobian of the stages.
-    mean: bool,
+    /// Whether Newton's method takes the shared Jacobian of the stages.
+    shared: bool,
     of: PhantomData<(M, R)>,
 }
 
 impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Fits<M, R, S> {
     type Output = (usize, bool);
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> (usize, bool) {
-        let fits = R::working_set::<E, S>(self.mean) as f64 <= WORKING_SET * second_level_cache() as f64;
+        let fits = R::working_set::<E, S>(self.shared) as f64 <= WORKING_SET * second_level_cache() as f64;
         // Without a plan the whole matrix is pivoted, which no two intervals do in the same way.
         (E::LANES, !M::STRUCTURE.elimination.pivots.is_empty() && fits)
     }

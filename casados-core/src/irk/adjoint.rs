@@ -142,7 +142,7 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
             if let Some(kept) = kept.take() {
                 work.linear.copy_from(kept);
             }
-            work.factor_pivoted(coefficients, n, 0, statistics)?;
+            work.factor_dense(coefficients, n, 0, statistics)?;
             self.stages(work, None, coefficients);
         }
         self.advance(work.linear(*kept));

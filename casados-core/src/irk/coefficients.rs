@@ -22,8 +22,8 @@ pub(crate) struct Coefficients<E, const S: usize> {
 }
 
 impl<E: Lanes, const S: usize> Coefficients<E, S> {
-    /// With the eigenbasis, if `mean` Jacobians are to be used.
-    pub fn new(tableau: Tableau<S>, mean: bool) -> Self {
+    /// With the eigenbasis, if `shared` Jacobians are to be used.
+    pub fn new(tableau: Tableau<S>, shared: bool) -> Self {
         let mut end = tableau.lagrange(1.0);
         if tableau.is_stiffly_accurate() {
             // The last stage is the end: not even a rounding error apart.
@@ -39,7 +39,7 @@ impl<E: Lanes, const S: usize> Coefficients<E, S> {
             end: end.map(E::from_f64),
             // Polynomials of higher degree are not worth much outside of their interval.
             next: (finite && S <= 4).then(|| next.map(|row| row.map(E::from_f64))),
-            basis: if const { S < 3 } || !mean { None } else { Eigenbasis::new(&tableau) },
+            basis: if const { S < 3 } || !shared { None } else { Eigenbasis::new(&tableau) },
             tableau,
         }
     }

@@ -4,7 +4,8 @@
 use super::adjoint::Adjoints;
 use super::dense_output::Point;
 use super::driver::{Arguments, Run};
-use super::forward::memory::{Directionals, ForwardMemory};
+use super::forward::directional::Directionals;
+use super::forward::memory::ForwardMemory;
 use super::hessian::pass::{HessianMemory, HessianStep};
 use crate::error::Error;
 #[cfg(feature = "alloc")]

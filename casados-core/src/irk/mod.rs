@@ -40,7 +40,10 @@ mod step;
 mod workspace;
 
 pub use adjoint::{AdjointMemory, Adjoints};
-pub use forward::memory::{DirectionalMemory, Directionals, ForwardMemory};
+pub use forward::{
+    directional::{DirectionalMemory, Directionals},
+    memory::ForwardMemory,
+};
 pub use integrator::Integrator;
 
 // Under their old place for those who ask here.
@@ -53,7 +56,10 @@ pub(crate) use crate::finite::not_finite;
 pub(crate) use self::{
     coefficients::{Coefficients, dot},
     driver::Arguments,
-    forward::memory::{StepOf, check_result, multiply},
+    forward::{
+        gradient::{check_result, multiply},
+        memory::StepOf,
+    },
     hessian::pass::{HessianMemory, HessianStep},
     newton::dense_fallback::unknown_name,
     newton::iteration::StageEquations,

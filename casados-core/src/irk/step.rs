@@ -129,7 +129,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 undetermined.map_or(Error::NotPivoted { step: n }, |unknown| singular::<M>(unknown, n))
             );
         }
-        match self.newton_pivoted(coefficients, &options.newton, n, x, y, statistics) {
+        match self.newton_dense(coefficients, &options.newton, n, x, y, statistics) {
             // Of the whole matrix, pivoted, it is asked again.
             Ok(()) if undetermined.is_some() => match self.is_determined(coefficients, n, x, y).1 {
                 Some(unknown) => Err(singular::<M>(unknown, n)),
@@ -157,7 +157,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
         self.linearize_planned(coefficients, None, n, step, exact, statistics);
         self.check_model(n, 0)?;
         if M::STRUCTURE.elimination.pivots.is_empty() {
-            self.factor_pivoted(coefficients, n, 0, statistics)?;
+            self.factor_dense(coefficients, n, 0, statistics)?;
         }
         Ok(())
     }
@@ -191,7 +191,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 None => factors,
             };
             factors.factor_by_plan(jacobian, &coefficients.a, h);
-            self.validity = Validity { factors: true, mean: false, rate: 0.0 };
+            self.validity = Validity { factors: true, shared: false, rate: 0.0 };
         }
     }
 }

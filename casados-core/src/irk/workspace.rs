@@ -1,7 +1,7 @@
 //! What is remembered about steps, and the memory that all calls work in.
 
 use super::stage_array::Stages;
-use crate::linalg::{Factors, MeanFactors};
+use crate::linalg::{Factors, SharedFactors};
 use crate::memory::{Fallback, fallback::Pivoting};
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae, VectorP, VectorU};
 use crate::result::{Dense, Nominal};
@@ -93,8 +93,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// The sizes of the last increments.
     pub(crate) sizes: ArrayK<M, T>,
     pub(crate) linear: Linearization<M, T, S, F>,
-    /// Factors of the mean Jacobian of the stages, which iterations take where that is cheaper.
-    pub(crate) mean: F::Place<MeanFactors<M, T, S>>,
+    /// Factors of the shared Jacobian of the stages, which iterations take where that is cheaper.
+    pub(crate) shared: F::Place<SharedFactors<M, T, S>>,
     /// Where derivatives are tried on their equations: sums, and the sizes of their terms. While
     /// stages are solved with compensated sums, what they are beyond their digits.
     pub(crate) probe: [Aligned<ArrayV<M, [T; S]>>; 2],
@@ -116,8 +116,8 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
 pub(crate) struct Validity {
     /// They belong to this call, and to its size of steps.
     pub factors: bool,
-    /// Those of the mean Jacobian do.
-    pub mean: bool,
+    /// Those of the shared Jacobian do.
+    pub shared: bool,
     /// How fast Newton's method converged with them, `θ`; zero if it is not known.
     pub rate: f64,
 }

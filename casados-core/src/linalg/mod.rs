@@ -35,9 +35,9 @@ pub(crate) use kernel::{
 pub use newton_matrix::{Factors, kinematic, slot};
 pub(crate) use sparse_lu::{
     factor::Planned,
-    solve::{Down, TransposedDown, TransposedUp, Up, Viewer, sweeps},
+    solve::{Down, TransposedDown, TransposedUp, Up, Visitor, sweeps},
 };
-pub(crate) use transformed::{basis::Eigenbasis, shared_factor::MeanFactors};
+pub(crate) use transformed::{basis::Eigenbasis, shared_factor::SharedFactors};
 #[cfg(feature = "alloc")]
 pub(crate) use transformed::{
     checked_factor::{EigenFactors, PARTS, Rows},

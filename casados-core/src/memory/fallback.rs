@@ -2,13 +2,13 @@
 
 use super::{Absent, Inside, Stored, sealed};
 
-/// It pivots the whole matrix. With three stages or more it has memory for the mean Jacobian of
+/// It pivots the whole matrix. With three stages or more it has memory for the shared Jacobian of
 /// the stages too, which Newton's method takes where iterations are not fixed.
 #[derive(Clone, Copy, Debug)]
 pub struct Pivoting;
 
 /// It returns [`Error::NotPivoted`](crate::Error::NotPivoted), and the time of a call has no
-/// other worst case than the usual one. Neither the whole matrix nor the mean Jacobian of the
+/// other worst case than the usual one. Neither the whole matrix nor the shared Jacobian of the
 /// stages has any memory or any code: for firmware with fixed iterations.
 ///
 /// ```

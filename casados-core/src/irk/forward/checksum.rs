@@ -2,7 +2,7 @@
 //! (`backward_error`, `refine`).
 
 use crate::irk::directions::weight;
-use crate::linalg::{Ahead, Arithmetic, Packet, Viewer};
+use crate::linalg::{Ahead, Arithmetic, Packet, Visitor};
 use crate::scalar::Field;
 
 /// So many strands a sum over all columns has; of numbers that are registers themselves only the
@@ -40,9 +40,9 @@ pub(in crate::irk) struct Summed<'a, E, const S: usize, const W: usize> {
     pub ahead: Ahead<'a, E>,
 }
 
-impl<E: Field, const S: usize, const W: usize> Viewer<E, S, W> for Summed<'_, E, S, W> {
+impl<E: Field, const S: usize, const W: usize> Visitor<E, S, W> for Summed<'_, E, S, W> {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn see<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {
+    fn on_solved<A: Arithmetic>(&mut self, slot: usize, packet: &Packet<E, S, W>) {
         for (strands, row) in self.sums.get_mut(slot).into_iter().flatten().zip(packet) {
             accumulate::<A, E, W>(strands, self.minus_weights, row);
         }

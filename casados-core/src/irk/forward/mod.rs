@@ -6,14 +6,22 @@
 //!
 //! The [`sweep`] takes a step panel by panel: the [right-hand side](right_hand_side), the solution,
 //! its [sums](checksum) over all directions, [rows of `D`](stage_rows) for second derivatives, the
-//! [output](output). More is [written](write) after the step where it is asked for. Derivatives
-//! whose equations have lost digits are [refined](refine). [`memory`] is what a call keeps.
+//! [output](output) to [matrices] of results, which have the [gradient](gradient) in them. More is
+//! [written](write) after the step where it is asked for. Derivatives whose equations have lost
+//! digits are [refined](refine); the [dense fallback](dense_fallback) solves column by column.
+//! [`memory`] is what a call keeps, in all directions or in [given ones](directional).
 
 pub(super) mod checksum;
+mod dense_fallback;
+pub(super) mod directional;
+pub(super) mod gradient;
+mod matrices;
 pub(super) mod memory;
 pub(super) mod output;
 mod refine;
 pub(super) mod right_hand_side;
+#[cfg(feature = "alloc")]
+mod slopes;
 pub(super) mod stage_rows;
 pub(super) mod sweep;
 mod write;

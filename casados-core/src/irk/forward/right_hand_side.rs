@@ -162,7 +162,7 @@ pub(in crate::irk) struct Later<'a, M: Dae, E: Plain, D, const S: usize, const W
 impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Later<'_, M, E, D, S, W> {
     /// The first entry of `f_x`.
     const FIRST: usize = M::STRUCTURE.blocks[1];
-    /// Whether a straight line begins with zeros everywhere: of plain numbers that is less than a
+    /// Whether an unrolled loop begins with zeros everywhere: of plain numbers that is less than a
     /// row that begins with its first entry.
     const AT_ONCE: bool = size_of::<E>() <= 8;
 

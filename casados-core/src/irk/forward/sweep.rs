@@ -11,7 +11,7 @@ use crate::irk::directions::{Directions, NEAREST, panel, panel_mut, panels};
 use crate::irk::kinematic::Forward;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
-    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Viewer, coupling, dispatch, each_row, is_long,
+    Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Visitor, coupling, dispatch, each_row, is_long,
     is_short, sweeps,
 };
 use crate::memory::Fallback;
@@ -180,27 +180,6 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     pub(in crate::irk) fn dy_mut(&mut self) -> &mut [R] {
         self.dy.as_mut().as_flattened_mut()
     }
-
-    /// Solves by the factors of the whole matrix, column by column.
-    fn solve_columns<D: Directions<E>, F: Fallback>(&mut self, work: &mut Work<M, E, S, F>) {
-        let Work { increment, linear, .. } = work;
-        let rows = M::Shape::NK;
-        let dy = R::flat_mut(self.dy.as_mut().as_flattened_mut());
-        panels!(D::COUNT, E, S, column, W => {
-            let (packets, _) = panel_mut::<E, W>(dy, column, rows * S).as_chunks_mut::<S>();
-            for c in 0..W {
-                for (to, from) in increment.as_mut().iter_mut().zip(packets.iter()) {
-                    *to = from.map(|row| [row[c]]);
-                }
-                linear.factors.solve(increment);
-                for (to, from) in packets.iter_mut().zip(increment.as_ref()) {
-                    for (to, [from]) in to.iter_mut().zip(from) {
-                        to[c] = *from;
-                    }
-                }
-            }
-        });
-    }
 }
 
 /// See [`Sweep::start`].
@@ -300,7 +279,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Kernel fo
 }
 
 impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, M, E, D, G, S> {
-    /// Whether all panels fit the nearest cache, and one straight line fills them; of a large model
+    /// Whether all panels fit the nearest cache, and one unrolled loop fills them; of a large model
     /// each is filled when its turn comes.
     const fn is_small<A: Arithmetic>() -> bool {
         let bytes = D::COUNT * M::Shape::NK * S * size_of::<E>();
@@ -308,8 +287,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
     }
 
     /// Whether sums are made of what is in the memory: of small models all of it is in the nearest
-    /// cache, and registers are few. (Chains of 5 masses took 3 % more otherwise; where numbers are
-    /// registers it takes 2 to 4 % less to see them when they are found.)
+    /// cache, and registers are few.
     const fn sums_late<A: Arithmetic>() -> bool {
         size_of::<E>() <= 8 && Self::is_small::<A>()
     }
@@ -327,8 +305,8 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
                 _ => Ahead(&[]),
             };
             let sums = &mut *self.sums;
-            let viewer = &mut Summed { sums, minus_weights, ahead };
-            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, viewer);
+            let visitor = &mut Summed { sums, minus_weights, ahead };
+            sweeps::<A, M, E, [E; W], S, W, Down, Up>(self.factors, dy, 0, visitor);
         }
         self.after::<A, W>(column, minus_weights, shared);
     }
@@ -373,7 +351,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, G: Target<E>, const S: usize> Step<'_, 
         if late {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut ());
             for (slot, packet) in dy.iter().enumerate() {
-                sums.see::<A>(slot, packet);
+                sums.on_solved::<A>(slot, packet);
             }
         } else {
             kinematic.reconstruct::<A>(&shared.minus_ha, dy, &mut sums);

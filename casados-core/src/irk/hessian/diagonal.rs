@@ -9,13 +9,13 @@ use core::marker::PhantomData;
 
 /// Second derivatives in a control or a parameter alone: its row of `D_i` is that of the unit
 /// matrix.
-pub(in crate::irk) struct Lone<'a, M, E, R, const S: usize> {
+pub(in crate::irk) struct Diagonal<'a, M, E, R, const S: usize> {
     pub entries: &'a [[E; S]],
     pub sum: &'a mut [R],
     pub model: PhantomData<M>,
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Lone<'_, M, E, R, S> {
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Kernel for Diagonal<'_, M, E, R, S> {
     type Number = E;
     type Output = ();
     #[inline(always)]

@@ -33,9 +33,7 @@ use core::marker::PhantomData;
 
 /// Whether second derivatives are summed in this way: where it takes fewer products, counted for
 /// each direction, those of the solve half as much again, which wait for memory while products of
-/// panels do not. Chains of masses on Zen 4 are even at 0.66 with two stages and at 0.85 with four;
-/// 33 masses are at 0.37 and 0.61. Only of single numbers: registers of them leave no room for
-/// packets.
+/// panels do not. Only of single numbers: registers of them leave no room for packets.
 pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
     let structure = &M::STRUCTURE;
     if COLUMNS < 16 || size_of::<E>() > 8 || structure.elimination.pivots.is_empty() {
@@ -52,7 +50,7 @@ pub(in crate::irk) const fn is_worth<M: Dae, E, const S: usize>() -> bool {
 }
 
 /// One step backwards, in all directions.
-pub(in crate::irk) struct Back<'a, M: Dae, E: Plain, R, const S: usize> {
+pub(in crate::irk) struct MatrixAdjoint<'a, M: Dae, E: Plain, R, const S: usize> {
     pub coefficients: &'a Coefficients<E, S>,
     /// Entries of `∇²(μᵀ f)` at all stages.
     pub entries: &'a [[E; S]],
@@ -71,7 +69,7 @@ pub(in crate::irk) struct Back<'a, M: Dae, E: Plain, R, const S: usize> {
     pub ahead: &'a [E],
 }
 
-impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Back<'_, M, E, R, S> {
+impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> MatrixAdjoint<'_, M, E, R, S> {
     /// Over a step that is linearised, with its factors, which were `kept` or are there.
     pub fn run<F: Fallback>(mut self, work: &mut Work<M, E, S, F>, kept: Option<&Linearization<M, E, S, F>>) {
         let h = work.inputs.time.step;
@@ -143,7 +141,7 @@ fn halves<M: Dae, E: Plain, const S: usize>(g: &mut ArrayV<M, [[E; COLUMNS]; S]>
     all.split_at_mut(all.len() / 2)
 }
 
-/// See [`Back`].
+/// See [`MatrixAdjoint`].
 struct Panels<'a, M: Dae, E: Plain, R, const S: usize> {
     phase: Phase,
     /// The panel that a phase other than all is of.

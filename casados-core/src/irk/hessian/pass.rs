@@ -8,8 +8,8 @@
 //! `products`. With weights `ν` of `z₀`, which is a sum of unknowns, it is
 //! `d²(λᵀ x_N + νᵀ z₀)/dw²`: they are in `μ` alone.
 
-use super::diagonal::Lone;
-use super::matrix_adjoint::{Back, is_worth};
+use super::diagonal::Diagonal;
+use super::matrix_adjoint::{MatrixAdjoint, is_worth};
 use super::output::Triangle;
 use super::products::{COLUMNS, Subtract};
 use crate::error::{Error, Place, Quantity};
@@ -175,7 +175,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
         let (entries, d, sum) =
             (entries.as_ref(), Array::flat(record.d.as_ref().as_flattened()), sum.as_mut());
         if const { is_worth::<M, E, S>() } {
-            Back::<M, E, ArrayW<M, E>, S> {
+            MatrixAdjoint::<M, E, ArrayW<M, E>, S> {
                 coefficients,
                 entries,
                 d,
@@ -198,7 +198,7 @@ impl<M: Dae, E: Lanes, const S: usize> HessianPass<M, E, S> {
             });
         }
         if const { !M::STRUCTURE.lone.is_empty() } {
-            dispatch(Lone::<M, E, ArrayW<M, E>, S> { entries, sum, model: PhantomData });
+            dispatch(Diagonal::<M, E, ArrayW<M, E>, S> { entries, sum, model: PhantomData });
         }
     }
 }

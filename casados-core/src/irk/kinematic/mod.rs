@@ -20,7 +20,7 @@ use crate::irk::directions::Directions;
 use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Linearization;
 use crate::linalg::{
-    Arithmetic, AtRow, Block, Kernel, Packet, Viewer, coupling, dispatch, each_row, kinematic, slot,
+    Arithmetic, AtRow, Block, Kernel, Packet, Visitor, coupling, dispatch, each_row, kinematic, slot,
     subtract, subtract_diagonal, subtract_transposed,
 };
 use crate::memory::Fallback;
@@ -321,9 +321,9 @@ impl<M: Dae, E: Lanes, D: Directions<E>, const S: usize, const W: usize> Forward
         &self,
         minus_ha: &Block<E, S>,
         rows: &mut [Packet<E, S, W>],
-        viewer: &mut impl Viewer<E, S, W>,
+        visitor: &mut impl Visitor<E, S, W>,
     ) {
-        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha, rows, viewer });
+        each_row::<A, _>(&mut Reconstruct { of: self, minus_ha, rows, visitor });
     }
 }
 
@@ -332,17 +332,17 @@ struct Reconstruct<'a, 'b, M: Dae, E: Plain, D, V, const S: usize, const W: usiz
     of: &'b Forward<'a, M, E, D, S, W>,
     minus_ha: &'b Block<E, S>,
     rows: &'b mut [Packet<E, S, W>],
-    viewer: &'b mut V,
+    visitor: &'b mut V,
 }
 
-impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, const W: usize> AtRow
+impl<M: Dae, E: Lanes, D: Directions<E>, V: Visitor<E, S, W>, const S: usize, const W: usize> AtRow
     for Reconstruct<'_, '_, M, E, D, V, S, W>
 {
     const ROWS: usize = count::<M>();
     const INSTRUCTIONS: usize = 4 + product::<E>(S, W);
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Self { of: forward, minus_ha, rows, viewer } = self;
+        let Self { of: forward, minus_ha, rows, visitor } = self;
         let Some(of) = kinematic::<M>(state) else { return };
         let mut packet = [[E::from_f64(0.0); W]; S];
         match (velocity::<M>(of), minus_c::<M, E, S>(of, forward.jacobian)) {
@@ -360,7 +360,7 @@ impl<M: Dae, E: Lanes, D: Directions<E>, V: Viewer<E, S, W>, const S: usize, con
         if let Some(row) = rows.get_mut(state) {
             *row = packet;
         }
-        viewer.see::<A>(state, &packet);
+        visitor.on_solved::<A>(state, &packet);
     }
 }
 

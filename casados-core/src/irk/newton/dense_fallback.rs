@@ -33,7 +33,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ///
     /// # Errors
     /// A value of the model that is not finite, a singular matrix, no convergence.
-    pub(crate) fn newton_pivoted(
+    pub(crate) fn newton_dense(
         &mut self,
         coefficients: &Coefficients<T, S>,
         options: &Newton,
@@ -83,7 +83,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 }
             }
             if current {
-                self.factor_pivoted(coefficients, step, iteration, statistics)?;
+                self.factor_dense(coefficients, step, iteration, statistics)?;
             }
             for (equation, f) in self.f.as_ref().iter().enumerate() {
                 if let Some(to) = self.increment.as_mut().get_mut(slot::<M>(equation)) {
@@ -109,7 +109,7 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
     ///
     /// # Errors
     /// [`Error::Singular`]
-    pub(crate) fn factor_pivoted(
+    pub(crate) fn factor_dense(
         &mut self,
         coefficients: &Coefficients<T, S>,
         step: usize,

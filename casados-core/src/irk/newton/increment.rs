@@ -1,6 +1,6 @@
 //! What an iteration of Newton's method does to the unknowns, and how far it went.
 
-use super::norm::{Followed, Measure};
+use super::norm::{KinematicScales, Measure};
 use super::norm::{part, part_mut};
 use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -83,7 +83,7 @@ impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
 
 /// `y ← y − Δ`; the size of the increment, and of the one that is expected next.
 pub(in crate::irk) struct Update<'a, M: Dae, E: Lanes, const S: usize> {
-    pub followed: &'a Followed<'a, M, E, S>,
+    pub scales: &'a KinematicScales<'a, M, E, S>,
     pub x: &'a ArrayX<M, E>,
     pub y: &'a mut ArrayK<M, [E; S]>,
     pub increment: &'a mut ArrayK<M, [[E; 1]; S]>,
@@ -103,7 +103,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
     type Output = (E, E);
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> (E, E) {
-        let Self { followed, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
+        let Self { scales, x, y, increment, weights, sizes, active, h, floor, tolerance, full, measure } =
             self;
         let (zero, infinite) = (E::from_f64(0.0), E::from_f64(f64::INFINITY));
         if measure {
@@ -111,7 +111,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Update<'_, M, E, S> {
             for (y, increment) in own_y.iter_mut().zip(own) {
                 subtract(core::array::from_mut(y), core::array::from_mut(increment), active);
             }
-            let measure = Measure::<M, E, S> { followed, x, y, increment, weights, sizes, h, floor };
+            let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
             return (measure.run::<A>(), infinite);
         }
         // Four unknowns side by side, and the rest one by one.

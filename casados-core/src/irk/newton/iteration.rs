@@ -30,7 +30,7 @@
 use super::convergence::{ConvergenceTest, IncrementKind, Status};
 use super::increment::{Largest, PlaceResidual, Subtract, Update};
 use super::jacobian_policy::Policy;
-use super::norm::{Followed, Measure};
+use super::norm::{KinematicScales, Measure};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{Eigenbasis, dispatch};
@@ -178,7 +178,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 return self.solved(&test, policy.shared);
             }
             if iteration == newton.max_iterations {
-                (self.validity.factors, self.validity.mean) = (false, false);
+                (self.validity.factors, self.validity.shared) = (false, false);
                 return Solved { converged: test.converged, exact: false, undetermined: None };
             }
             policy.after(&status, iteration, early);
@@ -279,9 +279,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let h = self.inputs.time.step;
         let floor = E::from_f64(rounding / tolerance);
         let Self { linear, points, increment, weights, sizes, .. } = self;
-        let followed = &Followed::<M, E, S> { jacobian: &linear.jacobian, points, a: &coefficients.a };
+        let scales = &KinematicScales::<M, E, S> { jacobian: &linear.jacobian, points, a: &coefficients.a };
         let (size, next) = dispatch(Update::<M, E, S> {
-            followed,
+            scales,
             x,
             y,
             increment,
@@ -298,7 +298,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             if iteration == 1 { IncrementKind::First { new: policy.renew } } else { IncrementKind::Later };
         let status = test.take(kind, size, next);
         if status.changed && status.moved && !M::STRUCTURE.linear_in_state && iteration > 1 {
-            let measure = Measure::<M, E, S> { followed, x, y, increment, weights, sizes, h, floor };
+            let measure = Measure::<M, E, S> { scales, x, y, increment, weights, sizes, h, floor };
             let again = dispatch(measure);
             return test.take(IncrementKind::Again, again, again);
         }
@@ -356,7 +356,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     #[inline(always)]
     fn factor_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
         if const { S > 2 }
-            && let (Some(basis), Some(factors)) = (basis, self.mean.get_mut())
+            && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
             factors.factor(&self.linear.jacobian, self.first_only, basis, self.inputs.time.step);
             return true;
@@ -368,7 +368,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     #[inline(always)]
     fn solve_shared(&mut self, basis: Option<&Eigenbasis<E, S, S>>) -> bool {
         if const { S > 2 }
-            && let (Some(basis), Some(factors)) = (basis, self.mean.get_mut())
+            && let (Some(basis), Some(factors)) = (basis, self.shared.get_mut())
         {
             factors.solve(basis, &self.f, &mut self.increment);
             return true;
@@ -391,7 +391,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     fn solved(&mut self, test: &ConvergenceTest<E>, shared: bool) -> Solved<E> {
         self.validity.rate = test.slowest_rate();
         let any = E::any(test.converged);
-        (self.validity.factors, self.validity.mean) = (any && !shared, any && shared);
+        (self.validity.factors, self.validity.shared) = (any && !shared, any && shared);
         Solved { converged: test.converged, exact: false, undetermined: None }
     }
 }

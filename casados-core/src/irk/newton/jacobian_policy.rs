@@ -22,9 +22,8 @@ const FAR: usize = 1;
 /// So often the shared Jacobian is renewed in a step before the stages' own are taken.
 const MEANS: usize = 3;
 
-/// So many iterations new factors still take themselves: by blocks, and of the shared Jacobian, with
-/// which increments never shrink quadratically. (With two, 17 masses had a factorisation more and
-/// 65 had two more, in one iteration less: 12 and 20 % more time.)
+/// So many iterations new factors still take themselves: by blocks, and of the shared Jacobian,
+/// with which increments never shrink quadratically.
 const STILL: [f64; 2] = [2.0, 3.0];
 
 /// The state of the rule while a step is solved.
@@ -57,8 +56,8 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
         M::STRUCTURE.operations.residual as f64 + blocks * S as f64 + 1.0
     };
 
-    /// The cost of new factors, in iterations with old ones: by blocks, and of the mean Jacobian in
-    /// the eigenbasis.
+    /// The cost of new factors, in iterations with old ones: by blocks, and of the shared Jacobian
+    /// in the eigenbasis.
     const RENEWAL: [f64; 2] = {
         let (operations, plan) = (&M::STRUCTURE.operations, &M::STRUCTURE.elimination);
         let (s, inverses) = (S as f64, 4.0 * plan.pivots.len() as f64);
@@ -75,8 +74,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
     const RESIDUAL: f64 = M::STRUCTURE.operations.residual as f64 / Self::ITERATION;
 
     /// Whether factors by blocks cost no more than the iterations that they save where start values
-    /// are near: with mean Jacobians, which are renewed up to three times, it took 7 to 12 of them,
-    /// with blocks 4 or 5 (Robertson, Van der Pol, Oregonator, HIRES, Akzo Nobel).
+    /// are near, with shared Jacobians that are renewed up to three times.
     const EXACT: bool = Self::RENEWAL[0] <= 10.0;
 
     /// Before the first iteration, with factors that are valid for something or nothing.
@@ -88,7 +86,7 @@ impl<M: Dae, E: Lanes, const S: usize> Policy<M, E, S> {
         let shared = may_share && !validity.factors;
         let near = cfg!(feature = "alloc") && Self::EXACT && near && shared;
         let renew = if shared {
-            !validity.mean
+            !validity.shared
         } else if M::STRUCTURE.constant_matrix && validity.factors {
             false
         } else {

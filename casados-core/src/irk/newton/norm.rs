@@ -9,7 +9,7 @@ use crate::shape::Plain;
 
 /// The size of an increment relative to the unknowns as they are now.
 pub(in crate::irk) struct Measure<'a, M: Dae, E: Plain, const S: usize> {
-    pub followed: &'a Followed<'a, M, E, S>,
+    pub scales: &'a KinematicScales<'a, M, E, S>,
     pub x: &'a ArrayX<M, E>,
     pub y: &'a ArrayK<M, [E; S]>,
     pub increment: &'a ArrayK<M, [[E; 1]; S]>,
@@ -24,7 +24,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
     type Output = E;
     #[inline(always)]
     fn run<A: Arithmetic>(self) -> E {
-        let Self { followed, x, y, increment, weights, sizes, h, floor } = self;
+        let Self { scales, x, y, increment, weights, sizes, h, floor } = self;
         let zero = E::from_f64(0.0);
         // A change of ẋ below this much of x/h rounds to none in x.
         let per_step = E::select(Scalar::eq(h, zero), zero, floor / h.abs());
@@ -49,7 +49,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
             return most;
         }
         let mut norm = zero;
-        for a in followed.a {
+        for a in scales.a {
             let mut sum = zero;
             for a in a {
                 sum = sum + a.abs();
@@ -58,7 +58,7 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Measure<'_, M, E, S> {
         }
         let norm = E::from_f64(TYPICAL) * norm * h.abs();
         let mut velocities =
-            Velocities::<M, E, S> { followed, x, increment, weights, sizes, per_step, norm, most };
+            Velocities::<M, E, S> { scales, x, increment, weights, sizes, per_step, norm, most };
         each_row::<A, _>(&mut velocities);
         velocities.most
     }
@@ -127,7 +127,7 @@ impl<E: Lanes, const N: usize> Relative<E, N> {
 /// `|Δ_q| ≤ |c| h ‖A‖ |Δ_v|`, relative to `k_q`: it counts where `v` is much smaller than its
 /// change within the step.
 struct Velocities<'a, M: Dae, E: Plain, const S: usize> {
-    followed: &'a Followed<'a, M, E, S>,
+    scales: &'a KinematicScales<'a, M, E, S>,
     x: &'a ArrayX<M, E>,
     increment: &'a ArrayK<M, [[E; 1]; S]>,
     weights: &'a mut ArrayK<M, E>,
@@ -144,7 +144,7 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
     const INSTRUCTIONS: usize = 8;
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, state: usize) {
-        let Followed { jacobian, points, .. } = self.followed;
+        let KinematicScales { jacobian, points, .. } = self.scales;
         let Some(of) = kinematic::<M>(state) else { return };
         let (Some(own), Some(minus_c)) = (velocity::<M>(of), minus_c::<M, E, S>(of, jacobian)) else {
             return;
@@ -178,13 +178,11 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for Velocities<'_, M, E, S> {
 
 /// So much of their bound increments of kinematic states typically are: `Σ_j a_ij Δ_j` sums up to
 /// half of the largest `Σ_j |a_ij| |Δ_j|` if they have one sign at all stages, and less if not.
-/// (With the bound itself 5 masses take an iteration more in each step than their own increments
-/// ask for.)
 const TYPICAL: f64 = 0.25;
 
 /// What increments of velocities are measured by too: `k_q` of [kinematic](crate::irk::kinematic)
 /// states.
-pub(in crate::irk) struct Followed<'a, M: Dae, E: Plain, const S: usize> {
+pub(in crate::irk) struct KinematicScales<'a, M: Dae, E: Plain, const S: usize> {
     pub jacobian: &'a M::Jacobian<[E; S]>,
     /// Where their `k` are.
     pub points: &'a ArrayV<M, [E; S]>,

@@ -5,8 +5,11 @@
 //! [`Arithmetic`], everything in it is inlined, and [`dispatch`] enters it through a function that
 //! is compiled for the better machine if this is one. Results differ by rounding only.
 
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 use super::arithmetic::Arithmetic;
+#[cfg(target_arch = "aarch64")]
+use super::arithmetic::Fused;
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+use super::arithmetic::Separate;
 #[cfg(target_arch = "x86_64")]
 use crate::scalar::lanes::{Level, level};
 #[cfg(target_arch = "x86_64")]
@@ -27,12 +30,11 @@ pub trait Kernel {
 }
 
 /// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
-/// side by side: with all kernels in one the aircraft would take a tenth longer.
+/// side by side.
 ///
 /// Those with instructions that not every machine has find the kernel where it was made: it is made
 /// of pointers, one after the other, and a copy would be made of two at a time, which the processor
-/// waits for until both have arrived in the nearest cache. (Calls of the pendulum took up to a
-/// fifth more.)
+/// waits for until both have arrived in the nearest cache.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod compiled {
@@ -85,9 +87,9 @@ mod compiled {
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     use compiled::{avx2, avx512, base};
     // Numbers that are registers, which are aligned to themselves, need what these are made of, and
-    // nothing else. Of other kernels short ones are up to a tenth faster without AVX-512; and
-    // unoptimised programs, where each copy of a kernel is much to compile and none is fast, have
-    // the one copy that runs everywhere.
+    // nothing else. Of other kernels short ones are faster without AVX-512; and unoptimised
+    // programs, where each copy of a kernel is much to compile and none is fast, have the one copy
+    // that runs everywhere.
     if const { cfg!(debug_assertions) && align_of::<K::Number>() < 32 } {
         return base::run(kernel);
     }

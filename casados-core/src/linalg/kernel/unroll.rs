@@ -1,14 +1,13 @@
-//! Loops over the constant tables of a model, as straight lines where they are short.
+//! Loops over the constant tables of a model, unrolled where they are short.
 //!
-//! The optimiser sees through constant tables only where indices are constants too. In a straight
-//! line addresses of blocks and rows are part of the instructions; in a loop most instructions of a
-//! small block are spent on finding it: a solve with the blocks of two stages takes a fifth of the
-//! instructions.
+//! The optimiser sees through constant tables only where indices are constants too. In an unrolled
+//! loop addresses of blocks and rows are part of the instructions; otherwise most instructions of a
+//! small block are spent on finding it.
 
 use crate::linalg::kernel::arithmetic::Arithmetic;
 use crate::model::{Dae, Pivot, Supernode, Update};
 
-// Where nothing is optimised straight lines would only be long, and in firmware memory is dearer
+// Where nothing is optimised unrolled loops would only be long, and in firmware memory is dearer
 // than time.
 #[cfg(any(test, all(feature = "std", not(debug_assertions))))]
 mod lines;
@@ -28,8 +27,6 @@ const MOST_INSTRUCTIONS: usize = 2000;
 
 /// So much longer they may be where each step has so few instructions that a loop would spend most
 /// of its time on finding what it is about: rows of `FEW`, and updates of blocks of one number.
-/// (The aircraft with four stages takes 2 to 6 % less. Lines of solves would be another 1 %, and a
-/// third of the time to compile it.)
 const LONGER: usize = 2;
 const FEW: usize = 8;
 
@@ -48,7 +45,7 @@ pub trait AtRow {
     fn simple(&mut self, _row: usize) {}
 }
 
-/// Whether the rows of a table are a straight line.
+/// Whether the rows of a table are unrolled.
 pub const fn is_short<A: Arithmetic, V: AtRow>() -> bool {
     let most = if V::INSTRUCTIONS <= FEW { LONGER * MOST_INSTRUCTIONS } else { MOST_INSTRUCTIONS };
     WANTED && A::FUSED && V::ROWS <= MOST * CHUNK && V::ROWS * V::INSTRUCTIONS <= most
@@ -111,9 +108,8 @@ pub fn from_last<A: Arithmetic, M: Dae, V: AtPivot>(visit: &mut V) {
         return lines::from_last::<A, M, V>(visit);
     }
     let all = M::STRUCTURE.elimination.pivots;
-    // The optimiser makes a straight line of a loop over indices where a plan is short, as in
-    // firmware, but not of one that goes backwards through a slice, which is faster where it stays
-    // a loop.
+    // The optimiser unrolls a loop over indices where a plan is short, as in firmware, but not one
+    // that goes backwards through a slice, which is faster where it stays a loop.
     if const { !V::OTHERS && cfg!(feature = "std") } {
         for pivot in all.iter().rev() {
             visit.at::<A>(pivot, &[], &[]);

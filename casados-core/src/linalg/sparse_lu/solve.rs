@@ -91,20 +91,20 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, const S: usize> Kernel for SolveTran
 }
 
 /// Who is present while packets are solved. What is here is to be `#[inline(always)]`.
-pub trait Viewer<E, const S: usize, const W: usize> {
+pub trait Visitor<E, const S: usize, const W: usize> {
     /// Sees an unknown that has just been found, but not of a transposed system.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn see<A: Arithmetic>(&mut self, _slot: usize, _packet: &Packet<E, S, W>) {}
+    fn on_solved<A: Arithmetic>(&mut self, _slot: usize, _packet: &Packet<E, S, W>) {}
     /// A pivot of the second system is done.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn pass(&mut self) {}
 }
 
 /// Nobody.
-impl<E, const S: usize, const W: usize> Viewer<E, S, W> for () {}
+impl<E, const S: usize, const W: usize> Visitor<E, S, W> for () {}
 
 /// Who asks for memory meanwhile, line by line.
-impl<E, const S: usize, const W: usize> Viewer<E, S, W> for Ahead<'_, E> {
+impl<E, const S: usize, const W: usize> Visitor<E, S, W> for Ahead<'_, E> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn pass(&mut self) {
         self.next();
@@ -127,20 +127,20 @@ pub fn sweeps<
     factors: Planned<'_, M, E, S>,
     rows: &mut [[R; S]],
     column: usize,
-    viewer: &mut impl Viewer<E, S, W>,
+    visitor: &mut impl Visitor<E, S, W>,
 ) {
     if !has_all::<M, _>(factors.blocks) || rows.len() != M::Shape::NK {
         return;
     }
     let viewer_of_first = &mut ();
     let mut first = Along::<First, Sweep<'_, M, E, R, (), S, W>>(
-        Sweep { factors, rows, column, viewer: viewer_of_first },
+        Sweep { factors, rows, column, visitor: viewer_of_first },
         PhantomData,
     );
     from_first::<A, M, _>(&mut first);
     let rows = first.0.rows;
     let mut second =
-        Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, viewer }, PhantomData);
+        Along::<Second, Sweep<'_, M, E, R, _, S, W>>(Sweep { factors, rows, column, visitor }, PhantomData);
     from_last::<A, M, _>(&mut second);
 }
 
@@ -150,7 +150,7 @@ pub struct Sweep<'a, M, E, R, V, const S: usize, const W: usize> {
     pub rows: &'a mut [[R; S]],
     pub column: usize,
     /// Of what is solved through `P + U`.
-    pub viewer: &'a mut V,
+    pub visitor: &'a mut V,
 }
 
 /// A triangular system.
@@ -161,7 +161,7 @@ pub trait System {
         M: Dae,
         E: Field + Plain,
         R: Array<E>,
-        V: Viewer<E, S, W>,
+        V: Visitor<E, S, W>,
         const S: usize,
         const W: usize,
     >(
@@ -173,7 +173,7 @@ pub trait System {
 /// A way through a system.
 struct Along<Y, T>(T, PhantomData<Y>);
 
-impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
+impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
     AtPivot for Along<Y, Sweep<'_, M, E, R, V, S, W>>
 {
     const INSTRUCTIONS: usize = {
@@ -183,7 +183,7 @@ impl<Y: System, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const
     #[inline(always)]
     fn at<A: Arithmetic>(&mut self, pivot: &'static Pivot, _: &'static [Pivot], _: &'static [Update]) {
         Y::at::<A, M, E, R, V, S, W>(&mut self.0, pivot);
-        self.0.viewer.pass();
+        self.0.visitor.pass();
     }
 }
 
@@ -195,7 +195,7 @@ macro_rules! system {
 
         impl System for $name {
             #[inline(always)]
-            fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>(
+            fn at<A: Arithmetic, M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>(
                 sweep: &mut Sweep<'_, M, E, R, V, S, W>,
                 pivot: &'static Pivot,
             ) {
@@ -222,7 +222,7 @@ system!(
     TransposedUp: transposed_up
 );
 
-impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, const W: usize>
+impl<M: Dae, E: Field + Plain, R: Array<E>, V: Visitor<E, S, W>, const S: usize, const W: usize>
     Sweep<'_, M, E, R, V, S, W>
 {
     #[inline(always)]
@@ -244,8 +244,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
         }
         // Directions that have not reached this unknown, as at the start of an interval. Of
         // registers the memory is asked: a packet of which single elements are looked at is not
-        // kept in registers. Of numbers the packet is, all of it at once: one after the other in
-        // memory took up to 7 % of a call more (chains of 3 and 5 masses).
+        // kept in registers. Of numbers the packet is, all of it at once.
         if const { W > 1 && size_of::<E>() > 8 } && is_zero::<E, R, S, W>(rows, slot, *column) {
             return;
         }
@@ -284,7 +283,7 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
 
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn up<A: Arithmetic>(&mut self, pivot: &'static Pivot) {
-        let Self { factors, rows, column, viewer } = self;
+        let Self { factors, rows, column, visitor } = self;
         if pivot.slot as usize >= rows.len() {
             return;
         }
@@ -310,14 +309,13 @@ impl<M: Dae, E: Field + Plain, R: Array<E>, V: Viewer<E, S, W>, const S: usize, 
             packet = solution;
         }
         store(rows, pivot.slot as usize, *column, &packet);
-        viewer.see::<A>(pivot.slot as usize, &packet);
+        visitor.on_solved::<A>(pivot.slot as usize, &packet);
     }
 }
 
 /// Whether right-hand sides of registers go through `L` row by row: blocks of a row lie each in
 /// another column. Of large blocks that the second cache holds the processor fetches some columns
-/// ahead side by side, but no more than that: chains of 5 masses take 2 % less by rows, the
-/// aircraft, with up to nineteen blocks in a row, 6 % more.
+/// ahead side by side, but no more than that.
 const fn goes_by_rows<M: Dae>(block: usize) -> bool {
     let pivots = M::STRUCTURE.elimination.pivots;
     let (mut longest, mut index) = (0, 0);

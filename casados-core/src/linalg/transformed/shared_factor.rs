@@ -1,4 +1,4 @@
-//! Factors of the mean Jacobian of the stages, in the eigenbasis of the tableau, of
+//! Factors of the shared Jacobian of the stages, in the eigenbasis of the tableau, of
 //! [coarse](Lanes::Coarse) numbers: increments that they give are corrected by the next iteration
 //! in any case.
 
@@ -15,23 +15,23 @@ use crate::scalar::Lanes;
 use crate::shape::Aligned;
 use bytemuck::Zeroable;
 
-/// Factors of the mean Jacobian of the stages for all eigenvalues, by the plan: what an iteration
+/// Factors of the shared Jacobian of the stages for all eigenvalues, by the plan: what an iteration
 /// takes that need not be exact.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub struct MeanFactors<M: Dae, E: Lanes, const S: usize> {
+pub struct SharedFactors<M: Dae, E: Lanes, const S: usize> {
     blocks: Aligned<M::Factors<[[Number<E, S>; 1]; 1]>>,
     rows: Aligned<ArrayK<M, [[Number<E, S>; 1]; 1]>>,
 }
 
-impl<M: Dae, E: Lanes, const S: usize> Clone for MeanFactors<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> Clone for SharedFactors<M, E, S> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Dae, E: Lanes, const S: usize> Copy for MeanFactors<M, E, S> {}
+impl<M: Dae, E: Lanes, const S: usize> Copy for SharedFactors<M, E, S> {}
 
-impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
+impl<M: Dae, E: Lanes, const S: usize> SharedFactors<M, E, S> {
     /// Factors; a pivot that vanishes leaves elements that are not finite. The Jacobian may be
     /// there for the `first_only` of stages that are alike, but not of a single lane.
     pub fn factor(
@@ -44,9 +44,9 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
         let blocks = &mut self.blocks;
         let values = &basis.values;
         if const { E::LANES > 1 } && first_only {
-            dispatch(AssembleMean::<M, E, S, true> { jacobian, values, h, blocks });
+            dispatch(AssembleShared::<M, E, S, true> { jacobian, values, h, blocks });
         } else {
-            dispatch(AssembleMean::<M, E, S, false> { jacobian, values, h, blocks });
+            dispatch(AssembleShared::<M, E, S, false> { jacobian, values, h, blocks });
         }
         factor::factor::<M, _, 1>(self.blocks.as_mut());
     }
@@ -66,8 +66,8 @@ impl<M: Dae, E: Lanes, const S: usize> MeanFactors<M, E, S> {
     }
 }
 
-/// `Σ c f (hμ)^order` of the mean Jacobian, each block written once.
-struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
+/// `Σ c f (hμ)^order` of the shared Jacobian, each block written once.
+struct AssembleShared<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// The eigenvalues `μ`.
     values: &'a Complex<E, S>,
@@ -76,7 +76,7 @@ struct AssembleMean<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool
 }
 
 impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
-    for AssembleMean<'_, M, E, S, FIRST_ONLY>
+    for AssembleShared<'_, M, E, S, FIRST_ONLY>
 {
     type Number = E;
     type Output = ();
@@ -89,7 +89,7 @@ impl<M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> Kernel
     }
 }
 
-/// See [`AssembleMean`].
+/// See [`AssembleShared`].
 struct Rows<'a, M: Dae, E: Lanes, const S: usize, const FIRST_ONLY: bool> {
     jacobian: &'a M::Jacobian<[E; S]>,
     /// `hμ` and `(hμ)²` of what is added up.

@@ -1,5 +1,5 @@
-//! Solves by factors of the mean Jacobian, from equations to unknowns: what takes equations to the
-//! eigenbasis and unknowns back goes on while each row waits for the one before it.
+//! Solves by factors of the shared Jacobian, from equations to unknowns: what takes equations to
+//! the eigenbasis and unknowns back goes on while each row waits for the one before it.
 //!
 //! Supernode by supernode: an unknown that several rows ask for is looked up once for all of them,
 //! and what a row is made of stays in registers.

@@ -1,16 +1,16 @@
-//! Derivatives of a call, as users see them: forward, in directions, adjoint, of second order.
+//! Forward sensitivities, in all directions or in given ones, as users see them.
 
-use super::dense_output::Point;
-use super::driver::Arguments;
-use super::forward::memory::{ForwardMemory, StepOf, gradient};
-use super::hessian::pass::HessianMemory;
-use super::integrator::Integrator;
 use crate::error::{Argument, Error};
 use crate::finite::check_input;
-use crate::memory::{Memory, WithAdjoint, WithDirectional, WithForward, WithHessian};
-use crate::model::{Dae, MatrixXC, VectorU, VectorX, VectorZ};
-use crate::quadrature::{Along, begin, finish, reborrow};
-use crate::result::{Adjoint, DenseForward, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
+use crate::irk::dense_output::Point;
+use crate::irk::driver::Arguments;
+use crate::irk::forward::gradient::gradient;
+use crate::irk::forward::memory::{ForwardMemory, StepOf};
+use crate::irk::integrator::Integrator;
+use crate::memory::{Memory, WithDirectional, WithForward};
+use crate::model::{Dae, VectorU, VectorX};
+use crate::quadrature::{Along, begin, finish};
+use crate::result::{DenseForward, Directional, Forward, ForwardAdjoint, Seeds};
 use crate::scalar::Real;
 use crate::shape::Matrix;
 
@@ -152,7 +152,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 
     /// After a successful call, whose stages and their derivatives are kept.
-    fn keep_forward(&mut self) -> Result<&Forward<M, T>, Error>
+    pub(super) fn keep_forward(&mut self) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
     {
@@ -259,229 +259,5 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.sweep = None;
         self.run.keep()?;
         Ok(&memory.result)
-    }
-
-    /// Allocates what `adjoint_many` with `C` seeds needs, so that no call of it will. `adjoint`
-    /// has one.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`]
-    pub fn reserve_adjoint<const C: usize>(&mut self) -> Result<(), Error>
-    where
-        W: WithAdjoint<C>,
-    {
-        W::adjoint(&mut self.adjoint)?;
-        self.run.reserve()
-    }
-
-    /// The solution, and the gradient of `λᵀx₊` with respect to `x₀`, `u` and `p`.
-    ///
-    /// # Errors
-    /// See [`Integrator`].
-    pub fn adjoint(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&Adjoint<M, T>, Error>
-    where
-        W: WithAdjoint<1>,
-    {
-        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), None)
-    }
-
-    /// As [`Integrator::adjoint`], with an integrand.
-    pub(crate) fn adjoint_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Adjoint<M, T>, Error>
-    where
-        W: WithAdjoint<1>,
-    {
-        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), along)
-    }
-
-    /// The solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of `lambdas`.
-    ///
-    /// # Errors
-    /// See [`Integrator`].
-    pub fn adjoint_many<const C: usize>(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambdas: &MatrixXC<M, T, C>,
-    ) -> Result<&Adjoint<M, T, C>, Error>
-    where
-        W: WithAdjoint<C>,
-    {
-        self.backward(&Arguments { x0, u, h }, lambdas.as_slice(), None)
-    }
-
-    fn backward<const C: usize>(
-        &mut self,
-        arguments: &Arguments<'_, M, T>,
-        seeds: &[T],
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Adjoint<M, T, C>, Error>
-    where
-        W: WithAdjoint<C>,
-    {
-        check_input(Argument::Lambda, seeds)?;
-        begin(&mut along);
-        let memory = W::adjoint(&mut self.adjoint)?;
-        let count = self.run.options.steps;
-        // On the way forth only the last step is linearised: it is where the way back begins.
-        let mut parts = self.run.steps(arguments, |parts, n, step, exact| {
-            if let Some(integrand) = &mut along {
-                parts.work.along_value(parts.coefficients, n, step, &mut **integrand)?;
-            }
-            if n + 1 == count { parts.linearize(n, step, exact) } else { Ok(()) }
-        })?;
-        memory.backward.start(seeds, &[]);
-        for (n, step) in parts.steps.iter().enumerate().rev() {
-            if n + 1 < count {
-                parts.linearize(n, step, false)?;
-            }
-            memory.backward.step(&mut parts, &mut None, n, step, &mut along)?;
-        }
-        memory.finish(parts.work)?;
-        finish(&mut along)?;
-        self.sweep = None;
-        self.run.keep()?;
-        Ok(&memory.result)
-    }
-}
-
-impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Allocates what `hessian` needs, so that no call of it will.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`]
-    pub fn reserve_hessian(&mut self) -> Result<(), Error>
-    where
-        W: WithHessian,
-    {
-        W::hessian(&mut self.hessian)?;
-        W::hessian_tape(&mut self.hessian_tape, self.run.options.steps)?;
-        self.reserve_forward()
-    }
-
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊`, in one pass.
-    ///
-    /// # Errors
-    /// See [`Integrator`].
-    pub fn hessian(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
-        self.hessian_along(x0, u, h, lambda, &[], None)
-    }
-
-    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx₊ + νᵀz₀`, with the
-    /// algebraic states `z₀` at the start of the interval, which are
-    /// [`z0`](crate::result::Nominal::z0) of the results: in the same pass.
-    ///
-    /// `νᵀ∂²z₀/∂(x₀, u, p)²` is what a Lagrangian needs of costs and constraints that depend on
-    /// algebraic states.
-    ///
-    /// # Errors
-    /// See [`Integrator`].
-    ///
-    /// ```
-    /// # use casados_core::{Error, Irk, Gauss, Dae, Options, model::{VectorU, VectorX, VectorZ}};
-    /// # fn example<Crane: Dae>(x0: VectorX<Crane, f64>, u: VectorU<Crane, f64>, lambda: VectorX<Crane, f64>, nu: VectorZ<Crane, f64>) -> Result<(), Error> {
-    /// let mut irk = Irk::<Crane, Gauss<4>>::new(Options::default())?;
-    /// let step = irk.hessian_with_z0(&x0, &u, 0.05, &lambda, &nu)?;
-    /// let (gradient, hessian) = (step.grad_x0, step.h_xx);
-    /// # Ok(())
-    /// # }
-    /// ```
-    pub fn hessian_with_z0(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        nu: &VectorZ<M, T>,
-    ) -> Result<&Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
-        self.hessian_along(x0, u, h, lambda, nu.as_slice(), None)
-    }
-
-    /// As [`Integrator::hessian`], with weights of `z₀` if they are not empty, and with an
-    /// integrand.
-    pub(crate) fn hessian_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        nu: &[T],
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
-        self.hessian_to(&Arguments { x0, u, h }, lambda.as_slice(), nu, along, None)?;
-        Ok(&W::hessian(&mut self.hessian)?.result)
-    }
-
-    /// The same, written to the memory of `hessian` or elsewhere, where there is no result if there
-    /// is an error.
-    pub(crate) fn hessian_to(
-        &mut self,
-        arguments: &Arguments<'_, M, T>,
-        lambda: &[T],
-        nu: &[T],
-        mut along: Along<'_, '_, M, T>,
-        to: Option<&mut Hessian<M, T>>,
-    ) -> Result<(), Error>
-    where
-        W: WithHessian,
-    {
-        check_input(Argument::Lambda, lambda)?;
-        check_input(Argument::Nu, nu)?;
-        begin(&mut along);
-        self.sweep = None;
-        let count = self.run.options.steps;
-        let forward = &mut W::forward(&mut self.forward)?.pass;
-        let HessianMemory { result, pass } = W::hessian(&mut self.hessian)?;
-        let distant = to.is_some();
-        let to = to.unwrap_or(result);
-        let records = W::hessian_tape(&mut self.hessian_tape, count)?;
-        let parts = self.run.steps(arguments, |parts, n, step, exact| {
-            parts.linearize(n, step, exact)?;
-            let Some(record) = records.get_mut(n) else { return Ok(()) };
-            let (at, to) = (StepOf { n, count, distant }, &mut to.first.forward);
-            forward.step::<_, false>(parts, at, Some(record.curved()), to)?;
-            if let Some(integrand) = &mut along {
-                parts.along_forward(n, step, &forward.sweep, true, &mut **integrand)?;
-            }
-            // That of the last step is still there on the way back.
-            if n + 1 < count {
-                record.record(parts.work);
-            }
-            Ok(())
-        })?;
-        forward.finish(&parts.work.result, count - 1, &mut to.first.forward)?;
-        finish(&mut along)?;
-        let ahead = if distant { to.h_xx.as_slice() } else { &[] };
-        pass.run(parts, records, [lambda, nu], ahead, reborrow(&mut along))?;
-        pass.finish(along.as_ref().and_then(|integrand| integrand.second()), to)?;
-        self.keep_forward().map(|_| ())
     }
 }

@@ -1,0 +1,98 @@
+//! The matrices that derivatives are written to.
+
+use super::output::Target;
+use crate::model::{Dae, NO_COLUMN};
+use crate::scalar::Lanes;
+use crate::shape::{Matrix, Shape};
+use core::marker::PhantomData;
+use core::mem::take;
+
+/// Three matrices of derivatives with respect to `x₀`, `u` and `p`, column after column.
+pub(super) struct Split<'a, M, T> {
+    matrices: [&'a mut [T]; 3],
+    rows: usize,
+    model: PhantomData<M>,
+}
+
+impl<'a, M: Dae, T: Lanes> Split<'a, M, T> {
+    pub fn new<X: Matrix<T>>(x: &'a mut X, u: &'a mut impl Matrix<T>, p: &'a mut impl Matrix<T>) -> Self {
+        let matrices = [x.as_mut_slice(), u.as_mut_slice(), p.as_mut_slice()];
+        Self { matrices, rows: X::ROWS, model: PhantomData }
+    }
+
+    /// To which matrix `dw_index` belongs, and its column there.
+    #[inline(always)]
+    fn place(index: usize) -> (usize, usize) {
+        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+        if index < nx {
+            (0, index)
+        } else if index < nx + nu {
+            (1, index - nx)
+        } else {
+            (2, index - nx - nu)
+        }
+    }
+
+    /// The columns of `dx₊` in directions that have no influence.
+    pub fn fill_others(&mut self) {
+        for (index, &column) in M::STRUCTURE.column_of_direction.iter().enumerate() {
+            if column == NO_COLUMN {
+                let ((part, column), rows) = (Self::place(index), self.rows);
+                let matrix = self.matrices.get_mut(part);
+                let column = matrix.and_then(|matrix| matrix.get_mut(column * rows..(column + 1) * rows));
+                let column = column.unwrap_or_default();
+                column.fill(T::from_f64(0.0));
+                if let Some(element) = column.get_mut(index) {
+                    *element = T::from_f64(1.0);
+                }
+            }
+        }
+    }
+}
+
+impl<M: Dae, T: Lanes> Target<T> for Split<'_, M, T> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+        let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
+        // What is behind the last column of each: directions ascend.
+        let [x, u, p] = &mut self.matrices;
+        let mut rest = [(0, &mut **x), (0, &mut **u), (0, &mut **p)];
+        let directions = M::STRUCTURE.directions.get(column..).unwrap_or_default();
+        for (to, &direction) in columns.iter_mut().zip(directions) {
+            let (part, own) = Self::place(direction as usize);
+            let Some((next, rest)) = rest.get_mut(part) else { continue };
+            let from = take(rest).get_mut((own - *next) * self.rows..).unwrap_or_default();
+            (*to, *rest) = from.split_at_mut_checked(self.rows).unwrap_or_default();
+            *next = own + 1;
+        }
+        columns
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn following<const W: usize>(&self, column: usize) -> &[T] {
+        let Some(&first) = M::STRUCTURE.directions.get(column + W) else { return &[] };
+        let (part, own) = Self::place(first as usize);
+        let from = self.matrices.get(part).and_then(|matrix| matrix.get(own * self.rows..));
+        let from = from.unwrap_or_default();
+        from.get(..W * self.rows).unwrap_or(from)
+    }
+}
+
+/// One matrix, column after column.
+pub(super) struct Single<'a, T> {
+    pub matrix: &'a mut [T],
+    pub rows: usize,
+}
+
+impl<T: Lanes> Target<T> for Single<'_, T> {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn columns<const W: usize>(&mut self, column: usize) -> [&mut [T]; W] {
+        let mut columns: [&mut [T]; W] = core::array::from_fn(|_| Default::default());
+        let matrix = self.matrix.get_mut(column * self.rows..).unwrap_or_default();
+        // A model without states has no columns to go through.
+        for (to, own) in columns.iter_mut().zip(matrix.chunks_exact_mut(self.rows.max(1))) {
+            *to = own;
+        }
+        columns
+    }
+}

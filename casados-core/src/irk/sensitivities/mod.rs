@@ -1,0 +1,5 @@
+//! Derivatives of a call, as users see them.
+
+mod adjoint;
+mod forward;
+mod hessian;

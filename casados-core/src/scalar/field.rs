@@ -1,0 +1,164 @@
+//! The arithmetic that kernels are made of.
+
+use super::Known;
+use core::fmt::Debug;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+
+/// What elimination is generic over: numbers that can be added, multiplied, divided, and compared
+/// in size.
+pub trait Field:
+    Copy
+    + Debug
+    + 'static
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The result of a comparison: `bool`, or one per lane.
+    type Mask: Copy;
+
+    /// A constant.
+    fn from_f64(value: f64) -> Self;
+
+    /// A whole number that is known at run time only: without double precision where this has none.
+    #[inline(always)]
+    fn from_whole(value: usize) -> Self {
+        Self::from_f64(value as f64)
+    }
+
+    /// `1/self`
+    #[inline(always)]
+    fn reciprocal(self) -> Self {
+        Self::from_f64(1.0) / self
+    }
+
+    /// `self − a b`, rounded once if the number type can do that. Only for code that knows that the
+    /// machine has an instruction for it: elsewhere it is slow.
+    #[inline(always)]
+    fn subtract_product(self, a: Self, b: Self) -> Self {
+        self - a * b
+    }
+
+    /// `target − left · right` of s×s blocks that lie column after column, fused: for
+    /// kernels, as all that asks for [`Known`] instructions.
+    #[inline(always)]
+    fn subtract_blocks<const S: usize, const WIDE: bool>(
+        target: &mut [[Self; S]; S],
+        left: &[[Self; S]; S],
+        right: &[[Self; S]; S],
+        known: Known<WIDE>,
+    ) {
+        for (target, right) in target.iter_mut().zip(right) {
+            Self::subtract_columns(target, left, right, known);
+        }
+    }
+
+    /// `target − block · x` of an s×s block that lies column after column, fused.
+    #[inline(always)]
+    fn subtract_columns<const S: usize, const WIDE: bool>(
+        target: &mut [Self; S],
+        block: &[[Self; S]; S],
+        x: &[Self; S],
+        _: Known<WIDE>,
+    ) {
+        for (column, &x) in block.iter().zip(x) {
+            for (target, &element) in target.iter_mut().zip(column) {
+                *target = target.subtract_product(element, x);
+            }
+        }
+    }
+
+    /// `target − a b`, element by element, fused.
+    #[inline(always)]
+    fn subtract_products<const W: usize, const WIDE: bool>(
+        target: &mut [Self; W],
+        a: &[Self; W],
+        b: &[Self; W],
+        _: Known<WIDE>,
+    ) {
+        for ((target, &a), &b) in target.iter_mut().zip(a).zip(b) {
+            *target = target.subtract_product(a, b);
+        }
+    }
+
+    /// `target = block`, a register at a time.
+    #[inline(always)]
+    fn write_block<const S: usize, const WIDE: bool>(
+        target: &mut [[Self; S]; S],
+        block: &[[Self; S]; S],
+        _: Known<WIDE>,
+    ) {
+        *target = *block;
+    }
+
+    /// Rows as columns.
+    #[inline(always)]
+    fn transposed<const N: usize, const WIDE: bool>(rows: &[[Self; N]; N], _: Known<WIDE>) -> [[Self; N]; N] {
+        transposed(rows)
+    }
+
+    /// `target − factor · row`, fused.
+    #[inline(always)]
+    fn subtract_row<const W: usize, const WIDE: bool>(
+        target: &mut [Self; W],
+        factor: Self,
+        row: &[Self; W],
+        _: Known<WIDE>,
+    ) {
+        for (target, &element) in target.iter_mut().zip(row) {
+            *target = target.subtract_product(factor, element);
+        }
+    }
+
+    /// `target − a b` of `⌊N/2⌋` complex numbers side by side, their real parts, then their
+    /// imaginary ones, and of a real number if `N` is odd, fused.
+    #[inline(always)]
+    fn subtract_complex<const N: usize, const WIDE: bool>(
+        target: &mut [Self; N],
+        a: &[Self; N],
+        b: &[Self; N],
+        _: Known<WIDE>,
+    ) {
+        let mut sum = *target;
+        for l in 0..const { N / 2 } {
+            let m = const { N / 2 } + l;
+            sum[l] = sum[l].subtract_product(a[l], b[l]).subtract_product(-a[m], b[m]);
+            sum[m] = sum[m].subtract_product(a[l], b[m]).subtract_product(a[m], b[l]);
+        }
+        if const { N % 2 == 1 } {
+            sum[N - 1] = sum[N - 1].subtract_product(a[N - 1], b[N - 1]);
+        }
+        *target = sum;
+    }
+
+    /// `|a| < |b|`
+    fn is_smaller(self, other: Self) -> Self::Mask;
+
+    /// `if mask { a } else { b }`, lane by lane
+    fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
+    /// Whether it holds in any lane.
+    fn any(mask: Self::Mask) -> bool;
+}
+
+/// `a + b`, rounded, and what rounding left of it: their sum is exact (D. Knuth).
+#[inline(always)]
+pub(crate) fn two_sum<E: Field>(a: E, b: E) -> [E; 2] {
+    let sum = a + b;
+    let second = sum - a;
+    let first = sum - second;
+    [sum, (a - first) + (b - second)]
+}
+
+/// Rows as columns.
+#[inline(always)]
+pub(crate) fn transposed<T: Copy, const N: usize>(rows: &[[T; N]; N]) -> [[T; N]; N] {
+    let mut columns = *rows;
+    for (r, row) in rows.iter().enumerate() {
+        for (column, &number) in columns.iter_mut().zip(row) {
+            column[r] = number;
+        }
+    }
+    columns
+}
