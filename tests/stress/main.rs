@@ -11,7 +11,7 @@
 //! | 10, 11 | the way back, linear invariants | `invariants` |
 //! | 12 | relative accuracy over decades | `stiffness` |
 //! | 13, 15, 16, 18, 19 | derivatives: adjoint and forward, the complex step, symmetry, cancellation, iterations that stop early | `sensitivities` |
-//! | 14, 17 | derivatives against references | `tests/adaptive/ivp_sensitivities.rs`; exact zeros in `sensitivities` |
+//! | 14, 17 | derivatives against references | `tests/ivp/sensitivities`; exact zeros in `sensitivities` |
 //! | 20, 21, 23, 35 | singular and nearly singular matrices, rank-deficient mass matrices | `elimination`, `failures` |
 //! | 22 | index two | `failures`, `adaptive`; at compile time `tests/ui/structurally_singular.rs` |
 //! | 24, 25, 33 | inconsistent start values, branches, warm starts | `starts`, `adaptive` |
