@@ -6,7 +6,7 @@
 //! its tolerance.
 
 use crate::data::Record;
-use crate::models::vibrations::{Beam, Modes, RodPendulum, Rope, SpringPendulum, Turning};
+use crate::models::ivp::vibrations::{Beam, Modes, RodPendulum, Rope, SpringPendulum, Turning};
 use casados::{Adaptive, AdaptiveOptions, Gauss, Radau};
 use nalgebra::SVector;
 

@@ -1,6 +1,6 @@
 //! What has no answer is an error that says why; what was asked before and after it is not touched.
 
-use super::oscillators::VanDerPol;
+use crate::models::oscillators::VanDerPol;
 use casados::error::Quantity;
 use casados::options::{Newton, Start};
 use casados::testing::Integrator;

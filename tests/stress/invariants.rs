@@ -1,7 +1,7 @@
 //! What solutions keep, methods keep: energy and angular momentum of an orbit, the way back, sums.
 
-use super::chemistry::Robertson;
 use super::orbit::{Kepler, STEP, changes, perihelion};
+use crate::models::chemistry::Robertson;
 use casados::{Adaptive, AdaptiveOptions, Erk, Gauss, Irk, Options, Radau, RadauIIA, Rk4, ode};
 use nalgebra::{SVector, vector};
 
@@ -46,7 +46,8 @@ fn t07_energy() {
     }
 }
 
-/// As many steps as an unoptimised build takes in a second; a million are in `tests/long_runs.rs`.
+/// As many steps as an unoptimised build takes in a second; a million are in
+/// `tests/optimised/long_runs.rs`.
 #[test]
 fn t09_compensated_sums() {
     const INTERVALS: usize = 4;

@@ -7,17 +7,17 @@
 //! | 3 | stability functions to `\|z\| = 1e12` | `stability` |
 //! | 4 | order of convergence, and the floor | `order` |
 //! | 5, 6 | order reduction, stiffness of 1e12 | `stiffness` |
-//! | 7, 8, 9 | energy, angular momentum, compensated sums | `invariants`; a million steps in `tests/long_runs.rs` |
+//! | 7, 8, 9 | energy, angular momentum, compensated sums | `invariants`; a million steps in `tests/optimised/long_runs.rs` |
 //! | 10, 11 | the way back, linear invariants | `invariants` |
 //! | 12 | relative accuracy over decades | `stiffness` |
 //! | 13, 15, 16, 18, 19 | derivatives: adjoint and forward, the complex step, symmetry, cancellation, iterations that stop early | `sensitivities` |
-//! | 14, 17 | derivatives against references | `tests/ivp_sensitivities.rs`; exact zeros in `sensitivities` |
+//! | 14, 17 | derivatives against references | `tests/ivp/sensitivities`; exact zeros in `sensitivities` |
 //! | 20, 21, 23, 35 | singular and nearly singular matrices, rank-deficient mass matrices | `elimination`, `failures` |
 //! | 22 | index two | `failures`, `adaptive`; at compile time `tests/ui/structurally_singular.rs` |
 //! | 24, 25, 33 | inconsistent start values, branches, warm starts | `starts`, `adaptive` |
 //! | 26, 29, 30, 31, 32 | models without a value, jumps, blow-up, divergence, quality of Newton's method | `failures`, `adaptive` |
 //! | 27, 28, 36 | powers of two, denormal numbers, lengths of steps | `scaling`, `adaptive` |
-//! | 34 | threads | `tests/batch.rs` |
+//! | 34 | threads | `tests/batch` |
 //! | 37, 38, 40 | nothing at all, ends of steps, polynomials | `endpoints` |
 //! | 39 | rounding of the data | `stiffness` |
 //!
@@ -25,20 +25,19 @@
 //! (`tests/fuzz.rs`, which is compiled beside; into the macro in `casados-macros/src/fuzz.rs`),
 //! single precision (`precision`).
 
-#[allow(dead_code)]
-#[path = "../../examples/models/ivp/chemistry.rs"]
-mod chemistry;
-#[allow(dead_code)]
-#[path = "../../examples/models/ivp/circuits.rs"]
-mod circuits;
 #[path = "../data/mod.rs"]
 mod data;
 #[path = "../interval/mod.rs"]
 mod interval;
-#[path = "../../examples/models/ivp/oscillators.rs"]
-mod oscillators;
 #[path = "../systems/mod.rs"]
 mod systems;
+#[allow(dead_code)] // Each program takes a part.
+#[path = "../../examples/models/ivp"]
+mod models {
+    pub mod chemistry;
+    pub mod circuits;
+    pub mod oscillators;
+}
 
 mod adaptive;
 mod elimination;
@@ -61,16 +60,18 @@ mod tableaux;
 
 #[test]
 fn every_number_has_a_test() {
-    let mut sources = String::new();
-    for directory in ["tests", "tests/stress"] {
-        let directory = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(directory);
-        for file in std::fs::read_dir(directory).expect("a directory") {
-            let path = file.expect("a file").path();
-            if path.extension().is_some_and(|extension| extension == "rs") {
-                sources += &std::fs::read_to_string(path).expect("a text");
+    fn read(directory: &std::path::Path, sources: &mut String) {
+        for entry in std::fs::read_dir(directory).expect("a directory") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                read(&path, sources);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                *sources += &std::fs::read_to_string(path).expect("a text");
             }
         }
     }
+    let mut sources = String::new();
+    read(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests"), &mut sources);
     for number in 1..=40 {
         let name = format!("t{number:02}_");
         assert!(sources.contains(&format!("fn {name}")) || sources.contains(&format!("({name}")), "{name}");

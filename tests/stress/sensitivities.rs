@@ -1,10 +1,10 @@
 //! Derivatives: identities, independent ways to the same numbers, what cancels, and what an
 //! iteration that stops early leaves.
 
-use super::chemistry::{AkzoNobel, Robertson};
 use super::data::Record;
 use super::everything::Everything;
-use super::oscillators::VanDerPol;
+use crate::models::chemistry::{AkzoNobel, Robertson};
+use crate::models::oscillators::VanDerPol;
 use casados::options::Newton;
 use casados::{
     Adaptive, AdaptiveOptions, DormandPrince8, Erk, Gauss, GraphDae, Irk, Method, Options, Radau, RadauIIA,

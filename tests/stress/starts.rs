@@ -1,6 +1,6 @@
 //! Start values that are wrong, and what is the same whatever they are.
 
-use super::chemistry::AkzoNobel;
+use crate::models::chemistry::AkzoNobel;
 use casados::options::Start;
 use casados::{Adaptive, AdaptiveOptions, Error, Gauss, Irk, Options, Radau, RadauIIA, dae};
 use nalgebra::{SVector, vector};

@@ -1,9 +1,9 @@
 //! Stiffness up to 1e12, and small numbers beside large ones.
 
-use super::chemistry::{E5Conserved, Hires, Oregonator, Robertson};
 use super::data::Record;
-use super::oscillators::VanDerPolScaled;
 use super::pollution::{self, Pollution};
+use crate::models::chemistry::{E5Conserved, Hires, Oregonator, Robertson};
+use crate::models::oscillators::VanDerPolScaled;
 use casados::model::{VectorP, VectorX};
 use casados::shape::Matrix;
 use casados::{Adaptive, AdaptiveOptions, Dae, Error, Gauss, Irk, Options, Radau, RadauIIA, Shape, ode};

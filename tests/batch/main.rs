@@ -1,0 +1,15 @@
+//! Many intervals in one call.
+
+#[path = "../data/mod.rs"]
+mod data;
+#[allow(dead_code)] // Each program takes a part.
+#[path = "../../examples/models"]
+mod models {
+    pub mod awe;
+    pub mod chain;
+    pub mod pendulum;
+}
+
+mod agreement;
+mod failures;
+mod horizon;

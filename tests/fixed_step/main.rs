@@ -1,0 +1,27 @@
+//! Integrators with steps of one size: against closed forms, independent implementations and
+//! differences.
+
+#[path = "../data/mod.rs"]
+mod data;
+#[path = "../interval/mod.rs"]
+mod interval;
+#[allow(dead_code)]
+#[path = "../../examples/firmware/src/lost.rs"]
+mod lost;
+#[path = "../systems/mod.rs"]
+mod systems;
+#[allow(dead_code)] // Each program takes a part.
+#[path = "../../examples/models"]
+mod models {
+    pub mod awe;
+    pub mod chain;
+    pub mod pendulum;
+}
+
+mod algebraic;
+mod analytic;
+mod erk;
+mod erk_reference;
+mod examples;
+mod kinematic;
+mod tube;

@@ -1,0 +1,12 @@
+//! The set of initial value problems: errors at the ends, and derivatives.
+
+#[path = "../data/mod.rs"]
+mod data;
+#[path = "../../examples/models"]
+mod models {
+    pub mod ivp;
+}
+
+mod ends;
+mod sensitivities;
+mod vibrations;

@@ -1,0 +1,141 @@
+//! The same results, but for rounding, with every kind of registers that this machine has: one
+//! interval, and many side by side, in every mode.
+
+use crate::models::chain::{Chain, stretched};
+use crate::models::pendulum::Pendulum;
+use casados::batch;
+use casados::prelude::*;
+use casados::result::{Adjoint, Forward, Hessian, Nominal};
+use casados::shape::Matrix;
+use casados::testing::{Level, limit};
+use casados::{irk, memory::Heap, model::VectorU, model::VectorX};
+use nalgebra::{SVector, Vector1, vector};
+
+type Test = Result<(), Box<dyn std::error::Error>>;
+
+/// One lane is left over in a register of four, five in one of eight.
+const COUNT: usize = 13;
+
+/// Conditions of the Newton matrices are of order ten, and four steps add up (as in
+/// `tests/batch`).
+const TOLERANCE: f64 = 2.0 * 100.0 * f64::EPSILON;
+
+struct Horizon<M: Dae> {
+    x0: Vec<VectorX<M, f64>>,
+    u: Vec<VectorU<M, f64>>,
+    h: f64,
+    lambda: Vec<VectorX<M, f64>>,
+}
+
+/// All results of all modes in a list for each matrix.
+fn flatten<M: Dae>(
+    nominal: &Nominal<M>,
+    forward: &Forward<M>,
+    adjoint: &Adjoint<M>,
+    hessian: &Hessian<M>,
+) -> Vec<Vec<f64>> {
+    [
+        nominal.x.as_slice(),
+        forward.x.as_slice(),
+        forward.dx_dx0.as_slice(),
+        forward.dx_du.as_slice(),
+        adjoint.grad_x0.as_slice(),
+        adjoint.grad_u.as_slice(),
+        hessian.dx_dx0.as_slice(),
+        hessian.grad_x0.as_slice(),
+        hessian.h_xx.as_slice(),
+        hessian.h_xu.as_slice(),
+        hessian.h_uu.as_slice(),
+    ]
+    .map(<[f64]>::to_vec)
+    .to_vec()
+}
+
+fn results<M: Dae, B: Send + Sync, const S: usize>(
+    horizon: &Horizon<M>,
+    irk: &mut irk::Integrator<M, B, S, f64, Heap>,
+    batch: &mut batch::Integrator<M, B, S, f64>,
+) -> Result<Vec<Vec<f64>>, Box<dyn std::error::Error>> {
+    let Horizon { x0, u, h, lambda } = horizon;
+    let mut all = Vec::new();
+    for ((x0, u), lambda) in x0.iter().zip(u).zip(lambda) {
+        let nominal = *irk.solve(x0, u, *h)?;
+        let forward = *irk.forward(x0, u, *h)?;
+        let adjoint = *irk.adjoint(x0, u, *h, lambda)?;
+        all.extend(flatten(&nominal, &forward, &adjoint, irk.hessian(x0, u, *h, lambda)?));
+    }
+    let intervals = Intervals { x0, u, h: &[*h], ..Default::default() };
+    let mut nominal = vec![Nominal::default(); COUNT];
+    let mut forward = vec![Forward::default(); COUNT];
+    let mut adjoint = vec![Adjoint::default(); COUNT];
+    let mut hessian = vec![Hessian::default(); COUNT];
+    batch.solve(&intervals, &mut nominal)?;
+    batch.forward(&intervals, &mut forward)?;
+    batch.adjoint(&intervals, lambda, &mut adjoint)?;
+    batch.hessian(&intervals, lambda, &mut hessian)?;
+    for (((nominal, forward), adjoint), hessian) in nominal.iter().zip(&forward).zip(&adjoint).zip(&hessian) {
+        all.extend(flatten(nominal, forward, adjoint, hessian));
+    }
+    Ok(all)
+}
+
+fn check<M: Dae, B: Send + Sync, const S: usize>(
+    horizon: &Horizon<M>,
+    mut build: impl FnMut() -> Result<
+        (irk::Integrator<M, B, S, f64, Heap>, batch::Integrator<M, B, S, f64>),
+        casados::Error,
+    >,
+) -> Test {
+    limit(Level::Single);
+    let (mut irk, mut batch) = build()?;
+    let expected = results(horizon, &mut irk, &mut batch)?;
+    for level in [Level::Base, Level::Avx2, Level::Avx512] {
+        limit(level);
+        let (mut irk, mut batch) = build()?;
+        let found = results(horizon, &mut irk, &mut batch)?;
+        for (place, (found, expected)) in found.iter().zip(&expected).enumerate() {
+            let size = expected.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+            for (found, expected) in found.iter().zip(expected) {
+                let error = (found - expected).abs();
+                assert!(
+                    error <= TOLERANCE * size,
+                    "{level:?}, list {place}: {found:e} instead of {expected:e}, {error:e} apart"
+                );
+            }
+        }
+        // What was computed for nothing would agree as well.
+        assert!(expected.iter().flatten().any(|value| *value != 0.0));
+    }
+    Ok(())
+}
+
+#[test]
+fn every_kind_of_registers_gives_the_same() -> Test {
+    let _turn = crate::turn();
+    let pendulum = Horizon::<Pendulum> {
+        x0: (0..COUNT).map(|k| vector![0.1, 0.3 + 0.05 * k as f64, -0.2, 0.4]).collect(),
+        u: (0..COUNT).map(|k| Vector1::new(0.1 * k as f64)).collect(),
+        h: 0.1,
+        lambda: vec![vector![1.0, -0.5, 0.25, 2.0]; COUNT],
+    };
+    let options = Options { steps: 2, ..Default::default() };
+    check(&pendulum, || {
+        Ok((Irk::<Pendulum, Gauss<2>>::new(options)?, Batch::<Pendulum, Gauss<2>>::new(options)?))
+    })?;
+    check(&pendulum, || {
+        Ok((Irk::<Pendulum, RadauIIA<3>>::new(options)?, Batch::<Pendulum, RadauIIA<3>>::new(options)?))
+    })?;
+    let wave = |k: usize| SVector::<f64, 9>::from_fn(|i, _| 0.01 * ((k * (i + 3)) as f64).sin());
+    let chain = Horizon::<Chain<9>> {
+        x0: (0..COUNT).map(|k| stretched::<9>() + wave(k + 1)).collect(),
+        u: (0..COUNT).map(|k| vector![0.1, -0.05 * k as f64, 0.2]).collect(),
+        h: 0.2,
+        lambda: vec![SVector::from_fn(|i, _| 1.0 - 0.2 * i as f64); COUNT],
+    };
+    check(&chain, || {
+        Ok((Irk::<Chain<9>, Gauss<4>>::new(options)?, Batch::<Chain<9>, Gauss<4>>::new(options)?))
+    })?;
+    check(&chain, || {
+        Ok((Irk::<Chain<9>, Gauss<6>>::new(options)?, Batch::<Chain<9>, Gauss<6>>::new(options)?))
+    })
+}
