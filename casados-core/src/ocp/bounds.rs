@@ -288,9 +288,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The derivative that makes a QP one without values.
     pub(super) fn derivative(&self, error: &QpError) -> Option<OcpError> {
-        // Bounds of constraints and constants of dynamics are made with derivatives, which come
-        // first there.
-        let QpError::InvalidValue { .. } = error else { return None };
+        // Whatever a solver says of a QP without values. Derivatives come first in it, before the
+        // bounds and constants that are made with them.
+        if matches!(error, QpError::Infeasible { .. }) {
+            return None;
+        }
         let Err(QpError::InvalidValue { field, stage, index, value }) = check(self.qp()) else { return None };
         let known = self.names();
         let (nx, nu) = (known.x.len(), known.u.len());
