@@ -2,7 +2,8 @@
 
 use crate::Test;
 use casados::ocp::{
-    Constraint, GeneralCost, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Part, Problem,
+    Constraint, GeneralCost, HeapIpm, HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Part,
+    Problem,
 };
 use casados::prelude::*;
 use casados::qp::StageDims;
@@ -320,6 +321,7 @@ fn functions_without_a_derivative() -> Test {
     let expected = "stage 2: the derivative of output 0 of `Root` by `x[0]` is inf: another guess, or bounds that keep \
                     away from there, may help";
     assert_eq!(text(HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)), expected);
+    assert_eq!(text(HeapIpm::new(&ocp)?.solve(&mut ocp)), expected);
     let mut controller = HeapRealTime::new(ocp)?;
     assert_eq!(text(controller.prepare()?.feedback(&[1.0; 2])), expected);
     Ok(())

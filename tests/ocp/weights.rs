@@ -40,7 +40,8 @@ fn weights() -> Test {
     let matrix = |elements: [f64; 4]| Weighted::new(&SMatrix::<f64, 2, 2>::from_row_slice(&elements));
     for (elements, outputs) in [
         ([1.0, 0.5, 0.4, 1.0], [1, 0]),
-        ([1.0, f64::NAN, 0.5, 1.0], [1, 0]),
+        ([1.0, f64::NAN, 0.5, 1.0], [0, 1]),
+        ([1.0, 0.5, f64::NAN, 1.0], [1, 0]),
         ([1.0, f64::INFINITY, f64::INFINITY, 1.0], [1, 0]),
         // Its eigenvalues are 3 and −1.
         ([1.0, 2.0, 2.0, 1.0], [1, 1]),

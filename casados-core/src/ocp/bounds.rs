@@ -7,7 +7,7 @@ use super::error::{ConstraintName, OcpError, Part, Text};
 use super::instance::{Initial, Ocp};
 use super::problem::Formulation;
 use super::{constraint::Constraints, cost::Cost};
-use crate::qp::{BoundsMut, Field, QpError, Side, StageDims};
+use crate::qp::{BoundsMut, Field, QpError, Side, StageDims, check};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use core::ops::{Range, RangeBounds};
@@ -288,7 +288,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// The derivative that makes a QP one without values.
     pub(super) fn derivative(&self, error: &QpError) -> Option<OcpError> {
-        let QpError::InvalidValue { field, stage, index, value } = *error else { return None };
+        // Whatever a solver says of a QP without values. Derivatives come first in it, before the
+        // bounds and constants that are made with them.
+        if matches!(error, QpError::Infeasible { .. }) {
+            return None;
+        }
+        let Err(QpError::InvalidValue { field, stage, index, value }) = check(self.qp()) else { return None };
         let known = self.names();
         let (nx, nu) = (known.x.len(), known.u.len());
         let rows = match field {

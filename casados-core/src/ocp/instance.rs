@@ -316,24 +316,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let stage = index.checked_div(np).unwrap_or(0);
             return Err(OcpError::Missing { part: Part::Parameters, stage });
         }
-        let last = self.intervals();
+        // All numbers at once; names are looked for where one of these is not finite.
+        if crate::irk::not_finite(self.iterate.numbers()).is_some() { self.name_not_finite() } else { Ok(()) }
+    }
+
+    /// The first number of the iterate that is not finite.
+    fn name_not_finite(&self) -> Result<(), OcpError> {
+        let (last, part) = (self.intervals(), Part::Multipliers);
         for (stage, point) in self.iterate.stages().enumerate() {
             Labels::states::<P, T>(Part::States, stage).check_finite(point.x)?;
             Labels::controls::<P, T>(Part::Controls, stage).check_finite(point.u)?;
-            let part = Part::Multipliers;
             for multipliers in [point.dynamics, point.x_lower, point.x_upper] {
                 Labels::states::<P, T>(part, stage).check_finite(multipliers)?;
             }
             for multipliers in [point.u_lower, point.u_upper] {
                 Labels::controls::<P, T>(part, stage).check_finite(multipliers)?;
             }
-            let of_constraints = Labels {
-                part,
-                ..Labels::constraints::<P, T>(
-                    if stage == last { Part::TerminalBounds } else { Part::PathBounds },
-                    stage,
-                )
-            };
+            let bounds = if stage == last { Part::TerminalBounds } else { Part::PathBounds };
+            let of_constraints = Labels { part, ..Labels::constraints::<P, T>(bounds, stage) };
             for multipliers in [point.g_lower, point.g_upper] {
                 of_constraints.check_finite(multipliers)?;
             }

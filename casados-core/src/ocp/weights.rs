@@ -3,7 +3,7 @@
 use super::error::OcpError;
 use crate::function::{Function, MatrixYY};
 use crate::scalar::Real;
-use crate::shape::Outputs;
+use crate::shape::{Matrix, Outputs};
 
 /// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of
 /// its diagonal: then the pivots of `W + δ diag(W)` are positive, but for outputs without weights.
@@ -13,14 +13,14 @@ use crate::shape::Outputs;
 /// [`OcpError::InvalidWeight`]
 pub(super) fn check<F: Function, T: Real>(weights: &MatrixYY<F, T>, coupled: bool) -> Result<(), OcpError> {
     let ny = F::Outputs::NY;
-    let fault = |i: usize, j: usize, value: T, allowed| {
-        let (function, value) = (F::STRUCTURE.name, value.to_f64());
+    let weight = |i: usize, j: usize| entry(weights.as_slice(), j * ny + i);
+    let fault = |i: usize, j: usize, allowed| {
+        let (function, value) = (F::STRUCTURE.name, weight(i, j).to_f64());
         Err(OcpError::InvalidWeight { function, outputs: [i, j], value, allowed })
     };
     for i in 0..ny {
-        let weight = weights[(i, i)];
-        if !(weight >= T::ZERO && weight.is_finite()) {
-            return fault(i, i, weight, "finite and not negative");
+        if !(weight(i, i) >= T::ZERO && weight(i, i).is_finite()) {
+            return fault(i, i, "finite and not negative");
         }
     }
     if !coupled {
@@ -29,32 +29,40 @@ pub(super) fn check<F: Function, T: Real>(weights: &MatrixYY<F, T>, coupled: boo
     let small = T::from_f64(T::EPSILON).sqrt();
     for i in 0..ny {
         for j in 0..i {
-            let [weight, mirrored] = [weights[(i, j)], weights[(j, i)]];
-            let difference = weight - mirrored;
+            let difference = weight(i, j) - weight(j, i);
             // The square of what the matrix may be off by there.
-            let allowed = small * small * weights[(i, i)] * weights[(j, j)];
+            let allowed = small * small * weight(i, i) * weight(j, j);
             let is_symmetric = difference * difference <= allowed;
             if !is_symmetric {
-                return fault(i, j, weight, "finite and the same as that of the same outputs in reverse");
+                let (i, j) =
+                    if weight(i, j).is_finite() && !weight(j, i).is_finite() { (j, i) } else { (i, j) };
+                return fault(i, j, "finite and the same as that of the same outputs in reverse");
             }
         }
     }
     let mut rest = *weights;
+    let rest = rest.as_mut_slice();
     for k in 0..ny {
-        let pivot = rest[(k, k)] + small * weights[(k, k)];
+        let pivot = entry(rest, k * ny + k) + small * weight(k, k);
         if pivot < T::ZERO {
-            return fault(k, k, weights[(k, k)], "larger: the weights are not positive semidefinite");
+            return fault(k, k, "larger: the weights are not positive semidefinite");
         }
         for i in k + 1..ny {
-            let below = rest[(i, k)];
-            if pivot > T::ZERO {
-                for j in k + 1..=i {
-                    rest[(i, j)] = rest[(i, j)] - below * rest[(j, k)] / pivot;
+            let below = entry(rest, k * ny + i);
+            if pivot == T::ZERO && below != T::ZERO {
+                return fault(i, k, "zero where one of the two outputs has no weight of its own");
+            }
+            for j in k + 1..i + 1 {
+                let product = if pivot > T::ZERO { below * entry(rest, k * ny + j) / pivot } else { T::ZERO };
+                if let Some(element) = rest.get_mut(j * ny + i) {
+                    *element = *element - product;
                 }
-            } else if below != T::ZERO {
-                return fault(i, k, below, "zero where one of the two outputs has no weight of its own");
             }
         }
     }
     Ok(())
+}
+
+fn entry<T: Real>(matrix: &[T], index: usize) -> T {
+    matrix.get(index).copied().unwrap_or(T::ZERO)
 }

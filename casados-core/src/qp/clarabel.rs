@@ -38,7 +38,7 @@ pub struct Clarabel {
 
 /// The part of a needed residual that Clarabel is asked for, as its own are relative to terms whose
 /// size is not known beforehand, and the least that is asked for.
-const PART: f64 = 1e-2;
+const PART: f64 = 1e-3;
 const LEAST: f64 = 1e-13;
 
 /// A solver and the pattern that it is for.

@@ -145,6 +145,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
         let ([v, dynamics, _], memory) = (self.lengths, self.memory.as_ref());
         (part(memory, 0, v), part(memory, v, dynamics))
     }
+    /// Everything, and what is padding.
+    pub(crate) fn numbers(&self) -> &[T] {
+        self.memory.as_ref()
+    }
     /// Everything of another solution of the same dimensions.
     pub(crate) fn copy_from(&mut self, other: &Self) {
         super::layout::assign(self.memory.as_mut(), other.memory.as_ref());
