@@ -97,13 +97,7 @@ pub fn two_bars(x: [f64; 5], u: [f64; 2]) -> [f64; 5] {
     let r1 = u[0] + 0.5 * s * (2.0 * first * second + second * second);
     let r2 = u[1] - 0.5 * s * first * first;
     let d = m11 * m22 - m12 * m12;
-    [
-        time * first,
-        time * second,
-        time * (m22 * r1 - m12 * r2) / d,
-        time * (m11 * r2 - m12 * r1) / d,
-        0.0,
-    ]
+    [time * first, time * second, time * (m22 * r1 - m12 * r2) / d, time * (m11 * r2 - m12 * r1) / d, 0.0]
 }
 
 #[function]
@@ -180,11 +174,7 @@ pub fn robot() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64
 /// voltage.
 #[dae]
 pub fn lifting_motor(xdot: [f64; 2], x: [f64; 2], z: [f64; 1], u: [f64; 1]) -> [f64; 3] {
-    [
-        xdot[0] - x[1],
-        xdot[1] + x[0].sin() + 0.1 * x[1] - z[0],
-        z[0] + 0.2 * z[0].powi(3) + 0.5 * x[1] - u[0],
-    ]
+    [xdot[0] - x[1], xdot[1] + x[0].sin() + 0.1 * x[1] - z[0], z[0] + 0.2 * z[0].powi(3) + 0.5 * x[1] - u[0]]
 }
 
 #[function]

@@ -22,7 +22,12 @@ fn rk4<M: Ode>(steps: usize) -> Result<Erk<M, Rk4>, Error> {
 }
 
 /// The straight line between two states, and a constant control, as the guess.
-fn line<P: Formulation<f64>>(ocp: &mut HeapOcp<P>, from: &[f64], to: &[f64], u: &[f64]) -> Result<(), OcpError> {
+fn line<P: Formulation<f64>>(
+    ocp: &mut HeapOcp<P>,
+    from: &[f64],
+    to: &[f64],
+    u: &[f64],
+) -> Result<(), OcpError> {
     let n = ocp.intervals();
     for k in 0..=n {
         let part = k as f64 / n as f64;

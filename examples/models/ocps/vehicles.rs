@@ -53,7 +53,12 @@ pub fn car_within(most: f64) -> Result<HeapOcp<impl Formulation<f64, Dynamics: S
     fix(&mut ocp, 0, &[0.0; 6])?;
     fix(&mut ocp, n, &[50.0, 20.0, 0.0, 0.0, 0.0, 0.0])?;
     let time = f64::min(10.0, most);
-    line(&mut ocp, &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, time], &[50.0, 20.0, 0.0, 5.0, 0.0, 0.0, time], &[0.0; 2])?;
+    line(
+        &mut ocp,
+        &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0, time],
+        &[50.0, 20.0, 0.0, 5.0, 0.0, 0.0, time],
+        &[0.0; 2],
+    )?;
     Ok(ocp)
 }
 
