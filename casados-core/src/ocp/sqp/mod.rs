@@ -6,12 +6,14 @@
 //!
 //! | | |
 //! | --- | --- |
+//! | `multipliers` | the first multipliers, where costs have no curvature |
 //! | `direction` | the QP: regularised where it is not convex, with penalties where it is infeasible |
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `run` | the iterations, and how they end |
 
 mod direction;
 mod measure;
+mod multipliers;
 mod options;
 mod run;
 mod search;

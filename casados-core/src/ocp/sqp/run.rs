@@ -155,6 +155,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         };
         self.leave_elastic(ocp, state);
+        if row.iteration == 0 && C::EXACT {
+            self.first_multipliers(ocp)?;
+        }
         let (residuals, objective) = ocp.residuals();
         (row.residuals, row.objective) = (residuals, objective);
         let size = residuals.largest();

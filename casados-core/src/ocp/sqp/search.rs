@@ -17,6 +17,14 @@ const MARGIN: f64 = 1e-5;
 /// The part of the expected decrease that is enough.
 const ARMIJO: f64 = 1e-4;
 
+/// Weights are at least this part of the largest multiplier: constraints without a force, as at
+/// states that cost nothing, would be left far behind otherwise.
+const LEAST: f64 = 1e-2;
+/// `ρ`: the merit function shrinks by this part of the weighted violations at least, to first
+/// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
+/// "Numerical Optimization", equation (18.36)).
+const SHARE: f64 = 0.1;
+
 /// What a line search remembers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Search {
@@ -85,17 +93,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         let weighted = self.options.globalisation == Globalisation::Merit;
-        if weighted {
-            // Those of this step count at least.
-            let half = T::from_f64(0.5);
-            self.weights.update(&self.solution, |w, multiplier| {
-                let size = multiplier.abs();
-                size.max(half * (w + size))
-            });
-        }
-        let here = ocp.measure_here(weighted.then_some(&self.weights));
-        let penalties = here.objective - ocp.objective.to_f64();
-        let line = Line { here, slope: ocp.slope(&self.solution, penalties) };
+        let line = self.line(ocp);
         let mut written = true;
         if state.search.full {
             if self.try_linearised(ocp, state, &line) {
@@ -128,6 +126,32 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             length *= 0.5;
         }
         Ok(None)
+    }
+
+    /// The line from the iterate to the solution of the QP, with new weights of violations.
+    fn line<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Line {
+        if self.options.globalisation != Globalisation::Merit {
+            let here = ocp.measure_here(None);
+            let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
+            return Line { here, slope };
+        }
+        let multipliers = self.solution.multipliers_mut();
+        let largest = multipliers.iter().fold(T::ZERO, |largest, m| m.abs().max(largest));
+        let (half, least) = (T::from_f64(0.5), T::from_f64(LEAST) * largest);
+        // Those of this step count at least.
+        self.weights.update(&self.solution, |w, multiplier| {
+            let size = multiplier.abs();
+            size.max(half * (w + size)).max(least)
+        });
+        let here = ocp.measure_here(Some(&self.weights));
+        let slope = ocp.slope(&self.solution, here.objective - ocp.objective.to_f64());
+        let factor = slope / ((1.0 - SHARE) * here.violation);
+        if !(factor > 1.0 && factor.is_finite()) {
+            return Line { here, slope };
+        }
+        let factor = T::from_f64(factor);
+        self.weights.multipliers_mut().iter_mut().for_each(|w| *w = factor * *w);
+        Line { here: ocp.measure_here(Some(&self.weights)), slope }
     }
 
     /// The full step, tried by linearising there.
