@@ -1,63 +1,70 @@
 //! Random problems by classes: what is solvable is solved, what is said of the others is true.
 //!
-//! A run has some hundred problems of each class; `CASADOS_QP_RANDOM=100` multiplies that.
+//! A run has some hundred problems of each class; `CASADOS_RANDOM=100` multiplies that.
 
 use crate::Test;
-use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, problem};
+use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, numbers, problem};
+use crate::runs::{Counts, kind, shows, times};
 use casados::qp::{
     Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver,
-    SolutionStage, Stage, StageDims, StageMut, Start, residuals,
+    SolutionStage, Stage, StageDims, StageMut, Start, Statistics, residuals,
 };
 
 const TOLERANCE: f64 = 1e-8;
 
 /// How many problems of a class.
 fn cases(few: u64) -> u64 {
-    let factor = std::env::var("CASADOS_QP_RANDOM").ok().and_then(|factor| factor.parse().ok());
-    few * factor.unwrap_or(1)
+    few * times()
 }
 
-/// What became of the problems of a class.
-#[derive(Debug, Default)]
-struct Counts {
-    all: u64,
-    solved: u64,
-    wrong: u64,
-    infeasible: u64,
-    not_convex: u64,
-    iterations_used_up: u64,
-    stalled: u64,
-    others: u64,
-    iterations: u64,
+/// What became of the problems of a class, and the solver of all of them.
+struct Class {
+    counts: Counts,
+    solver: HeapInteriorPoint<f64>,
 }
 
-impl Counts {
+impl Class {
+    fn new(name: impl Into<String>) -> Self {
+        Self { counts: Counts::new(name), solver: HeapInteriorPoint::new() }
+    }
+    /// Solves with the solver that has seen all problems before: one that never saw them says the
+    /// same, to the bit.
+    fn solve(
+        &mut self,
+        qp: &HeapQp<f64>,
+        start: Start,
+        solution: &mut HeapSolution<f64>,
+    ) -> Result<Statistics, QpError> {
+        let mut other = solution.clone();
+        let mut fresh = HeapInteriorPoint::new();
+        fresh.options = self.solver.options;
+        let found = self.solver.solve(qp.view(), start, solution.view_mut());
+        let again = fresh.solve(qp.view(), start, other.view_mut());
+        assert_eq!(format!("{found:?}"), format!("{again:?}"));
+        assert!(numbers(solution).zip(numbers(&other)).all(|(a, b)| a.to_bits() == b.to_bits()));
+        found
+    }
     /// Every verdict but `Ok` is false: the problem has a solution.
-    fn count(&mut self, seed: u64, found: &Result<(usize, Option<String>), QpError>) {
-        self.all += 1;
+    fn count(&mut self, seed: u64, found: &Result<Option<String>, QpError>) {
         match found {
-            Ok((iterations, None)) => {
-                self.solved += 1;
-                self.iterations += *iterations as u64;
-            }
-            Ok((_, Some(_))) => self.wrong += 1,
-            Err(QpError::Infeasible { .. }) => self.infeasible += 1,
-            Err(QpError::NotConvex { .. }) => self.not_convex += 1,
-            Err(QpError::MaxIterations { .. }) => self.iterations_used_up += 1,
-            Err(QpError::Stalled { .. }) => self.stalled += 1,
-            Err(_) => self.others += 1,
+            Ok(None) => self.counts.count("Ok"),
+            Ok(Some(_)) => self.counts.count("wrong"),
+            Err(error) => self.counts.count(&kind(error)),
         }
-        if std::env::var("CASADOS_QP_SHOW").is_ok() && !matches!(found, Ok((_, None))) {
-            println!("{seed}: {found:?}");
+        if shows() && !matches!(found, Ok(None)) {
+            println!("{}, {seed}: {found:?}", self.counts);
         }
     }
     /// Whether no more than so many of a thousand, or one of a few, were given up with the
     /// residuals that were reached.
     fn unsolved(&self, most: u64) -> bool {
-        1000 * (self.iterations_used_up + self.stalled) <= most * self.all.max(1000)
+        1000 * self.given_up() <= most * self.counts.all().max(1000)
+    }
+    fn given_up(&self) -> u64 {
+        self.counts.among(&["MaxIterations", "Stalled"])
     }
     fn false_verdicts(&self) -> u64 {
-        self.wrong + self.infeasible + self.not_convex + self.others
+        self.counts.all() - self.counts.of("Ok") - self.given_up()
     }
 }
 
@@ -117,29 +124,27 @@ fn objective_terms(data: &Stage<'_, f64>, point: &SolutionStage<'_, f64>) -> f64
 }
 
 /// Solves problems of a kind; `start` may write something senseless into the solution first.
-fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Counts, QpError> {
-    let mut counts = Counts::default();
+fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Class, QpError> {
+    let mut class = Class::new(name);
+    if kind.units > 0.0 {
+        // Terms of other sizes: a part of them is what can be asked for.
+        class.solver.options.relative_tolerance = 1e-9;
+    }
     for seed in 0..cases(few) {
         let mut random = Numbers::new(seed.wrapping_mul(2).wrapping_add(1));
         let known = problem(&mut random, kind)?;
         let (own, _) = residuals(known.qp.view(), &known.solution);
         assert!(own.largest() < 1e-11 * 10_f64.powf(2.0 * kind.units), "{seed}: {own}");
-        let mut solver = HeapInteriorPoint::new();
-        if kind.units > 0.0 {
-            // Terms of other sizes: a part of them is what can be asked for.
-            solver.options.relative_tolerance = 1e-9;
-        }
         let mut solution = HeapSolution::new(known.qp.dims())?;
         if start == Start::Warm {
             senseless(&mut random, &mut solution);
         }
-        let found = solver.solve(known.qp.view(), start, solution.view_mut());
+        let found = class.solve(&known.qp, start, &mut solution);
         let tolerance = if kind.units > 0.0 { f64::INFINITY } else { TOLERANCE };
-        let found = found.map(|statistics| (statistics.iterations, wrong(&known, &solution, tolerance)));
-        counts.count(seed, &found);
+        class.count(seed, &found.map(|_| wrong(&known, &solution, tolerance)));
     }
-    println!("{name}: {counts:?}");
-    Ok(counts)
+    println!("{}", class.counts);
+    Ok(class)
 }
 
 /// Numbers of all sizes and signs, and now and then none.
@@ -167,11 +172,11 @@ fn senseless(random: &mut Numbers, solution: &mut HeapSolution<f64>) {
 
 #[test]
 fn strictly_convex() -> Test {
-    let counts = run("strictly convex", &PLAIN, 300, Start::Cold)?;
-    assert_eq!(counts.solved, counts.all);
+    let class = run("strictly convex", &PLAIN, 300, Start::Cold)?;
+    assert_eq!(class.counts.of("Ok"), class.counts.all());
     let kind = Kind { empty: true, ..PLAIN };
-    let counts = run("strictly convex with empty stages", &kind, 300, Start::Cold)?;
-    assert_eq!(counts.solved, counts.all);
+    let class = run("strictly convex with empty stages", &kind, 300, Start::Cold)?;
+    assert_eq!(class.counts.of("Ok"), class.counts.all());
     Ok(())
 }
 
@@ -179,8 +184,8 @@ fn strictly_convex() -> Test {
 fn convex() -> Test {
     for hessian in [Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, empty: true, ..PLAIN };
-        let counts = run(&format!("{hessian:?}"), &kind, 300, Start::Cold)?;
-        assert!(counts.false_verdicts() == 0 && counts.unsolved(1), "{counts:?}");
+        let class = run(&format!("{hessian:?}"), &kind, 300, Start::Cold)?;
+        assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
     }
     Ok(())
 }
@@ -189,8 +194,8 @@ fn convex() -> Test {
 fn degenerate() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, degenerate: true, empty: true, ..PLAIN };
-        let counts = run(&format!("degenerate, {hessian:?}"), &kind, 300, Start::Cold)?;
-        assert!(counts.false_verdicts() == 0 && counts.unsolved(1), "{counts:?}");
+        let class = run(&format!("degenerate, {hessian:?}"), &kind, 300, Start::Cold)?;
+        assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
     }
     Ok(())
 }
@@ -200,8 +205,8 @@ fn soft() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank] {
         for huge in [1e3, 1e8, 1e10, 1e12, 1e14, 1e20, f64::INFINITY] {
             let kind = Kind { hessian, soft: Some(huge), empty: true, ..PLAIN };
-            let counts = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, Start::Cold)?;
-            assert!(counts.false_verdicts() == 0 && counts.unsolved(1), "{counts:?}");
+            let class = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, Start::Cold)?;
+            assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
         }
     }
     Ok(())
@@ -211,8 +216,8 @@ fn soft() -> Test {
 fn senseless_starts() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, soft: Some(1e12), degenerate: true, empty: true, ..PLAIN };
-        let counts = run(&format!("senseless start, {hessian:?}"), &kind, 200, Start::Warm)?;
-        assert!(counts.false_verdicts() == 0 && counts.unsolved(5), "{counts:?}");
+        let class = run(&format!("senseless start, {hessian:?}"), &kind, 200, Start::Warm)?;
+        assert!(class.false_verdicts() == 0 && class.unsolved(5), "{}", class.counts);
     }
     Ok(())
 }
@@ -222,8 +227,8 @@ fn other_units() -> Test {
     for hessian in [Hessian::Definite, Hessian::Zero] {
         for units in [1.0, 3.0] {
             let kind = Kind { hessian, units, ..PLAIN };
-            let counts = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, Start::Cold)?;
-            assert!(counts.false_verdicts() == 0 && counts.unsolved(5), "{counts:?}");
+            let class = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, Start::Cold)?;
+            assert!(class.false_verdicts() == 0 && class.unsolved(5), "{}", class.counts);
         }
     }
     Ok(())
@@ -235,16 +240,15 @@ fn other_units() -> Test {
 #[test]
 fn infeasible() -> Test {
     for (hessian, distance) in [(Hessian::Definite, 1.0), (Hessian::Zero, 1e-3), (Hessian::LowRank, 1e4)] {
-        let (mut counts, mut found_some) = (Counts::default(), 0);
+        let mut class = Class::new(format!("infeasible by {distance:e}, {hessian:?}"));
         for seed in 0..cases(100) {
             let mut random = Numbers::new(!seed);
             let kind = Kind { hessian, empty: seed % 2 == 0, soft: (seed % 3 == 0).then_some(1e9), ..PLAIN };
             let known = problem(&mut random, &kind)?;
             let Some((qp, stage)) = contradict(&known, &mut random, distance)? else { continue };
-            found_some += 1;
             let mut solution = HeapSolution::new(qp.dims())?;
-            let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
-            counts.count(seed, &found.map(|s| (s.iterations, Some("solved".into()))));
+            let found = class.solve(&qp, Start::Cold, &mut solution);
+            class.count(seed, &found.map(|_| Some("solved".into())));
             let Err(QpError::Infeasible { violation, .. }) = found else { continue };
             // The named violation is the largest of the point, and at least half of what is missing
             // is at one of the rows.
@@ -256,9 +260,9 @@ fn infeasible() -> Test {
             assert!(r.dynamics <= 1e-8 * (1.0 + violation), "{seed}: {r}");
             assert!(violation >= distance / (1e2 * qp.dims()[stage].ng as f64), "{seed}: {violation:e}");
         }
-        println!("infeasible by {distance:e}, {hessian:?}: {counts:?}");
-        assert!(found_some > 0 && counts.wrong + counts.not_convex + counts.others == 0);
-        assert!(counts.unsolved(5), "{counts:?}");
+        println!("{}", class.counts);
+        let (all, true_ones) = (class.counts.all(), class.counts.of("Infeasible"));
+        assert!(all > 0 && true_ones + class.given_up() == all && class.unsolved(5), "{}", class.counts);
     }
     Ok(())
 }
@@ -336,8 +340,8 @@ fn copy(from: &Stage<'_, f64>, to: &mut StageMut<'_, f64>) {
 /// eliminated has a negative eigenvalue.
 #[test]
 fn not_convex() -> Test {
-    let mut counts = Counts::default();
-    let (mut said, mut convex) = (0, 0);
+    let mut class = Class::new("some not convex");
+    let mut convex = 0;
     for seed in 0..cases(300) {
         let mut random = Numbers::new(seed.wrapping_mul(7));
         let dims: Vec<_> = (0..2 + random.below(4))
@@ -358,21 +362,22 @@ fn not_convex() -> Test {
         let x0: Vec<f64> = (0..dims[0].nx).map(|_| random.next()).collect();
         qp.fix_initial_state(&x0)?;
         let mut solution = HeapSolution::new(&dims)?;
-        let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+        let found = class.solve(&qp, Start::Cold, &mut solution);
         let least = least_curvature(&qp);
         convex += u64::from(least > 1e-6);
         match found {
             Ok(_) => assert!(residuals(qp.view(), &solution).0.largest() <= TOLERANCE),
             Err(QpError::NotConvex { pivot, .. }) => {
-                said += 1;
                 assert!(pivot < 0.0 && least < 0.0, "{seed}: {pivot:e} {least:e}");
             }
             Err(_) => assert!(least < 1e-6, "{seed}: {found:?} {least:e}"),
         }
-        counts.count(seed, &found.map(|s| (s.iterations, None)));
+        class.count(seed, &found.map(|_| None));
     }
-    println!("not convex: {counts:?}, {convex} are convex");
-    assert!(said > 0 && convex > 0 && counts.others == 0, "{counts:?}");
+    println!("{}", class.counts);
+    let said = class.counts.of("NotConvex");
+    let known = said + class.counts.of("Ok") + class.given_up();
+    assert!(said > 0 && convex > 0 && known == class.counts.all(), "{}", class.counts);
     Ok(())
 }
 

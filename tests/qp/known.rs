@@ -2,7 +2,7 @@
 //! and the gradient is what makes them satisfy the conditions of optimality. Where the Hessian is
 //! positive semidefinite that point is a minimum, whatever else is degenerate.
 
-use casados::qp::{HeapQp, HeapSolution, QpError, StageDims};
+use casados::qp::{HeapQp, HeapSolution, QpError, SolutionStage, StageDims};
 
 const INFINITY: f64 = f64::INFINITY;
 
@@ -35,6 +35,15 @@ impl Numbers {
     pub fn power(&mut self, exponent: f64) -> f64 {
         10_f64.powf(exponent * self.next())
     }
+}
+
+/// All numbers of a solution.
+pub fn numbers(solution: &HeapSolution<f64>) -> impl Iterator<Item = f64> {
+    let parts = |s: SolutionStage<'_, f64>| -> Vec<f64> {
+        let sides = [s.x_lower, s.x_upper, s.u_lower, s.u_upper, s.g_lower, s.g_upper];
+        [s.x, s.u, s.dynamics].into_iter().chain(sides).flatten().copied().collect()
+    };
+    solution.stages().flat_map(parts)
 }
 
 /// The Hessians of the stages.

@@ -4,7 +4,10 @@
 
 #[path = "../data/mod.rs"]
 mod data;
+#[path = "../runs/mod.rs"]
+mod runs;
 
+mod absurd;
 mod chain;
 mod classes;
 mod errors;

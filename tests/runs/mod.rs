@@ -1,0 +1,74 @@
+//! Random runs: how long they are, and what became of them.
+//!
+//! `CASADOS_RANDOM=100` makes them a hundred times as long. Each class prints a row of the table in
+//! `docs/random_runs.md`.
+
+#![allow(dead_code)] // Each program that includes it takes a part.
+
+use std::collections::BTreeMap;
+use std::fmt::{self, Debug};
+
+/// How many times as long as usual.
+pub fn times() -> u64 {
+    let given = std::env::var("CASADOS_RANDOM").ok().and_then(|times| times.parse().ok());
+    given.unwrap_or(1)
+}
+
+/// Whether cases with other verdicts than `Ok` are printed.
+pub fn shows() -> bool {
+    std::env::var("CASADOS_RANDOM_SHOW").is_ok()
+}
+
+/// How many cases of a class ended with each verdict.
+pub struct Counts {
+    class: String,
+    of: BTreeMap<String, u64>,
+}
+
+impl Counts {
+    pub fn new(class: impl Into<String>) -> Self {
+        Self { class: class.into(), of: BTreeMap::new() }
+    }
+
+    /// One more of a verdict.
+    pub fn count(&mut self, verdict: &str) {
+        *self.of.entry(verdict.into()).or_default() += 1;
+    }
+
+    /// One more of `Ok`, or of the kind of an error.
+    pub fn result<T, E: Debug>(&mut self, found: &Result<T, E>) {
+        match found {
+            Ok(_) => self.count("Ok"),
+            Err(error) => self.count(&kind(error)),
+        }
+    }
+
+    /// How many of a verdict.
+    pub fn of(&self, verdict: &str) -> u64 {
+        self.of.get(verdict).copied().unwrap_or(0)
+    }
+
+    /// How many of some verdicts.
+    pub fn among(&self, verdicts: &[&str]) -> u64 {
+        verdicts.iter().map(|verdict| self.of(verdict)).sum()
+    }
+
+    pub fn all(&self) -> u64 {
+        self.of.values().sum()
+    }
+}
+
+impl fmt::Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "| {} | {} | {} |", self.class, self.all(), self.of("Ok"))?;
+        let others: Vec<_> = self.of.iter().filter(|(verdict, _)| *verdict != "Ok").collect();
+        let others: Vec<_> = others.iter().map(|(verdict, count)| format!("{verdict} {count}")).collect();
+        write!(f, " {} |", others.join(", "))
+    }
+}
+
+/// The name of the variant of an error.
+pub fn kind(error: &impl Debug) -> String {
+    let text = format!("{error:?}");
+    text.chars().take_while(|c| c.is_alphanumeric()).collect()
+}
