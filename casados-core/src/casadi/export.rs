@@ -31,15 +31,33 @@ macro_rules! __casadi_export {
                 $(settings.$field = $value;)*
                 Functions::new(settings)
             });
-            $crate::__casadi_function!(LIBRARY, 0, "", $name);
-            $crate::__casadi_function!(LIBRARY, 1, "jac_", $name);
-            $crate::__casadi_function!(LIBRARY, 2, "adj1_", $name);
-            $crate::__casadi_function!(LIBRARY, 3, "jac_adj1_", $name);
-            /// How many intervals were integrated, for tests.
-            #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
-            extern "C" fn integrations() -> ::core::ffi::c_longlong {
-                $crate::casadi::ffi::integrations(&LIBRARY)
-            }
+            $crate::__casadi_functions!(LIBRARY, $name);
+        };
+    };
+}
+
+/// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all intervals
+/// of a horizon, one after the other in time, in one call. `x0`, `u`, `p` and `xf` have a column for
+/// each. The last answers are remembered, two if `cache` says nothing else.
+///
+/// ```text
+/// casados::casadi::export_horizon! {
+///     pendulums = Batch<Pendulum, Gauss<2>>, interval = 0.2, intervals = 40, options = Options { steps: 4, ..Default::default() }
+/// }
+/// ```
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_export_horizon {
+    ($name:ident = $batch:ty, interval = $interval:expr, intervals = $count:expr $(, $field:ident = $value:expr)* $(,)?) => {
+        const _: () = {
+            type Functions = $crate::casadi::Horizons<$batch>;
+            static LIBRARY: $crate::casadi::Library<Functions> = $crate::casadi::Library::new(|| {
+                let mut settings = $crate::casadi::Settings::new($interval);
+                settings.cache = 2;
+                $(settings.$field = $value;)*
+                Functions::new(settings, $count)
+            });
+            $crate::__casadi_functions!(LIBRARY, $name);
         };
     };
 }
@@ -74,6 +92,23 @@ macro_rules! __casadi_export_problem {
                 $crate::casadi::ffi::integrations(&LIBRARY)
             }
         };
+    };
+}
+
+/// Exports the four functions of an integrator.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_functions {
+    ($library:ident, $name:ident) => {
+        $crate::__casadi_function!($library, 0, "", $name);
+        $crate::__casadi_function!($library, 1, "jac_", $name);
+        $crate::__casadi_function!($library, 2, "adj1_", $name);
+        $crate::__casadi_function!($library, 3, "jac_adj1_", $name);
+        /// How many intervals were integrated, for tests.
+        #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
+        extern "C" fn integrations() -> ::core::ffi::c_longlong {
+            $crate::casadi::ffi::integrations(&$library)
+        }
     };
 }
 

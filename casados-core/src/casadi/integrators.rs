@@ -3,17 +3,19 @@
 //! With `w = (x₀, u, p)` and the outputs `y = (x, q)` they are `y`, `∂y/∂w`, `∇(λᵀy)`, and the
 //! derivatives of `∇(λᵀy)`, which are `∇²(λᵀy)` by `w` and `(∂y/∂w)ᵀ` by `λ`.
 
-use super::cache::{Answer, Cache, equal};
+use super::blocks::{
+    Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, rows, write,
+};
+use super::cache::{Answer, Cache};
 use super::dependence;
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
 use super::interval::{Interval, Point};
 use super::library::{Client, Failure};
-use super::signature::{self, Entry, Output, Source};
+use super::signature::{self, Output};
 use super::sparsity::Relation;
 use crate::batch::vector;
 use crate::model::{Dae, VectorX};
-use crate::result::{Forward, Hessian};
 use crate::shape::{Matrix, Shape};
 use alloc::vec;
 use alloc::vec::Vec;
@@ -86,8 +88,9 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let mut outputs: Vec<_> = [0..nx, nx..ny].into();
         outputs.truncate(1 + usize::from(Q::COUNT > 0));
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
-        let functions = signature::functions(&inputs, &outputs, &value, &hessian);
-        let (signatures, outputs) = functions.into_iter().unzip();
+        let shape =
+            signature::Shape { count: 1, inputs, outputs: &outputs, value: &value, hessian: &hessian };
+        let (signatures, outputs) = shape.functions().into_iter().unzip();
         let cache = Mutex::new(Cache::new(settings.cache));
         let integrations = AtomicU64::new(0);
         Self { settings, signatures, outputs, cache, integrations, integrals: PhantomData }
@@ -135,19 +138,17 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let seed: VectorX<I::Model, f64> = vector(of_states);
         if wanted.hessian {
             let result = integrator.curvature(&point, &seed, along)?;
-            jacobian::<I::Model>(result, ny, answer.jacobian.set(ny * nw));
-            hessian::<I::Model>(result, answer.hessian.set(nw * nw));
+            jacobian(result, ny, answer.jacobian.set(ny * nw));
+            hessian(result, answer.hessian.set(nw * nw));
             answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
-            let parts = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
-            join(parts, answer.gradient.set(nw));
+            gradient_of(result, answer.gradient.set(nw));
         } else if wanted.gradient {
             let result = integrator.gradient(&point, &seed, along)?;
             answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
-            let parts = [result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()];
-            join(parts, answer.gradient.set(nw));
+            gradient(result, answer.gradient.set(nw));
         } else if wanted.jacobian {
             let result = integrator.jacobian(&point, along)?;
-            jacobian::<I::Model>(result, ny, answer.jacobian.set(ny * nw));
+            jacobian(result, ny, answer.jacobian.set(ny * nw));
             answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
         } else {
             let result = integrator.value(&point, along)?;
@@ -213,15 +214,10 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             return Err(Failure("there is no such function".into()));
         };
         let wanted = Wanted::by(outputs, call);
-        if !(wanted.value || wanted.jacobian || wanted.gradient || wanted.hessian) {
+        if wanted.is_nothing() {
             return Ok(());
         }
-        let mut begin = 0;
-        for (input, port) in signature.inputs.iter().enumerate().take(3) {
-            let end = begin + port.sparsity.entries().len();
-            call.read(input, &mut worker.inputs[begin..end]);
-            begin = end;
-        }
+        read_inputs(signature, call, &mut worker.inputs);
         read_multipliers(signature, call, &mut worker.lambda);
         if self.known(worker, &wanted, outputs, call) {
             return Ok(());
@@ -235,111 +231,5 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
 
     fn integrations(&self) -> u64 {
         self.integrations.load(Ordering::Relaxed)
-    }
-}
-
-/// The multipliers of the outputs, which follow the nominal outputs among the inputs of adjoints.
-fn read_multipliers(signature: &Signature, call: &dyn Call, lambda: &mut [f64]) {
-    let mut begin = 0;
-    for (input, port) in signature.inputs.iter().enumerate() {
-        if signature::is_seed(port) {
-            let end = begin + port.sparsity.entries().len();
-            call.read(input, &mut lambda[begin..end]);
-            begin = end;
-        }
-    }
-}
-
-/// What the wanted outputs are made of.
-struct Wanted {
-    value: bool,
-    jacobian: bool,
-    gradient: bool,
-    hessian: bool,
-}
-
-impl Wanted {
-    fn by(outputs: &[Output], call: &dyn Call) -> Self {
-        let wants = |source| {
-            outputs.iter().enumerate().any(|(index, output)| {
-                output.source == source && !output.entries.is_empty() && call.wants(index)
-            })
-        };
-        Self {
-            value: wants(Source::Value),
-            jacobian: wants(Source::Jacobian),
-            gradient: wants(Source::Gradient),
-            hessian: wants(Source::Hessian),
-        }
-    }
-
-    fn is_in<T>(&self, answer: &Answer<T>, lambda: &[f64]) -> bool {
-        let same = || answer.lambda.get().is_some_and(|known| equal(known, lambda));
-        (!self.value || answer.value.get().is_some())
-            && (!self.jacobian || answer.jacobian.get().is_some())
-            && (!self.gradient || answer.gradient.get().is_some() && same())
-            && (!self.hessian || answer.hessian.get().is_some() && same())
-    }
-}
-
-/// The outputs that are wanted.
-fn write<T>(answer: &Answer<T>, outputs: &[Output], call: &mut dyn Call) {
-    for (index, Output { source, entries }) in outputs.iter().enumerate() {
-        let Some(to) = call.output(index) else { continue };
-        let part = match source {
-            Source::Value => &answer.value,
-            Source::Jacobian => &answer.jacobian,
-            Source::Gradient => &answer.gradient,
-            Source::Hessian => &answer.hessian,
-            Source::Zero => continue,
-        };
-        if let Some(from) = part.get() {
-            for (to, &Entry(entry)) in to.iter_mut().zip(entries) {
-                *to = from.get(entry).copied().unwrap_or(f64::NAN);
-            }
-        }
-    }
-}
-
-fn join(parts: [&[f64]; 3], to: &mut [f64]) {
-    for (to, from) in to.iter_mut().zip(parts.into_iter().flatten()) {
-        *to = *from;
-    }
-}
-
-/// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
-fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &mut [f64]) {
-    if count > 0 {
-        let columns = blocks.into_iter().flat_map(|block| block.chunks_exact(count));
-        for (column, to) in columns.zip(to.chunks_exact_mut(rows)) {
-            to[first..first + count].copy_from_slice(column);
-        }
-    }
-}
-
-fn jacobian<M: Dae>(result: &Forward<M>, ny: usize, to: &mut [f64]) {
-    let blocks = [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()];
-    rows(blocks, M::Shape::NX, 0, ny, to);
-}
-
-/// Both triangles over `(x₀, u, p)`.
-fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
-    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-    let blocks: [(&[f64], [usize; 2], usize); 6] = [
-        (result.h_xx.as_slice(), [0, 0], nx),
-        (result.h_xu.as_slice(), [0, nx], nx),
-        (result.h_uu.as_slice(), [nx, nx], nu),
-        (result.h_xp.as_slice(), [0, nx + nu], nx),
-        (result.h_up.as_slice(), [nx, nx + nu], nu),
-        (result.h_pp.as_slice(), [nx + nu, nx + nu], nw - nx - nu),
-    ];
-    for (block, [row, column], rows) in blocks {
-        for (j, values) in block.chunks_exact(rows.max(1)).enumerate() {
-            for (i, value) in values.iter().enumerate() {
-                let (i, j) = (row + i, column + j);
-                to[i + nw * j] = *value;
-                to[j + nw * i] = *value;
-            }
-        }
     }
 }

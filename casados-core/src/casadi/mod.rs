@@ -26,17 +26,23 @@
 //! An adaptive integrator takes the steps that it chose at [`Settings::steps_at`] in all calls: one
 //! smooth function of its inputs.
 //!
+//! [`export_horizon!`] has the same functions for all intervals of a horizon in one call, a column
+//! for each; [`export_problem!`] a whole problem of [`ocp`](crate::ocp) for `casadi.nlpsol`.
+//!
 //! The interface is described in CasADi's `casadi/core/external.cpp` and `external_impl.hpp`.
 
+mod blocks;
 mod cache;
 mod dependence;
 mod export;
 #[doc(hidden)]
 pub mod ffi;
 mod function;
+mod horizon;
 mod integral;
 mod integrators;
 mod interval;
+mod layout;
 mod library;
 mod problem;
 mod program;
@@ -44,7 +50,11 @@ mod signature;
 mod sparsity;
 
 #[doc(inline)]
-pub use crate::{__casadi_export as export, __casadi_export_problem as export_problem};
+pub use crate::{
+    __casadi_export as export, __casadi_export_horizon as export_horizon,
+    __casadi_export_problem as export_problem,
+};
+pub use horizon::{Horizon, Horizons};
 pub use integral::{Integral, Nothing, Of};
 pub use integrators::{Integrators, Settings};
 pub use interval::Interval;

@@ -1,4 +1,5 @@
-//! Names, patterns and sources of the outputs of `F`, `jac_F`, `adj1_F` and `jac_adj1_F`.
+//! Names, patterns and sources of the outputs of `F`, `jac_F`, `adj1_F` and `jac_adj1_F`, of one
+//! interval or of many side by side, whose matrices are block-diagonal.
 //!
 //! Inputs of a derivative are those of the function, then its outputs, `out_…`, whose patterns are
 //! empty here: nothing depends on them, and CasADi does not compute what nobody needs. Blocks of
@@ -67,95 +68,136 @@ pub fn is_seed(port: &Port) -> bool {
     SEEDS.contains(&port.name)
 }
 
-/// The four functions: `inputs` and `outputs` are ranges of `w` and of `y`, `value` says where
-/// `∂y/∂w` has entries, `hessian` where `∇²(λᵀy)` has.
-pub fn functions(
-    inputs: &[Range<usize>; 3],
-    outputs: &[Range<usize>],
-    value: &Relation,
-    hessian: &Relation,
-) -> [(Signature, Vec<Output>); 4] {
-    let names = |names: &[&'static CStr], ranges: &[Range<usize>], zero: bool| -> Vec<Port> {
-        let sparsity = |length| if zero { Sparsity::zero(length, 1) } else { Sparsity::vector(length) };
+/// What one interval has.
+pub struct Shape<'a> {
+    /// How many intervals there are.
+    pub count: usize,
+    /// The inputs as ranges of `w`.
+    pub inputs: [Range<usize>; 3],
+    /// The outputs as ranges of `y`.
+    pub outputs: &'a [Range<usize>],
+    /// Where `∂y/∂w` has entries.
+    pub value: &'a Relation,
+    /// Where `∇²(λᵀy)` has.
+    pub hessian: &'a Relation,
+}
+
+impl Shape<'_> {
+    /// Elements of `w`.
+    fn directions(&self) -> usize {
+        self.inputs.iter().map(Range::len).sum()
+    }
+
+    /// Elements of `y`.
+    fn rows(&self) -> usize {
+        self.outputs.iter().map(Range::len).sum()
+    }
+
+    /// The four functions.
+    pub fn functions(&self) -> [(Signature, Vec<Output>); 4] {
+        let Self { inputs, outputs, .. } = self;
+        let [of_inputs, of_outputs] =
+            [self.ports(&INPUTS, inputs, false), self.ports(&OUTPUTS, outputs, false)];
+        let nominal = self.ports(&NOMINAL, outputs, true);
+        let seeds = self.ports(&SEEDS, outputs, false);
+        let gradients = self.ports(&GRADIENTS, inputs, false);
+        let of_adjoint = [of_inputs.clone(), nominal.clone(), seeds].concat();
+        let of_second = [of_adjoint.clone(), self.ports(&NOMINAL_GRADIENTS, inputs, true)].concat();
+        let [value, gradient] = [
+            self.vectors(Source::Value, outputs, self.rows()),
+            self.vectors(Source::Gradient, inputs, self.directions()),
+        ];
+        let [first, second] = [self.first(), self.second()];
+        let whole =
+            |inputs, (outputs, sources): (Vec<Port>, Vec<Output>)| (Signature { inputs, outputs }, sources);
+        [
+            whole(of_inputs.clone(), (of_outputs, value)),
+            whole([of_inputs, nominal].concat(), first),
+            whole(of_adjoint, (gradients, gradient)),
+            whole(of_second, second),
+        ]
+    }
+
+    /// A column for each interval.
+    fn ports(&self, names: &[&'static CStr], ranges: &[Range<usize>], zero: bool) -> Vec<Port> {
+        let sparsity = |length| Sparsity::new(length, self.count, |_, _| !zero);
         names.iter().zip(ranges).map(|(name, range)| Port::new(name, sparsity(range.len()))).collect()
-    };
-    let [of_inputs, of_outputs] = [names(&INPUTS, inputs, false), names(&OUTPUTS, outputs, false)];
-    let nominal = names(&NOMINAL, outputs, true);
-    let seeds = names(&SEEDS, outputs, false);
-    let gradients = names(&GRADIENTS, inputs, false);
-    let of_adjoint = [of_inputs.clone(), nominal.clone(), seeds].concat();
-    let of_second = [of_adjoint.clone(), names(&NOMINAL_GRADIENTS, inputs, true)].concat();
-
-    let plain = |source, ranges: &[Range<usize>]| -> Vec<Output> {
-        let entries = |range: &Range<usize>| range.clone().map(Entry).collect();
-        ranges.iter().map(|range| Output { source, entries: entries(range) }).collect()
-    };
-    let [first, second] = [first(inputs, outputs, value), second(inputs, outputs, value, hessian)];
-    let whole =
-        |inputs, (outputs, sources): (Vec<Port>, Vec<Output>)| (Signature { inputs, outputs }, sources);
-    [
-        whole(of_inputs.clone(), (of_outputs, plain(Source::Value, outputs))),
-        whole([of_inputs, nominal].concat(), first),
-        whole(of_adjoint, (gradients, plain(Source::Gradient, inputs))),
-        whole(of_second, second),
-    ]
-}
-
-/// The blocks of `∂y/∂w`.
-fn first(inputs: &[Range<usize>; 3], outputs: &[Range<usize>], value: &Relation) -> (Vec<Port>, Vec<Output>) {
-    let rows = outputs.iter().map(Range::len).sum::<usize>();
-    let mut blocks = (Vec::new(), Vec::new());
-    for (names, output) in JACOBIANS.iter().zip(outputs) {
-        for (name, input) in names.iter().zip(inputs) {
-            let sparsity = value.block(output.clone(), input.clone());
-            let entries = places(&sparsity, output.start + rows * input.start, 1, rows);
-            push(&mut blocks, name, sparsity, Source::Jacobian, entries);
-        }
     }
-    blocks
-}
 
-/// The blocks of the derivatives of `∇(λᵀy)`.
-fn second(
-    inputs: &[Range<usize>; 3],
-    outputs: &[Range<usize>],
-    value: &Relation,
-    hessian: &Relation,
-) -> (Vec<Port>, Vec<Output>) {
-    let directions = inputs.iter().map(Range::len).sum::<usize>();
-    let rows = outputs.iter().map(Range::len).sum::<usize>();
-    let mut blocks = (Vec::new(), Vec::new());
-    for (gradient, row) in inputs.iter().enumerate() {
-        for (name, column) in HESSIANS[gradient].iter().zip(inputs) {
-            let sparsity = hessian.block(row.clone(), column.clone());
-            let entries = places(&sparsity, row.start + directions * column.start, 1, directions);
-            push(&mut blocks, name, sparsity, Source::Hessian, entries);
-        }
-        for (name, output) in BY_NOMINAL[gradient].iter().zip(outputs) {
-            push(&mut blocks, name, Sparsity::zero(row.len(), output.len()), Source::Zero, Vec::new());
-        }
-        for (name, output) in BY_SEEDS[gradient].iter().zip(outputs) {
-            let sparsity = value.transposed_block(output.clone(), row.clone());
-            let entries = places(&sparsity, output.start + rows * row.start, rows, 1);
-            push(&mut blocks, name, sparsity, Source::Jacobian, entries);
-        }
+    fn vectors(&self, source: Source, ranges: &[Range<usize>], length: usize) -> Vec<Output> {
+        let intervals = |range: &Range<usize>| {
+            let of = |k: usize| range.clone().map(move |index| Entry(k * length + index));
+            (0..self.count).flat_map(of).collect()
+        };
+        ranges.iter().map(|range| Output { source, entries: intervals(range) }).collect()
     }
-    blocks
+
+    /// The blocks of `∂y/∂w`.
+    fn first(&self) -> (Vec<Port>, Vec<Output>) {
+        let rows = self.rows();
+        let mut blocks = (Vec::new(), Vec::new());
+        for (names, output) in JACOBIANS.iter().zip(self.outputs) {
+            for (name, input) in names.iter().zip(&self.inputs) {
+                let sparsity = self.value.block(output.clone(), input.clone());
+                let place = Place { first: output.start + rows * input.start, row: 1, column: rows };
+                self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
+            }
+        }
+        blocks
+    }
+
+    /// The blocks of the derivatives of `∇(λᵀy)`.
+    fn second(&self) -> (Vec<Port>, Vec<Output>) {
+        let (directions, rows) = (self.directions(), self.rows());
+        let mut blocks = (Vec::new(), Vec::new());
+        for (gradient, row) in self.inputs.iter().enumerate() {
+            for (name, column) in HESSIANS[gradient].iter().zip(&self.inputs) {
+                let sparsity = self.hessian.block(row.clone(), column.clone());
+                let place =
+                    Place { first: row.start + directions * column.start, row: 1, column: directions };
+                self.push(&mut blocks, name, &sparsity, Source::Hessian, place);
+            }
+            for (name, output) in BY_NOMINAL[gradient].iter().zip(self.outputs) {
+                let sparsity = Sparsity::zero(row.len(), output.len());
+                self.push(&mut blocks, name, &sparsity, Source::Zero, Place { first: 0, row: 0, column: 0 });
+            }
+            for (name, output) in BY_SEEDS[gradient].iter().zip(self.outputs) {
+                let sparsity = self.value.transposed_block(output.clone(), row.clone());
+                let place = Place { first: output.start + rows * row.start, row: rows, column: 1 };
+                self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
+            }
+        }
+        blocks
+    }
+
+    /// Adds a block for each interval.
+    fn push(
+        &self,
+        blocks: &mut (Vec<Port>, Vec<Output>),
+        name: &'static CStr,
+        sparsity: &Sparsity,
+        source: Source,
+        place: Place,
+    ) {
+        // How much there is of one interval.
+        let length = match source {
+            Source::Hessian => self.directions() * self.directions(),
+            _ => self.rows() * self.directions(),
+        };
+        let of = |k: usize| {
+            let entries = sparsity.entries().iter();
+            entries.map(move |&(i, j)| Entry(k * length + place.first + i * place.row + j * place.column))
+        };
+        let entries = (0..self.count).flat_map(of).collect();
+        blocks.0.push(Port::new(name, sparsity.diagonal(self.count)));
+        blocks.1.push(Output { source, entries });
+    }
 }
 
-/// Where the entries of a block are, whose first element is at `first`, with this distance from row
-/// to row and from column to column.
-fn places(sparsity: &Sparsity, first: usize, row: usize, column: usize) -> Vec<Entry> {
-    sparsity.entries().iter().map(|&(i, j)| Entry(first + i * row + j * column)).collect()
-}
-
-fn push(
-    blocks: &mut (Vec<Port>, Vec<Output>),
-    name: &'static CStr,
-    sparsity: Sparsity,
-    source: Source,
-    entries: Vec<Entry>,
-) {
-    blocks.0.push(Port::new(name, sparsity));
-    blocks.1.push(Output { source, entries });
+/// Where the first element of a block is, and the distances of rows and of columns.
+#[derive(Clone, Copy)]
+struct Place {
+    first: usize,
+    row: usize,
+    column: usize,
 }

@@ -47,6 +47,18 @@ impl Sparsity {
         Self::new(rows, columns, |_, _| false)
     }
 
+    /// This pattern so many times along the diagonal.
+    pub fn diagonal(&self, count: usize) -> Self {
+        let [rows, columns] = self.dimensions();
+        let of = |k: usize| self.entries.iter().map(move |&(i, j)| (k * rows + i, k * columns + j));
+        Self::from_entries(count * rows, count * columns, (0..count).flat_map(of).collect())
+    }
+
+    /// The numbers of rows and columns.
+    pub fn dimensions(&self) -> [usize; 2] {
+        [0, 1].map(|index| self.compressed.get(index).map_or(0, |&length| length as usize))
+    }
+
     /// What CasADi reads.
     pub fn compressed(&self) -> &[i64] {
         &self.compressed

@@ -58,6 +58,10 @@ casados::casadi::export! {
 }
 casados::casadi::export! { cascade_euler = Erk<Cascade, Euler>, interval = 0.1, options = steps(1) }
 casados::casadi::export! { cascade = Irk<Cascade, Gauss<3>>, interval = 0.1 }
+casados::casadi::export_horizon! {
+    pendulums = Batch<Pendulum, Gauss<2>>, interval = 0.05, intervals = 7, options = steps(2)
+}
+casados::casadi::export_horizon! { roots = Batch<Root, RadauIIA<2>>, interval = 0.1, intervals = 5 }
 casados::casadi::export! { root = Irk<Root, RadauIIA<2>>, interval = 0.1 }
 casados::casadi::export! {
     adaptive = Adaptive<Pendulum, Radau>, interval = 0.5,
