@@ -2,8 +2,8 @@
 //! there for whoever asks next.
 //!
 //! IPOPT asks for all constraints, then for their Jacobian, then for the Hessian at the same
-//! iterate, each by a graph of its own over the same intervals. So there is an entry for each of the
-//! inputs, found by their bits.
+//! iterate, each by a graph of its own over the same intervals. So there is an entry for each of
+//! the inputs, found by their bits.
 
 use alloc::vec::Vec;
 use std::collections::HashMap;
@@ -112,7 +112,8 @@ struct Entry<T> {
 }
 
 impl<T: Default> Cache<T> {
-    /// A cache of at most this number of entries, which have their memory from when they are needed.
+    /// A cache of at most this number of entries, which have their memory from when they are
+    /// needed.
     pub fn new(capacity: usize) -> Self {
         Self { entries: Vec::new(), places: HashMap::default(), capacity, oldest: 0 }
     }
@@ -123,8 +124,8 @@ impl<T: Default> Cache<T> {
         equal(&entry.inputs, inputs).then_some(&entry.answer)
     }
 
-    /// Takes what is known about these inputs, and leaves some other memory in its place. The oldest
-    /// inputs are forgotten if there is no place.
+    /// Takes what is known about these inputs, and leaves some other memory in its place. The
+    /// oldest inputs are forgotten if there is no place.
     pub fn store(&mut self, inputs: &[f64], answer: &mut Answer<T>) {
         let hash = hash(inputs);
         if let Some(entry) = self.places.get(&hash).and_then(|&place| self.entries.get_mut(place)) {

@@ -67,8 +67,8 @@ const fn variable_of(unknown: usize, nx: usize) -> usize {
     if unknown < nx { unknown } else { nx + unknown }
 }
 
-/// Which entries of the Hessian of any `λᵀy` over `w` may differ from zero, where `second` are those
-/// of second derivatives by the variables.
+/// Which entries of the Hessian of any `λᵀy` over `w` may differ from zero, where `second` are
+/// those of second derivatives by the variables.
 pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation, directions: usize) {
     for (one, other) in second.iter() {
         for a in (0..directions).filter(|&a| variables.has(one, a)) {
@@ -80,7 +80,8 @@ pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation, 
     }
 }
 
-/// An equation for each unknown `(ẋ, z)`, by augmenting paths; none if there is no perfect matching.
+/// An equation for each unknown `(ẋ, z)`, by augmenting paths; none if there is no perfect
+/// matching.
 fn matching<M: Dae>() -> Vec<Option<usize>> {
     let (nx, nk) = (M::Shape::NX, M::Shape::NK);
     let mut unknowns_of = vec![Vec::new(); nk];

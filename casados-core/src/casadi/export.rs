@@ -37,8 +37,8 @@ macro_rules! __casadi_export {
 }
 
 /// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all intervals
-/// of a horizon, one after the other in time, in one call. `x0`, `u`, `p` and `xf` have a column for
-/// each. The last answers are remembered, two if `cache` says nothing else.
+/// of a horizon, one after the other in time, in one call. `x0`, `u`, `p` and `xf` have a column
+/// for each. The last answers are remembered, two if `cache` says nothing else.
 ///
 /// ```text
 /// casados::casadi::export_horizon! {
@@ -62,8 +62,8 @@ macro_rules! __casadi_export_horizon {
     };
 }
 
-/// Exports a problem of optimal control to CasADi: `casadi.nlpsol("s", "ipopt", "./lib….so")` solves
-/// it, with all of its derivatives computed in the library; see [`casadi`](crate::casadi).
+/// Exports a problem of optimal control to CasADi: `casadi.nlpsol("s", "ipopt", "./lib….so")`
+/// solves it, with all of its derivatives computed in the library; see [`casadi`](crate::casadi).
 ///
 /// ```text
 /// fn swing() -> Result<impl Program, Box<dyn Error>> { … }

@@ -1,8 +1,9 @@
 //! The functions of a shared library that CasADi calls: pointers become a safe `Call`.
 //!
-//! CasADi's contract (`casadi/core/external_impl.hpp`): the pointers of a call are to as many arrays
-//! as there are inputs and outputs, each null or as long as its pattern has non-zeros; nobody else
-//! writes them during the call. Patterns and names are read as long as the function is referred to.
+//! CasADi's contract (`casadi/core/external_impl.hpp`): the pointers of a call are to as many
+//! arrays as there are inputs and outputs, each null or as long as its pattern has non-zeros;
+//! nobody else writes them during the call. Patterns and names are read as long as the function is
+//! referred to.
 #![allow(unsafe_code)]
 
 use super::function::{Call, Port, Signature};
@@ -66,8 +67,8 @@ impl Call for Pointers<'_> {
         }
         let port = self.outputs.get(output)?;
         // SAFETY: as in `wants`, which says that the pointer is not null; then it is to an array of
-        // as many numbers as the pattern has non-zeros, which nobody else reads or writes during the
-        // call. The result borrows `self`, so that there is no second reference.
+        // as many numbers as the pattern has non-zeros, which nobody else reads or writes during
+        // the call. The result borrows `self`, so that there is no second reference.
         Some(unsafe { from_raw_parts_mut(*self.results.add(output), port.sparsity.entries().len()) })
     }
 }
@@ -111,8 +112,8 @@ pub fn name<C: Client>(
     name.flatten().unwrap_or(null())
 }
 
-/// `F_sparsity_in`, `F_sparsity_out`: null if there is no such port. The pointer is one to memory of
-/// the client, which lives until the last reference to the functions is gone.
+/// `F_sparsity_in`, `F_sparsity_out`: null if there is no such port. The pointer is one to memory
+/// of the client, which lives until the last reference to the functions is gone.
 pub fn sparsity<C: Client>(
     library: &Library<C>,
     function: usize,

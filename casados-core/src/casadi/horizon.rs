@@ -1,5 +1,5 @@
-//! A batch as the functions of one integrator, of all intervals of a horizon at once: `x0`, `u`, `p`
-//! and `xf` have a column for each interval, derivatives are block-diagonal.
+//! A batch as the functions of one integrator, of all intervals of a horizon at once: `x0`, `u`,
+//! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
 
 use super::blocks::{Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, write};
 use super::cache::{Answer, Cache};

@@ -17,11 +17,11 @@
 //! | `adj1_F` | and `adj_xf`, which is `λ` | `∇(λᵀxf)` |
 //! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and the transposed Jacobian, which is the derivative by `λ` |
 //!
-//! Patterns are those of the model's graph, followed over stages and steps. What was computed at the
-//! last inputs is remembered ([`Settings::cache`]): the stages are solved for once, whatever is asked
-//! about them, in whatever order. Results that nobody wants are not computed. A call that fails
-//! returns CasADi's status for that; with the variable `CASADOS_CASADI_ERRORS` in the environment it
-//! says why on standard error. Threads (`F.map(N, "thread")`) have memory of their own.
+//! Patterns are those of the model's graph, followed over stages and steps. What was computed at
+//! the last inputs is remembered ([`Settings::cache`]): the stages are solved for once, whatever is
+//! asked about them, in whatever order. Results that nobody wants are not computed. A call that
+//! fails returns CasADi's status for that; with the variable `CASADOS_CASADI_ERRORS` in the
+//! environment it says why on standard error. Threads (`F.map(N, "thread")`) have memory of their own.
 //!
 //! An adaptive integrator takes the steps that it chose at [`Settings::steps_at`] in all calls: one
 //! smooth function of its inputs.
