@@ -21,7 +21,8 @@
 //! the last inputs is remembered ([`Settings::cache`]): the stages are solved for once, whatever is
 //! asked about them, in whatever order. Results that nobody wants are not computed. A call that
 //! fails returns CasADi's status for that; with the variable `CASADOS_CASADI_ERRORS` in the
-//! environment it says why on standard error. Threads (`F.map(N, "thread")`) have memory of their own.
+//! environment it says why on standard error. Threads (`F.map(N, "thread")`)
+//! have memory of their own.
 //!
 //! An adaptive integrator takes the steps that it chose at [`Settings::steps_at`] in all calls: one
 //! smooth function of its inputs.

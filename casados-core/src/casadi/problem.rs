@@ -18,8 +18,8 @@ use core::sync::atomic::{AtomicU64, Ordering};
 /// What makes a problem.
 pub type Make = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
 
-/// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`, `nlp_grad_f`,
-/// `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`.
+/// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`,
+/// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`.
 pub struct Problems {
     make: Make,
     layout: Layout,
