@@ -86,6 +86,9 @@ macro_rules! __casadi_export_problem {
             $crate::__casadi_function!(LIBRARY, 5, "", nlp_hess_l);
             $crate::__casadi_function!(LIBRARY, 6, "", nlp_grad);
             $crate::__casadi_function!(LIBRARY, 7, "", nlp_bounds);
+            $crate::__casadi_function!(LIBRARY, 8, "jac_", nlp);
+            $crate::__casadi_function!(LIBRARY, 9, "adj1_", nlp);
+            $crate::__casadi_function!(LIBRARY, 10, "jac_adj1_", nlp);
             /// How many intervals were integrated, for tests.
             #[unsafe(export_name = "nlp_integrations")]
             extern "C" fn integrations() -> ::core::ffi::c_longlong {

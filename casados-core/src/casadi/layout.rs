@@ -50,9 +50,9 @@ impl Layout {
                     of_jacobian.push((rows + tie, column + j));
                     jacobian.push(Slot::Constant(if stage == 0 { 1.0 } else { -1.0 }));
                 }
-                for i in 0..=j {
+                for i in 0..n {
                     of_hessian.push((column + i, column + j));
-                    hessian.push(Slot::Entry { stage, index: i * ld + j });
+                    hessian.push(Slot::Entry { stage, index: i.min(j) * ld + i.max(j) });
                 }
             }
             column += n;

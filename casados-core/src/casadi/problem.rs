@@ -1,7 +1,8 @@
 //! A whole problem of optimal control as the functions that `casadi.nlpsol` asks a library for.
 //!
-//! Jacobian and Hessian have dense blocks for each stage. CasADi's Hessian is the upper triangle of
-//! that of `γ = σ f + μᵀg`.
+//! Jacobian and Hessian have dense blocks for each stage. IPOPT takes the upper triangle of that of
+//! `γ = σ f + μᵀg`. Other solvers ask for other functions: they get those that CasADi makes of `nlp`
+//! and its derivatives, which have the form of those of any external function.
 
 use super::function::{Call, Port, Signature};
 use super::layout::Layout;
@@ -19,11 +20,13 @@ use core::sync::atomic::{AtomicU64, Ordering};
 pub type Make = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
 
 /// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`,
-/// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`.
+/// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`, `jac_nlp`, `adj1_nlp`,
+/// `jac_adj1_nlp`.
 pub struct Problems {
     make: Make,
     layout: Layout,
     signatures: Vec<Signature>,
+    patterns: Patterns,
     /// What was wrong with the problem when it was made first.
     wrong: Option<String>,
     integrations: AtomicU64,
@@ -53,6 +56,14 @@ struct Known {
     second: bool,
 }
 
+/// Where the matrices of a problem have entries.
+struct Patterns {
+    jacobian: Sparsity,
+    hessian: Sparsity,
+    /// Where the entries of the transposed Jacobian are among those of the Jacobian.
+    transposed: Vec<usize>,
+}
+
 const NOT_MADE: &str = "the problem could not be made";
 
 impl Problems {
@@ -64,19 +75,15 @@ impl Problems {
             program.check().map_err(|error| error.to_string())?;
             Ok(program)
         });
-        let integrations = AtomicU64::new(0);
-        match made {
-            Ok(mut program) => {
-                let (layout, patterns) = Layout::new(program.dims(), program.periodic());
-                let signatures = signatures(&layout, patterns);
-                Self { make, layout, signatures, wrong: None, integrations }
-            }
-            Err(wrong) => {
-                let (layout, patterns) = Layout::new(Vec::new(), Vec::new());
-                let signatures = signatures(&layout, patterns);
-                Self { make, layout, signatures, wrong: Some(wrong), integrations }
-            }
-        }
+        let (dims, periodic, wrong) = match made {
+            Ok(mut program) => (program.dims(), program.periodic(), None),
+            Err(wrong) => (Vec::new(), Vec::new(), Some(wrong)),
+        };
+        let (layout, [jacobian, hessian]) = Layout::new(dims, periodic);
+        let (transposed_pattern, transposed) = jacobian.transposed();
+        let signatures = signatures(&layout, &jacobian, &hessian, transposed_pattern);
+        let patterns = Patterns { jacobian, hessian, transposed };
+        Self { make, layout, signatures, patterns, wrong, integrations: AtomicU64::new(0) }
     }
 
     fn count(&self) {
@@ -179,10 +186,11 @@ impl Client for Problems {
             worker.known = Known::default();
             worker.x.copy_from_slice(&worker.input);
         }
-        if signature.inputs.len() > 2 {
+        let seed = |port: &Port| [c"lam_f", c"adj_f"].contains(&port.name);
+        if let Some(input) = signature.inputs.iter().position(seed) {
             if let Some((sigma, mu)) = worker.input_multipliers.split_first_mut() {
-                call.read(2, core::slice::from_mut(sigma));
-                call.read(3, mu);
+                call.read(input, core::slice::from_mut(sigma));
+                call.read(input + 1, mu);
             }
             if !super::cache::equal(&worker.multipliers, &worker.input_multipliers) {
                 worker.known.second = false;
@@ -211,28 +219,39 @@ impl Problems {
     fn compute(&self, worker: &mut Worker, port: &Port) -> Result<(), OcpError> {
         match port.name.to_bytes() {
             b"f" | b"g" => self.value(worker),
-            b"grad_f_x" | b"jac_g_x" | b"grad_gamma_x" => self.first(worker),
-            b"triu_hess_gamma_x_x" => self.second(worker),
+            b"grad_f_x" | b"jac_f_x" | b"jac_g_x" | b"grad_gamma_x" | b"adj_x" => self.first(worker),
+            b"jac_adj_x_adj_f" | b"jac_adj_x_adj_g" => self.first(worker),
+            b"triu_hess_gamma_x_x" | b"jac_adj_x_x" => self.second(worker),
             _ => Ok(()),
         }
     }
 
+    /// An output; those of other names have no entries.
     fn write(&self, worker: &Worker, port: &Port, to: &mut [f64]) {
-        let layout = &self.layout;
         match port.name.to_bytes() {
             b"f" => to.fill(worker.objective),
-            b"g" => layout.constraints(&worker.x, &worker.ends, to),
-            b"grad_f_x" => to.copy_from_slice(&worker.gradient),
+            b"g" => self.layout.constraints(&worker.x, &worker.ends, to),
+            b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => to.copy_from_slice(&worker.gradient),
             b"jac_g_x" => to.copy_from_slice(&worker.jacobian),
-            b"triu_hess_gamma_x_x" => to.copy_from_slice(&worker.hessian),
-            b"grad_gamma_x" => {
+            b"jac_adj_x_adj_g" => {
+                for (to, &entry) in to.iter_mut().zip(&self.patterns.transposed) {
+                    *to = worker.jacobian[entry];
+                }
+            }
+            b"jac_adj_x_x" => to.copy_from_slice(&worker.hessian),
+            b"triu_hess_gamma_x_x" => {
+                let entries = self.patterns.hessian.entries().iter().zip(&worker.hessian);
+                let upper = entries.filter(|((row, column), _)| row <= column);
+                for (to, (_, value)) in to.iter_mut().zip(upper) {
+                    *to = *value;
+                }
+            }
+            b"grad_gamma_x" | b"adj_x" => {
                 let Some((sigma, mu)) = worker.multipliers.split_first() else { return };
                 for (to, gradient) in to.iter_mut().zip(&worker.gradient) {
                     *to = sigma * gradient;
                 }
-                let pattern = self.signatures.get(4).and_then(|signature| signature.outputs.get(1));
-                let entries = pattern.map_or(&[][..], |port| port.sparsity.entries());
-                for (&(row, column), value) in entries.iter().zip(&worker.jacobian) {
+                for (&(row, column), value) in self.patterns.jacobian.entries().iter().zip(&worker.jacobian) {
                     to[column] += mu[row] * value;
                 }
             }
@@ -265,12 +284,22 @@ impl Problems {
 }
 
 /// Inputs and outputs of all functions.
-fn signatures(layout: &Layout, [jacobian, hessian]: [Sparsity; 2]) -> Vec<Signature> {
+fn signatures(
+    layout: &Layout,
+    jacobian: &Sparsity,
+    hessian: &Sparsity,
+    transposed: Sparsity,
+) -> Vec<Signature> {
     let (n, m) = (layout.variables, layout.constraints);
     let port = |name, rows| Port::new(name, Sparsity::vector(rows));
+    let zero = |name, rows, columns| Port::new(name, Sparsity::zero(rows, columns));
     let point = vec![port(c"x", n), port(c"p", 0)];
     let lagrangian = [point.clone(), vec![port(c"lam_f", 1), port(c"lam_g", m)]].concat();
     let (f, g) = (port(c"f", 1), port(c"g", m));
+    let jac_g = Port::new(c"jac_g_x", jacobian.clone());
+    let nominal = [point.clone(), vec![zero(c"out_f", 1, 1), zero(c"out_g", m, 1)]].concat();
+    let adjoint = [nominal.clone(), vec![port(c"adj_f", 1), port(c"adj_g", m)]].concat();
+    let second = [adjoint.clone(), vec![zero(c"out_adj_x", n, 1), zero(c"out_adj_p", 0, 1)]].concat();
     let of_point = |outputs| Signature { inputs: point.clone(), outputs };
     let of_lagrangian = |outputs| Signature { inputs: lagrangian.clone(), outputs };
     vec![
@@ -278,12 +307,39 @@ fn signatures(layout: &Layout, [jacobian, hessian]: [Sparsity; 2]) -> Vec<Signat
         of_point(vec![f.clone()]),
         of_point(vec![g.clone()]),
         of_point(vec![f.clone(), port(c"grad_f_x", n)]),
-        of_point(vec![g.clone(), Port::new(c"jac_g_x", jacobian)]),
-        of_lagrangian(vec![Port::new(c"triu_hess_gamma_x_x", hessian)]),
+        of_point(vec![g.clone(), jac_g.clone()]),
+        of_lagrangian(vec![Port::new(c"triu_hess_gamma_x_x", hessian.upper())]),
         of_lagrangian(vec![f, g, port(c"grad_gamma_x", n), port(c"grad_gamma_p", 0)]),
         Signature {
             inputs: Vec::new(),
             outputs: vec![port(c"lbx", n), port(c"ubx", n), port(c"x0", n), port(c"lbg", m), port(c"ubg", m)],
+        },
+        Signature {
+            inputs: nominal,
+            outputs: vec![
+                Port::new(c"jac_f_x", Sparsity::new(1, n, |_, _| true)),
+                zero(c"jac_f_p", 1, 0),
+                jac_g,
+                zero(c"jac_g_p", m, 0),
+            ],
+        },
+        Signature { inputs: adjoint, outputs: vec![port(c"adj_x", n), port(c"adj_p", 0)] },
+        Signature {
+            inputs: second,
+            outputs: vec![
+                Port::new(c"jac_adj_x_x", hessian.clone()),
+                zero(c"jac_adj_x_p", n, 0),
+                zero(c"jac_adj_x_out_f", n, 1),
+                zero(c"jac_adj_x_out_g", n, m),
+                port(c"jac_adj_x_adj_f", n),
+                Port::new(c"jac_adj_x_adj_g", transposed),
+                zero(c"jac_adj_p_x", 0, n),
+                zero(c"jac_adj_p_p", 0, 0),
+                zero(c"jac_adj_p_out_f", 0, 1),
+                zero(c"jac_adj_p_out_g", 0, m),
+                zero(c"jac_adj_p_adj_f", 0, 1),
+                zero(c"jac_adj_p_adj_g", 0, m),
+            ],
         },
     ]
 }

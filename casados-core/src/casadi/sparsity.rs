@@ -47,6 +47,22 @@ impl Sparsity {
         Self::new(rows, columns, |_, _| false)
     }
 
+    /// The pattern of the transposed matrix, and where its entries are among those of this one.
+    pub fn transposed(&self) -> (Self, Vec<usize>) {
+        let [rows, columns] = self.dimensions();
+        let mut order: Vec<usize> = (0..self.entries.len()).collect();
+        order.sort_by_key(|&entry| self.entries[entry]);
+        let entries = order.iter().map(|&entry| self.entries[entry]).collect();
+        (Self::from_entries(columns, rows, swapped(entries)), order)
+    }
+
+    /// The pattern of the upper triangle.
+    pub fn upper(&self) -> Self {
+        let [rows, columns] = self.dimensions();
+        let entries = self.entries.iter().copied().filter(|(row, column)| row <= column).collect();
+        Self::from_entries(rows, columns, entries)
+    }
+
     /// This pattern so many times along the diagonal.
     pub fn diagonal(&self, count: usize) -> Self {
         let [rows, columns] = self.dimensions();
@@ -68,6 +84,10 @@ impl Sparsity {
     pub fn entries(&self) -> &[(usize, usize)] {
         &self.entries
     }
+}
+
+fn swapped(entries: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
+    entries.into_iter().map(|(row, column)| (column, row)).collect()
 }
 
 /// Which entries of a matrix may differ from zero.

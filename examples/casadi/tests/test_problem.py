@@ -90,13 +90,32 @@ class Solvers(unittest.TestCase):
         self.assertTrue((np.abs(x[CONTROLS]) > 5.99).any() or (full(external("nlp_g")(x, casadi.DM(0, 1))) > 1.49).any())
 
     def test_another_plugin(self):
-        options = {"print_time": False, "print_header": False, "print_iteration": False, "qpsol": "qrqp"}
+        """Of `nlp` and its derivatives CasADi makes what other solvers ask for."""
+        nlp, given = external("nlp"), bounds()
+        x = casadi.MX.sym("x", nlp.size_in(0))
+        f, g = nlp(x, casadi.MX(0, 1))
+        options = {"print_time": False, "print_header": False, "print_iteration": False, "print_status": False}
+        options |= {"qpsol": "qrqp", "tol_pr": 1e-9, "tol_du": 1e-9}
         options["qpsol_options"] = {"print_iter": False, "print_header": False, "error_on_fail": False}
-        options["tol_pr"], options["tol_du"] = 1e-9, 1e-9
-        f, _ = self.solve("sqpmethod", options)
+        solver = casadi.nlpsol("s", "sqpmethod", {"x": x, "f": f, "g": g}, options)
+        found = float(solver(**{name: given[name] for name in ["lbx", "ubx", "x0", "lbg", "ubg"]})["f"])
         own = np.zeros(27)
         RUST.own_solution(own.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
-        np.testing.assert_allclose(f, own[0], rtol=1e-7)
+        np.testing.assert_allclose(found, own[0], rtol=1e-7)
+
+    def test_both_forms_of_derivatives(self):
+        x, mu = point(6)
+        p = casadi.DM(0, 1)
+        blocks = external("jac_adj1_nlp")(x, p, 0, 0, 0.8, mu, 0, 0)
+        upper = full(external("nlp_hess_l")(x, p, 0.8, mu))
+        np.testing.assert_array_equal(full(blocks[0]), upper + np.triu(upper, 1).T)
+        jac = external("jac_nlp")(x, p, 0, 0)
+        np.testing.assert_array_equal(full(jac[0]).T, full(external("nlp_grad_f")(x, p)[1]))
+        np.testing.assert_array_equal(full(jac[2]), full(external("nlp_jac_g")(x, p)[1]))
+        np.testing.assert_allclose(full(blocks[5]).T, full(jac[2]), rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(full(blocks[4]), full(jac[0]).T, rtol=1e-12, atol=1e-13)
+        adjoint = external("adj1_nlp")(x, p, 0, 0, 0.8, mu)[0]
+        np.testing.assert_array_equal(full(adjoint).ravel(), gradient(x, 0.8, mu))
 
     def test_what_is_known_is_not_computed_again(self):
         x, mu = point(5)
