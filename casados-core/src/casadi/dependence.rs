@@ -9,21 +9,42 @@
 //! to step.
 
 use super::sparsity::Relation;
-use crate::model::Dae;
-use crate::shape::Shape;
 use crate::structure::Pattern;
 use alloc::vec;
 use alloc::vec::Vec;
 
+/// The numbers of states, of algebraic states, and of directions `w = (x₀, u, p)` of a model.
+#[derive(Clone, Copy, Debug)]
+pub struct Dimensions {
+    /// States.
+    pub nx: usize,
+    /// Algebraic states.
+    pub nz: usize,
+    /// States, controls and parameters.
+    pub nw: usize,
+}
+
+impl Dimensions {
+    /// Those of a model.
+    pub const fn of<M: crate::model::Dae>() -> Self {
+        use crate::shape::Shape;
+        Self { nx: M::Shape::NX, nz: M::Shape::NZ, nw: M::Shape::NW }
+    }
+
+    /// The variable that an unknown `(ẋ, z)` is.
+    const fn variable(self, unknown: usize) -> usize {
+        if unknown < self.nx { unknown } else { self.nx + unknown }
+    }
+}
+
 /// Of which of the directions `w = (x₀, u, p)` the variables `(ẋ, x, z, u, p)` at any stage of an
-/// interval depend, and at its end.
+/// interval depend, and at its end; `jacobian` has the non-zeros of the model's.
 ///
 /// `depth` is the number of evaluations of the model that come one after the other in an explicit
 /// method, each of which leads one equation further; in an implicit one each depends on all.
-pub fn variables<M: Dae>(depth: Option<usize>) -> Relation {
-    let (nx, nz, nw) = (M::Shape::NX, M::Shape::NZ, M::Shape::NW);
-    let count = M::Shape::NV - 1;
-    let mut relation = Relation::zero(count, nw);
+pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>) -> Relation {
+    let Dimensions { nx, nz, nw } = dimensions;
+    let mut relation = Relation::zero(nx + nz + nw, nw);
     // States, controls and parameters are themselves.
     for direction in 0..nx {
         relation.set(nx + direction, direction);
@@ -31,19 +52,18 @@ pub fn variables<M: Dae>(depth: Option<usize>) -> Relation {
     for direction in nx..nw {
         relation.set(nx + nz + direction, direction);
     }
-    let equations = matching::<M>();
+    let equations = matching(dimensions, jacobian);
     let mut contains = vec![Vec::new(); nx + nz];
-    for (equation, variable) in M::STRUCTURE.jacobian.iter() {
+    for (equation, variable) in jacobian.iter() {
         if let Some(variables) = contains.get_mut(equation) {
             variables.push(variable);
         }
     }
-    let rounds = depth.unwrap_or(usize::MAX);
-    for _ in 0..rounds {
+    for _ in 0..depth.unwrap_or(usize::MAX) {
         let before = relation.clone();
         let mut news = false;
         for (unknown, equation) in equations.iter().enumerate() {
-            let variable = variable_of(unknown, nx);
+            let variable = dimensions.variable(unknown);
             for from in equation.and_then(|equation| contains.get(equation)).into_iter().flatten() {
                 news |= relation.join(variable, &before, *from);
             }
@@ -62,11 +82,6 @@ pub fn variables<M: Dae>(depth: Option<usize>) -> Relation {
     relation
 }
 
-/// The variable that an unknown `(ẋ, z)` is.
-const fn variable_of(unknown: usize, nx: usize) -> usize {
-    if unknown < nx { unknown } else { nx + unknown }
-}
-
 /// Which entries of the Hessian of any `λᵀy` over `w` may differ from zero, where `second` are
 /// those of second derivatives by the variables.
 pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation, directions: usize) {
@@ -82,10 +97,10 @@ pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation, 
 
 /// An equation for each unknown `(ẋ, z)`, by augmenting paths; none if there is no perfect
 /// matching.
-fn matching<M: Dae>() -> Vec<Option<usize>> {
-    let (nx, nk) = (M::Shape::NX, M::Shape::NK);
+fn matching(Dimensions { nx, nz, .. }: Dimensions, jacobian: Pattern) -> Vec<Option<usize>> {
+    let nk = nx + nz;
     let mut unknowns_of = vec![Vec::new(); nk];
-    for (equation, variable) in M::STRUCTURE.jacobian.iter() {
+    for (equation, variable) in jacobian.iter() {
         let unknown = match variable {
             _ if variable < nx => Some(variable),
             _ if (2 * nx..nx + nk).contains(&variable) => Some(variable - nx),

@@ -3,7 +3,7 @@
 
 use super::blocks::{Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, write};
 use super::cache::{Answer, Cache};
-use super::dependence;
+use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integrators::Settings;
 use super::library::{Client, Failure};
@@ -133,7 +133,8 @@ impl<B: Horizon> Horizons<B> {
     #[must_use]
     pub fn new(settings: Settings<Options>, count: usize) -> Self {
         let (nx, nu, nw) = (Self::NX, Self::NU, Self::NW);
-        let variables = dependence::variables::<B::Model>(None);
+        let variables =
+            dependence::variables(Dimensions::of::<B::Model>(), B::Model::STRUCTURE.jacobian, None);
         let (mut value, mut hessian) = (Relation::zero(nx, nw), Relation::zero(nw, nw));
         for state in 0..nx {
             value.join(state, &variables, nx + state);

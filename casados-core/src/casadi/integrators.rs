@@ -7,7 +7,7 @@ use super::blocks::{
     Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, rows, write,
 };
 use super::cache::{Answer, Cache};
-use super::dependence;
+use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
 use super::interval::{Interval, Point};
@@ -77,7 +77,11 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     #[must_use]
     pub fn new(settings: Settings<I::Options>) -> Self {
         let (nx, nu, nw, ny) = (Self::NX, Self::NU, Self::NW, Self::NY);
-        let variables = dependence::variables::<I::Model>(I::depth(&settings.options));
+        let variables = dependence::variables(
+            Dimensions::of::<I::Model>(),
+            I::Model::STRUCTURE.jacobian,
+            I::depth(&settings.options),
+        );
         let mut value = Relation::zero(ny, nw);
         let mut hessian = Relation::zero(nw, nw);
         for state in 0..nx {

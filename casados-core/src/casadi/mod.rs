@@ -49,6 +49,8 @@ mod problem;
 mod program;
 mod signature;
 mod sparsity;
+#[cfg(test)]
+mod tests;
 
 #[doc(inline)]
 pub use crate::{

@@ -1,8 +1,8 @@
 //! A whole problem of optimal control as the functions that `casadi.nlpsol` asks a library for.
 //!
 //! Jacobian and Hessian have dense blocks for each stage. IPOPT takes the upper triangle of that of
-//! `γ = σ f + μᵀg`. Other solvers ask for other functions: they get those that CasADi makes of `nlp`
-//! and its derivatives, which have the form of those of any external function.
+//! `γ = σ f + μᵀg`. Other solvers ask for other functions: they get those that CasADi makes of
+//! `nlp` and its derivatives, which have the form of those of any external function.
 
 use super::function::{Call, Port, Signature};
 use super::layout::Layout;
