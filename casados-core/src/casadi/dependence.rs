@@ -37,11 +37,12 @@ impl Dimensions {
     }
 }
 
-/// Of which of the directions `w = (x₀, u, p)` the variables `(ẋ, x, z, u, p)` at any stage of an
-/// interval depend, and at its end; `jacobian` has the non-zeros of the model's.
+/// Of which of the directions `w = (x₀, u, p)` the variables `(ẋ, x, z, u, p)` depend; `jacobian`
+/// has the non-zeros of the model's.
 ///
 /// `depth` is the number of evaluations of the model that come one after the other in an explicit
-/// method, each of which leads one equation further; in an implicit one each depends on all.
+/// method, each of which leads one equation further. In an implicit one each depends on all, and
+/// what holds at a stage holds at the end.
 pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>) -> Relation {
     let Dimensions { nx, nz, nw } = dimensions;
     let mut relation = Relation::zero(nx + nz + nw, nw);

@@ -77,18 +77,17 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     #[must_use]
     pub fn new(settings: Settings<I::Options>) -> Self {
         let (nx, nu, nw, ny) = (Self::NX, Self::NU, Self::NW, Self::NY);
-        let variables = dependence::variables(
-            Dimensions::of::<I::Model>(),
-            I::Model::STRUCTURE.jacobian,
-            I::depth(&settings.options),
-        );
-        let mut value = Relation::zero(ny, nw);
-        let mut hessian = Relation::zero(nw, nw);
+        let at =
+            |depth| dependence::variables(Dimensions::of::<I::Model>(), I::Model::STRUCTURE.jacobian, depth);
+        // The last evaluation of an explicit method is at a point that does not depend on it.
+        let depth = I::depth(&settings.options);
+        let (end, stages) = (at(depth), at(depth.map(|depth| depth.saturating_sub(1))));
+        let (mut value, mut hessian) = (Relation::zero(ny, nw), Relation::zero(nw, nw));
         for state in 0..nx {
-            value.join(state, &variables, nx + state);
+            value.join(state, &end, nx + state);
         }
-        dependence::curvature(&variables, I::Model::STRUCTURE.hessian, &mut hessian, nw);
-        Q::depend(&variables, nx, &mut value, &mut hessian);
+        dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian, nw);
+        Q::depend(&stages, nx, &mut value, &mut hessian);
         let mut outputs: Vec<_> = [0..nx, nx..ny].into();
         outputs.truncate(1 + usize::from(Q::COUNT > 0));
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];

@@ -185,11 +185,14 @@ class Patterns(unittest.TestCase):
         """One step of Euler: bidiagonal; an implicit one: lower triangular."""
         euler = np.array(casadi.DM(external("jac_cascade_euler").sparsity_out(0), 1).full())
         np.testing.assert_array_equal(euler, np.eye(4) + np.eye(4, k=-1))
+        # `x₁²` is evaluated at the start alone.
+        second = np.array(casadi.DM(external("jac_adj1_cascade_euler").sparsity_out(0), 1).full())
+        np.testing.assert_array_equal(second, np.diag([0, 1, 1, 0]))
         implicit = np.array(casadi.DM(external("jac_cascade").sparsity_out(0), 1).full())
         np.testing.assert_array_equal(implicit, np.tril(np.ones((4, 4))))
 
     def test_only_curved_states_have_second_derivatives(self):
-        """`x₂'' = sin x₂` and `x₁²`: nothing depends on `x₃`, and it occurs linearly."""
+        """`x₁²` and `sin x₂`: nothing depends on `x₃`."""
         hessian = np.array(casadi.DM(external("jac_adj1_cascade").sparsity_out(0), 1).full())
         np.testing.assert_array_equal(hessian[3], np.zeros(4))
         np.testing.assert_array_equal(hessian[:3, :3], np.ones((3, 3)))
