@@ -35,6 +35,8 @@ compile_error!(
 pub mod adaptive;
 #[cfg(feature = "alloc")]
 pub mod batch;
+#[cfg(feature = "casadi")]
+pub mod casadi;
 #[cfg(feature = "num-dual")]
 pub mod dual;
 pub mod erk;

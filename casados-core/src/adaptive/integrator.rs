@@ -340,7 +340,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     }
 
     /// As [`Integrator::forward`], with an integrand.
-    pub(super) fn forward_along(
+    pub(crate) fn forward_along(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -369,7 +369,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     }
 
     /// As [`Integrator::adjoint`], with an integrand.
-    pub(super) fn adjoint_along(
+    pub(crate) fn adjoint_along(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -402,7 +402,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     }
 
     /// As [`Integrator::hessian`], with an integrand.
-    pub(super) fn hessian_along(
+    pub(crate) fn hessian_along(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -421,7 +421,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     }
 
     /// As [`Integrator::solve`], with an integrand: the steps are taken again, to rounding.
-    pub(super) fn solve_along(
+    pub(crate) fn solve_along(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,

@@ -54,6 +54,8 @@ pub use integrals::{PiecewiseLeastSquares, PiecewiseQuadrature, Spanning};
 pub use integrator::Integrator;
 pub use options::AdaptiveOptions;
 pub use piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
+#[cfg(feature = "casadi")]
+pub(crate) use sealed::Engine;
 pub use statistics::AdaptiveStatistics;
 
 use crate::error::Error;

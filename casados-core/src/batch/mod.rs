@@ -26,6 +26,8 @@ mod work;
 pub use error::{BatchError, Slice};
 pub use integrator::Integrator;
 pub use intervals::Intervals;
+#[cfg(feature = "casadi")]
+pub(crate) use intervals::vector;
 pub use statistics::BatchStatistics;
 
 use crate::model::Dae;

@@ -31,7 +31,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Which states are periodic, and the multipliers of that.
-    pub(super) fn coupling(&mut self) -> (&[T], &mut [T]) {
+    pub(crate) fn coupling(&mut self) -> (&[T], &mut [T]) {
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
         (data.tied, data.coupling_multipliers)
     }

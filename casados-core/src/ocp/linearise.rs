@@ -261,7 +261,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
-    pub(super) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
+    pub(crate) fn evaluate(&mut self, at: &Solution<T, D, M>, ends: &mut [T]) -> Result<T, OcpError> {
         let intervals = self.intervals();
         let nx = P::Shape::NX;
         let data = split::<P, T>(self.data.as_mut(), intervals);
@@ -292,7 +292,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// How many numbers `φ` of every interval and `g` of every stage are.
-    pub(super) fn ends(&self) -> usize {
+    pub(crate) fn ends(&self) -> usize {
         ends::<P, T>(self.qp.dims())
     }
 
@@ -331,7 +331,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// Bounds of a general constraint of a stage, as they were given.
-    pub(super) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
+    pub(crate) fn limits(&self, stage: usize, row: usize) -> [T; 2] {
         let intervals = self.intervals();
         let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;

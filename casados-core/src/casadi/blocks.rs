@@ -1,0 +1,142 @@
+//! What functions of integrators want, and how results become their outputs.
+
+use super::cache::{Answer, equal};
+use super::function::{Call, Port, Signature};
+use super::signature::{self, Entry, Output, Source};
+use crate::model::Dae;
+use crate::result::{Adjoint, Forward, Hessian};
+use crate::shape::{Matrix, Shape};
+
+/// `(x₀, u, p)`, the first three inputs.
+pub fn read_inputs(signature: &Signature, call: &dyn Call, to: &mut [f64]) {
+    read(signature.inputs.iter().enumerate().take(3), call, to);
+}
+
+/// The multipliers of the outputs, which follow the nominal outputs among the inputs of adjoints.
+pub fn read_multipliers(signature: &Signature, call: &dyn Call, to: &mut [f64]) {
+    read(signature.inputs.iter().enumerate().filter(|(_, port)| signature::is_seed(port)), call, to);
+}
+
+/// Inputs, one behind the other.
+fn read<'a>(inputs: impl Iterator<Item = (usize, &'a Port)>, call: &dyn Call, to: &mut [f64]) {
+    let mut rest = to;
+    for (input, port) in inputs {
+        let length = port.sparsity.entries().len().min(rest.len());
+        let (to, behind) = rest.split_at_mut(length);
+        call.read(input, to);
+        rest = behind;
+    }
+}
+
+/// What the wanted outputs are made of.
+#[derive(Clone, Copy)]
+pub struct Wanted {
+    pub value: bool,
+    pub jacobian: bool,
+    pub gradient: bool,
+    pub hessian: bool,
+}
+
+impl Wanted {
+    /// What a call wants.
+    pub fn by(outputs: &[Output], call: &dyn Call) -> Self {
+        let wants = |source| {
+            outputs.iter().enumerate().any(|(index, output)| {
+                output.source == source && !output.entries.is_empty() && call.wants(index)
+            })
+        };
+        Self {
+            value: wants(Source::Value),
+            jacobian: wants(Source::Jacobian),
+            gradient: wants(Source::Gradient),
+            hessian: wants(Source::Hessian),
+        }
+    }
+
+    /// Whether nothing is wanted.
+    pub fn is_nothing(&self) -> bool {
+        !(self.value || self.jacobian || self.gradient || self.hessian)
+    }
+
+    /// Whether all of it is known, for these multipliers.
+    pub fn is_in<T>(&self, answer: &Answer<T>, lambda: &[f64]) -> bool {
+        let same = || answer.lambda.get().is_some_and(|known| equal(known, lambda));
+        (!self.value || answer.value.get().is_some())
+            && (!self.jacobian || answer.jacobian.get().is_some())
+            && (!self.gradient || answer.gradient.get().is_some() && same())
+            && (!self.hessian || answer.hessian.get().is_some() && same())
+    }
+}
+
+/// The outputs that are wanted.
+pub fn write<T>(answer: &Answer<T>, outputs: &[Output], call: &mut dyn Call) {
+    for (index, Output { source, entries }) in outputs.iter().enumerate() {
+        let Some(to) = call.output(index) else { continue };
+        let part = match source {
+            Source::Value => &answer.value,
+            Source::Jacobian => &answer.jacobian,
+            Source::Gradient => &answer.gradient,
+            Source::Hessian => &answer.hessian,
+            Source::Zero => continue,
+        };
+        if let Some(from) = part.get() {
+            for (to, &Entry(entry)) in to.iter_mut().zip(entries) {
+                *to = from.get(entry).copied().unwrap_or(f64::NAN);
+            }
+        }
+    }
+}
+
+fn join(parts: [&[f64]; 3], to: &mut [f64]) {
+    for (to, from) in to.iter_mut().zip(parts.into_iter().flatten()) {
+        *to = *from;
+    }
+}
+
+/// Over `(x₀, u, p)`.
+pub fn gradient<M: Dae>(result: &Adjoint<M>, to: &mut [f64]) {
+    join([result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()], to);
+}
+
+/// Over `(x₀, u, p)`.
+pub fn gradient_of<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
+    join([result.grad_x0.as_slice(), result.grad_u.as_slice(), result.grad_p.as_slice()], to);
+}
+
+/// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
+pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &mut [f64]) {
+    if count > 0 {
+        let columns = blocks.into_iter().flat_map(|block| block.chunks_exact(count));
+        for (column, to) in columns.zip(to.chunks_exact_mut(rows)) {
+            to[first..first + count].copy_from_slice(column);
+        }
+    }
+}
+
+/// The rows of the states in a matrix of `ny` rows.
+pub fn jacobian<M: Dae>(result: &Forward<M>, ny: usize, to: &mut [f64]) {
+    let blocks = [result.dx_dx0.as_slice(), result.dx_du.as_slice(), result.dx_dp.as_slice()];
+    rows(blocks, M::Shape::NX, 0, ny, to);
+}
+
+/// Both triangles over `(x₀, u, p)`.
+pub fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
+    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+    let blocks: [(&[f64], [usize; 2], usize); 6] = [
+        (result.h_xx.as_slice(), [0, 0], nx),
+        (result.h_xu.as_slice(), [0, nx], nx),
+        (result.h_uu.as_slice(), [nx, nx], nu),
+        (result.h_xp.as_slice(), [0, nx + nu], nx),
+        (result.h_up.as_slice(), [nx, nx + nu], nu),
+        (result.h_pp.as_slice(), [nx + nu, nx + nu], nw - nx - nu),
+    ];
+    for (block, [row, column], rows) in blocks {
+        for (j, values) in block.chunks_exact(rows.max(1)).enumerate() {
+            for (i, value) in values.iter().enumerate() {
+                let (i, j) = (row + i, column + j);
+                to[i + nw * j] = *value;
+                to[j + nw * i] = *value;
+            }
+        }
+    }
+}

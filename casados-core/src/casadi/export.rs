@@ -1,0 +1,189 @@
+//! What users write: the macro that exports the functions of an integrator.
+
+/// Exports an integrator to CasADi: the functions `name`, `jac_name`, `adj1_name` and
+/// `jac_adj1_name` of a `cdylib`, which `casadi.external("name", "./lib….so")` finds; see
+/// [`casadi`](crate::casadi).
+///
+/// After the integrator and the length of its interval come, in this order and each if it is
+/// wanted, `quadrature = F`, whose integrals are the output `qf`, and fields of
+/// [`Settings`](crate::casadi::Settings).
+///
+/// ```text
+/// casados::casadi::export! {
+///     pendulum = Irk<Pendulum, Gauss<2>>, interval = 0.2, options = Options { steps: 4, ..Default::default() }
+/// }
+/// ```
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_export {
+    ($name:ident = $integrator:ty, interval = $interval:expr, quadrature = $integrand:ty $(, $field:ident = $value:expr)* $(,)?) => {
+        $crate::__casadi_export!(@ $name, $integrator, $crate::casadi::Of<$integrand>, $interval, $($field = $value)*);
+    };
+    ($name:ident = $integrator:ty, interval = $interval:expr $(, $field:ident = $value:expr)* $(,)?) => {
+        $crate::__casadi_export!(@ $name, $integrator, $crate::casadi::Nothing, $interval, $($field = $value)*);
+    };
+    (@ $name:ident, $integrator:ty, $integrals:ty, $interval:expr, $($field:ident = $value:expr)*) => {
+        const _: () = {
+            type Functions = $crate::casadi::Integrators<$integrator, $integrals>;
+            static LIBRARY: $crate::casadi::Library<Functions> = $crate::casadi::Library::new(|| {
+                #[allow(unused_mut)]
+                let mut settings = $crate::casadi::Settings::new($interval);
+                $(settings.$field = $value;)*
+                Functions::new(settings)
+            });
+            $crate::__casadi_functions!(LIBRARY, $name);
+        };
+    };
+}
+
+/// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all intervals
+/// of a horizon, one after the other in time, in one call. `x0`, `u`, `p` and `xf` have a column
+/// for each. The last answers are remembered, two if `cache` says nothing else.
+///
+/// ```text
+/// casados::casadi::export_horizon! {
+///     pendulums = Batch<Pendulum, Gauss<2>>, interval = 0.2, intervals = 40, options = Options { steps: 4, ..Default::default() }
+/// }
+/// ```
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_export_horizon {
+    ($name:ident = $batch:ty, interval = $interval:expr, intervals = $count:expr $(, $field:ident = $value:expr)* $(,)?) => {
+        const _: () = {
+            type Functions = $crate::casadi::Horizons<$batch>;
+            static LIBRARY: $crate::casadi::Library<Functions> = $crate::casadi::Library::new(|| {
+                let mut settings = $crate::casadi::Settings::new($interval);
+                settings.cache = 2;
+                $(settings.$field = $value;)*
+                Functions::new(settings, $count)
+            });
+            $crate::__casadi_functions!(LIBRARY, $name);
+        };
+    };
+}
+
+/// Exports a problem of optimal control to CasADi: `casadi.nlpsol("s", "ipopt", "./lib….so")`
+/// solves it, with all of its derivatives computed in the library; see [`casadi`](crate::casadi).
+///
+/// ```text
+/// fn swing() -> Result<impl Program, Box<dyn Error>> { … }
+/// casados::casadi::export_problem! { swing }
+/// ```
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_export_problem {
+    ($make:path) => {
+        const _: () = {
+            static LIBRARY: $crate::casadi::Library<$crate::casadi::Problems> =
+                $crate::casadi::Library::new(|| {
+                    $crate::casadi::Problems::new(|| Ok(::std::boxed::Box::new($make()?)))
+                });
+            $crate::__casadi_function!(LIBRARY, 0, "", nlp);
+            $crate::__casadi_function!(LIBRARY, 1, "", nlp_f);
+            $crate::__casadi_function!(LIBRARY, 2, "", nlp_g);
+            $crate::__casadi_function!(LIBRARY, 3, "", nlp_grad_f);
+            $crate::__casadi_function!(LIBRARY, 4, "", nlp_jac_g);
+            $crate::__casadi_function!(LIBRARY, 5, "", nlp_hess_l);
+            $crate::__casadi_function!(LIBRARY, 6, "", nlp_grad);
+            $crate::__casadi_function!(LIBRARY, 7, "", nlp_bounds);
+            $crate::__casadi_function!(LIBRARY, 8, "jac_", nlp);
+            $crate::__casadi_function!(LIBRARY, 9, "adj1_", nlp);
+            $crate::__casadi_function!(LIBRARY, 10, "jac_adj1_", nlp);
+            /// How many intervals were integrated, for tests.
+            #[unsafe(export_name = "nlp_integrations")]
+            extern "C" fn integrations() -> ::core::ffi::c_longlong {
+                $crate::casadi::ffi::integrations(&LIBRARY)
+            }
+        };
+    };
+}
+
+/// Exports the four functions of an integrator.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_functions {
+    ($library:ident, $name:ident) => {
+        $crate::__casadi_function!($library, 0, "", $name);
+        $crate::__casadi_function!($library, 1, "jac_", $name);
+        $crate::__casadi_function!($library, 2, "adj1_", $name);
+        $crate::__casadi_function!($library, 3, "jac_adj1_", $name);
+        /// How many intervals were integrated, for tests.
+        #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
+        extern "C" fn integrations() -> ::core::ffi::c_longlong {
+            $crate::casadi::ffi::integrations(&$library)
+        }
+    };
+}
+
+/// Exports one function of a library, with all that CasADi asks about it.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __casadi_function {
+    ($library:ident, $function:literal, $prefix:literal, $name:ident) => {
+        const _: () = {
+            use ::core::ffi::{c_char, c_int, c_longlong};
+            use $crate::casadi::ffi;
+            #[unsafe(export_name = concat!($prefix, stringify!($name)))]
+            unsafe extern "C" fn evaluate(
+                arguments: *const *const f64,
+                results: *mut *mut f64,
+                _: *mut c_longlong,
+                _: *mut f64,
+                memory: c_int,
+            ) -> c_int {
+                // SAFETY: the caller's promise is that of `ffi::evaluate`.
+                unsafe { ffi::evaluate(&$library, $function, arguments, results, memory) }
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_n_in"))]
+            extern "C" fn n_in() -> c_longlong {
+                ffi::count(&$library, $function, ffi::Side::Input)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_n_out"))]
+            extern "C" fn n_out() -> c_longlong {
+                ffi::count(&$library, $function, ffi::Side::Output)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_name_in"))]
+            extern "C" fn name_in(index: c_longlong) -> *const c_char {
+                ffi::name(&$library, $function, ffi::Side::Input, index)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_name_out"))]
+            extern "C" fn name_out(index: c_longlong) -> *const c_char {
+                ffi::name(&$library, $function, ffi::Side::Output, index)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_sparsity_in"))]
+            extern "C" fn sparsity_in(index: c_longlong) -> *const c_longlong {
+                ffi::sparsity(&$library, $function, ffi::Side::Input, index)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_sparsity_out"))]
+            extern "C" fn sparsity_out(index: c_longlong) -> *const c_longlong {
+                ffi::sparsity(&$library, $function, ffi::Side::Output, index)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_work"))]
+            unsafe extern "C" fn work(
+                arguments: *mut c_longlong,
+                results: *mut c_longlong,
+                integers: *mut c_longlong,
+                numbers: *mut c_longlong,
+            ) -> c_int {
+                // SAFETY: the caller's promise is that of `ffi::work`.
+                unsafe { ffi::work(&$library, $function, [arguments, results, integers, numbers]) }
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_checkout"))]
+            extern "C" fn checkout() -> c_int {
+                ffi::check_out(&$library)
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_release"))]
+            extern "C" fn release(memory: c_int) {
+                ffi::release(&$library, memory);
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_incref"))]
+            extern "C" fn incref() {
+                ffi::refer(&$library);
+            }
+            #[unsafe(export_name = concat!($prefix, stringify!($name), "_decref"))]
+            extern "C" fn decref() {
+                ffi::forget(&$library);
+            }
+        };
+    };
+}

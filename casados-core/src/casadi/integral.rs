@@ -1,0 +1,90 @@
+//! Integrals along the solution as a further output.
+
+use super::dependence;
+use super::interval::Along;
+use super::sparsity::Relation;
+use crate::error::Error;
+use crate::function::Function;
+use crate::model::Dae;
+use crate::quadrature::Quadrature;
+use crate::shape::{Matrix, Outputs, Shape};
+use alloc::boxed::Box;
+use core::marker::PhantomData;
+
+/// The integrals of all outputs of a function, or none.
+pub trait Integral<M: Dae>: 'static {
+    /// How many.
+    const COUNT: usize;
+    /// Memory of them.
+    type Memory: Send;
+
+    /// Memory for a thread.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn memory() -> Result<Self::Memory, Error>;
+    /// What the integrator takes along, with these multipliers.
+    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> Along<'a, M>;
+    /// The values.
+    fn value(memory: &Self::Memory) -> &[f64];
+    /// The derivatives by `x₀`, `u` and `p`, each column by column.
+    fn jacobian(memory: &Self::Memory) -> [&[f64]; 3];
+    /// On which directions the outputs depend (in rows from `first` on), and where the Hessian of
+    /// them has entries, if these are the variables at the stages.
+    fn depend(variables: &Relation, first: usize, value: &mut Relation, hessian: &mut Relation);
+}
+
+/// No integrals.
+#[derive(Clone, Copy, Debug)]
+pub struct Nothing;
+
+impl<M: Dae> Integral<M> for Nothing {
+    const COUNT: usize = 0;
+    type Memory = ();
+
+    fn memory() -> Result<(), Error> {
+        Ok(())
+    }
+    fn along<'a>((): &'a mut (), _: &[f64]) -> Along<'a, M> {
+        None
+    }
+    fn value((): &()) -> &[f64] {
+        &[]
+    }
+    fn jacobian((): &()) -> [&[f64]; 3] {
+        [&[]; 3]
+    }
+    fn depend(_: &Relation, _: usize, _: &mut Relation, _: &mut Relation) {}
+}
+
+/// The integrals of all outputs of a function `F`.
+#[derive(Clone, Copy, Debug)]
+pub struct Of<F>(PhantomData<fn() -> F>);
+
+impl<M: Dae, F: Function<Shape = M::Shape>> Integral<M> for Of<F>
+where
+    Box<Quadrature<F>>: Send,
+{
+    const COUNT: usize = F::Outputs::NY;
+    type Memory = Box<Quadrature<F>>;
+
+    fn memory() -> Result<Self::Memory, Error> {
+        Quadrature::boxed()
+    }
+    fn along<'a>(memory: &'a mut Self::Memory, nu: &[f64]) -> Along<'a, M> {
+        memory.nu.as_mut_slice().copy_from_slice(nu);
+        Some(&mut **memory)
+    }
+    fn value(memory: &Self::Memory) -> &[f64] {
+        memory.q.as_slice()
+    }
+    fn jacobian(memory: &Self::Memory) -> [&[f64]; 3] {
+        [memory.dq_dx0.as_slice(), memory.dq_du.as_slice(), memory.dq_dp.as_slice()]
+    }
+    fn depend(variables: &Relation, first: usize, value: &mut Relation, hessian: &mut Relation) {
+        for (output, variable) in F::STRUCTURE.jacobian.iter() {
+            value.join(first + output, variables, variable);
+        }
+        dependence::curvature(variables, F::STRUCTURE.hessian, hessian, M::Shape::NW);
+    }
+}

@@ -1,0 +1,221 @@
+//! What is asked of an integrator, whichever it is.
+
+use crate::adaptive::{self, AdaptiveOptions};
+use crate::error::Error;
+use crate::memory::Heap;
+use crate::model::{ArrayK, Dae, Ode, VectorP, VectorU, VectorX};
+use crate::options::Options;
+use crate::quadrature::Integrand;
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::tableau::Method;
+use crate::{erk, irk};
+use alloc::vec::Vec;
+use bytemuck::Zeroable;
+
+/// An integrand that is taken along, or none.
+pub type Along<'a, M> = Option<&'a mut dyn Integrand<M, f64>>;
+
+/// An integrator of one interval: `Irk`, `Erk` and `Adaptive` of `f64` on the heap.
+pub trait Interval: Sized + Send + 'static {
+    /// Its model.
+    type Model: Dae;
+    /// What can be chosen about it.
+    type Options: Default + Clone + Send + Sync + 'static;
+    /// The stages of all steps.
+    type Tape: Default + Clone + Send + 'static;
+
+    /// An integrator with these options.
+    ///
+    /// # Errors
+    /// [`Error::InvalidOption`]
+    fn build(options: &Self::Options) -> Result<Self, Error>;
+    /// How many evaluations of the model come one after the other, if that is a number that no
+    /// equation can change.
+    fn depth(options: &Self::Options) -> Option<usize>;
+    /// Whether steps have to be chosen before the first call: see [`Interval::choose`].
+    const CHOOSES: bool = false;
+    /// Chooses the steps of all following calls.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn choose(&mut self, at: &Point<Self::Model>) -> Result<(), Error> {
+        let _ = at;
+        Ok(())
+    }
+    /// The parameters of all following calls.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]
+    fn parameters(&mut self, p: &VectorP<Self::Model, f64>) -> Result<(), Error>;
+    /// The time at the start of all following calls.
+    ///
+    /// # Errors
+    /// [`Error::NonFiniteInput`]
+    fn time(&mut self, t: f64) -> Result<(), Error>;
+    /// The solution.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn value(
+        &mut self,
+        point: &Point<Self::Model>,
+        along: Along<'_, Self::Model>,
+    ) -> Result<&Nominal<Self::Model>, Error>;
+    /// The solution and its derivatives.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn jacobian(
+        &mut self,
+        point: &Point<Self::Model>,
+        along: Along<'_, Self::Model>,
+    ) -> Result<&Forward<Self::Model>, Error>;
+    /// The solution and the gradient of `λᵀx`.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn gradient(
+        &mut self,
+        point: &Point<Self::Model>,
+        lambda: &VectorX<Self::Model, f64>,
+        along: Along<'_, Self::Model>,
+    ) -> Result<&Adjoint<Self::Model>, Error>;
+    /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn curvature(
+        &mut self,
+        point: &Point<Self::Model>,
+        lambda: &VectorX<Self::Model, f64>,
+        along: Along<'_, Self::Model>,
+    ) -> Result<&Hessian<Self::Model>, Error>;
+
+    /// Copies the stages of the last call, of a method that solves equations for them.
+    ///
+    /// # Errors
+    /// [`Error::NoResult`]
+    fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
+        let _ = tape;
+        Ok(false)
+    }
+    /// The next call has these stages, and only differentiates them.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
+        let _ = tape;
+        Ok(())
+    }
+}
+
+/// Where an interval begins, its control and its length.
+pub struct Point<M: Dae> {
+    /// The state at the start.
+    pub x0: VectorX<M, f64>,
+    /// The control.
+    pub u: VectorU<M, f64>,
+    /// The length.
+    pub h: f64,
+}
+
+/// The calls that all integrators have, with integrands.
+macro_rules! calls {
+    ($model:ident, $($nu:expr)?) => {
+        fn parameters(&mut self, p: &VectorP<$model, f64>) -> Result<(), Error> {
+            self.set_parameters(p)
+        }
+        fn time(&mut self, t: f64) -> Result<(), Error> {
+            self.set_time(t)
+        }
+        fn value(
+            &mut self,
+            point: &Point<$model>,
+            along: Along<'_, $model>,
+        ) -> Result<&Nominal<$model>, Error> {
+            self.solve_along(&point.x0, &point.u, point.h, along)
+        }
+        fn jacobian(
+            &mut self,
+            point: &Point<$model>,
+            along: Along<'_, $model>,
+        ) -> Result<&Forward<$model>, Error> {
+            self.forward_along(&point.x0, &point.u, point.h, along)
+        }
+        fn gradient(
+            &mut self,
+            point: &Point<$model>,
+            lambda: &VectorX<$model, f64>,
+            along: Along<'_, $model>,
+        ) -> Result<&Adjoint<$model>, Error> {
+            self.adjoint_along(&point.x0, &point.u, point.h, lambda, along)
+        }
+        fn curvature(
+            &mut self,
+            point: &Point<$model>,
+            lambda: &VectorX<$model, f64>,
+            along: Along<'_, $model>,
+        ) -> Result<&Hessian<$model>, Error> {
+            self.hessian_along(&point.x0, &point.u, point.h, lambda, $($nu,)? along)
+        }
+    };
+}
+
+impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrator<M, B, S, f64, Heap> {
+    type Model = M;
+    type Options = Options;
+    type Tape = Vec<ArrayK<M, [f64; S]>>;
+
+    fn build(options: &Options) -> Result<Self, Error> {
+        Self::new(*options)
+    }
+    fn depth(_: &Options) -> Option<usize> {
+        None
+    }
+    calls!(M, &[]);
+
+    fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
+        tape.resize(self.options().steps, Zeroable::zeroed());
+        irk::Integrator::record(self, tape).map(|()| true)
+    }
+    fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
+        self.set_solution(tape)
+    }
+}
+
+impl<M: Ode, B: Method<S> + 'static, const S: usize> Interval for erk::Integrator<M, B, S, f64, Heap> {
+    type Model = M;
+    type Options = Options;
+    type Tape = ();
+
+    fn build(options: &Options) -> Result<Self, Error> {
+        Self::new(*options)
+    }
+    fn depth(options: &Options) -> Option<usize> {
+        Some(S.saturating_mul(options.steps))
+    }
+    calls!(M,);
+}
+
+// `Engine` is sealed, and its integrators can be sent only where their states can.
+impl<M: Dae, B: adaptive::Engine<M, f64> + 'static> Interval for adaptive::Integrator<M, B, f64>
+where
+    Self: Send,
+{
+    type Model = M;
+    type Options = AdaptiveOptions;
+    type Tape = ();
+    const CHOOSES: bool = true;
+
+    fn build(options: &AdaptiveOptions) -> Result<Self, Error> {
+        Self::new(*options)
+    }
+    fn depth(_: &AdaptiveOptions) -> Option<usize> {
+        None
+    }
+    fn choose(&mut self, at: &Point<M>) -> Result<(), Error> {
+        self.solve(&at.x0, &at.u, at.h)?;
+        self.freeze()
+    }
+    calls!(M,);
+}

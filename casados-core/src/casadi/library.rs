@@ -1,0 +1,204 @@
+//! What lives as long as a shared library is loaded: the client of its functions, and a pool of
+//! memories, one for each thread that calls at the same time.
+
+use super::function::{Call, Signature};
+use crate::error::Error;
+use alloc::boxed::Box;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt::Display;
+use core::panic::AssertUnwindSafe;
+use std::panic::catch_unwind;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Several functions that share memory.
+pub trait Client: Send + Sync + 'static {
+    /// What a thread has to itself.
+    type Worker: Send;
+    /// Inputs and outputs of all functions.
+    fn signatures(&self) -> &[Signature];
+    /// Memory for one thread.
+    ///
+    /// # Errors
+    /// Those of the options.
+    fn worker(&self) -> Result<Self::Worker, Failure>;
+    /// Computes the outputs of a function that are wanted.
+    ///
+    /// # Errors
+    /// Then the outputs mean nothing.
+    fn evaluate(
+        &self,
+        worker: &mut Self::Worker,
+        function: usize,
+        call: &mut dyn Call,
+    ) -> Result<(), Failure>;
+    /// How many intervals were integrated.
+    fn integrations(&self) -> u64;
+}
+
+/// Why a call failed, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure(pub String);
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl Failure {
+    /// A memory that is nobody's.
+    fn memory(id: i32) -> Self {
+        Self(alloc::format!("memory {id} was not checked out, or another call has it"))
+    }
+}
+
+/// A client that is made when it is needed first, and forgotten when nobody refers to it any more.
+pub struct Library<C: Client> {
+    make: fn() -> C,
+    state: Mutex<State<C>>,
+}
+
+struct State<C: Client> {
+    references: usize,
+    client: Option<Arc<C>>,
+    memories: Vec<Memory<C::Worker>>,
+}
+
+/// A memory of the pool.
+enum Memory<W> {
+    /// Nobody's.
+    Free(Option<Box<W>>),
+    /// Checked out.
+    Ready(Option<Box<W>>),
+    /// In a call.
+    Busy,
+}
+
+impl<C: Client> Library<C> {
+    /// A library whose client is made by `make`.
+    pub const fn new(make: fn() -> C) -> Self {
+        Self { make, state: Mutex::new(State { references: 0, client: None, memories: Vec::new() }) }
+    }
+
+    /// The state; what a panic interrupts leaves it whole, since nothing in here panics half-way.
+    fn state(&self) -> MutexGuard<'_, State<C>> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The client; none if it can't be made.
+    pub fn client(&self) -> Option<Arc<C>> {
+        if let Some(client) = &self.state().client {
+            return Some(Arc::clone(client));
+        }
+        let made = Arc::new(guarded(self.make).map_err(|failure| say(&failure.0)).ok()?);
+        Some(Arc::clone(self.state().client.get_or_insert(made)))
+    }
+
+    /// Somebody more refers to the functions.
+    pub fn refer(&self) {
+        self.state().references += 1;
+    }
+
+    /// Somebody less does; with the last one everything is forgotten.
+    pub fn forget(&self) {
+        let mut state = self.state();
+        state.references = state.references.saturating_sub(1);
+        if state.references == 0 {
+            let last = (state.client.take(), core::mem::take(&mut state.memories));
+            drop(state);
+            drop(last);
+        }
+    }
+
+    /// A memory of the caller's own.
+    pub fn check_out(&self) -> Option<i32> {
+        let mut state = self.state();
+        let free = state.memories.iter().position(|memory| matches!(memory, Memory::Free(_)));
+        let id = free.unwrap_or(state.memories.len());
+        let number = i32::try_from(id).ok()?;
+        match state.memories.get_mut(id) {
+            Some(memory) => {
+                let worker = match memory {
+                    Memory::Free(worker) => worker.take(),
+                    _ => None,
+                };
+                *memory = Memory::Ready(worker);
+            }
+            None => state.memories.push(Memory::Ready(None)),
+        }
+        Some(number)
+    }
+
+    /// A memory is nobody's again. One that is in a call stays there.
+    pub fn release(&self, id: i32) {
+        let mut state = self.state();
+        let memory = usize::try_from(id).ok().and_then(|id| state.memories.get_mut(id));
+        if let Some(memory) = memory
+            && let Memory::Ready(worker) = memory
+        {
+            *memory = Memory::Free(worker.take());
+        }
+    }
+
+    /// Computes the outputs of a function that are wanted.
+    ///
+    /// # Errors
+    /// Those of the client; a memory that was not checked out; a panic.
+    pub fn evaluate(&self, function: usize, call: &mut dyn Call, id: i32) -> Result<(), Failure> {
+        let client = self.client().ok_or_else(|| Failure("the library has no client".into()))?;
+        let worker = self.state().take(id).ok_or_else(|| Failure::memory(id))?;
+        // After a panic the worker is gone, and the next call has a new one.
+        let outcome = guarded(AssertUnwindSafe(|| {
+            let mut worker = match worker {
+                Some(worker) => worker,
+                None => Box::new(client.worker()?),
+            };
+            let outcome = client.evaluate(&mut worker, function, call);
+            Ok::<_, Failure>((worker, outcome))
+        }));
+        let (worker, outcome) = match outcome {
+            Ok(Ok((worker, outcome))) => (Some(worker), outcome),
+            Ok(Err(failure)) | Err(failure) => (None, Err(failure)),
+        };
+        self.state().give(id, worker);
+        outcome.inspect_err(|failure| say(&failure.0))
+    }
+}
+
+impl<C: Client> State<C> {
+    fn take(&mut self, id: i32) -> Option<Option<Box<C::Worker>>> {
+        let memory = self.memories.get_mut(usize::try_from(id).ok()?)?;
+        match core::mem::replace(memory, Memory::Busy) {
+            Memory::Ready(worker) => Some(worker),
+            other => {
+                *memory = other;
+                None
+            }
+        }
+    }
+
+    fn give(&mut self, id: i32, worker: Option<Box<C::Worker>>) {
+        if let Some(memory) = usize::try_from(id).ok().and_then(|id| self.memories.get_mut(id)) {
+            *memory = Memory::Ready(worker);
+        }
+    }
+}
+
+/// What a function returns, or that it panicked.
+fn guarded<R>(run: impl FnOnce() -> R) -> Result<R, Failure> {
+    catch_unwind(AssertUnwindSafe(run)).map_err(|panic| {
+        let said = panic.downcast_ref::<&str>().copied().map(String::from);
+        let said = said.or_else(|| panic.downcast_ref::<String>().cloned());
+        Failure(alloc::format!("panicked: {}", said.unwrap_or_default()))
+    })
+}
+
+/// Writes a failure to where errors go, if the environment asks for that: solvers try points at
+/// which functions fail.
+fn say(what: &dyn Display) {
+    if std::env::var_os("CASADOS_CASADI_ERRORS").is_some() {
+        std::eprintln!("casados: {what}");
+    }
+}

@@ -1,0 +1,66 @@
+//! Integrators as external functions of CasADi, in a shared library (feature `casadi`).
+//!
+//! CasADi finds functions of a shared library by their names:
+//! `casadi.external("pendulum", "./libmodel.so")` is an ordinary `casadi.Function` then, with exact
+//! first and second derivatives. [`export!`] writes them. In a crate of the type `cdylib`:
+//!
+//! ```text
+//! casados::casadi::export! {
+//!     pendulum = Irk<Pendulum, Gauss<2>>, interval = 0.2, options = Options { steps: 4, ..Default::default() }
+//! }
+//! ```
+//!
+//! | function | inputs | outputs |
+//! | --- | --- | --- |
+//! | `F` | `x0`, `u`, `p` | `xf`, and `qf` with `quadrature = F` |
+//! | `jac_F` | and `out_xf` | `∂xf/∂x0`, `∂xf/∂u`, … |
+//! | `adj1_F` | and `adj_xf`, which is `λ` | `∇(λᵀxf)` |
+//! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and the transposed Jacobian, which is the derivative by `λ` |
+//!
+//! Patterns are those of the model's graph, followed over stages and steps. What was computed at
+//! the last inputs is remembered ([`Settings::cache`]): the stages are solved for once, whatever is
+//! asked about them, in whatever order. Results that nobody wants are not computed. A call that
+//! fails returns CasADi's status for that; with the variable `CASADOS_CASADI_ERRORS` in the
+//! environment it says why on standard error. Threads (`F.map(N, "thread")`)
+//! have memory of their own.
+//!
+//! An adaptive integrator takes the steps that it chose at [`Settings::steps_at`] in all calls: one
+//! smooth function of its inputs.
+//!
+//! [`export_horizon!`] has the same functions for all intervals of a horizon in one call, a column
+//! for each; [`export_problem!`] a whole problem of [`ocp`](crate::ocp) for `casadi.nlpsol`.
+//!
+//! The interface is described in CasADi's `casadi/core/external.cpp` and `external_impl.hpp`.
+
+mod blocks;
+mod cache;
+mod dependence;
+mod export;
+#[doc(hidden)]
+pub mod ffi;
+mod function;
+mod horizon;
+mod integral;
+mod integrators;
+mod interval;
+mod layout;
+mod library;
+mod problem;
+mod program;
+mod signature;
+mod sparsity;
+#[cfg(test)]
+mod tests;
+
+#[doc(inline)]
+pub use crate::{
+    __casadi_export as export, __casadi_export_horizon as export_horizon,
+    __casadi_export_problem as export_problem,
+};
+pub use horizon::{Horizon, Horizons};
+pub use integral::{Integral, Nothing, Of};
+pub use integrators::{Integrators, Settings};
+pub use interval::Interval;
+pub use library::Library;
+pub use problem::Problems;
+pub use program::Program;

@@ -1,0 +1,203 @@
+//! Names, patterns and sources of the outputs of `F`, `jac_F`, `adj1_F` and `jac_adj1_F`, of one
+//! interval or of many side by side, whose matrices are block-diagonal.
+//!
+//! Inputs of a derivative are those of the function, then its outputs, `out_…`, whose patterns are
+//! empty here: nothing depends on them, and CasADi does not compute what nobody needs. Blocks of
+//! Jacobians are ordered by output, then by input.
+
+use super::function::{Port, Signature};
+use super::sparsity::{Relation, Sparsity};
+use alloc::vec::Vec;
+use core::ffi::CStr;
+use core::ops::Range;
+
+/// Where the numbers of an output are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// `y`
+    Value,
+    /// `∂y/∂w`
+    Jacobian,
+    /// `∇(λᵀy)`
+    Gradient,
+    /// `∇²(λᵀy)`
+    Hessian,
+    /// There are none.
+    Zero,
+}
+
+/// The place of a number in its source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry(pub usize);
+
+/// Where the numbers of an output come from.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// What they are part of.
+    pub source: Source,
+    /// The place of each non-zero there.
+    pub entries: Vec<Entry>,
+}
+
+const INPUTS: [&CStr; 3] = [c"x0", c"u", c"p"];
+const OUTPUTS: [&CStr; 2] = [c"xf", c"qf"];
+const NOMINAL: [&CStr; 2] = [c"out_xf", c"out_qf"];
+const SEEDS: [&CStr; 2] = [c"adj_xf", c"adj_qf"];
+const GRADIENTS: [&CStr; 3] = [c"adj_x0", c"adj_u", c"adj_p"];
+const NOMINAL_GRADIENTS: [&CStr; 3] = [c"out_adj_x0", c"out_adj_u", c"out_adj_p"];
+const JACOBIANS: [[&CStr; 3]; 2] =
+    [[c"jac_xf_x0", c"jac_xf_u", c"jac_xf_p"], [c"jac_qf_x0", c"jac_qf_u", c"jac_qf_p"]];
+const HESSIANS: [[&CStr; 3]; 3] = [
+    [c"jac_adj_x0_x0", c"jac_adj_x0_u", c"jac_adj_x0_p"],
+    [c"jac_adj_u_x0", c"jac_adj_u_u", c"jac_adj_u_p"],
+    [c"jac_adj_p_x0", c"jac_adj_p_u", c"jac_adj_p_p"],
+];
+const BY_NOMINAL: [[&CStr; 2]; 3] = [
+    [c"jac_adj_x0_out_xf", c"jac_adj_x0_out_qf"],
+    [c"jac_adj_u_out_xf", c"jac_adj_u_out_qf"],
+    [c"jac_adj_p_out_xf", c"jac_adj_p_out_qf"],
+];
+const BY_SEEDS: [[&CStr; 2]; 3] = [
+    [c"jac_adj_x0_adj_xf", c"jac_adj_x0_adj_qf"],
+    [c"jac_adj_u_adj_xf", c"jac_adj_u_adj_qf"],
+    [c"jac_adj_p_adj_xf", c"jac_adj_p_adj_qf"],
+];
+
+/// Whether an input holds multipliers of an output.
+pub fn is_seed(port: &Port) -> bool {
+    SEEDS.contains(&port.name)
+}
+
+/// What one interval has.
+pub struct Shape<'a> {
+    /// How many intervals there are.
+    pub count: usize,
+    /// The inputs as ranges of `w`.
+    pub inputs: [Range<usize>; 3],
+    /// The outputs as ranges of `y`.
+    pub outputs: &'a [Range<usize>],
+    /// Where `∂y/∂w` has entries.
+    pub value: &'a Relation,
+    /// Where `∇²(λᵀy)` has.
+    pub hessian: &'a Relation,
+}
+
+impl Shape<'_> {
+    /// Elements of `w`.
+    fn directions(&self) -> usize {
+        self.inputs.iter().map(Range::len).sum()
+    }
+
+    /// Elements of `y`.
+    fn rows(&self) -> usize {
+        self.outputs.iter().map(Range::len).sum()
+    }
+
+    /// The four functions.
+    pub fn functions(&self) -> [(Signature, Vec<Output>); 4] {
+        let Self { inputs, outputs, .. } = self;
+        let [of_inputs, of_outputs] =
+            [self.ports(&INPUTS, inputs, false), self.ports(&OUTPUTS, outputs, false)];
+        let nominal = self.ports(&NOMINAL, outputs, true);
+        let seeds = self.ports(&SEEDS, outputs, false);
+        let gradients = self.ports(&GRADIENTS, inputs, false);
+        let of_adjoint = [of_inputs.clone(), nominal.clone(), seeds].concat();
+        let of_second = [of_adjoint.clone(), self.ports(&NOMINAL_GRADIENTS, inputs, true)].concat();
+        let [value, gradient] = [
+            self.vectors(Source::Value, outputs, self.rows()),
+            self.vectors(Source::Gradient, inputs, self.directions()),
+        ];
+        let [first, second] = [self.first(), self.second()];
+        let whole =
+            |inputs, (outputs, sources): (Vec<Port>, Vec<Output>)| (Signature { inputs, outputs }, sources);
+        [
+            whole(of_inputs.clone(), (of_outputs, value)),
+            whole([of_inputs, nominal].concat(), first),
+            whole(of_adjoint, (gradients, gradient)),
+            whole(of_second, second),
+        ]
+    }
+
+    /// A column for each interval.
+    fn ports(&self, names: &[&'static CStr], ranges: &[Range<usize>], zero: bool) -> Vec<Port> {
+        let sparsity = |length| Sparsity::new(length, self.count, |_, _| !zero);
+        names.iter().zip(ranges).map(|(name, range)| Port::new(name, sparsity(range.len()))).collect()
+    }
+
+    fn vectors(&self, source: Source, ranges: &[Range<usize>], length: usize) -> Vec<Output> {
+        let intervals = |range: &Range<usize>| {
+            let of = |k: usize| range.clone().map(move |index| Entry(k * length + index));
+            (0..self.count).flat_map(of).collect()
+        };
+        ranges.iter().map(|range| Output { source, entries: intervals(range) }).collect()
+    }
+
+    /// The blocks of `∂y/∂w`.
+    fn first(&self) -> (Vec<Port>, Vec<Output>) {
+        let rows = self.rows();
+        let mut blocks = (Vec::new(), Vec::new());
+        for (names, output) in JACOBIANS.iter().zip(self.outputs) {
+            for (name, input) in names.iter().zip(&self.inputs) {
+                let sparsity = self.value.block(output.clone(), input.clone());
+                let place = Place { first: output.start + rows * input.start, row: 1, column: rows };
+                self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
+            }
+        }
+        blocks
+    }
+
+    /// The blocks of the derivatives of `∇(λᵀy)`.
+    fn second(&self) -> (Vec<Port>, Vec<Output>) {
+        let (directions, rows) = (self.directions(), self.rows());
+        let mut blocks = (Vec::new(), Vec::new());
+        for (gradient, row) in self.inputs.iter().enumerate() {
+            for (name, column) in HESSIANS[gradient].iter().zip(&self.inputs) {
+                let sparsity = self.hessian.block(row.clone(), column.clone());
+                let place =
+                    Place { first: row.start + directions * column.start, row: 1, column: directions };
+                self.push(&mut blocks, name, &sparsity, Source::Hessian, place);
+            }
+            for (name, output) in BY_NOMINAL[gradient].iter().zip(self.outputs) {
+                let sparsity = Sparsity::zero(row.len(), output.len());
+                self.push(&mut blocks, name, &sparsity, Source::Zero, Place { first: 0, row: 0, column: 0 });
+            }
+            for (name, output) in BY_SEEDS[gradient].iter().zip(self.outputs) {
+                let sparsity = self.value.transposed_block(output.clone(), row.clone());
+                let place = Place { first: output.start + rows * row.start, row: rows, column: 1 };
+                self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
+            }
+        }
+        blocks
+    }
+
+    /// Adds a block for each interval.
+    fn push(
+        &self,
+        blocks: &mut (Vec<Port>, Vec<Output>),
+        name: &'static CStr,
+        sparsity: &Sparsity,
+        source: Source,
+        place: Place,
+    ) {
+        // How much there is of one interval.
+        let length = match source {
+            Source::Hessian => self.directions() * self.directions(),
+            _ => self.rows() * self.directions(),
+        };
+        let of = |k: usize| {
+            let entries = sparsity.entries().iter();
+            entries.map(move |&(i, j)| Entry(k * length + place.first + i * place.row + j * place.column))
+        };
+        let entries = (0..self.count).flat_map(of).collect();
+        blocks.0.push(Port::new(name, sparsity.diagonal(self.count)));
+        blocks.1.push(Output { source, entries });
+    }
+}
+
+/// Where the first element of a block is, and the distances of rows and of columns.
+#[derive(Clone, Copy)]
+struct Place {
+    first: usize,
+    row: usize,
+    column: usize,
+}

@@ -1,0 +1,148 @@
+//! Patterns of matrices as CasADi reads them, and what they are for an integrator.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// Structural non-zeros of a matrix in compressed columns, as CasADi reads them: numbers of rows
+/// and columns, where each column begins and the last one ends, rows; or both numbers and a one if
+/// nothing is zero.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sparsity {
+    compressed: Vec<i64>,
+    /// `(row, column)`, column by column.
+    entries: Vec<(usize, usize)>,
+}
+
+impl Sparsity {
+    /// The pattern of the entries for which this holds.
+    pub fn new(rows: usize, columns: usize, is_entry: impl Fn(usize, usize) -> bool) -> Self {
+        let all = (0..columns).flat_map(|column| (0..rows).map(move |row| (row, column)));
+        Self::from_entries(rows, columns, all.filter(|&(row, column)| is_entry(row, column)).collect())
+    }
+
+    /// The pattern of these entries, which are in order: column by column.
+    pub fn from_entries(rows: usize, columns: usize, entries: Vec<(usize, usize)>) -> Self {
+        let mut compressed = vec![rows as i64, columns as i64];
+        if entries.len() == rows * columns && !entries.is_empty() {
+            compressed.push(1);
+        } else {
+            let mut begin = 0;
+            for column in 0..=columns {
+                begin += entries[begin..].iter().take_while(|entry| entry.1 < column).count();
+                compressed.push(begin as i64);
+            }
+            compressed.extend(entries.iter().map(|&(row, _)| row as i64));
+        }
+        Self { compressed, entries }
+    }
+
+    /// The pattern of a vector without zeros.
+    pub fn vector(rows: usize) -> Self {
+        Self::new(rows, 1, |_, _| true)
+    }
+
+    /// The pattern of a matrix that is zero.
+    pub fn zero(rows: usize, columns: usize) -> Self {
+        Self::new(rows, columns, |_, _| false)
+    }
+
+    /// The pattern of the transposed matrix, and where its entries are among those of this one.
+    pub fn transposed(&self) -> (Self, Vec<usize>) {
+        let [rows, columns] = self.dimensions();
+        let mut order: Vec<usize> = (0..self.entries.len()).collect();
+        order.sort_by_key(|&entry| self.entries[entry]);
+        let entries = order.iter().map(|&entry| self.entries[entry]).collect();
+        (Self::from_entries(columns, rows, swapped(entries)), order)
+    }
+
+    /// The pattern of the upper triangle.
+    pub fn upper(&self) -> Self {
+        let [rows, columns] = self.dimensions();
+        let entries = self.entries.iter().copied().filter(|(row, column)| row <= column).collect();
+        Self::from_entries(rows, columns, entries)
+    }
+
+    /// This pattern so many times along the diagonal.
+    pub fn diagonal(&self, count: usize) -> Self {
+        let [rows, columns] = self.dimensions();
+        let of = |k: usize| self.entries.iter().map(move |&(i, j)| (k * rows + i, k * columns + j));
+        Self::from_entries(count * rows, count * columns, (0..count).flat_map(of).collect())
+    }
+
+    /// The numbers of rows and columns.
+    pub fn dimensions(&self) -> [usize; 2] {
+        [0, 1].map(|index| self.compressed.get(index).map_or(0, |&length| length as usize))
+    }
+
+    /// What CasADi reads.
+    pub fn compressed(&self) -> &[i64] {
+        &self.compressed
+    }
+
+    /// `(row, column)` of the entries in the order of their values.
+    pub fn entries(&self) -> &[(usize, usize)] {
+        &self.entries
+    }
+}
+
+fn swapped(entries: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
+    entries.into_iter().map(|(row, column)| (column, row)).collect()
+}
+
+/// Which entries of a matrix may differ from zero.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Relation {
+    columns: usize,
+    related: Vec<bool>,
+}
+
+impl Relation {
+    /// Nothing but zeros.
+    pub fn zero(rows: usize, columns: usize) -> Self {
+        Self { columns, related: vec![false; rows * columns] }
+    }
+
+    /// A row.
+    pub fn row(&self, row: usize) -> &[bool] {
+        self.related.get(row * self.columns..(row + 1) * self.columns).unwrap_or(&[])
+    }
+
+    /// Whether an entry may differ from zero.
+    pub fn has(&self, row: usize, column: usize) -> bool {
+        self.row(row).get(column).copied().unwrap_or(false)
+    }
+
+    /// An entry may differ from zero.
+    pub fn set(&mut self, row: usize, column: usize) {
+        if let Some(related) = self.related.get_mut(row * self.columns + column) {
+            *related = true;
+        }
+    }
+
+    /// What is in `row` of `other` is in `to` too; whether that is news.
+    pub fn join(&mut self, to: usize, other: &Self, row: usize) -> bool {
+        let mut news = false;
+        let range = to * self.columns..(to + 1) * self.columns;
+        let Some(related) = self.related.get_mut(range) else { return false };
+        for (to, from) in related.iter_mut().zip(other.row(row)) {
+            news |= *from && !*to;
+            *to |= *from;
+        }
+        news
+    }
+
+    /// The pattern of a block.
+    pub fn block(&self, rows: Range<usize>, columns: Range<usize>) -> Sparsity {
+        Sparsity::new(rows.len(), columns.len(), |row, column| {
+            self.has(rows.start + row, columns.start + column)
+        })
+    }
+
+    /// The pattern of a transposed block: `columns` are its rows.
+    pub fn transposed_block(&self, rows: Range<usize>, columns: Range<usize>) -> Sparsity {
+        Sparsity::new(columns.len(), rows.len(), |row, column| {
+            self.has(rows.start + column, columns.start + row)
+        })
+    }
+}

@@ -1,0 +1,133 @@
+"""A whole problem of casados in CasADi's solvers, against those of casados and against differences."""
+
+import ctypes
+import unittest
+
+import casadi
+import numpy as np
+from test_integrator import LIBRARY, RUST, differences, external, full, integrations
+
+N, STAGE = 25, 5
+CONTROLS = slice(4, N * STAGE, STAGE)
+
+
+def bounds():
+    return external("nlp_bounds")()
+
+
+def point(seed):
+    rng = np.random.default_rng(seed)
+    n, m = external("nlp_g").nnz_in(0), external("nlp_g").nnz_out(0)
+    return rng.uniform(-0.5, 0.5, n), rng.uniform(-1, 1, m)
+
+
+def gradient(x, sigma, mu):
+    return full(external("nlp_grad")(x, casadi.DM(0, 1), sigma, mu)[2]).ravel()
+
+
+class Derivatives(unittest.TestCase):
+    """By central differences of the values: eight digits."""
+
+    def test_dimensions(self):
+        x, mu = point(1)
+        self.assertEqual(len(x), N * STAGE + 4)
+        # Ends of intervals, two path constraints and one at the end.
+        self.assertEqual(len(mu), N * 6 + 1)
+
+    def test_first(self):
+        x, _ = point(1)
+        p = casadi.DM(0, 1)
+        f, g = external("nlp_f"), external("nlp_g")
+        np.testing.assert_allclose(
+            full(external("nlp_grad_f")(x, p)[1]).ravel(),
+            differences(lambda x: full(f(x, p)), x).ravel(),
+            rtol=1e-8,
+            atol=1e-8,
+        )
+        jac = external("nlp_jac_g")(x, p)[1]
+        expected = differences(lambda x: full(g(x, p)), x)
+        np.testing.assert_allclose(full(jac), expected, rtol=1e-8, atol=1e-8)
+        f_and_g = external("nlp")(x, p)
+        np.testing.assert_array_equal(full(f_and_g[0]), full(f(x, p)))
+        np.testing.assert_array_equal(full(f_and_g[1]), full(g(x, p)))
+
+    def test_gradient_of_the_lagrangian(self):
+        x, mu = point(2)
+        p = casadi.DM(0, 1)
+        expected = 0.7 * full(external("nlp_grad_f")(x, p)[1]).ravel()
+        expected += full(external("nlp_jac_g")(x, p)[1]).T @ mu
+        np.testing.assert_allclose(gradient(x, 0.7, mu), expected, rtol=1e-13, atol=1e-13)
+
+    def test_second(self):
+        """With a factor of the objective, without one, and with none of it."""
+        x, mu = point(3)
+        for sigma in [1.0, 0.3, 0.0]:
+            upper = full(external("nlp_hess_l")(x, casadi.DM(0, 1), sigma, mu))
+            self.assertTrue((np.tril(upper, -1) == 0).all())
+            hessian = upper + np.triu(upper, 1).T
+            expected = differences(lambda x: gradient(x, sigma, mu), x)
+            np.testing.assert_allclose(hessian, expected, rtol=1e-7, atol=1e-7)
+
+
+class Solvers(unittest.TestCase):
+    def solve(self, plugin, options):
+        solver = casadi.nlpsol("s", plugin, LIBRARY, options)
+        given = bounds()
+        solution = solver(**{name: given[name] for name in ["lbx", "ubx", "x0", "lbg", "ubg"]})
+        self.assertTrue(solver.stats()["success"], solver.stats()["return_status"])
+        return float(solution["f"]), full(solution["x"]).ravel()
+
+    def test_ipopt_and_those_of_casados_agree(self):
+        own = np.zeros(27)
+        self.assertEqual(RUST.own_solution(own.ctypes.data_as(ctypes.POINTER(ctypes.c_double))), 0)
+        options = {"print_time": False, "ipopt": {"print_level": 0, "tol": 1e-11, "bound_relax_factor": 0}}
+        f, x = self.solve("ipopt", options)
+        # Conditions of optimality to 1e-10, over a Hessian of the controls of 0.001 (0.02 times the
+        # length of an interval).
+        np.testing.assert_allclose([f, f], own[:2], rtol=1e-8)
+        np.testing.assert_allclose(x[CONTROLS], own[2:], atol=1e-6)
+        # The problem is one: bounds are active.
+        self.assertTrue((np.abs(x[CONTROLS]) > 5.99).any() or (full(external("nlp_g")(x, casadi.DM(0, 1))) > 1.49).any())
+
+    def test_another_plugin(self):
+        """Of `nlp` and its derivatives CasADi makes what other solvers ask for."""
+        nlp, given = external("nlp"), bounds()
+        x = casadi.MX.sym("x", nlp.size_in(0))
+        f, g = nlp(x, casadi.MX(0, 1))
+        options = {"print_time": False, "print_header": False, "print_iteration": False, "print_status": False}
+        options |= {"qpsol": "qrqp", "tol_pr": 1e-9, "tol_du": 1e-9}
+        options["qpsol_options"] = {"print_iter": False, "print_header": False, "error_on_fail": False}
+        solver = casadi.nlpsol("s", "sqpmethod", {"x": x, "f": f, "g": g}, options)
+        found = float(solver(**{name: given[name] for name in ["lbx", "ubx", "x0", "lbg", "ubg"]})["f"])
+        own = np.zeros(27)
+        RUST.own_solution(own.ctypes.data_as(ctypes.POINTER(ctypes.c_double)))
+        np.testing.assert_allclose(found, own[0], rtol=1e-7)
+
+    def test_both_forms_of_derivatives(self):
+        x, mu = point(6)
+        p = casadi.DM(0, 1)
+        blocks = external("jac_adj1_nlp")(x, p, 0, 0, 0.8, mu, 0, 0)
+        upper = full(external("nlp_hess_l")(x, p, 0.8, mu))
+        np.testing.assert_array_equal(full(blocks[0]), upper + np.triu(upper, 1).T)
+        jac = external("jac_nlp")(x, p, 0, 0)
+        np.testing.assert_array_equal(full(jac[0]).T, full(external("nlp_grad_f")(x, p)[1]))
+        np.testing.assert_array_equal(full(jac[2]), full(external("nlp_jac_g")(x, p)[1]))
+        np.testing.assert_allclose(full(blocks[5]).T, full(jac[2]), rtol=1e-13, atol=1e-14)
+        np.testing.assert_allclose(full(blocks[4]), full(jac[0]).T, rtol=1e-12, atol=1e-13)
+        adjoint = external("adj1_nlp")(x, p, 0, 0, 0.8, mu)[0]
+        np.testing.assert_array_equal(full(adjoint).ravel(), gradient(x, 0.8, mu))
+
+    def test_what_is_known_is_not_computed_again(self):
+        x, mu = point(5)
+        p = casadi.DM(0, 1)
+        # With the last of them all memory goes.
+        functions = [external(name) for name in ["nlp_hess_l", "nlp_jac_g", "nlp_grad_f"]]
+        before = integrations("nlp")
+        for function, arguments in zip(functions, [(x, p, 1, mu), (x, p), (x, p)]):
+            function(*arguments)
+        # The gradient comes with the value of the objective.
+        self.assertEqual(integrations("nlp") - before, 2 * N)
+
+
+if __name__ == "__main__":
+    unittest.main()
