@@ -33,6 +33,10 @@ const ARROWS: &[(&str, &str)] = &[
     ("batch", "error shape statistics tableau memory options scalar model linalg result finite irk"),
     ("testing", "error shape memory scalar model result erk irk"),
     ("ocp", "error shape memory scalar function model qp linalg result quadrature irk batch"),
+    (
+        "casadi",
+        "error shape structure tableau memory options function model qp result quadrature erk irk adaptive batch ocp",
+    ),
 ];
 
 /// A room is a folder of `src`, or a file in it.

@@ -72,7 +72,7 @@ impl Problems {
     pub fn new(make: Make) -> Self {
         let made = make().map_err(|error| error.to_string());
         let made = made.and_then(|mut program| {
-            program.check().map_err(|error| error.to_string())?;
+            program.check()?;
             Ok(program)
         });
         let (dims, periodic, wrong) = match made {

@@ -1,8 +1,10 @@
 //! A problem of optimal control as a nonlinear program: what is asked of it.
 
+use crate::ocp::{ConstraintName, Formulation};
 use crate::ocp::{Convexification, Exact, GaussNewton, HeapOcp, OcpError, SecondOrder};
-use crate::ocp::{Formulation, Part};
-use crate::qp::{QpView, Solution, StageDims};
+use crate::qp::{Field, QpView, Side, Solution, StageDims};
+use alloc::format;
+use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
 /// A problem of optimal control, whose variables and constraints are
@@ -22,8 +24,8 @@ pub trait Program: Send {
     /// Whether all that was to be said was, and all bounds are hard.
     ///
     /// # Errors
-    /// [`OcpError::Missing`]; [`OcpError::InvalidValue`] of a penalty.
-    fn check(&mut self) -> Result<(), OcpError>;
+    /// What is wrong, as a text.
+    fn check(&mut self) -> Result<(), String>;
     /// The variables of the iterate.
     fn point(&self, to: &mut [f64]);
     /// The objective, and `φ` of every interval and `g` of every stage in `ends`.
@@ -65,21 +67,15 @@ where
         HeapOcp::limits(self, stage, row)
     }
 
-    fn check(&mut self) -> Result<(), OcpError> {
-        HeapOcp::check(self)?;
-        for (stage, bounds) in self.qp().stages().enumerate() {
-            for bounds in [bounds.x_bounds(), bounds.u_bounds(), bounds.g_bounds()] {
-                let sides = [(bounds.lower, bounds.lower_linear), (bounds.upper, bounds.upper_linear)];
-                for (bounds, penalties) in sides {
-                    for (index, (bound, &value)) in bounds.iter().zip(penalties).enumerate() {
-                        if bound.is_finite() && value.is_finite() {
-                            return Err(OcpError::InvalidValue { part: Part::Penalty, stage, index, value });
-                        }
-                    }
-                }
-            }
+    fn check(&mut self) -> Result<(), String> {
+        HeapOcp::check(self).map_err(|error| error.to_string())?;
+        match soft(self) {
+            None => Ok(()),
+            Some(bound) => Err(format!(
+                "{bound} is soft, and the program of CasADi has no slack variables: write the penalty as a cost, \
+                 or leave `soften` out"
+            )),
         }
-        Ok(())
     }
 
     fn point(&self, to: &mut [f64]) {
@@ -108,6 +104,30 @@ where
         self.linearise(Exact { convexification: Convexification::None })?;
         Ok(self.qp())
     }
+}
+
+/// A bound that is soft, if there is one.
+fn soft<P: Formulation<f64>>(ocp: &HeapOcp<P, f64>) -> Option<ConstraintName> {
+    for (at, stage) in ocp.qp().stages().enumerate() {
+        let fields = [
+            (Field::StateBounds, stage.x_bounds()),
+            (Field::ControlBounds, stage.u_bounds()),
+            (Field::GeneralBounds, stage.g_bounds()),
+        ];
+        for (field, bounds) in fields {
+            let sides = [
+                (Side::Lower, bounds.lower, bounds.lower_linear),
+                (Side::Upper, bounds.upper, bounds.upper_linear),
+            ];
+            for (side, bounds, penalties) in sides {
+                let is_soft = |(bound, penalty): (&f64, &f64)| bound.is_finite() && penalty.is_finite();
+                if let Some(index) = bounds.iter().zip(penalties).position(is_soft) {
+                    return Some(ocp.name(field, at, index, side));
+                }
+            }
+        }
+    }
+    None
 }
 
 /// Variables and multipliers of `g` to where the problem reads them.
