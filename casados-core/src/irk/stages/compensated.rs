@@ -19,7 +19,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
 use crate::irk::jacobian_entries::entries;
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, moved, two_product};
+use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, kernels, moved, two_product};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes, two_sum};
@@ -113,21 +113,15 @@ fn conjugate<A: Arithmetic, E: Field, const S: usize>(a: &[[E; S]; S], b: &[E; S
     more
 }
 
-/// `x + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
-pub(in crate::irk) struct Advance<'a, E, const S: usize> {
-    pub x: &'a mut [E],
-    pub rest: &'a mut [E],
-    pub y: &'a [[E; S]],
-    pub b: &'a [E; S],
-    pub h: E,
-}
-
-impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { x, rest, y, b, h } = self;
+kernels! {
+    /// `x + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
+    pub(in crate::irk) fn advance [E: Field, const S: usize] [E, S] <A>(
+        x: &'k mut [E],
+        rest: &'k mut [E],
+        y: &'k [[E; S]],
+        b: &'k [E; S],
+        h: E,
+    ) {
         for ((x, rest), k) in x.iter_mut().zip(rest).zip(y) {
             [*x, *rest] = moved::<A, E>([*x, *rest], h, dot_compensated::<A, E>(b.iter().zip(k)));
         }
