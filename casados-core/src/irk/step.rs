@@ -30,7 +30,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.place_inputs();
         // The same input gives the same bits in every call: nothing of the last one is taken over.
         self.validity = Default::default();
-        self.rest.as_mut().fill(E::from_f64(0.0));
+        self.compensation.as_mut().fill(E::from_f64(0.0));
     }
 
     /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
@@ -45,8 +45,8 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let h = self.inputs.time.step;
         let b = &coefficients.b;
         if compensate {
-            let (x, rest, y) = (self.x.as_mut(), self.rest.as_mut(), step.y.as_ref());
-            compensated::advance(x, rest, y, b, h);
+            let (x, compensation, y) = (self.x.as_mut(), self.compensation.as_mut(), step.y.as_ref());
+            compensated::advance(x, compensation, y, b, h);
         } else {
             advance::<M, E, S>(&mut self.x, &step.y, b, h);
         }

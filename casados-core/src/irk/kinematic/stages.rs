@@ -23,9 +23,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !is_any::<M>() } {
             return;
         }
-        let Self { linear, points, rest, inputs, .. } = self;
+        let Self { linear, points, compensation, inputs, .. } = self;
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        reconstruct_stages::<M, E, S>(jacobian, points, x, rest, y, a, h);
+        reconstruct_stages::<M, E, S>(jacobian, points, x, compensation, y, a, h);
     }
 
     /// Whether stages are all alike while `k_q = 0`, so that the model, with its Jacobian, is
@@ -86,12 +86,12 @@ pub(in crate::irk) fn derivative<M: Dae, E: Lanes, const S: usize>(
 }
 
 kernels! {
-    /// See [`Work::reconstruct`]; `rest` is what `x` has beyond its digits.
+    /// See [`Work::reconstruct`]; `compensation` is what `x` has beyond its digits.
     fn reconstruct_stages [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
         jacobian: &'k M::Jacobian<[E; S]>,
         points: &'k mut ArrayV<M, [E; S]>,
         x: &'k ArrayX<M, E>,
-        rest: &'k ArrayX<M, E>,
+        compensation: &'k ArrayX<M, E>,
         y: &'k mut ArrayK<M, [E; S]>,
         a: &'k [[E; S]; S],
         h: E,
@@ -101,7 +101,8 @@ kernels! {
         for state in 0..count::<M>() {
             let Some(of) = kinematic::<M>(state) else { continue };
             if let Some(v) = velocity::<M>(of)
-                && let (Some(&x), Some(&rest), Some(k)) = (x.as_ref().get(v), rest.as_ref().get(v), y.get(v))
+                && let (Some(&x), Some(&rest), Some(k)) =
+                    (x.as_ref().get(v), compensation.as_ref().get(v), y.get(v))
                 && let Some(xi) = points.get_mut(M::Shape::NX + v)
             {
                 *xi = stage_values::<A, E, S>(rest, &minus_ha, k);
