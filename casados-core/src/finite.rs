@@ -1,7 +1,7 @@
 //! Finite checks: of what is given, and of what is returned.
 
 use crate::error::{Argument, Error};
-use crate::linalg::{Arithmetic, Kernel, are_finite, dispatch};
+use crate::linalg::{are_finite, kernels};
 use crate::scalar::Real;
 
 /// # Errors
@@ -26,23 +26,16 @@ pub(crate) fn check_output<T: Real>(values: &[T], step: usize) -> Result<(), Err
 #[inline]
 pub(crate) fn not_finite<T: Real>(values: &[T]) -> Option<(usize, f64)> {
     // A few are looked at before the function for many is entered.
-    let finite = if values.len() < 16 { are_finite(values) } else { dispatch(Finite { values }) };
+    let finite = if values.len() < 16 { are_finite(values) } else { are_all_finite(values) };
     if finite {
         return None;
     }
     values.iter().position(|value| !value.is_finite()).map(|index| (index, values[index].to_f64()))
 }
 
-/// See [`are_finite`].
-struct Finite<'a, T> {
-    values: &'a [T],
-}
-
-impl<T: Real> Kernel for Finite<'_, T> {
-    type Number = T;
-    type Output = bool;
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) -> bool {
-        are_finite(self.values)
+kernels! {
+    /// See [`are_finite`].
+    fn are_all_finite [E: Real] [E] <A>(values: &'k [E]) -> bool {
+        are_finite(values)
     }
 }

@@ -4,7 +4,7 @@
 //! their equations; lanes never mix, so that one that fails takes nobody with it.
 
 use super::intervals::Interval;
-use super::lanes::{MOST_LANES, Pack, Unpack, Verdict, yes};
+use super::lanes::{MOST_LANES, Unpack, Verdict, pack, yes};
 use crate::error::Error;
 use crate::irk::{
     AdjointMemory, Coefficients, ForwardMemory, HessianMemory, HessianStep, InitialGuess, Linearization,
@@ -120,7 +120,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
                     for (from, $interval) in from.iter_mut().zip(intervals) {
                         *from = $slice;
                     }
-                    dispatch(Pack { from: &from, to });
+                    pack(&from, to);
                 }
             };
         }
@@ -138,7 +138,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
         self.given = given.is_some();
         let (xdot, z) = work.given.as_mut().split_at_mut(M::Shape::NX);
         for (given, to) in given.iter().flatten().zip([xdot, z]) {
-            dispatch(Pack { from: &[*given; MOST_LANES], to });
+            pack(&[*given; MOST_LANES], to);
         }
         pack!(Heap::nominal(&mut self.lambda)?.as_mut(), |interval| interval.lambda);
         // All of them have some, or none.
@@ -152,7 +152,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             for (from, record) in from.iter_mut().zip(records) {
                 *from = record.get(n).map_or(&[], |y| y.as_ref().as_flattened());
             }
-            dispatch(Pack { from: &from, to: step.y.as_mut().as_flattened_mut() });
+            pack(&from, step.y.as_mut().as_flattened_mut());
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Numbers of several intervals in the lanes of registers, and back.
 
 use crate::error::Error;
-use crate::linalg::{Arithmetic, Kernel};
+use crate::linalg::{Arithmetic, Kernel, kernels};
 use crate::scalar::Lanes;
 use crate::shape::Plain;
 use bytemuck::Zeroable;
@@ -46,20 +46,15 @@ pub fn unpack<T: Plain, E: Lanes<Cell: AsRef<[T]>>>(from: &[E], to: &mut [&mut [
     }
 }
 
-/// The elements of several slices, one of each in the lanes of a register.
-pub struct Pack<'a, T, E> {
-    pub from: &'a [&'a [T]; MOST_LANES],
-    pub to: &'a mut [E],
-}
-
-impl<T: Plain, E: Lanes<Cell: AsMut<[T]>>> Kernel for Pack<'_, T, E> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+kernels! {
+    /// The elements of several slices, one of each in the lanes of a register.
+    pub fn pack [T: Plain, E: Lanes<Cell: AsMut<[T]>>] [T, E] <A>(
+        from: &'k [&'k [T]; MOST_LANES],
+        to: &'k mut [E],
+    ) {
         let mut cell: E::Cell = Zeroable::zeroed();
-        for (i, to) in self.to.iter_mut().enumerate() {
-            for (cell, from) in cell.as_mut().iter_mut().zip(self.from) {
+        for (i, to) in to.iter_mut().enumerate() {
+            for (cell, from) in cell.as_mut().iter_mut().zip(from) {
                 if let Some(&from) = from.get(i) {
                     *cell = from;
                 }

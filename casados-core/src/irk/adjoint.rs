@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::finite::check_output;
 use crate::irk::coefficients::Coefficients;
 use crate::irk::jacobian_entries::entry;
-use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row, kernels, slot};
 use crate::memory::{Fallback, Family};
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, VectorZ};
 use crate::quadrature::Along;
@@ -73,7 +73,7 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
             self.sourced = true;
         }
         let source = self.source.as_mut().get_mut(M::Shape::NX..).unwrap_or_default();
-        dispatch(Weigh { nu: self.nu.as_slice(), start: &coefficients.start, source });
+        weigh(self.nu.as_slice(), &coefficients.start, source);
     }
 
     /// `μ` of a step that is linearised, by the factors that were `kept` or are there; whether it
@@ -96,9 +96,9 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         h: E,
     ) {
         let Self { lambda, mu, source, sourced, .. } = self;
-        dispatch(RightHandSide { lambda: lambda.as_ref(), b: &coefficients.b, h, mu: mu.as_mut() });
+        right_hand_side(lambda.as_ref(), &coefficients.b, h, mu.as_mut());
         if *sourced {
-            dispatch(Add { to: mu.as_mut().as_flattened_mut(), from: source.as_ref().as_flattened() });
+            add_to_all(mu.as_mut().as_flattened_mut(), source.as_ref().as_flattened());
         }
         linear.solve_transposed((coefficients, h), mu);
     }
@@ -111,8 +111,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
         dispatch(Advance::<M, E, S, C> { jacobian, mu, lambda: &mut *lambda, gradient: &mut *gradient });
         if *sourced {
             let (states, inputs) = shift.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
-            dispatch(Add { to: lambda, from: states });
-            dispatch(Add { to: gradient.get_mut(M::Shape::NX..).unwrap_or_default(), from: inputs });
+            add_to_all(lambda, states);
+            add_to_all(gradient.get_mut(M::Shape::NX..).unwrap_or_default(), inputs);
         }
     }
 }
@@ -150,20 +150,14 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> Backward<M, T, S, C> {
     }
 }
 
-/// `h (b ⊗ λ, 0)`
-struct RightHandSide<'a, E, const S: usize, const C: usize> {
-    lambda: &'a [[E; C]],
-    b: &'a [E; S],
-    h: E,
-    mu: &'a mut [[[E; C]; S]],
-}
-
-impl<E: Lanes, const S: usize, const C: usize> Kernel for RightHandSide<'_, E, S, C> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { lambda, b, h, mu } = self;
+kernels! {
+    /// `h (b ⊗ λ, 0)`
+    fn right_hand_side [E: Lanes, const S: usize, const C: usize] [E, S, C] <A>(
+        lambda: &'k [[E; C]],
+        b: &'k [E; S],
+        h: E,
+        mu: &'k mut [[[E; C]; S]],
+    ) {
         mu.fill([[E::from_f64(0.0); C]; S]);
         for (mu, lambda) in mu.iter_mut().zip(lambda) {
             for (mu, &b) in mu.iter_mut().zip(b) {
@@ -173,41 +167,24 @@ impl<E: Lanes, const S: usize, const C: usize> Kernel for RightHandSide<'_, E, S
             }
         }
     }
-}
 
-/// Adds the same to all seeds.
-struct Add<'a, E, const C: usize> {
-    to: &'a mut [[E; C]],
-    from: &'a [E],
-}
-
-impl<E: Lanes, const C: usize> Kernel for Add<'_, E, C> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for (to, &from) in self.to.iter_mut().zip(self.from) {
+    /// Adds the same to all seeds.
+    fn add_to_all [E: Lanes, const C: usize] [E, C] <A>(to: &'k mut [[E; C]], from: &'k [E]) {
+        for (to, &from) in to.iter_mut().zip(from) {
             for to in to {
                 *to = *to + from;
             }
         }
     }
-}
 
-/// `source_i += ℓ_i(0) ν` at every stage.
-struct Weigh<'a, E, const S: usize> {
-    nu: &'a [E],
-    start: &'a [E; S],
-    source: &'a mut [[E; S]],
-}
-
-impl<E: Lanes, const S: usize> Kernel for Weigh<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for (source, &nu) in self.source.iter_mut().zip(self.nu) {
-            for (source, &start) in source.iter_mut().zip(self.start) {
+    /// `source_i += ℓ_i(0) ν` at every stage.
+    fn weigh [E: Lanes, const S: usize] [E, S] <A>(
+        nu: &'k [E],
+        start: &'k [E; S],
+        source: &'k mut [[E; S]],
+    ) {
+        for (source, &nu) in source.iter_mut().zip(nu) {
+            for (source, &start) in source.iter_mut().zip(start) {
                 *source = *source + start * nu;
             }
         }

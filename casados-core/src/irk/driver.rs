@@ -25,7 +25,7 @@ pub(crate) struct Run<M: Dae, T: Real, const S: usize, W: Memory> {
     work: W::Nominal<Work<M, T, S, W::Fallback>>,
     /// The record of the last successful call, and that of the call that runs.
     tapes: [W::Tape<Step<M, T, S>>; 2],
-    kept: usize,
+    last_tape: usize,
     /// Whether any call succeeded.
     any: bool,
     /// Whether the record is a warm start.
@@ -76,7 +76,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
             statistics: Statistics::default(),
             work: Default::default(),
             tapes: Default::default(),
-            kept: 0,
+            last_tape: 0,
             any: false,
             warm: false,
             solved: false,
@@ -150,15 +150,15 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         work.inputs.time.step = arguments.h / T::from_whole(options.steps);
         work.x.as_mut().copy_from_slice(arguments.x0.as_slice());
         let [first, second] = tapes;
-        let (kept, running) = if self.kept == 0 { (first, second) } else { (second, first) };
+        let (last, running) = if self.last_tape == 0 { (first, second) } else { (second, first) };
         // Both in the first call: later ones do not allocate.
         let steps = W::tape(running, options.steps)?;
-        let kept = W::tape(kept, options.steps)?;
+        let last = W::tape(last, options.steps)?;
         let guess = match options.start {
-            _ if core::mem::take(&mut self.solved) => InitialGuess::Solution(kept),
+            _ if core::mem::take(&mut self.solved) => InitialGuess::Solution(last),
             Start::Zero => InitialGuess::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
-            Start::Warm if self.warm => InitialGuess::Previous(kept),
+            Start::Warm if self.warm => InitialGuess::Previous(last),
             _ if self.given => InitialGuess::Given,
             _ => InitialGuess::Nominal,
         };
@@ -181,7 +181,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn set_stages(&mut self, y: &[T]) -> Result<(), Error> {
         let [first, second] = &mut self.tapes;
-        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
         if let Some(step) = steps.first_mut() {
             for (to, from) in step.y.as_mut().as_flattened_mut().iter_mut().zip(y) {
                 *to = *from;
@@ -209,7 +209,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     #[cfg(feature = "alloc")]
     pub fn set_record(&mut self, record: &[crate::model::ArrayK<M, [T; S]>]) -> Result<(), Error> {
         let [first, second] = &mut self.tapes;
-        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
         for (step, y) in steps.iter_mut().zip(record) {
             crate::shape::assign(&mut *step.y, y);
         }
@@ -228,8 +228,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     /// Everything succeeded: the record of this call is the one to keep.
     pub fn keep(&mut self) -> Result<&Work<M, T, S, W::Fallback>, Error> {
         let work = W::nominal(&mut self.work)?;
-        work.kept = work.inputs;
-        self.kept = 1 - self.kept;
+        work.last_inputs = work.inputs;
+        self.last_tape = 1 - self.last_tape;
         self.any = true;
         self.warm = true;
         Ok(work)
@@ -242,7 +242,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         }
         let work = W::nominal(&mut self.work)?;
         let [first, second] = &mut self.tapes;
-        let steps = W::tape(if self.kept == 0 { first } else { second }, self.options.steps)?;
+        let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
         Ok(Parts { work, coefficients: &self.coefficients, steps, statistics: &mut self.statistics })
     }
 }

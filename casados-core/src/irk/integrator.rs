@@ -279,8 +279,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     pub fn dense(&mut self, t: T) -> Result<&Dense<M, T>, Error> {
         let last = self.run.last()?;
         let work = last.work;
-        let point = Point::new(t, &work.kept, last.steps.len(), &last.coefficients.tableau)?;
-        let h = work.kept.time.step;
+        let point = Point::new(t, &work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
+        let h = work.last_inputs.time.step;
         if let Some(step) = last.steps.get(point.step) {
             point.evaluate(step, h, &mut work.dense)?;
         }

@@ -9,12 +9,12 @@ use crate::error::{Error, Place};
 use crate::finite::{check_output, not_finite};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
-use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::linalg::kernels;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::options::Options;
 use crate::scalar::{Field, Lanes, Real};
-use crate::shape::{Matrix, Plain, Shape, assign};
+use crate::shape::{Matrix, Shape, assign};
 use crate::statistics::Statistics;
 
 /// How an interval is integrated.
@@ -30,7 +30,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         self.place_inputs();
         // The same input gives the same bits in every call: nothing of the last one is taken over.
         self.validity = Default::default();
-        self.rest.as_mut().fill(E::from_f64(0.0));
+        self.compensation.as_mut().fill(E::from_f64(0.0));
     }
 
     /// `x_{n+1} = x_n + h Σ_i b_i k_i`, and `z` at the ends of the interval.
@@ -45,10 +45,10 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         let h = self.inputs.time.step;
         let b = &coefficients.b;
         if compensate {
-            let (x, rest, y) = (self.x.as_mut(), self.rest.as_mut(), step.y.as_ref());
-            dispatch(compensated::Advance { x, rest, y, b, h });
+            let (x, compensation, y) = (self.x.as_mut(), self.compensation.as_mut(), step.y.as_ref());
+            compensated::advance(x, compensation, y, b, h);
         } else {
-            dispatch(Advance::<M, E, S> { x: &mut self.x, y: &step.y, b, h });
+            advance::<M, E, S>(&mut self.x, &step.y, b, h);
         }
         if n == 0 {
             algebraic::<M, E, S>(self.result.z0.as_mut_slice(), &step.y, &coefficients.start);
@@ -208,41 +208,30 @@ pub(crate) fn algebraic<M: Dae, E: Lanes, const S: usize>(
     lagrange: &[E; S],
 ) {
     let y = y.as_ref().get(M::Shape::NX..).unwrap_or_default();
-    dispatch(Combine { to: z, y, weights: lagrange });
+    combine(z, y, lagrange);
 }
 
-/// `Σ_i weight_i y_i` of each unknown.
-struct Combine<'a, E, const S: usize> {
-    to: &'a mut [E],
-    y: &'a [[E; S]],
-    weights: &'a [E; S],
-}
-
-impl<E: Field, const S: usize> Kernel for Combine<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for (to, y) in self.to.iter_mut().zip(self.y) {
-            *to = dot(self.weights, y);
+kernels! {
+    /// `Σ_i weight_i y_i` of each unknown.
+    fn combine [E: Field, const S: usize] [E, S] <A>(
+        to: &'k mut [E],
+        y: &'k [[E; S]],
+        weights: &'k [E; S],
+    ) {
+        for (to, y) in to.iter_mut().zip(y) {
+            *to = dot(weights, y);
         }
     }
 }
 
-/// `x ← x + h Σ_i b_i k_i`
-struct Advance<'a, M: Dae, E: Plain, const S: usize> {
-    x: &'a mut ArrayX<M, E>,
-    y: &'a ArrayK<M, [E; S]>,
-    b: &'a [E; S],
-    h: E,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Advance<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { x, y, b, h } = self;
+kernels! {
+    /// `x ← x + h Σ_i b_i k_i`
+    fn advance [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+        x: &'k mut ArrayX<M, E>,
+        y: &'k ArrayK<M, [E; S]>,
+        b: &'k [E; S],
+        h: E,
+    ) {
         for (x, k) in x.as_mut().iter_mut().zip(y.as_ref()) {
             *x = *x + h * dot(b, k);
         }

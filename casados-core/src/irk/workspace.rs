@@ -73,7 +73,7 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// What the last call was given.
     pub(crate) inputs: Inputs<M, T>,
     /// What the last successful call was given.
-    pub(crate) kept: Inputs<M, T>,
+    pub(crate) last_inputs: Inputs<M, T>,
     /// Parameters as they were set.
     pub(crate) parameters: VectorP<M, T>,
     /// Start values as they were given.
@@ -81,7 +81,7 @@ pub struct Work<M: Dae, T: Lanes, const S: usize, F: Fallback = Pivoting> {
     /// The state at the start of the step, then at its end.
     pub(crate) x: ArrayX<M, T>,
     /// What was rounded off from it, if sums are compensated.
-    pub(crate) rest: ArrayX<M, T>,
+    pub(crate) compensation: ArrayX<M, T>,
     /// Variables of the model, each at all stages.
     pub(crate) points: Aligned<Stages<ArrayV<M, [T; S]>, T, S>>,
     /// The residual at all stages.

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::finite::check_output;
-use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::linalg::kernels;
 use crate::model::Dae;
 use crate::result::{Forward, ForwardAdjoint};
 use crate::scalar::{Lanes, Real};
@@ -35,7 +35,7 @@ pub(crate) fn multiply<M: Dae, E: Lanes>(result: &mut ForwardAdjoint<M, E>, lamb
         (forward.dx_du.as_slice(), grad_u.as_mut_slice()),
         (forward.dx_dp.as_slice(), grad_p.as_mut_slice()),
     ] {
-        dispatch(Product { lambda, matrix, gradient });
+        product(lambda, matrix, gradient);
     }
 }
 
@@ -53,19 +53,9 @@ pub(crate) fn gradient<M: Dae, T: Real>(
     check_output(result.grad_p.as_slice(), 0)
 }
 
-/// `gradientᵀ = λᵀ S`, with `S` column after column.
-struct Product<'a, E> {
-    lambda: &'a [E],
-    matrix: &'a [E],
-    gradient: &'a mut [E],
-}
-
-impl<E: Lanes> Kernel for Product<'_, E> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { lambda, matrix, gradient } = self;
+kernels! {
+    /// `gradientᵀ = λᵀ S`, with `S` column after column.
+    fn product [E: Lanes] [E] <A>(lambda: &'k [E], matrix: &'k [E], gradient: &'k mut [E]) {
         gradient.fill(E::from_f64(0.0));
         // A model without states has no columns to go through.
         let columns = matrix.chunks_exact(lambda.len().max(1));

@@ -12,7 +12,7 @@ use crate::irk::kinematic::Forward;
 use crate::irk::workspace::{Linearization, Work, copy};
 use crate::linalg::{
     Ahead, Arithmetic, Block, Down, Kernel, Planned, Up, Visitor, coupling, dispatch, each_row, is_long,
-    is_short, sweeps,
+    is_short, kernels, sweeps,
 };
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
@@ -80,7 +80,7 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         // Without an operating system every call takes the same time, the first one too.
         if !(cfg!(feature = "std") && D::SPARSE && self.begun) {
             let end = R::flat_mut(self.v[0].as_mut());
-            dispatch(Start::<_, _, S> { v: end, rows: M::Shape::NX, directions });
+            unit_or_seeds::<E, D, S>(end, M::Shape::NX, directions);
         }
         self.begun = D::SPARSE;
     }
@@ -182,19 +182,13 @@ impl<M: Dae, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
     }
 }
 
-/// See [`Sweep::start`].
-struct Start<'a, E, D, const S: usize> {
-    v: &'a mut [E],
-    rows: usize,
-    directions: &'a D,
-}
-
-impl<E: Lanes, D: Directions<E>, const S: usize> Kernel for Start<'_, E, D, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { v, rows, directions } = self;
+kernels! {
+    /// See [`Sweep::start`].
+    fn unit_or_seeds [E: Lanes, D: Directions<E>, const S: usize] [E, D, S] <A>(
+        v: &'k mut [E],
+        rows: usize,
+        directions: &'k D,
+    ) {
         v.fill(E::from_f64(0.0));
         panels!(D::COUNT, E, S, column, W => {
             for (index, row) in panel_mut::<E, W>(v, column, rows).iter_mut().enumerate() {

@@ -6,11 +6,11 @@ use crate::irk::coefficients::nodes;
 use crate::irk::coefficients::stage_values;
 use crate::irk::jacobian_entries::entry;
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, coupling, dispatch, kinematic};
+use crate::linalg::{coupling, kernels, kinematic};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::Lanes;
-use crate::shape::{Plain, Shape};
+use crate::shape::Shape;
 
 impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// Writes `k_q`.
@@ -23,15 +23,9 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !is_any::<M>() } {
             return;
         }
-        dispatch(ReconstructStages::<M, E, S> {
-            jacobian: &self.linear.jacobian,
-            points: &mut self.points,
-            x,
-            rest: &self.rest,
-            y,
-            a: &coefficients.a,
-            h: self.inputs.time.step,
-        });
+        let Self { linear, points, compensation, inputs, .. } = self;
+        let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
+        reconstruct_stages::<M, E, S>(jacobian, points, x, compensation, y, a, h);
     }
 
     /// Whether stages are all alike while `k_q = 0`, so that the model, with its Jacobian, is
@@ -53,7 +47,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let Self { f, points, linear, inputs, .. } = self;
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        dispatch(EliminateMissing::<M, E, S> { jacobian, points, f, a, h });
+        eliminate_missing::<M, E, S>(jacobian, points, f, a, h);
     }
 
     /// Writes what follows from [compensated](crate::irk::stages::compensated) sums, to its last
@@ -62,11 +56,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         if const { !is_any::<M>() } {
             return;
         }
-        dispatch(ReconstructCompensated::<M, E, S> {
-            jacobian: &self.linear.jacobian,
-            points: &mut self.points,
-            y,
-        });
+        reconstruct_compensated::<M, E, S>(&self.linear.jacobian, &mut self.points, y);
     }
 
     /// Takes from the residual of the others what is missing in `k_q` beyond its digits.
@@ -76,7 +66,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         }
         let Self { f, linear, inputs, .. } = self;
         let (jacobian, a, h) = (&linear.jacobian, &coefficients.a, inputs.time.step);
-        dispatch(EliminateRounded::<M, E, S> { jacobian, f, a, h });
+        eliminate_rounded::<M, E, S>(jacobian, f, a, h);
     }
 }
 
@@ -95,30 +85,24 @@ pub(in crate::irk) fn derivative<M: Dae, E: Lanes, const S: usize>(
     Some(k)
 }
 
-/// See [`Work::reconstruct`].
-struct ReconstructStages<'a, M: Dae, E: Plain, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    points: &'a mut ArrayV<M, [E; S]>,
-    x: &'a ArrayX<M, E>,
-    /// What `x` has beyond its digits.
-    rest: &'a ArrayX<M, E>,
-    y: &'a mut ArrayK<M, [E; S]>,
-    a: &'a [[E; S]; S],
-    h: E,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructStages<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { jacobian, points, x, rest, y, a, h } = self;
+kernels! {
+    /// See [`Work::reconstruct`]; `compensation` is what `x` has beyond its digits.
+    fn reconstruct_stages [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+        jacobian: &'k M::Jacobian<[E; S]>,
+        points: &'k mut ArrayV<M, [E; S]>,
+        x: &'k ArrayX<M, E>,
+        compensation: &'k ArrayX<M, E>,
+        y: &'k mut ArrayK<M, [E; S]>,
+        a: &'k [[E; S]; S],
+        h: E,
+    ) {
         let (points, y) = (points.as_mut(), y.as_mut());
         let minus_ha = coupling(a, h);
         for state in 0..count::<M>() {
             let Some(of) = kinematic::<M>(state) else { continue };
             if let Some(v) = velocity::<M>(of)
-                && let (Some(&x), Some(&rest), Some(k)) = (x.as_ref().get(v), rest.as_ref().get(v), y.get(v))
+                && let (Some(&x), Some(&rest), Some(k)) =
+                    (x.as_ref().get(v), compensation.as_ref().get(v), y.get(v))
                 && let Some(xi) = points.get_mut(M::Shape::NX + v)
             {
                 *xi = stage_values::<A, E, S>(rest, &minus_ha, k);
@@ -131,24 +115,15 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructStages<'_, M, E, S>
             }
         }
     }
-}
 
-/// See [`Work::eliminate_missing`].
-struct EliminateMissing<'a, M: Dae, E: Plain, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    /// Where `k_q` will be.
-    points: &'a mut ArrayV<M, [E; S]>,
-    f: &'a mut ArrayK<M, [E; S]>,
-    a: &'a [[E; S]; S],
-    h: E,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateMissing<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { jacobian, points, f, a, h } = self;
+    /// See [`Work::eliminate_missing`].
+    fn eliminate_missing [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+        jacobian: &'k M::Jacobian<[E; S]>,
+        points: &'k mut ArrayV<M, [E; S]>,
+        f: &'k mut ArrayK<M, [E; S]>,
+        a: &'k [[E; S]; S],
+        h: E,
+    ) {
         let nodes = nodes(a, h);
         for dependent in M::STRUCTURE.elimination.dependents {
             let of = kinematic::<M>(dependent.state as usize);
@@ -174,21 +149,13 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateMissing<'_, M, E, S> 
             }
         }
     }
-}
 
-/// See [`Work::reconstruct_compensated`].
-struct ReconstructCompensated<'a, M: Dae, E: Plain, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    points: &'a mut ArrayV<M, [E; S]>,
-    y: &'a mut ArrayK<M, [E; S]>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructCompensated<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { jacobian, points, y } = self;
+    /// See [`Work::reconstruct_compensated`].
+    fn reconstruct_compensated [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+        jacobian: &'k M::Jacobian<[E; S]>,
+        points: &'k mut ArrayV<M, [E; S]>,
+        y: &'k mut ArrayK<M, [E; S]>,
+    ) {
         for state in 0..count::<M>() {
             let k = derivative::<M, E, S>(state, jacobian, points.as_ref());
             if let (Some(k), Some(point), Some(y)) =
@@ -198,22 +165,14 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for ReconstructCompensated<'_, M, 
             }
         }
     }
-}
 
-/// See [`Work::eliminate_rounded`].
-struct EliminateRounded<'a, M: Dae, E: Plain, const S: usize> {
-    jacobian: &'a M::Jacobian<[E; S]>,
-    f: &'a mut ArrayK<M, [E; S]>,
-    a: &'a [[E; S]; S],
-    h: E,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for EliminateRounded<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { jacobian, f, a, h } = self;
+    /// See [`Work::eliminate_rounded`].
+    fn eliminate_rounded [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+        jacobian: &'k M::Jacobian<[E; S]>,
+        f: &'k mut ArrayK<M, [E; S]>,
+        a: &'k [[E; S]; S],
+        h: E,
+    ) {
         let minus_ha = coupling(a, h);
         for dependent in M::STRUCTURE.elimination.dependents {
             let of = kinematic::<M>(dependent.state as usize);

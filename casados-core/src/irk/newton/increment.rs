@@ -2,7 +2,7 @@
 
 use super::norm::{KinematicScales, Measure};
 use super::norm::{part, part_mut};
-use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kinematic, slot};
+use crate::linalg::{Arithmetic, AtRow, Kernel, each_row, kernels, kinematic, slot};
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::Lanes;
 use crate::shape::{Plain, Shape};
@@ -37,18 +37,11 @@ impl<M: Dae, E: Lanes, const S: usize> AtRow for PlaceResidual<'_, M, E, S> {
     }
 }
 
-/// The largest residual, of what is a number.
-pub(in crate::irk) struct Largest<'a, E> {
-    pub residual: &'a [E],
-}
-
-impl<E: Lanes> Kernel for Largest<'_, E> {
-    type Number = E;
-    type Output = E;
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) -> E {
+kernels! {
+    /// The largest residual, of what is a number.
+    pub(in crate::irk) fn largest [E: Lanes] [E] <A>(residual: &'k [E]) -> E {
         let mut largest = [E::from_f64(0.0); 8];
-        let (eights, rest) = self.residual.as_chunks::<8>();
+        let (eights, rest) = residual.as_chunks::<8>();
         for residuals in eights {
             for (largest, residual) in largest.iter_mut().zip(residuals) {
                 *largest = residual.abs().max(*largest);
@@ -62,18 +55,13 @@ impl<E: Lanes> Kernel for Largest<'_, E> {
     }
 }
 
-/// `y ← y − Δ`
-pub(in crate::irk) struct Subtract<'a, E, const S: usize> {
-    pub y: &'a mut [[E; S]],
-    pub increment: &'a [[[E; 1]; S]],
-}
-
-impl<E: Lanes, const S: usize> Kernel for Subtract<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for (y, increment) in self.y.iter_mut().zip(self.increment) {
+kernels! {
+    /// `y ← y − Δ`
+    pub(in crate::irk) fn subtract_increment [E: Lanes, const S: usize] [E, S] <A>(
+        y: &'k mut [[E; S]],
+        increment: &'k [[[E; 1]; S]],
+    ) {
+        for (y, increment) in y.iter_mut().zip(increment) {
             for (y, [delta]) in y.iter_mut().zip(increment) {
                 *y = *y - *delta;
             }

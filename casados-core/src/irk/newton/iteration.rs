@@ -28,7 +28,7 @@
 //! All of this goes on in every lane at once: a lane that has converged waits for the others.
 
 use super::convergence::{ConvergenceTest, IncrementKind, Status};
-use super::increment::{Largest, PlaceResidual, Subtract, Update};
+use super::increment::{PlaceResidual, Update, largest, subtract_increment};
 use super::jacobian_policy::Policy;
 use super::norm::{KinematicScales, Measure};
 use crate::irk::coefficients::Coefficients;
@@ -238,7 +238,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The largest residual of all stages.
     #[inline(always)]
     fn largest_residual(&self) -> E {
-        dispatch(Largest { residual: self.f.as_ref().as_flattened() })
+        largest(self.f.as_ref().as_flattened())
     }
 
     /// The end of linear equations, if their residual says so: one iteration solves them, but for
@@ -345,7 +345,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             statistics.iterations += 1;
             self.place_residual();
             kept.unwrap_or(&self.linear).factors.solve(&mut self.increment);
-            dispatch(Subtract { y: y.as_mut(), increment: self.increment.as_ref() });
+            subtract_increment(y.as_mut(), self.increment.as_ref());
         }
         let zero = E::from_f64(0.0);
         Solved { converged: E::le(zero, zero), exact: false, undetermined: None }

@@ -194,10 +194,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     {
         let forward = W::forward(&mut self.forward)?;
         let last = self.run.last()?;
-        let point = Point::new(t, &last.work.kept, last.steps.len(), &last.coefficients.tableau)?;
+        let point = Point::new(t, &last.work.last_inputs, last.steps.len(), &last.coefficients.tableau)?;
         let done = self.sweep.take().filter(|done| *done <= point.step);
         let mut parts = last;
-        parts.work.inputs = parts.work.kept;
+        parts.work.inputs = parts.work.last_inputs;
         // Factors that are there may be those of a call that failed.
         parts.work.begin();
         let first = done.map_or(0, |done| done + 1);
@@ -209,7 +209,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
             pass.step::<_, false>(&mut parts, at, None, &mut result.forward)?;
         }
         self.sweep = Some(point.step);
-        let h = parts.work.kept.time.step;
+        let h = parts.work.last_inputs.time.step;
         if let Some(step) = parts.steps.get(point.step) {
             point.evaluate(step, h, &mut forward.dense.dense)?;
         }

@@ -19,7 +19,7 @@ use crate::irk::coefficients::Coefficients;
 use crate::irk::coefficients::dot;
 use crate::irk::jacobian_entries::entries;
 use crate::irk::workspace::Work;
-use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, moved, two_product};
+use crate::linalg::{Arithmetic, Kernel, dispatch, dot_compensated, kernels, moved, two_product};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayX, Dae};
 use crate::scalar::{Field, Lanes, two_sum};
@@ -34,12 +34,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
         y: &ArrayK<M, [E; S]>,
     ) {
         let states = M::Shape::NX..2 * M::Shape::NX;
-        let [rest, _] = &mut self.probe;
+        let [beyond, _] = &mut self.probe;
         dispatch(Place {
             points: self.points.as_mut().get_mut(states.clone()).unwrap_or_default(),
-            beyond: rest.as_mut().get_mut(states).unwrap_or_default(),
+            beyond: beyond.as_mut().get_mut(states).unwrap_or_default(),
             x: x.as_ref(),
-            rest: self.rest.as_ref(),
+            compensation: self.compensation.as_ref(),
             y: y.as_ref(),
             a: &coefficients.a,
             b: &coefficients.b,
@@ -69,7 +69,7 @@ struct Place<'a, E, const S: usize> {
     points: &'a mut [[E; S]],
     beyond: &'a mut [[E; S]],
     x: &'a [E],
-    rest: &'a [E],
+    compensation: &'a [E],
     y: &'a [[E; S]],
     a: &'a [[E; S]; S],
     b: &'a [E; S],
@@ -82,13 +82,13 @@ impl<E: Field, const S: usize> Kernel for Place<'_, E, S> {
     type Output = ();
     #[inline(always)]
     fn run<A: Arithmetic>(self) {
-        let Self { points, beyond, x, rest, y, a, b, symplectic, h } = self;
+        let Self { points, beyond, x, compensation, y, a, b, symplectic, h } = self;
         let more = if symplectic { conjugate::<A, E, S>(a, b) } else { [[E::from_f64(0.0); S]; S] };
-        let states = x.iter().zip(rest).zip(y);
-        for ((xi, beyond), ((&x, &rest), k)) in points.iter_mut().zip(beyond).zip(states) {
+        let states = x.iter().zip(compensation).zip(y);
+        for ((xi, beyond), ((&x, &compensation), k)) in points.iter_mut().zip(beyond).zip(states) {
             for ((xi, beyond), (a, more)) in xi.iter_mut().zip(beyond).zip(a.iter().zip(&more)) {
                 let [sum, lost] = dot_compensated::<A, E>(a.iter().zip(k));
-                [*xi, *beyond] = moved::<A, E>([x, rest], h, [sum, lost + dot(more, k)]);
+                [*xi, *beyond] = moved::<A, E>([x, compensation], h, [sum, lost + dot(more, k)]);
             }
         }
     }
@@ -113,23 +113,17 @@ fn conjugate<A: Arithmetic, E: Field, const S: usize>(a: &[[E; S]; S], b: &[E; S
     more
 }
 
-/// `x + rest ← x + rest + h Σ_i b_i k_i`, where `rest` is less than `x` has digits for.
-pub(in crate::irk) struct Advance<'a, E, const S: usize> {
-    pub x: &'a mut [E],
-    pub rest: &'a mut [E],
-    pub y: &'a [[E; S]],
-    pub b: &'a [E; S],
-    pub h: E,
-}
-
-impl<E: Field, const S: usize> Kernel for Advance<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let Self { x, rest, y, b, h } = self;
-        for ((x, rest), k) in x.iter_mut().zip(rest).zip(y) {
-            [*x, *rest] = moved::<A, E>([*x, *rest], h, dot_compensated::<A, E>(b.iter().zip(k)));
+kernels! {
+    /// `x + e ← x + e + h Σ_i b_i k_i`, where the compensation `e` is less than `x` has digits for.
+    pub(in crate::irk) fn advance [E: Field, const S: usize] [E, S] <A>(
+        x: &'k mut [E],
+        compensation: &'k mut [E],
+        y: &'k [[E; S]],
+        b: &'k [E; S],
+        h: E,
+    ) {
+        for ((x, compensation), k) in x.iter_mut().zip(compensation).zip(y) {
+            [*x, *compensation] = moved::<A, E>([*x, *compensation], h, dot_compensated::<A, E>(b.iter().zip(k)));
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::irk::coefficients::stage_values;
 use crate::irk::kinematic::{self, are_together, derivative, unknowns};
 use crate::irk::stage_array::Stages;
 use crate::irk::workspace::{Times, Work};
-use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row};
+use crate::linalg::{self, Arithmetic, AtRow, Block, Kernel, coupling, dispatch, each_row, kernels};
 use crate::memory::Fallback;
 use crate::model::{ArrayK, ArrayV, ArrayX, Dae};
 use crate::scalar::{Lanes, SideBySide, Strided};
@@ -85,7 +85,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
             }
             return;
         }
-        dispatch(Middle::<M, E, S> { points: &mut self.points });
+        to_middle::<M, E, S>(&mut self.points);
         self.at_stage::<true>(0);
         self.first_only = true;
         self.place_unknowns(coefficients, step, x, y);
@@ -99,7 +99,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     /// The Jacobian at all stages, if it is there for the first one only.
     pub(crate) fn complete(&mut self) {
         if core::mem::take(&mut self.first_only) {
-            dispatch(Spread { cells: self.linear.jacobian.as_mut() });
+            spread(self.linear.jacobian.as_mut());
         }
     }
 
@@ -117,7 +117,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 self.at_stage::<JACOBIAN>(i);
             }
             if alike {
-                dispatch(Spread { cells: self.f.as_mut() });
+                spread(self.f.as_mut());
                 self.first_only |= JACOBIAN;
             }
         }
@@ -136,17 +136,12 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
     }
 }
 
-/// The mean of the stages in place of the first one. (Inputs are the same at all of them.)
-struct Middle<'a, M: Dae, E: Plain, const S: usize> {
-    points: &'a mut ArrayV<M, [E; S]>,
-}
-
-impl<M: Dae, E: Lanes, const S: usize> Kernel for Middle<'_, M, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        let points = self.points.as_mut();
+kernels! {
+    /// The mean of the stages in place of the first one. (Inputs are the same at all of them.)
+    fn to_middle [M: Dae, E: Lanes, const S: usize] [M, E, S] <A>(
+        points: &'k mut ArrayV<M, [E; S]>,
+    ) {
+        let points = points.as_mut();
         let (own, rest) = points.split_at_mut((2 * M::Shape::NX + M::Shape::NZ).min(points.len()));
         let share = E::from_f64(const { 1.0 / S as f64 });
         for stages in own.iter_mut().chain(rest.last_mut()) {
@@ -159,17 +154,10 @@ impl<M: Dae, E: Lanes, const S: usize> Kernel for Middle<'_, M, E, S> {
     }
 }
 
-/// What was computed at the first stage, for all of them.
-struct Spread<'a, E, const S: usize> {
-    cells: &'a mut [[E; S]],
-}
-
-impl<E: Lanes, const S: usize> Kernel for Spread<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
-        for cell in self.cells {
+kernels! {
+    /// What was computed at the first stage, for all of them.
+    fn spread [E: Lanes, const S: usize] [E, S] <A>(cells: &'k mut [[E; S]]) {
+        for cell in cells {
             *cell = [cell[0]; S];
         }
     }

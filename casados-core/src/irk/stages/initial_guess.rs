@@ -2,7 +2,7 @@
 
 use crate::irk::coefficients::Coefficients;
 use crate::irk::workspace::{Step, Work};
-use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::linalg::kernels;
 use crate::memory::Fallback;
 use crate::model::{ArrayK, Dae};
 use crate::scalar::{Field, Lanes};
@@ -38,7 +38,7 @@ impl<M: Dae, E: Lanes, const S: usize, F: Fallback> Work<M, E, S, F> {
                 }
             }
             (_, Some(before), Some(next)) => {
-                dispatch(Continue { from: before.y.as_ref(), next, to: y.as_mut() });
+                extrapolate(before.y.as_ref(), next, y.as_mut());
             }
             (InitialGuess::Nominal | InitialGuess::Zero, ..) => {
                 y.as_mut().fill([E::from_f64(0.0); S]);
@@ -89,29 +89,24 @@ const fn starts_at_rest<M: Dae>() -> bool {
     true
 }
 
-/// The polynomial through the stages at those of the next step.
-struct Continue<'a, E, const S: usize> {
-    from: &'a [[E; S]],
-    next: &'a [[E; S]; S],
-    to: &'a mut [[E; S]],
-}
-
-impl<E: Field, const S: usize> Kernel for Continue<'_, E, S> {
-    type Number = E;
-    type Output = ();
-    #[inline(always)]
-    fn run<A: Arithmetic>(self) {
+kernels! {
+    /// The polynomial through the stages at those of the next step.
+    fn extrapolate [E: Field, const S: usize] [E, S] <A>(
+        from: &'k [[E; S]],
+        next: &'k [[E; S]; S],
+        to: &'k mut [[E; S]],
+    ) {
         let zero = E::from_f64(0.0);
         // By columns: the stages of an unknown are a vector.
-        let mut next = [[zero; S]; S];
-        for (i, row) in self.next.iter().enumerate() {
-            for (column, &l) in next.iter_mut().zip(row) {
+        let mut columns = [[zero; S]; S];
+        for (i, row) in next.iter().enumerate() {
+            for (column, &l) in columns.iter_mut().zip(row) {
                 column[i] = -l;
             }
         }
-        for (to, from) in self.to.iter_mut().zip(self.from) {
+        for (to, from) in to.iter_mut().zip(from) {
             let mut sum = [zero; S];
-            for (column, &value) in next.iter().zip(from) {
+            for (column, &value) in columns.iter().zip(from) {
                 for (sum, &element) in sum.iter_mut().zip(column) {
                     *sum = A::subtract(*sum, element, value);
                 }

@@ -29,6 +29,38 @@ pub trait Kernel {
     fn run<A: Arithmetic>(self) -> Self::Output;
 }
 
+/// Functions that are kernels: `fn name [generics] [their names] <A>(arguments) { … }`, with the
+/// lifetime `'k`, numbers `E` and the arithmetic `A`.
+macro_rules! kernels {
+    ($(
+        $(#[$meta:meta])*
+        $visibility:vis fn $name:ident [$($generics:tt)*] [$($names:tt)*] <$arithmetic:ident>(
+            $($argument:ident: $type:ty),* $(,)?
+        ) $(-> $output:ty)? $body:block
+    )*) => { $(
+        $(#[$meta])*
+        #[inline(always)]
+        $visibility fn $name<'k, $($generics)*>($($argument: $type),*) $(-> $output)? {
+            struct Call<'k, $($generics)*> {
+                $($argument: $type),*
+            }
+            impl<'k, $($generics)*> $crate::linalg::Kernel for Call<'k, $($names)*> {
+                type Number = E;
+                type Output = $crate::linalg::kernels!(@output $($output)?);
+                #[inline(always)]
+                fn run<$arithmetic: $crate::linalg::Arithmetic>(self) -> Self::Output {
+                    let Self { $($argument),* } = self;
+                    $body
+                }
+            }
+            $crate::linalg::dispatch(Call::<'k, $($names)*> { $($argument),* })
+        }
+    )* };
+    (@output $output:ty) => { $output };
+    (@output) => { () };
+}
+pub(crate) use kernels;
+
 /// What kernels are compiled for. Each has a module of its own, since the compiler works on modules
 /// side by side.
 ///
