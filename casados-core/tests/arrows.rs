@@ -35,7 +35,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("ocp", "error shape memory scalar function model qp linalg result quadrature irk batch"),
     (
         "casadi",
-        "error shape structure tableau memory options function model qp result quadrature erk irk adaptive batch ocp",
+        "error shape structure tableau memory options function model qp result quadrature adaptive batch ocp",
     ),
 ];
 

@@ -1,0 +1,58 @@
+//! Options and limits.
+
+use crate::Test;
+use crate::ocps::vehicles::car_within;
+use casados::ocp::{HeapSqp, OcpError, SqpOptions, Status};
+
+/// The limit of iterations proves nothing.
+#[test]
+fn limits_of_iterations_are_no_infeasibility() -> Test {
+    for most in [50.0, 1.0] {
+        for limit in [0, 1, 2] {
+            let mut ocp = car_within(most)?;
+            let mut sqp = HeapSqp::new(&ocp)?;
+            sqp.options.max_iterations = limit;
+            let status = sqp.solve(&mut ocp)?.status;
+            assert_eq!(status, Status::MaxIterations);
+            assert!(status.to_string().contains("options.max_iterations"));
+        }
+    }
+    Ok(())
+}
+
+/// What makes no sense is refused by its name.
+#[test]
+fn options_are_validated() -> Test {
+    type Change = fn(&mut SqpOptions, f64);
+    let bad: [(&str, Change, &[f64]); 4] = [
+        ("tolerance", |o, v| o.tolerance = v, &[f64::NAN, -1.0, 0.0, f64::INFINITY]),
+        ("qp_accuracy", |o, v| o.qp_accuracy = v, &[f64::NAN, -1e-3, 2.0]),
+        ("elastic_penalty", |o, v| o.elastic_penalty = v, &[f64::NAN, -1.0, 0.0, f64::INFINITY]),
+        ("shortest_step", |o, v| o.shortest_step = v, &[f64::NAN, -1.0, 0.0, 1.5]),
+    ];
+    let mut ocp = car_within(50.0)?;
+    for (expected, change, values) in bad {
+        for &wrong in values {
+            let mut sqp = HeapSqp::new(&ocp)?;
+            change(&mut sqp.options, wrong);
+            match sqp.solve(&mut ocp) {
+                Err(error @ OcpError::InvalidOption { name, value, .. }) => {
+                    assert_eq!((name, value.to_bits()), (expected, wrong.to_bits()));
+                    assert!(error.to_string().contains(expected));
+                }
+                other => return Err(format!("{expected} {wrong}: {other:?}").into()),
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The log grows with what happens, not with what may.
+#[test]
+fn any_number_of_iterations_is_a_limit() -> Test {
+    let mut ocp = car_within(50.0)?;
+    let mut sqp = HeapSqp::new(&ocp)?;
+    sqp.options.max_iterations = usize::MAX;
+    assert!(sqp.solve(&mut ocp)?.is_converged());
+    Ok(())
+}
