@@ -141,9 +141,8 @@ impl<B: Horizon> Horizons<B> {
         }
         dependence::curvature(&variables, B::Model::STRUCTURE.hessian, &mut hessian, nw);
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
-        let outputs = core::slice::from_ref(&inputs[0]);
-        let shape =
-            signature::Shape { count, inputs: inputs.clone(), outputs, value: &value, hessian: &hessian };
+        let outputs = [0..nx, nx..nx, nx..nx];
+        let shape = signature::Shape { count, inputs, outputs, value: &value, hessian: &hessian };
         let (signatures, outputs) = shape.functions().into_iter().unzip();
         let cache = Mutex::new(Cache::new(settings.cache));
         let integrations = AtomicU64::new(0);

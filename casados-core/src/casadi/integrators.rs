@@ -1,16 +1,17 @@
 //! One integrator as the functions `F`, `jac_F`, `adj1_F` and `jac_adj1_F`.
 //!
-//! With `w = (x₀, u, p)` and the outputs `y = (x, q)` they are `y`, `∂y/∂w`, `∇(λᵀy)`, and the
+//! With `w = (x₀, u, p)` and the outputs `y = (x, z, q)` they are `y`, `∂y/∂w`, `∇(λᵀy)`, and the
 //! derivatives of `∇(λᵀy)`, which are `∇²(λᵀy)` by `w` and `(∂y/∂w)ᵀ` by `λ`.
 
+use super::algebraic::{self, Sizes};
 use super::blocks::{
     Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, rows, write,
 };
-use super::cache::{Answer, Cache};
+use super::cache::{Answer, Cache, Part};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
-use super::interval::{Interval, Point};
+use super::interval::{Along, Consistent, Interval, Point};
 use super::library::{Client, Failure};
 use super::signature::{self, Output};
 use super::sparsity::Relation;
@@ -32,6 +33,8 @@ pub struct Settings<O> {
     pub options: O,
     /// The time at the start; zero by default.
     pub time: f64,
+    /// Whether the algebraic states at the end are the output `zf`; not by default.
+    pub algebraic: bool,
     /// How many inputs are remembered with what was computed at them; 512 by default. As many as a
     /// problem has intervals are needed, or none is found again.
     pub cache: usize,
@@ -43,7 +46,7 @@ impl<O: Default> Settings<O> {
     /// The defaults, for an interval of this length.
     #[must_use]
     pub fn new(interval: f64) -> Self {
-        Self { interval, options: O::default(), time: 0.0, cache: 512, steps_at: &[] }
+        Self { interval, options: O::default(), time: 0.0, algebraic: false, cache: 512, steps_at: &[] }
     }
 }
 
@@ -65,18 +68,26 @@ pub struct Worker<I: Interval, Q: Integral<I::Model>> {
     inputs: Vec<f64>,
     lambda: Vec<f64>,
     answer: Answer<I::Tape>,
+    /// Algebraic states at the end.
+    zeta: Consistent,
 }
 
 impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     const NX: usize = <<I::Model as Dae>::Shape as Shape>::NX;
     const NU: usize = <<I::Model as Dae>::Shape as Shape>::NU;
     const NW: usize = <<I::Model as Dae>::Shape as Shape>::NW;
-    const NY: usize = Self::NX + Q::COUNT;
+    const NZ: usize = <<I::Model as Dae>::Shape as Shape>::NZ;
+
+    /// Dimensions, with the algebraic states that are outputs.
+    const fn sizes(settings: &Settings<I::Options>) -> Sizes {
+        let nz = if settings.algebraic { Self::NZ } else { 0 };
+        Sizes { nx: Self::NX, nz, nw: Self::NW, ny: Self::NX + nz + Q::COUNT }
+    }
 
     /// The functions with these settings.
     #[must_use]
     pub fn new(settings: Settings<I::Options>) -> Self {
-        let (nx, nu, nw, ny) = (Self::NX, Self::NU, Self::NW, Self::NY);
+        let (Sizes { nx, nz, nw, ny }, nu) = (Self::sizes(&settings), Self::NU);
         let at =
             |depth| dependence::variables(Dimensions::of::<I::Model>(), I::Model::STRUCTURE.jacobian, depth);
         // The last evaluation of an explicit method is at a point that does not depend on it.
@@ -86,13 +97,14 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         for state in 0..nx {
             value.join(state, &end, nx + state);
         }
+        for output in 0..nz {
+            value.join(nx + output, &end, 2 * nx + output);
+        }
         dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian, nw);
-        Q::depend(&stages, nx, &mut value, &mut hessian);
-        let mut outputs: Vec<_> = [0..nx, nx..ny].into();
-        outputs.truncate(1 + usize::from(Q::COUNT > 0));
+        Q::depend(&stages, nx + nz, &mut value, &mut hessian);
+        let outputs = [0..nx, nx..nx + nz, nx + nz..ny];
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
-        let shape =
-            signature::Shape { count: 1, inputs, outputs: &outputs, value: &value, hessian: &hessian };
+        let shape = signature::Shape { count: 1, inputs, outputs, value: &value, hessian: &hessian };
         let (signatures, outputs) = shape.functions().into_iter().unzip();
         let cache = Mutex::new(Cache::new(settings.cache));
         let integrations = AtomicU64::new(0);
@@ -122,10 +134,10 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
 
     /// Computes what is wanted, from stages that are known if there are any.
     fn compute(&self, worker: &mut Worker<I, Q>, wanted: &Wanted) -> Result<(), Failure> {
-        let Worker { integrator, integrals, inputs, lambda, answer } = worker;
-        let (nx, nu, nw, ny) = (Self::NX, Self::NU, Self::NW, Self::NY);
+        let Worker { integrator, integrals, inputs, lambda, answer, zeta } = worker;
+        let sizes @ Sizes { nx, nz, ny, .. } = Self::sizes(&self.settings);
         let (x0, rest) = inputs.split_at(nx);
-        let (u, p) = rest.split_at(nu);
+        let (u, p) = rest.split_at(Self::NU);
         let point = Point { x0: vector(x0), u: vector(u), h: self.settings.interval };
         if !p.is_empty() {
             integrator.parameters(&vector(p))?;
@@ -136,39 +148,111 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
                 self.integrations.fetch_add(1, Ordering::Relaxed);
             }
         }
-        let (of_states, of_integrals) = lambda.split_at(nx);
-        let along = Q::along(integrals, of_integrals);
-        let seed: VectorX<I::Model, f64> = vector(of_states);
-        if wanted.hessian {
-            let result = integrator.curvature(&point, &seed, along)?;
-            jacobian(result, ny, answer.jacobian.set(ny * nw));
-            hessian(result, answer.hessian.set(nw * nw));
-            answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
-            gradient_of(result, answer.gradient.set(nw));
-        } else if wanted.gradient {
-            let result = integrator.gradient(&point, &seed, along)?;
-            answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
-            gradient(result, answer.gradient.set(nw));
-        } else if wanted.jacobian {
-            let result = integrator.jacobian(&point, along)?;
-            jacobian(result, ny, answer.jacobian.set(ny * nw));
-            answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
-        } else {
-            let result = integrator.value(&point, along)?;
-            answer.value.set(ny)[..nx].copy_from_slice(result.x.as_slice());
+        let (of_states, rest) = lambda.split_at(nx);
+        let (nu, of_integrals) = rest.split_at(nz);
+        let mut seed: VectorX<I::Model, f64> = vector(of_states);
+        let adjoint = wanted.gradient || wanted.hessian;
+        if nz > 0 && adjoint {
+            // What the state is multiplied by depends on where it ends.
+            let end = integrator.value(&point, None)?.x;
+            keep(integrator, &mut answer.tape)?;
+            self.consistent(integrator, Point { x0: end, u: vector(u), h: 0.0 }, nu, zeta)?;
+            algebraic::add_to_seed(sizes, zeta, nu, seed.as_mut_slice());
+            if let Some(tape) = answer.tape.get() {
+                integrator.restore(tape)?;
+            }
         }
-        if wanted.gradient || wanted.hessian {
+        let asked = Asked { point: &point, seed: &seed, wanted: *wanted, sizes };
+        asked.of(integrator, Q::along(integrals, of_integrals), answer)?;
+        keep(integrator, &mut answer.tape)?;
+        if adjoint {
             answer.lambda.set(ny).copy_from_slice(lambda);
         }
-        answer.value.open()[nx..].copy_from_slice(Q::value(integrals));
+        let values = answer.value.open();
+        values[nx + nz..].copy_from_slice(Q::value(integrals));
         if answer.jacobian.get().is_some() {
-            rows(Q::jacobian(integrals), Q::COUNT, nx, ny, answer.jacobian.open());
+            rows(Q::jacobian(integrals), Q::COUNT, nx + nz, ny, answer.jacobian.open());
         }
-        if answer.tape.get().is_none() && !integrator.record(answer.tape.open())? {
-            answer.tape.clear();
+        if nz > 0 {
+            if !adjoint {
+                let end = Point { x0: vector(&values[..nx]), u: vector(u), h: 0.0 };
+                self.consistent(integrator, end, &[], zeta)?;
+            }
+            values[nx..nx + nz].copy_from_slice(&zeta.z);
+            if answer.jacobian.get().is_some() {
+                algebraic::write_jacobian(sizes, zeta, answer.jacobian.open());
+            }
+            if adjoint {
+                algebraic::add_to_gradient(sizes, zeta, nu, answer.gradient.open());
+            }
+            if wanted.hessian {
+                let Some(jacobian) = answer.jacobian.get() else { return Ok(()) };
+                algebraic::add_to_hessian(sizes, zeta, jacobian, answer.hessian.open());
+            }
         }
         Ok(())
     }
+
+    /// Algebraic states at the end of the interval.
+    fn consistent(
+        &self,
+        integrator: &mut I,
+        at: Point<I::Model>,
+        nu: &[f64],
+        zeta: &mut Consistent,
+    ) -> Result<(), Failure> {
+        integrator.time(self.settings.time + self.settings.interval)?;
+        let outcome = integrator.consistent(&at, nu, zeta);
+        integrator.time(self.settings.time)?;
+        Ok(outcome?)
+    }
+}
+
+/// What an integrator is asked.
+struct Asked<'a, M: Dae> {
+    point: &'a Point<M>,
+    seed: &'a VectorX<M, f64>,
+    wanted: Wanted,
+    sizes: Sizes,
+}
+
+impl<M: Dae> Asked<'_, M> {
+    /// Writes the answer: the rows of the states, and what there is of gradient and Hessian.
+    fn of<I: Interval<Model = M>>(
+        &self,
+        integrator: &mut I,
+        along: Along<'_, M>,
+        answer: &mut Answer<I::Tape>,
+    ) -> Result<(), Failure> {
+        let Self { point, seed, wanted, sizes: Sizes { nx, nw, ny, .. } } = *self;
+        let values = answer.value.set(ny);
+        if wanted.hessian {
+            let result = integrator.curvature(point, seed, along)?;
+            values[..nx].copy_from_slice(result.x.as_slice());
+            jacobian(result, ny, answer.jacobian.set(ny * nw));
+            gradient_of(result, answer.gradient.set(nw));
+            hessian(result, answer.hessian.set(nw * nw));
+        } else if wanted.gradient {
+            let result = integrator.gradient(point, seed, along)?;
+            values[..nx].copy_from_slice(result.x.as_slice());
+            gradient(result, answer.gradient.set(nw));
+        } else if wanted.jacobian {
+            let result = integrator.jacobian(point, along)?;
+            values[..nx].copy_from_slice(result.x.as_slice());
+            jacobian(result, ny, answer.jacobian.set(ny * nw));
+        } else {
+            values[..nx].copy_from_slice(integrator.value(point, along)?.x.as_slice());
+        }
+        Ok(())
+    }
+}
+
+/// Keeps the stages of the last call, if nobody has.
+fn keep<I: Interval>(integrator: &mut I, tape: &mut Part<I::Tape>) -> Result<(), Failure> {
+    if tape.get().is_none() && !integrator.record(tape.open())? {
+        tape.clear();
+    }
+    Ok(())
 }
 
 impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
@@ -179,6 +263,9 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
     }
 
     fn worker(&self) -> Result<Self::Worker, Failure> {
+        if self.settings.algebraic && Self::NZ > 0 && !I::CONSISTENT {
+            return Err(Failure("`algebraic` is for implicit methods with steps of equal size".into()));
+        }
         let mut integrator = I::build(&self.settings.options)?;
         integrator.time(self.settings.time)?;
         if I::CHOOSES {
@@ -201,8 +288,9 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             integrator,
             integrals: Q::memory()?,
             inputs: vec![0.0; Self::NW],
-            lambda: vec![0.0; Self::NY],
+            lambda: vec![0.0; Self::sizes(&self.settings).ny],
             answer: Answer::default(),
+            zeta: Consistent::default(),
         })
     }
 
@@ -225,7 +313,8 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
         if self.known(worker, &wanted, outputs, call) {
             return Ok(());
         }
-        self.compute(worker, &wanted)?;
+        // Stages that were not taken by a call that was refused are not those of the next one.
+        self.compute(worker, &wanted).inspect_err(|_| worker.integrator.forget())?;
         write(&worker.answer, outputs, call);
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         cache.store(&worker.inputs, &mut worker.answer);

@@ -1,12 +1,14 @@
 //! What is asked of an integrator, whichever it is.
 
 use crate::adaptive::{self, AdaptiveOptions};
+use crate::batch::vector;
 use crate::error::Error;
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
 use crate::quadrature::Integrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::shape::{Matrix, Shape};
 use crate::tableau::Method;
 use crate::{erk, irk};
 use alloc::vec::Vec;
@@ -91,6 +93,18 @@ pub trait Interval: Sized + Send + 'static {
         along: Along<'_, Self::Model>,
     ) -> Result<&Hessian<Self::Model>, Error>;
 
+    /// Whether it finds algebraic states that are consistent with a state.
+    const CONSISTENT: bool = false;
+    /// Algebraic states `ζ(x, u, p)` that are consistent with a state, and derivatives: of first
+    /// order, and of second order of `νᵀζ` if `nu` is not empty.
+    ///
+    /// # Errors
+    /// Those of the integrator.
+    fn consistent(&mut self, at: &Point<Self::Model>, nu: &[f64], to: &mut Consistent) -> Result<(), Error> {
+        let _ = (at, nu, to);
+        Err(Error::NoInterpolation)
+    }
+
     /// Copies the stages of the last call, of a method that solves equations for them.
     ///
     /// # Errors
@@ -99,6 +113,8 @@ pub trait Interval: Sized + Send + 'static {
         let _ = tape;
         Ok(false)
     }
+    /// Forgets the stages that the next call was to have, after an error.
+    fn forget(&mut self) {}
     /// The next call has these stages, and only differentiates them.
     ///
     /// # Errors
@@ -107,6 +123,17 @@ pub trait Interval: Sized + Send + 'static {
         let _ = tape;
         Ok(())
     }
+}
+
+/// Algebraic states `ζ(x, u, p)`, and derivatives over `(x, u, p)`.
+#[derive(Clone, Debug, Default)]
+pub struct Consistent {
+    /// `ζ`
+    pub z: Vec<f64>,
+    /// `∂ζ/∂(x, u, p)`, column by column.
+    pub jacobian: Vec<f64>,
+    /// `∇²(νᵀζ)`
+    pub hessian: Vec<f64>,
 }
 
 /// Where an interval begins, its control and its length.
@@ -180,6 +207,32 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
     }
     fn restore(&mut self, tape: &Self::Tape) -> Result<(), Error> {
         self.set_solution(tape)
+    }
+    fn forget(&mut self) {
+        self.reset();
+    }
+
+    const CONSISTENT: bool = true;
+    /// All stages of an interval of no length are at its start.
+    fn consistent(&mut self, at: &Point<M>, nu: &[f64], to: &mut Consistent) -> Result<(), Error> {
+        let copy = |to: &mut Consistent, result: &Forward<M>| {
+            to.z.clear();
+            to.z.extend(result.z0.as_slice());
+            to.jacobian.clear();
+            for block in [result.dz0_dx0.as_slice(), result.dz0_du.as_slice(), result.dz0_dp.as_slice()] {
+                to.jacobian.extend(block);
+            }
+        };
+        if nu.is_empty() {
+            let result = self.forward(&at.x0, &at.u, 0.0)?;
+            copy(to, result);
+        } else {
+            let result = self.hessian_with_z0(&at.x0, &at.u, 0.0, &Zeroable::zeroed(), &vector(nu))?;
+            copy(to, result);
+            to.hessian.resize(M::Shape::NW * M::Shape::NW, 0.0);
+            super::blocks::hessian(result, &mut to.hessian);
+        }
+        Ok(())
     }
 }
 

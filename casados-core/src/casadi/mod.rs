@@ -12,7 +12,7 @@
 //!
 //! | function | inputs | outputs |
 //! | --- | --- | --- |
-//! | `F` | `x0`, `u`, `p` | `xf`, and `qf` with `quadrature = F` |
+//! | `F` | `x0`, `u`, `p` | `xf`; `zf` with `algebraic = true`; `qf` with `quadrature = F` |
 //! | `jac_F` | and `out_xf` | `∂xf/∂x0`, `∂xf/∂u`, … |
 //! | `adj1_F` | and `adj_xf`, which is `λ` | `∇(λᵀxf)` |
 //! | `jac_adj1_F` | and `out_adj_x0`, … | `∇²(λᵀxf)`, and the transposed Jacobian, which is the derivative by `λ` |
@@ -24,6 +24,8 @@
 //! environment it says why on standard error. Threads (`F.map(N, "thread")`)
 //! have memory of their own.
 //!
+//! `zf` are the algebraic states that are consistent with `xf`, of implicit methods.
+//!
 //! An adaptive integrator takes the steps that it chose at [`Settings::steps_at`] in all calls: one
 //! smooth function of its inputs.
 //!
@@ -32,6 +34,7 @@
 //!
 //! The interface is described in CasADi's `casadi/core/external.cpp` and `external_impl.hpp`.
 
+mod algebraic;
 mod blocks;
 mod cache;
 mod dependence;

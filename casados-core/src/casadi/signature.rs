@@ -40,27 +40,30 @@ pub struct Output {
 }
 
 const INPUTS: [&CStr; 3] = [c"x0", c"u", c"p"];
-const OUTPUTS: [&CStr; 2] = [c"xf", c"qf"];
-const NOMINAL: [&CStr; 2] = [c"out_xf", c"out_qf"];
-const SEEDS: [&CStr; 2] = [c"adj_xf", c"adj_qf"];
+const OUTPUTS: [&CStr; 3] = [c"xf", c"zf", c"qf"];
+const NOMINAL: [&CStr; 3] = [c"out_xf", c"out_zf", c"out_qf"];
+const SEEDS: [&CStr; 3] = [c"adj_xf", c"adj_zf", c"adj_qf"];
 const GRADIENTS: [&CStr; 3] = [c"adj_x0", c"adj_u", c"adj_p"];
 const NOMINAL_GRADIENTS: [&CStr; 3] = [c"out_adj_x0", c"out_adj_u", c"out_adj_p"];
-const JACOBIANS: [[&CStr; 3]; 2] =
-    [[c"jac_xf_x0", c"jac_xf_u", c"jac_xf_p"], [c"jac_qf_x0", c"jac_qf_u", c"jac_qf_p"]];
+const JACOBIANS: [[&CStr; 3]; 3] = [
+    [c"jac_xf_x0", c"jac_xf_u", c"jac_xf_p"],
+    [c"jac_zf_x0", c"jac_zf_u", c"jac_zf_p"],
+    [c"jac_qf_x0", c"jac_qf_u", c"jac_qf_p"],
+];
 const HESSIANS: [[&CStr; 3]; 3] = [
     [c"jac_adj_x0_x0", c"jac_adj_x0_u", c"jac_adj_x0_p"],
     [c"jac_adj_u_x0", c"jac_adj_u_u", c"jac_adj_u_p"],
     [c"jac_adj_p_x0", c"jac_adj_p_u", c"jac_adj_p_p"],
 ];
-const BY_NOMINAL: [[&CStr; 2]; 3] = [
-    [c"jac_adj_x0_out_xf", c"jac_adj_x0_out_qf"],
-    [c"jac_adj_u_out_xf", c"jac_adj_u_out_qf"],
-    [c"jac_adj_p_out_xf", c"jac_adj_p_out_qf"],
+const BY_NOMINAL: [[&CStr; 3]; 3] = [
+    [c"jac_adj_x0_out_xf", c"jac_adj_x0_out_zf", c"jac_adj_x0_out_qf"],
+    [c"jac_adj_u_out_xf", c"jac_adj_u_out_zf", c"jac_adj_u_out_qf"],
+    [c"jac_adj_p_out_xf", c"jac_adj_p_out_zf", c"jac_adj_p_out_qf"],
 ];
-const BY_SEEDS: [[&CStr; 2]; 3] = [
-    [c"jac_adj_x0_adj_xf", c"jac_adj_x0_adj_qf"],
-    [c"jac_adj_u_adj_xf", c"jac_adj_u_adj_qf"],
-    [c"jac_adj_p_adj_xf", c"jac_adj_p_adj_qf"],
+const BY_SEEDS: [[&CStr; 3]; 3] = [
+    [c"jac_adj_x0_adj_xf", c"jac_adj_x0_adj_zf", c"jac_adj_x0_adj_qf"],
+    [c"jac_adj_u_adj_xf", c"jac_adj_u_adj_zf", c"jac_adj_u_adj_qf"],
+    [c"jac_adj_p_adj_xf", c"jac_adj_p_adj_zf", c"jac_adj_p_adj_qf"],
 ];
 
 /// Whether an input holds multipliers of an output.
@@ -74,8 +77,9 @@ pub struct Shape<'a> {
     pub count: usize,
     /// The inputs as ranges of `w`.
     pub inputs: [Range<usize>; 3],
-    /// The outputs as ranges of `y`.
-    pub outputs: &'a [Range<usize>],
+    /// States, algebraic states and integrals as ranges of `y`; those that are empty are no
+    /// outputs, but for the states.
+    pub outputs: [Range<usize>; 3],
     /// Where `∂y/∂w` has entries.
     pub value: &'a Relation,
     /// Where `∇²(λᵀy)` has.
@@ -93,13 +97,21 @@ impl Shape<'_> {
         self.outputs.iter().map(Range::len).sum()
     }
 
+    /// What the outputs are, and their ranges.
+    fn present(&self) -> impl Iterator<Item = (usize, Range<usize>)> {
+        self.outputs.iter().cloned().enumerate().filter(|(kind, range)| *kind == 0 || !range.is_empty())
+    }
+
     /// The four functions.
     pub fn functions(&self) -> [(Signature, Vec<Output>); 4] {
-        let Self { inputs, outputs, .. } = self;
+        let inputs = &self.inputs;
+        let (kinds, outputs): (Vec<_>, Vec<_>) = self.present().unzip();
+        let outputs = &outputs;
+        let of = |names: [&'static CStr; 3]| kinds.iter().map(|&kind| names[kind]).collect::<Vec<_>>();
         let [of_inputs, of_outputs] =
-            [self.ports(&INPUTS, inputs, false), self.ports(&OUTPUTS, outputs, false)];
-        let nominal = self.ports(&NOMINAL, outputs, true);
-        let seeds = self.ports(&SEEDS, outputs, false);
+            [self.ports(&INPUTS, inputs, false), self.ports(&of(OUTPUTS), outputs, false)];
+        let nominal = self.ports(&of(NOMINAL), outputs, true);
+        let seeds = self.ports(&of(SEEDS), outputs, false);
         let gradients = self.ports(&GRADIENTS, inputs, false);
         let of_adjoint = [of_inputs.clone(), nominal.clone(), seeds].concat();
         let of_second = [of_adjoint.clone(), self.ports(&NOMINAL_GRADIENTS, inputs, true)].concat();
@@ -136,8 +148,8 @@ impl Shape<'_> {
     fn first(&self) -> (Vec<Port>, Vec<Output>) {
         let rows = self.rows();
         let mut blocks = (Vec::new(), Vec::new());
-        for (names, output) in JACOBIANS.iter().zip(self.outputs) {
-            for (name, input) in names.iter().zip(&self.inputs) {
+        for (kind, output) in self.present() {
+            for (name, input) in JACOBIANS[kind].iter().zip(&self.inputs) {
                 let sparsity = self.value.block(output.clone(), input.clone());
                 let place = Place { first: output.start + rows * input.start, row: 1, column: rows };
                 self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
@@ -157,11 +169,13 @@ impl Shape<'_> {
                     Place { first: row.start + directions * column.start, row: 1, column: directions };
                 self.push(&mut blocks, name, &sparsity, Source::Hessian, place);
             }
-            for (name, output) in BY_NOMINAL[gradient].iter().zip(self.outputs) {
+            for (kind, output) in self.present() {
+                let name = BY_NOMINAL[gradient][kind];
                 let sparsity = Sparsity::zero(row.len(), output.len());
                 self.push(&mut blocks, name, &sparsity, Source::Zero, Place { first: 0, row: 0, column: 0 });
             }
-            for (name, output) in BY_SEEDS[gradient].iter().zip(self.outputs) {
+            for (kind, output) in self.present() {
+                let name = BY_SEEDS[gradient][kind];
                 let sparsity = self.value.transposed_block(output.clone(), row.clone());
                 let place = Place { first: output.start + rows * row.start, row: rows, column: 1 };
                 self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);

@@ -98,11 +98,10 @@ fn names_and_places_of_two_intervals() {
     value.set(0, 2);
     hessian.set(1, 2);
     hessian.set(2, 1);
-    let output = 0..1;
     let shape = Shape {
         count: 2,
         inputs: [0..2, 2..3, 3..3],
-        outputs: core::slice::from_ref(&output),
+        outputs: [0..1, 1..1, 1..1],
         value: &value,
         hessian: &hessian,
     };

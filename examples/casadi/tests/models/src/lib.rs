@@ -56,6 +56,9 @@ casados::casadi::export! { pendulum_rk4 = Erk<Pendulum, Rk4>, interval = 0.05, o
 casados::casadi::export! {
     spring = Irk<Spring, RadauIIA<3>>, interval = 0.3, quadrature = Effort, options = steps(2), cache = 4
 }
+casados::casadi::export! {
+    spring_z = Irk<Spring, Gauss<2>>, interval = 0.3, quadrature = Effort, options = steps(2), algebraic = true
+}
 casados::casadi::export! { cascade_euler = Erk<Cascade, Euler>, interval = 0.1, options = steps(1) }
 casados::casadi::export! { cascade = Irk<Cascade, Gauss<3>>, interval = 0.1 }
 casados::casadi::export_horizon! {
