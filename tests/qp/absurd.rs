@@ -5,7 +5,7 @@
 
 use crate::Test;
 use crate::known::{Hessian, Kind, Numbers, PLAIN, numbers, problem};
-use crate::runs::{Counts, shows, times};
+use crate::runs::{Counts, seeds, shows};
 use casados::qp::{
     Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPointOptions, QpError, QpSolver,
     Residuals, StageMut, Start, Statistics, residuals,
@@ -202,7 +202,7 @@ fn kind(random: &mut Numbers) -> Kind {
 #[test]
 fn anything() -> Test {
     let mut class = Class::new("anything for data, starts, options");
-    for seed in 0..600 * times() {
+    for seed in seeds(600) {
         let mut random = Numbers::new(seed ^ (7 << 40));
         let kind = kind(&mut random);
         let mut qp = problem(&mut random, &kind)?.qp;
@@ -225,7 +225,7 @@ fn anything() -> Test {
 #[test]
 fn huge_and_tiny() -> Test {
     let mut class = Class::new("feasible and convex, with anything finite for gradients and far bounds");
-    for seed in 0..600 * times() {
+    for seed in seeds(600) {
         let mut random = Numbers::new(seed ^ (8 << 40));
         let kind = kind(&mut random);
         let mut qp = problem(&mut random, &kind)?.qp;

@@ -5,7 +5,7 @@
 //! reached, and so does a solver that never saw another problem.
 
 use crate::known::{Numbers, numbers};
-use crate::runs::{Counts, shows, times};
+use crate::runs::{Counts, seeds, shows};
 use crate::{Test, solve_to};
 use casados::qp::{
     Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, SecondOrderCone,
@@ -154,7 +154,7 @@ fn judged(counts: &Counts, unbounded: u64) {
 fn same_minimum_as_clarabel() -> Test {
     let (mut counts, mut unbounded) = (Counts::new("feasible, convex; beside clarabel"), 0);
     let mut solver = interior_point();
-    for seed in 0..200 * times() {
+    for seed in seeds(200) {
         let dims = dims(seed);
         let qp = problem(&dims, seed)?;
         let mut solution = HeapSolution::new(&dims)?;
@@ -181,7 +181,7 @@ fn same_minimum_as_clarabel() -> Test {
 #[test]
 fn condensed_is_uncondensed() -> Test {
     let mut counts = Counts::new("feasible, convex; states eliminated");
-    for seed in 0..100 * times() {
+    for seed in seeds(100) {
         let dims = dims(!seed);
         let qp = problem(&dims, !seed)?;
         let Ok((_, expected, _)) = solve_to(TOLERANCE, &qp) else { continue };
@@ -208,7 +208,7 @@ fn condensed_is_uncondensed() -> Test {
 fn warm_is_cold() -> Test {
     let mut counts = Counts::new("feasible, convex; from a solution nearby");
     let mut solver = interior_point();
-    for seed in 0..200 * times() {
+    for seed in seeds(200) {
         let dims = dims(seed ^ (1 << 40));
         let mut qp = problem(&dims, seed ^ (1 << 40))?;
         let mut solution = HeapSolution::new(&dims)?;

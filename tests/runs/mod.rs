@@ -1,17 +1,26 @@
 //! Random runs: how long they are, and what became of them.
 //!
 //! `CASADOS_RANDOM=100` makes them a hundred times as long. Each class prints a row of the table in
-//! `docs/random_runs.md`.
+//! `docs/random_runs.md`, which says the rest.
 
 #![allow(dead_code)] // Each program that includes it takes a part.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Debug};
+use std::ops::Range;
+
+fn number(name: &str) -> Option<u64> {
+    std::env::var(name).ok().and_then(|number| number.parse().ok())
+}
 
 /// How many times as long as usual.
 pub fn times() -> u64 {
-    let given = std::env::var("CASADOS_RANDOM").ok().and_then(|times| times.parse().ok());
-    given.unwrap_or(1)
+    number("CASADOS_RANDOM").unwrap_or(1)
+}
+
+/// The seeds of so many cases, or the one that `CASADOS_RANDOM_SEED` names.
+pub fn seeds(few: u64) -> Range<u64> {
+    number("CASADOS_RANDOM_SEED").map_or(0..few * times(), |seed| seed..seed + 1)
 }
 
 /// Whether cases with other verdicts than `Ok` are printed.

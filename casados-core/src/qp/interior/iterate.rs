@@ -352,11 +352,11 @@ impl<'a, T: Real> Iterate<'a, T> {
         let Largest { stationarity, dynamics, .. } = self.residuals::<E>();
         let (inequalities, complementarity) = self.sides.judge();
         // The multipliers of the dynamics make gradients zero but for rounding, which is a part of
-        // the terms.
-        let rounding = T::from_f64(T::EPSILON) * self.terms.forces;
+        // the terms; in another order the sums of values are rounded otherwise.
+        let rounding = |terms| T::from_f64(T::EPSILON) * terms;
         Largest {
-            stationarity: larger_or_nan(stationarity, rounding),
-            dynamics,
+            stationarity: larger_or_nan(stationarity, rounding(self.terms.forces)),
+            dynamics: larger_or_nan(dynamics, rounding(self.terms.values)),
             inequalities,
             complementarity,
         }

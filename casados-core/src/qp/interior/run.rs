@@ -243,9 +243,14 @@ impl<T: Real> Iterate<'_, T> {
             refine = false;
         };
         // The multipliers of the dynamics, and what is said of it, belong to the point that is
-        // left.
-        let _ = self.evaluate::<E>(solution.dynamics);
-        let (residuals, iterations) = (self.judged::<E>().into(), statistics.iterations);
+        // left, which may be better than what was known of it.
+        let objective = self.evaluate::<E>(solution.dynamics);
+        let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
+        let residuals = judged.into();
+        if limits.hold(judged, self.terms) {
+            (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals);
+            return Ok(statistics);
+        }
         Err(if stalled {
             QpError::Stalled { iterations, residuals }
         } else {
