@@ -63,7 +63,8 @@ typedef enum {
 } CasadosStatus;
 
 /**
- * An integrator: two Gauss stages, and as many Newton iterations in every step as it was made with.
+ * An integrator: two Gauss stages, and as many Newton iterations in every step as it was made
+ * with.
  */
 typedef struct CasadosPendulum CasadosPendulum;
 
@@ -72,11 +73,12 @@ extern "C" {
 #endif // __cplusplus
 
 /**
- * Makes an integrator in `size` bytes of memory, which is to live as long as it, with so many iterations, at least one.
- * After an error `*integrator` is null.
+ * Makes an integrator in `size` bytes of memory, which is to live as long as it, with so many
+ * iterations, at least one. After an error `*integrator` is null.
  *
  * # Safety
- * `memory` is null, or points to `size` bytes that nothing else uses; `integrator` is null, or points to a pointer.
+ * `memory` is null, or points to `size` bytes that nothing else uses; `integrator` is null, or
+ * points to a pointer.
  */
 CasadosStatus casados_new(uint8_t *memory,
                           uintptr_t size,
@@ -84,12 +86,14 @@ CasadosStatus casados_new(uint8_t *memory,
                           CasadosPendulum **integrator);
 
 /**
- * One step of length `h`: from the state `x` and the control `u` to the state at its end, and its derivatives, column
- * after column. `dx_dx` and `dx_du` may be null: then they are not computed. After an error nothing is written.
+ * One step of length `h`: from the state `x` and the control `u` to the state at its end, and its
+ * derivatives, column after column. `dx_dx` and `dx_du` may be null: then they are not computed.
+ * After an error nothing is written.
  *
  * # Safety
- * `integrator` is from `casados_new`, and in no other call; the others are null or point to as many numbers as they
- * have: `x` and `x_next` to `CASADOS_STATES`, `u` to `CASADOS_CONTROLS`, the derivatives to their products.
+ * `integrator` is from `casados_new`, and in no other call; the others are null or point to as
+ * many numbers as they have: `x` and `x_next` to `CASADOS_STATES`, `u` to `CASADOS_CONTROLS`, the
+ * derivatives to their products.
  */
 CasadosStatus casados_step(CasadosPendulum *integrator,
                            const double *x,
