@@ -46,7 +46,7 @@ pub use forward::{
 };
 pub use integrator::Integrator;
 
-// Under their old place for those who ask here.
+// Finite checks, which rooms above find here too.
 #[cfg(feature = "alloc")]
 pub(crate) use crate::finite::check_input as check;
 pub(crate) use crate::finite::not_finite;
