@@ -9,10 +9,10 @@ pub enum Globalisation {
     FullStep,
     /// As far as the merit function `f + Σ ν_i |c_i|` shrinks as it should, with second-order
     /// correction. Each constraint has a weight of its own, which follows its multiplier:
-    /// `ν ← max(|λ|, ½ (ν + |λ|))` (M. J. D. Powell, "A fast algorithm for nonlinearly constrained
-    /// optimization calculations", 1978). It does not depend on the units of constraints, and near
-    /// a solution full steps are what it accepts: the linearisation there is that of the next
-    /// iteration.
+    /// `ν_i ← max(|λ_i|, ½ (ν_i + |λ_i|), 0.01 max |λ|)` (M. J. D. Powell, "A fast algorithm for
+    /// nonlinearly constrained optimization calculations", 1978, and a bound from below). Where the
+    /// step is no direction of descent all of them grow until it is. Near a solution full steps are
+    /// what it accepts: the linearisation there is that of the next iteration.
     #[default]
     Merit,
     /// As far as objective or violation shrink compared to all iterates before, with second-order

@@ -50,6 +50,8 @@ pub(super) struct Taken {
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
+    /// With exact Hessians, without multipliers and without costs that curve in all controls, it
+    /// begins with the multipliers of least squares.
     ///
     /// # Errors
     /// [`OcpError::Missing`]; [`OcpError::Integration`] and [`OcpError::NonFiniteFunction`] where
