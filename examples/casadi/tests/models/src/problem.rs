@@ -3,8 +3,8 @@
 use crate::{Pendulum, steps};
 use casados::casadi::Program;
 use casados::ocp::{
-    Constraint, Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Problem,
-    SecondOrder, Shooting,
+    Constraint, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost,
+    Problem, SecondOrder, Shooting,
 };
 use casados::prelude::*;
 use std::error::Error;
@@ -64,7 +64,7 @@ casados::casadi::export_problem! { swing }
 /// controls of the latter.
 fn solve(to: &mut [f64]) -> Result<(), Box<dyn Error>> {
     let mut ocp = formulate()?;
-    let mut sqp = HeapSqp::new(&ocp)?;
+    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
     sqp.options.tolerance = 1e-9;
     let outcome = sqp.solve(&mut ocp)?;
     to[0] = if outcome.is_converged() { outcome.objective } else { f64::NAN };
