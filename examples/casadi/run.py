@@ -45,6 +45,7 @@ def main():
         return
     for command in [
         ["cargo", "build", "--quiet", "--locked", "--release"],
+        ["cargo", "build", "--quiet", "--locked", "--package", "casados-casadi-tests"],
         [python, "-m", "unittest", "discover", "--start-directory", "tests"],
         [python, "pendulum.py"],
     ]:

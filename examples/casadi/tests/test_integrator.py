@@ -9,7 +9,7 @@ import unittest
 import casadi
 import numpy as np
 
-LIBRARY = str(pathlib.Path(__file__).resolve().parent.parent / "target" / "release" / "libtests.so")
+LIBRARY = str(pathlib.Path(__file__).resolve().parent.parent / "target" / "debug" / "libtests.so")
 RUST = ctypes.CDLL(LIBRARY)
 X0, U, LAMBDA = np.array([0.1, 0.4, -0.3, 0.7]), np.array([1.5]), np.array([0.3, -0.2, 0.7, 1.1])
 # What a difference of second order loses: h² of the third derivative and ε/h.
@@ -269,7 +269,7 @@ class Cache(unittest.TestCase):
         np.testing.assert_allclose(jac[:4, :4], full(F.jacobian()(rng_at(1, N)[:4], rng_at(1, N)[4], column([]), 0)[0]))
         np.testing.assert_array_equal(hess, hess.T)
 
-    def test_stages_from_the_cache_give_the_same_bits(self):
+    def test_stages_from_the_cache_give_the_same_derivatives(self):
         """The Hessian after the nominal value, and in one call."""
         F, second = external("spring"), external("jac_adj1_spring")
         at = [np.array([0.41, -0.2, 1.0]), np.array([0.7]), np.array([2.0, 0.5])]

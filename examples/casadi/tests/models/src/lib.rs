@@ -35,8 +35,8 @@ fn cascade(x: [f64; 4], u: f64) -> [f64; 4] {
     [u - x[0], x[0] - x[1], x[1] * x[1] - x[2], x[2].sin()]
 }
 
-/// It has no solution where `x` is negative, and panics nowhere.
-#[dae]
+/// It has no solution where `x` is negative.
+#[dae(nominal(z = 1.0))]
 fn root(xdot: [f64; 1], x: [f64; 1], z: f64) -> [f64; 2] {
     [xdot[0] + x[0], z * z - x[0]]
 }

@@ -3,8 +3,8 @@
 use crate::{Pendulum, steps};
 use casados::casadi::Program;
 use casados::ocp::{
-    Constraint, Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Problem,
-    SecondOrder, Shooting,
+    Constraint, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost,
+    Problem, SecondOrder, Shooting,
 };
 use casados::prelude::*;
 use std::error::Error;
@@ -46,10 +46,10 @@ fn formulate()
             GeneralCost::<Effort>::new(),
         ))
         .terminal_cost(LeastSquaresCost::<End>::diagonal(&[10.0, 10.0, 1.0, 1.0]))
-        .path_constraints(Constraint::<Limit>::new([-1.0, -0.04], [1.5, f64::INFINITY]))
+        .path_constraints(Constraint::<Limit>::new([-0.4, -0.3], [1.5, f64::INFINITY]))
         .terminal_constraints(Constraint::<EndLimit>::new([-0.2], [0.2]))
         .on(Horizon::uniform(25, 0.05))?;
-    ocp.fix_initial_state(&[0.2, 0.4, 0.0, 0.0])?.bound("u", .., -6.0, 6.0)?;
+    ocp.fix_initial_state(&[0.2, 0.2, 0.0, 0.0])?.bound("u", .., -6.0, 6.0)?;
     ocp.guess(&[0.0; 4], &[0.0])?;
     Ok(ocp)
 }
@@ -64,13 +64,15 @@ casados::casadi::export_problem! { swing }
 /// controls of the latter.
 fn solve(to: &mut [f64]) -> Result<(), Box<dyn Error>> {
     let mut ocp = formulate()?;
-    let mut sqp = HeapSqp::new(&ocp)?;
-    sqp.options.tolerance = 1e-10;
-    to[0] = sqp.solve(&mut ocp)?.objective;
+    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    sqp.options.tolerance = 1e-9;
+    let outcome = sqp.solve(&mut ocp)?;
+    to[0] = if outcome.is_converged() { outcome.objective } else { f64::NAN };
     let mut ocp = formulate()?;
     let mut ipm = HeapIpm::new(&ocp)?;
     ipm.options.tolerance = 1e-10;
-    to[1] = ipm.solve(&mut ocp)?.objective;
+    let outcome = ipm.solve(&mut ocp)?;
+    to[1] = if outcome.is_converged() { outcome.objective } else { f64::NAN };
     for (to, stage) in to[2..].iter_mut().zip(ocp.iterate().stages()) {
         *to = stage.u[0];
     }
