@@ -9,4 +9,5 @@ mod models {
 
 mod ends;
 mod sensitivities;
+mod tolerances;
 mod vibrations;

@@ -3,7 +3,7 @@
 //! A run has some hundred problems of each class; `CASADOS_RANDOM=100` multiplies that.
 
 use crate::Test;
-use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, numbers, problem};
+use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, numbers, problem, senseless};
 use crate::runs::{Counts, kind, seeds, shows};
 use casados::qp::{
     Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver,
@@ -142,29 +142,6 @@ fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Class, QpError
     }
     println!("{}", class.counts);
     Ok(class)
-}
-
-/// Numbers of all sizes and signs, and now and then none.
-fn senseless(random: &mut Numbers, solution: &mut HeapSolution<f64>) {
-    let size = [0.0, 1.0, 8.0, 100.0][random.below(4)];
-    for k in 0..solution.dims().len() {
-        let Some(stage) = solution.stage_mut(k) else { return };
-        let parts = [
-            stage.x,
-            stage.u,
-            stage.dynamics,
-            stage.x_lower,
-            stage.x_upper,
-            stage.u_lower,
-            stage.u_upper,
-            stage.g_lower,
-            stage.g_upper,
-        ];
-        for value in parts.into_iter().flatten() {
-            let number = random.next() * random.power(size);
-            *value = if random.chance(0.001) { f64::NAN } else { number };
-        }
-    }
 }
 
 #[test]

@@ -46,6 +46,29 @@ pub fn numbers(solution: &HeapSolution<f64>) -> impl Iterator<Item = f64> {
     solution.stages().flat_map(parts)
 }
 
+/// Numbers of all sizes and signs, and now and then none.
+pub fn senseless(random: &mut Numbers, solution: &mut HeapSolution<f64>) {
+    let size = [0.0, 1.0, 8.0, 100.0][random.below(4)];
+    for k in 0..solution.dims().len() {
+        let Some(stage) = solution.stage_mut(k) else { return };
+        let parts = [
+            stage.x,
+            stage.u,
+            stage.dynamics,
+            stage.x_lower,
+            stage.x_upper,
+            stage.u_lower,
+            stage.u_upper,
+            stage.g_lower,
+            stage.g_upper,
+        ];
+        for value in parts.into_iter().flatten() {
+            let number = random.next() * random.power(size);
+            *value = if random.chance(0.001) { f64::NAN } else { number };
+        }
+    }
+}
+
 /// The Hessians of the stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hessian {

@@ -50,31 +50,54 @@ impl Predictive {
     }
 }
 
+/// How the step size of an explicit method follows its error.
+#[derive(Clone, Copy, Debug)]
+pub struct Control {
+    /// The error of one step behaves like `h` to this power.
+    pub order: f64,
+    /// How much of the last error takes part,
+    pub memory: f64,
+    /// and what stands for it at first.
+    pub before: f64,
+    /// A step is this much shorter than the one that would just be accepted.
+    pub safety: f64,
+    /// Whether a step is no longer than what the trend of the last two asks for, as with implicit
+    /// methods.
+    pub predicts: bool,
+    /// By how much a step size may shrink and grow.
+    pub range: (f64, f64),
+}
+
 /// The controller of explicit methods: what the error of the last step was takes part (K.
 /// Gustafsson, Control theoretic techniques for stepsize selection in explicit Runge-Kutta methods,
 /// ACM Trans. Math. Softw. 17 (1991)).
 #[derive(Clone, Copy, Debug)]
 pub struct Proportional {
-    last: f64,
-}
-
-impl Default for Proportional {
-    fn default() -> Self {
-        Self { last: 1e-4 }
-    }
+    control: Control,
+    /// The length of the last accepted step, and its error.
+    last: (f64, f64),
 }
 
 impl Proportional {
-    /// The factor for the step size after a step whose error behaves like `h^(1/exponent)`, within
-    /// a range.
-    pub fn factor(&mut self, error: f64, exponent: f64, memory: f64, range: (f64, f64)) -> f64 {
+    pub fn new(control: Control) -> Self {
+        Self { control, last: (f64::INFINITY, control.before) }
+    }
+
+    /// The factor for the step size after a step of size `h`, within a range.
+    pub fn factor(&mut self, h: f64, error: f64) -> f64 {
+        let Control { order, memory, safety, predicts, range, .. } = self.control;
+        let exponent = 1.0 / order;
         let present = power(error, exponent - 0.75 * memory);
         if error > 1.0 {
             return (0.9 / present).clamp(range.0, range.1);
         }
-        let past = if memory > 0.0 { power(self.last, memory) } else { 1.0 };
-        self.last = error.max(1e-4);
-        (0.9 * past / present).clamp(range.0, range.1)
+        let (step, before) = core::mem::replace(&mut self.last, (h, error.max(1e-4)));
+        let past = if memory > 0.0 { power(before, memory) } else { 1.0 };
+        let mut factor = safety * past / present;
+        if predicts && step.is_finite() {
+            factor = factor.min(0.9 * (h / step) * power(before / (error * error), exponent));
+        }
+        factor.clamp(range.0, range.1)
     }
 }
 

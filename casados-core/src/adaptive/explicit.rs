@@ -152,7 +152,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
     let mut t = span.start;
     let mut h = T::from_f64(direction * first_step::<M, B, T, S>(step, run, &x, t, direction, longest)?);
-    let mut controller = Proportional::default();
+    let mut controller = Proportional::new(B::CONTROL);
     let mut refusal = Refusal::Error;
     let (mut rejected, mut tried) = (false, 0);
     loop {
@@ -165,10 +165,11 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let error = match step.take(t, h) {
-            Ok(()) => step.error(h, run.base.rtol.as_ref(), run.base.atol.as_ref()),
-            Err(_) => f64::NAN,
-        };
+        let error = step.take(t, h).and_then(|()| {
+            let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
+            step.error(t, h, rtol, atol)
+        });
+        let error = error.unwrap_or(f64::NAN);
         let error = match &mut run.sensitivities {
             Some(sensitivities) if error <= 1.0 => {
                 let Base { point, u, parameters, rtol, atol, .. } = &*run.base;
@@ -187,7 +188,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
             rejected = true;
             continue;
         }
-        let factor = controller.factor(error, 1.0 / B::ORDER, B::MEMORY, B::RANGE);
+        let factor = controller.factor(h.to_f64().abs(), error);
         if error > 1.0 {
             run.statistics.rejected += 1;
             refusal = Refusal::Error;
@@ -267,8 +268,11 @@ fn first_step<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step.go(run.base.point.as_ref(), x.as_slice());
     step.slope(t)?;
     let largest = speed.max(mean(sum, scale.len()) / guess);
-    let second =
-        if largest <= 1e-15 { (guess * 1e-3).max(1e-6) } else { power(0.01 / largest, 1.0 / B::ORDER) };
+    let second = if largest <= 1e-15 {
+        (guess * 1e-3).max(1e-6)
+    } else {
+        power(0.01 / largest, 1.0 / B::CONTROL.order)
+    };
     Ok((100.0 * guess).min(second).min(longest))
 }
 
@@ -304,6 +308,7 @@ macro_rules! explicit {
                 step.go(inputs, numbers.0);
                 step.slope(entry.t)?;
                 step.take(entry.t, entry.h)?;
+                step.arrive(entry.t, entry.h)?;
                 step.interpolate(entry.t, entry.h, (t - entry.t) / entry.h, dense)
             }
 

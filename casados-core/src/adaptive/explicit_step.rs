@@ -37,13 +37,22 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn slope(&mut self, t: T) -> Result<&[T], Error>;
-    /// All stages of a step whose first is there.
+    /// All stages of a step whose first is there, and its end.
     ///
     /// # Errors
     /// A value that is not finite.
     fn take(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The estimated error relative to what is tolerated.
-    fn error(&mut self, h: T, rtol: &[T], atol: &[T]) -> f64;
+    /// The derivative at the end.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
+    /// The estimated error relative to what is tolerated; the derivative at the end is there if
+    /// that is at most one.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn error(&mut self, t: T, h: T, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
     /// The state at the end.
     fn end(&self) -> &[T];
     /// The end is the next start.
@@ -88,6 +97,33 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
     }
 }
 
+impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
+    /// How often an error counts: once where the Jacobian takes it back, as where it is damped,
+    /// and [`Pair::PERSISTENCE`] times where it turns it or lets it grow. The last stage `Y` is at
+    /// the end, as the step is; of the difference `d` of the two and `J d` the cosine is asked.
+    fn persistence(&mut self) -> f64 {
+        let Memory { record, end_slope, difference, scale, .. } = &mut *self.memory;
+        let Some(last) = record.k.last() else { return 1.0 };
+        difference.as_mut().fill(T::ZERO);
+        combine(&B::LAST, &record.k, difference.as_mut());
+        let (mut along, mut distances, mut changes) = (T::ZERO, T::ZERO, T::ZERO);
+        let slopes = end_slope.as_ref().iter().zip(last.as_ref());
+        for ((distance, (end, last)), scale) in difference.as_ref().iter().zip(slopes).zip(scale.as_ref()) {
+            let (distance, change) = (*distance * *scale, (*end - *last) * *scale);
+            along = along + distance * change;
+            distances = distances + distance * distance;
+            changes = changes + change * change;
+        }
+        let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
+        let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
+        if damped.is_nan() {
+            B::PERSISTENCE
+        } else {
+            B::PERSISTENCE + (1.0 - B::PERSISTENCE) * damped.min(1.0)
+        }
+    }
+}
+
 /// `Σ_i e_i k_i`
 fn combine<T: Real, R: Array<T>>(coefficients: &[f64], stages: &[R], sum: &mut [T]) {
     for (coefficient, stage) in coefficients.iter().zip(stages) {
@@ -116,18 +152,26 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
     }
 
     fn take(&mut self, t: T, h: T) -> Result<(), Error> {
-        let Memory { point, record, end, end_slope, .. } = &mut *self.memory;
+        let Memory { point, record, end, .. } = &mut *self.memory;
         let grid = Grid { start: t, h, steps: 1, compensated: false };
         for stage in 1..S {
             let at = Place { step: 0, stage, iteration: 0 };
             point.go(&self.scheme, grid, record, at)?;
             point.derivative(&self.scheme, &mut record.k[stage], at)?;
         }
-        record.end(&self.scheme, grid, 0, end, None)?;
+        record.end(&self.scheme, grid, 0, end, None)
+    }
+
+    fn arrive(&mut self, t: T, h: T) -> Result<(), Error> {
+        let Memory { point, end, end_slope, .. } = &mut *self.memory;
         Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)
     }
 
-    fn error(&mut self, h: T, rtol: &[T], atol: &[T]) -> f64 {
+    fn error(&mut self, t: T, h: T, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
+        let (stages, last) = B::DIFFERENCE;
+        if last != 0.0 {
+            self.arrive(t, h)?;
+        }
         let Memory { record, end, end_slope, difference, scale, .. } = &mut *self.memory;
         let states = record.x.as_ref().iter().zip(end.as_ref());
         for (((scale, (before, after)), rtol), atol) in
@@ -135,17 +179,23 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         {
             *scale = h / (*atol + *rtol * before.abs().max(after.abs()));
         }
-        let (stages, last) = B::DIFFERENCE;
-        difference.as_mut().fill(T::ZERO);
-        combine(&stages, &record.k, difference.as_mut());
-        combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
-        let fine = norm(difference.as_ref(), scale.as_ref());
-        let coarse = B::COARSE.map(|coarse| {
+        let mut difference_of = |coefficients: &[f64; S]| {
             difference.as_mut().fill(T::ZERO);
-            combine(&coarse, &record.k, difference.as_mut());
+            combine(coefficients, &record.k, difference.as_mut());
+            if last != 0.0 {
+                combine(&[last], core::slice::from_ref(end_slope), difference.as_mut());
+            }
             norm(difference.as_ref(), scale.as_ref())
-        });
-        B::combined(fine, coarse)
+        };
+        let fine = difference_of(&stages);
+        let coarse = B::COARSE.as_ref().map(difference_of);
+        let error = B::combined(fine, coarse);
+        // Written so that NaN stays.
+        if last != 0.0 || error > 1.0 {
+            return Ok(error);
+        }
+        self.arrive(t, h)?;
+        Ok(if B::PERSISTENCE > 1.0 { error * self.persistence() } else { error })
     }
 
     fn end(&self) -> &[T] {

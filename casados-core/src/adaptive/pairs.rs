@@ -4,6 +4,7 @@
 //! E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, sections II.5,
 //! II.6 and II.10; the coefficients of the codes DOPRI5 and DOP853.
 
+use super::control::Control;
 use crate::scalar::Scalar;
 use crate::tableau::{DormandPrince5, DormandPrince8, Method};
 
@@ -15,12 +16,21 @@ pub trait Pair<const S: usize>: Method<S> {
     /// The difference to a third one of low order: the estimate is then that of higher order, as
     /// far as the two agree.
     const COARSE: Option<[f64; S]>;
-    /// The error of one step behaves like `h` to this power.
-    const ORDER: f64;
-    /// By how much a step size may shrink and grow.
-    const RANGE: (f64, f64);
-    /// How much of the last error the controller takes into account.
-    const MEMORY: f64;
+    /// How often the error counts of what is not damped: it stays, and adds up with those of
+    /// other steps. One where nobody asks whether it is damped.
+    const PERSISTENCE: f64;
+    /// `b` less the coefficients of the last stage, which is at the end of the step.
+    const LAST: [f64; S] = {
+        let mut last = *Self::TABLEAU.b();
+        let (mut column, row) = (0, &Self::TABLEAU.a()[S - 1]);
+        while column < S {
+            last[column] -= row[column];
+            column += 1;
+        }
+        last
+    };
+    /// How the step size follows the error.
+    const CONTROL: Control;
     /// Stages for dense output alone: for each its node, its coefficients of the stages, of the one
     /// at the end and of the ones before it.
     const MORE: &'static [More<S>];
@@ -54,9 +64,9 @@ impl Pair<6> for DormandPrince5 {
         -1.0 / 40.0,
     );
     const COARSE: Option<[f64; 6]> = None;
-    const ORDER: f64 = 5.0;
-    const RANGE: (f64, f64) = (0.2, 10.0);
-    const MEMORY: f64 = 0.04;
+    const PERSISTENCE: f64 = 1.0;
+    const CONTROL: Control =
+        Control { order: 5.0, memory: 0.04, before: 1e-4, safety: 0.9, predicts: false, range: (0.2, 10.0) };
     const MORE: &'static [More<6>] = &[];
     const POLYNOMIAL: &'static [([f64; 6], f64, [f64; 3])] = &[(
         [
@@ -97,9 +107,16 @@ impl Pair<12> for DormandPrince8 {
         coarse[11] -= 0.022058823529411766;
         Some(coarse)
     };
-    const ORDER: f64 = 8.0;
-    const RANGE: (f64, f64) = (1.0 / 3.0, 6.0);
-    const MEMORY: f64 = 0.0;
+    const PERSISTENCE: f64 = 6.0;
+    // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
+    const CONTROL: Control = Control {
+        order: 8.0,
+        memory: 0.05,
+        before: 1.0,
+        safety: 0.965,
+        predicts: true,
+        range: (1.0 / 3.0, 6.0),
+    };
     const MORE: &'static [More<12>] = &[
         More {
             node: 0.1,
