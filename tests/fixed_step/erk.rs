@@ -1,116 +1,24 @@
 //! Explicit integrators against an independent implementation over dual numbers.
 
 use casados::memory::{Inline, mode};
-use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, symmetric};
 use casados::tableau::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Method, Midpoint, Rk4};
-use casados::{Custom, Dae, Dims, Erk, Error, Lanes, Ode, Options, Tableau};
+use casados::{Custom, Erk, Error, Ode, Options, Tableau, dae};
 use nalgebra::{SMatrix, SVector, vector};
 use num_dual::HyperDual64;
 
 /// `ẋ₀ = x₁ + u t`, `ẋ₁ = p (1 − x₀²) x₁ − x₀ + u²`, with equations exchanged and scaled.
-struct Oscillator;
+#[dae]
+fn oscillator(xdot: [f64; 2], x: [f64; 2], u: f64, p: f64, t: f64) -> [f64; 2] {
+    [-2.0 * (xdot[1] - (p * (1.0 - x[0] * x[0]) * x[1] - x[0] + u * u)), 0.5 * (xdot[0] - (x[1] + u * t))]
+}
 
 fn g(x: [HyperDual64; 2], u: HyperDual64, p: HyperDual64, t: f64) -> [HyperDual64; 2] {
     [x[1] + u * t, p * (-x[0] * x[0] + 1.0) * x[1] - x[0] + u * u]
 }
 
-const VARIABLES: [&str; 2] = ["x[0]", "x[1]"];
-
-impl Dae for Oscillator {
-    type Shape = Dims<2, 0, 1, 1, 2, 7, 4>;
-    type Jacobian<T: casados::shape::Plain> = [T; 8];
-    type Hessian<T: casados::shape::Plain> = [T; 5];
-    type Factors<B: casados::shape::Plain> = [B; 0];
-    const STRUCTURE: Structure = Structure {
-        name: "oscillator",
-        x: &VARIABLES,
-        z: &[],
-        u: &["u"],
-        p: &["p"],
-        jacobian: Pattern { rows: &[0, 1, 0, 0, 1, 0, 1, 0], columns: &[1, 0, 2, 3, 3, 4, 4, 5] },
-        blocks: [0, 2, 5, 5, 7, 8],
-        by_column: &[2, 3, 4, 5, 6, 7],
-        constant: &[true, true, false, false, true, false, false, false],
-        hessian: Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
-        linear: &[false, true],
-        linear_in_state: false,
-        constant_matrix: false,
-        autonomous: false,
-        constant_rows: &[false; 2],
-        trivial: &[],
-        quadratures: &[],
-        directions: &[0, 1, 2, 3],
-        column_of_direction: &[0, 1, 2, 3],
-        curved: &[2, 3, 4, 5],
-        symmetric: &symmetric::<4, 8>(
-            &Pattern { rows: &[2, 3, 4, 5, 5], columns: &[2, 2, 4, 2, 3] },
-            &[2, 3, 4, 5],
-        ),
-        lone: &[],
-        operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
-        elimination: Elimination::NONE,
-    };
-
-    fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
-        let [k0, k1, x0, x1, u, p, t] = v.map(|cell| S::load(&cell));
-        let n = S::from_f64;
-        S::store(n(-2.0) * (k1 - (p * (n(1.0) - x0 * x0) * x1 - x0 + u * u)), &mut f[0]);
-        S::store(n(0.5) * (k0 - (x1 + u * t)), &mut f[1]);
-    }
-    fn jacobian_constants<S: Lanes>(jacobian: &mut [S::Cell; 8]) {
-        let n = S::from_f64;
-        for (entry, value) in [(0, -2.0), (1, 0.5), (4, -0.5)] {
-            n(value).store(&mut jacobian[entry]);
-        }
-    }
-    fn residual_jacobian<S: Lanes>(
-        v: &ArrayV<Self, S::Cell>,
-        f: &mut ArrayK<Self, S::Cell>,
-        jacobian: &mut [S::Cell; 8],
-    ) {
-        Self::residual::<S>(v, f);
-        let [_, _, x0, x1, u, p, t] = v.map(|cell| S::load(&cell));
-        let n = S::from_f64;
-        S::store(n(2.0) * (n(-2.0) * p * x0 * x1 - n(1.0)), &mut jacobian[2]);
-        S::store(n(2.0) * p * (n(1.0) - x0 * x0), &mut jacobian[3]);
-        S::store(n(4.0) * u, &mut jacobian[5]);
-        S::store(n(-0.5) * t, &mut jacobian[6]);
-        S::store(n(2.0) * (n(1.0) - x0 * x0) * x1, &mut jacobian[7]);
-    }
-    fn adjoint<S: Lanes>(
-        v: &ArrayV<Self, S::Cell>,
-        mu: &ArrayK<Self, S::Cell>,
-        gradient: &mut ArrayV<Self, S::Cell>,
-    ) {
-        let (mut f, mut jacobian) = ([v[0]; 2], [v[0]; 8]);
-        Self::jacobian_constants::<S>(&mut jacobian);
-        Self::residual_jacobian::<S>(v, &mut f, &mut jacobian);
-        for cell in gradient.iter_mut() {
-            S::from_f64(0.0).store(cell);
-        }
-        for (entry, value) in jacobian.iter().enumerate() {
-            let (row, column) = Self::STRUCTURE.jacobian.at(entry);
-            let sum = S::load(&gradient[column]) + S::load(&mu[row]) * S::load(value);
-            sum.store(&mut gradient[column]);
-        }
-    }
-    fn hessian<S: Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, hessian: &mut [S::Cell; 5]) {
-        let [_, _, x0, x1, _, p, _] = v.map(|cell| S::load(&cell));
-        let n = S::from_f64;
-        let twice = n(2.0) * S::load(&mu[0]);
-        let values = [
-            twice * n(-2.0) * p * x1,
-            twice * n(-2.0) * p * x0,
-            twice * n(2.0),
-            twice * n(-2.0) * x0 * x1,
-            twice * (n(1.0) - x0 * x0),
-        ];
-        hessian.iter_mut().zip(values).for_each(|(cell, value)| value.store(cell));
-    }
-}
-
-impl Ode for Oscillator {
-    const ROWS: &'static [(u32, f64)] = &[(1, 0.5), (0, -2.0)];
+#[test]
+fn equations_are_exchanged_and_scaled() {
+    assert_eq!(Oscillator::ROWS, [(1, 0.5), (0, -2.0)]);
 }
 
 const X0: [f64; 2] = [0.8, -0.6];

@@ -8,8 +8,6 @@ mod interval;
 #[allow(dead_code)]
 #[path = "../../examples/firmware/src/lost.rs"]
 mod lost;
-#[path = "../systems/mod.rs"]
-mod systems;
 #[allow(dead_code)] // Each program takes a part.
 #[path = "../../examples/models"]
 mod models {

@@ -29,8 +29,6 @@
 mod data;
 #[path = "../interval/mod.rs"]
 mod interval;
-#[path = "../systems/mod.rs"]
-mod systems;
 #[allow(dead_code)] // Each program takes a part.
 #[path = "../../examples/models/ivp"]
 mod models {
@@ -56,6 +54,7 @@ mod sensitivities;
 mod stability;
 mod starts;
 mod stiffness;
+mod systems;
 mod tableaux;
 
 #[test]
