@@ -7,6 +7,7 @@ mod data;
 
 mod chain;
 mod classes;
+mod coupling;
 mod errors;
 mod hard;
 mod known;

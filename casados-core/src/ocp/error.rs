@@ -188,8 +188,9 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
-    /// States are periodic, and this solver has no such conditions: [`Ipm`](super::Ipm) has.
-    Periodic,
+    /// States are periodic or controls shared, and this solver has no such conditions:
+    /// [`Ipm`](super::Ipm) and [`Sqp`](super::Sqp) have.
+    Coupled,
     /// An option of the solver is out of its range.
     InvalidOption {
         /// Its name.
@@ -292,9 +293,9 @@ impl fmt::Display for OcpError {
                 write!(f, "stage {stage}: output {output} of `{function}` is {value}")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
-            Self::Periodic => {
-                f.write_str("states are periodic: `Ipm` solves such problems, this solver does not")
-            }
+            Self::Coupled => f.write_str(
+                "states are periodic or controls shared: `Ipm` and `Sqp` solve such problems, this solver does not",
+            ),
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it has to be {allowed}")
             }

@@ -75,7 +75,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         ocp.fits(self.solution.dims())?;
-        ocp.is_uncoupled()?;
         self.options.check()?;
         let mut state = State {
             search: Search::new(),
@@ -87,6 +86,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             best_iteration: Iteration::default(),
             number: PhantomData,
         };
+        // Steps are to solutions of QPs: what is one stays so.
+        ocp.join_controls();
+        ocp.join_states();
         self.weights.multipliers_mut().fill(T::ZERO);
         #[cfg(feature = "alloc")]
         {
