@@ -56,7 +56,7 @@ fn problem(seed: u64, stages: usize) -> Result<HeapQp<f64>, QpError> {
         for i in 0..periodic {
             assert!(qp.make_periodic(i));
         }
-    } else if seed % 3 > 0 {
+    } else if !seed.is_multiple_of(3) {
         qp.fix_initial_state(&[0.5, -0.3, 0.2, 0.1])?;
     }
     for j in (0..nu).filter(|j| marks & (1 << j) > 0) {
