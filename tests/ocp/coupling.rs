@@ -95,7 +95,7 @@ fn couplings_of_linear_systems_are_those_of_one_linear_system() -> Test {
             for k in 0..=N {
                 let stage = ocp.stage(k)?;
                 for (i, value) in stage.x.iter().chain(stage.u).enumerate() {
-                    // The condition of the system is below 1e5; the compliance of sides leaves 1e-9.
+                    // The condition of the system is below 1e5; compliances leave 1e-9.
                     let error = (value - solution[5 * k + i]).abs();
                     assert!(error < 1e-8, "{periodic:?} {shared:?} {by:?} {k} {i} {error:e}");
                 }
@@ -171,8 +171,8 @@ fn period(_x: [f64; 2], u: [f64; 1]) -> f64 {
     u[0]
 }
 
-/// Period and amplitude of van der Pol's equation with `μ = 1`, to 1e-12: simulated in Python from a
-/// maximum to the next until both stay, RK4 with steps of 2e-3 and 1e-3, crossings by bisection.
+/// Period and amplitude of van der Pol's equation with `μ = 1`, to 1e-12: simulated in Python from
+/// maximum to maximum until both stay, RK4 with steps of 2e-3 and 1e-3, crossings by bisection.
 const PERIOD: f64 = 6.66328685932;
 const AMPLITUDE: f64 = 2.00861986087;
 
