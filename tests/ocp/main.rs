@@ -10,10 +10,13 @@ mod chain_problem;
 mod data;
 
 mod algebraic;
+mod arrival;
 mod bounds;
 mod chain;
 mod closed_form;
+mod coupling;
 mod curvature;
+mod degenerate;
 mod errors;
 mod guesses;
 mod infeasible;

@@ -10,6 +10,7 @@ mod runs;
 mod absurd;
 mod chain;
 mod classes;
+mod coupling;
 mod errors;
 mod hard;
 mod known;

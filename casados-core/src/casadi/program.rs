@@ -2,7 +2,7 @@
 
 use crate::ocp::{ConstraintName, Formulation};
 use crate::ocp::{Convexification, Exact, GaussNewton, HeapOcp, OcpError, SecondOrder};
-use crate::qp::{Field, QpView, Side, Solution, StageDims};
+use crate::qp::{Field, QpView, Side, Solution, StageDims, marked};
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -54,7 +54,7 @@ where
     }
 
     fn periodic(&mut self) -> Vec<usize> {
-        self.coupling().0.iter().enumerate().filter(|(_, tied)| **tied != 0.0).map(|(i, _)| i).collect()
+        marked(self.qp().periodic()).collect()
     }
 
     fn bounds(&self) -> Vec<(f64, f64)> {
@@ -69,6 +69,13 @@ where
 
     fn check(&mut self) -> Result<(), String> {
         HeapOcp::check(self).map_err(|error| error.to_string())?;
+        if let Some(control) = marked(self.qp().shared()).next() {
+            let name = self.names().u.get(control).copied().unwrap_or_default();
+            return Err(format!(
+                "the control `{name}` is shared, which the program of CasADi does not say: make it a state of \
+                 derivative zero"
+            ));
+        }
         match soft(self) {
             None => Ok(()),
             Some(bound) => Err(format!(

@@ -30,10 +30,8 @@ pub(super) struct Data<'a, T> {
     pub extended: &'a mut [T],
     /// Room for two matrices and a vector over `(x, u)`.
     pub scratch: &'a mut [T],
-    /// One for every state with `x₀ = x_N`, and zero.
-    pub tied: &'a mut [T],
-    /// The multipliers of these conditions.
-    pub coupling_multipliers: &'a mut [T],
+    /// Mean and weights of the arrival cost.
+    pub arrival: &'a mut [T],
 }
 
 /// `NX + NU`
@@ -46,7 +44,7 @@ pub(super) const fn is_algebraic<P: Formulation<T>, T: Real>() -> bool {
     P::StageCost::ALGEBRAIC || P::Path::ALGEBRAIC
 }
 
-const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 11] {
+const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 10] {
     let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
     let rows = intervals * P::Path::ROWS + P::Terminal::ROWS;
     let n = inputs::<P::Shape>();
@@ -61,8 +59,7 @@ const fn lengths<P: Formulation<T>, T: Real>(intervals: usize) -> [usize; 11] {
         if is_algebraic::<P, T>() { intervals * P::Shape::NZ } else { 0 },
         extended::<P::Shape>(constraints),
         (2 * n + 1) * pad::<T>(n),
-        P::Shape::NX,
-        P::Shape::NX,
+        P::Shape::NX * (P::Shape::NX + 1),
     ]
 }
 
@@ -80,36 +77,13 @@ pub(super) const fn length<P: Formulation<T>, T: Real>(intervals: usize) -> usiz
 /// The parts.
 pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usize) -> Data<'_, T> {
     let mut rest = memory;
-    let [
-        times,
-        p,
-        references,
-        lower,
-        upper,
-        algebraic,
-        weights,
-        extended,
-        scratch,
-        tied,
-        coupling_multipliers,
-    ] = lengths::<P, T>(intervals).map(|length| {
-        let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
-        rest = behind;
-        part
-    });
-    Data {
-        times,
-        p,
-        references,
-        lower,
-        upper,
-        algebraic,
-        weights,
-        extended,
-        scratch,
-        tied,
-        coupling_multipliers,
-    }
+    let [times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival] =
+        lengths::<P, T>(intervals).map(|length| {
+            let (part, behind) = core::mem::take(&mut rest).split_at_mut_checked(length).unwrap_or_default();
+            rest = behind;
+            part
+        });
+    Data { times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival }
 }
 
 /// What is given at a node.

@@ -21,6 +21,8 @@ pub enum Part {
     Parameters,
     /// The state at the start.
     InitialState,
+    /// Weights of an arrival cost.
+    Arrival,
     /// Reference of the stage cost.
     Reference,
     /// Reference of the terminal cost.
@@ -164,6 +166,15 @@ pub enum OcpError {
         /// What it has to be.
         allowed: &'static str,
     },
+    /// The weights of an arrival cost are no symmetric, positive semidefinite matrix.
+    InvalidArrivalWeight {
+        /// The row and the column: two of the states.
+        states: [&'static str; 2],
+        /// The weight.
+        value: f64,
+        /// What it has to be.
+        allowed: &'static str,
+    },
     /// Times of nodes do not increase.
     Times {
         /// The interval.
@@ -240,8 +251,9 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
-    /// States are periodic, and this solver has no such conditions: [`Ipm`](super::Ipm) has.
-    Periodic,
+    /// States are periodic or controls shared, and this solver has no such conditions:
+    /// [`Ipm`](super::Ipm) and [`Sqp`](super::Sqp) have.
+    Coupled,
     /// An option of the solver is out of its range.
     InvalidOption {
         /// Its name.

@@ -2,14 +2,14 @@
 //! point.
 
 use crate::qp::{
-    Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, larger,
-    part, part_mut, scale, subtract, subtract_column, symmetric,
+    Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, is_marked,
+    larger, marked, pad, part, part_mut, scale, subtract, subtract_column, symmetric,
 };
 use crate::scalar::{Packed, Real, Registers};
 
 /// The residuals, and penalties of soft bounds. Residuals as in
 /// [`qp::residuals`](crate::qp::residuals), which goes element by element and needs no scratch,
-/// here with room for two vectors over `(x, u)`.
+/// here with room for three vectors over `(x, u)`.
 pub(super) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     at: &Solution<T, D, M>,
@@ -44,10 +44,16 @@ fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
     let mut residuals = Residuals::default();
     let mut penalties = 0.0;
     let mut arriving: &[T] = &[];
+    let (periodic, shared) = (qp.periodic(), qp.shared());
+    let (first, last) = (qp.dims().first().copied().unwrap_or_default(), qp.dims().len().saturating_sub(1));
+    let ld = pad::<T>(first.nx + first.nu);
+    let (scratch, joint) = scratch.split_at_mut_checked(2 * ld).unwrap_or_default();
+    let joint = part_mut(joint, 0, ld);
+    joint.fill(T::ZERO);
     let (all, _) = at.vectors();
     let mut begin = 0;
     let mut stages = at.stages().peekable();
-    for stage in qp.stages() {
+    for (k, stage) in qp.stages().enumerate() {
         let Some(point) = stages.next() else { break };
         let next = stages.peek().map_or(&[][..], |next| next.x);
         let view = stage.arrays();
@@ -79,8 +85,18 @@ fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
         }
         let upper = point.x_upper.iter().chain(point.u_upper);
         let lower = point.x_lower.iter().chain(point.u_lower);
-        for ((&sum, &upper), &lower) in sum.iter().zip(upper).zip(lower) {
-            grow(&mut residuals.stationarity, sum + lower - upper);
+        let nx = point.x.len();
+        for (i, ((&sum, &upper), &lower)) in sum.iter().zip(upper).zip(lower).enumerate() {
+            let residual = sum + lower - upper;
+            // Of variables that are one the sum counts.
+            let is_joint = match i.checked_sub(nx) {
+                None => (k == 0 || k == last) && is_marked(periodic, i),
+                Some(j) => is_marked(shared, j),
+            };
+            match joint.get_mut(i).filter(|_| is_joint) {
+                None => grow(&mut residuals.stationarity, residual),
+                Some(joint) => *joint = *joint + residual,
+            }
         }
         let value = |values: &[T], i: usize| values.get(i).map_or(0.0, |x| x.to_f64());
         let g = |i: usize| dot::<T, E>(part(view.matrix, (view.next + i) * ld, ld), v).to_f64();
@@ -90,7 +106,31 @@ fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
         penalties += bound_residuals(&stage.g_bounds(), g, point.g_lower, point.g_upper, &mut residuals);
         arriving = point.dynamics;
     }
+    if qp.is_coupled() {
+        joint_residuals(qp, at, joint, &mut residuals);
+    }
     (residuals, penalties)
+}
+
+/// Residuals of variables that are one, from the sums of their gradients.
+fn joint_residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    qp: QpView<'_, T>,
+    at: &Solution<T, D, M>,
+    joint: &[T],
+    residuals: &mut Residuals,
+) {
+    let mut stages = at.stages();
+    let (Some(first), last) = (stages.next(), stages.next_back()) else { return };
+    joint.iter().for_each(|&sum| grow(&mut residuals.stationarity, sum));
+    let get = |values: &[T], i: usize| values.get(i).copied().unwrap_or(T::ZERO);
+    for i in marked(qp.periodic()) {
+        grow(&mut residuals.dynamics, get(first.x, i) - last.map_or(T::ZERO, |last| get(last.x, i)));
+    }
+    for j in marked(qp.shared()) {
+        for &u in at.stages().filter_map(|stage| stage.u.get(j)) {
+            grow(&mut residuals.dynamics, u - get(first.u, j));
+        }
+    }
 }
 
 /// The larger size; NaN stays.

@@ -1,6 +1,7 @@
 //! The QP at an iterate.
 
 use super::algebraic::{self, Extended};
+use super::arrival;
 use super::constraint::Constraints;
 use super::convexify::{Convexification, convexify};
 use super::cost::{At, Cost};
@@ -223,8 +224,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 *gradient = *gradient - product;
             }
         }
-        self.objective = objective;
-        self.couple();
+        arrival::add(data.arrival, qp);
+        self.objective = objective + arrival::cost(data.arrival, iterate);
         Ok(())
     }
 
@@ -248,10 +249,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
-        let (mut residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
-        for gap in super::coupling::gaps(data.tied, &self.iterate) {
-            super::kkt::grow(&mut residuals.dynamics, gap);
-        }
+        let (residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
         (residuals, self.objective.to_f64() + penalties)
     }
 
@@ -267,7 +265,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = self.problem.parts();
         let (v, multipliers) = at.vectors();
-        let mut objective = T::ZERO;
+        let mut objective = arrival::cost(data.arrival, at);
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
         dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
             objective = objective + step.cost.value;

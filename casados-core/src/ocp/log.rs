@@ -68,6 +68,11 @@ pub enum Status {
     MaxIterations,
     /// The observer stopped it.
     Stopped,
+    /// The time was over.
+    OutOfTime,
+    /// Variables grow without end at points that satisfy all constraints: something is missing that
+    /// bounds the objective.
+    Unbounded,
     /// Near the iterate no point satisfies all constraints: no direction makes the sum of its gaps
     /// and violations smaller by a thousandth, to first order. This is the constraint that the
     /// iterate violates most.
@@ -145,6 +150,10 @@ impl fmt::Display for Status {
                  (`Sqp::exact`) or another guess may help",
             ),
             Self::Stopped => f.write_str("stopped by the observer"),
+            Self::OutOfTime => f.write_str("not converged: the time was over"),
+            Self::Unbounded => f.write_str(
+                "unbounded: variables grow without end; bounds of states and controls, or a cost of them, are missing",
+            ),
             Self::Infeasible { constraint, violation } => {
                 write!(f, "infeasible near the iterate: {constraint} is violated by {violation:e}; another guess may help")
             }

@@ -25,6 +25,7 @@ impl fmt::Display for Part {
             Self::Multipliers => "the multipliers",
             Self::Parameters => "the parameters",
             Self::InitialState => "the initial state",
+            Self::Arrival => "the weights of the arrival cost",
             Self::Reference => "the reference of the stage cost",
             Self::TerminalReference => "the reference of the terminal cost",
             Self::StateBounds => "the bounds of the states",
@@ -97,6 +98,13 @@ impl fmt::Display for OcpError {
                 named(f, *part, name, *index)?;
                 write!(f, " is {value}: it has to be {allowed}")
             }
+            Self::InvalidArrivalWeight { states: [i, j], value, allowed } => {
+                match i == j {
+                    true => write!(f, "the weight of `{i}` in the arrival cost")?,
+                    false => write!(f, "the weight of `{i}` and `{j}` in the arrival cost")?,
+                }
+                write!(f, " is {value}: it has to be {allowed}")
+            }
             Self::InvalidWeight { function, outputs: [i, j], value, allowed } => {
                 match i == j {
                     true => write!(f, "the weight of output {i} of `{function}`")?,
@@ -143,9 +151,9 @@ impl fmt::Display for OcpError {
                 write!(f, " is {value}: another guess, or bounds that keep away from there, may help")
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
-            Self::Periodic => {
-                f.write_str("states are periodic: `Ipm` solves such problems, this solver does not")
-            }
+            Self::Coupled => f.write_str(
+                "states are periodic or controls shared: `Ipm` and `Sqp` solve such problems, this solver does not",
+            ),
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it has to be {allowed}")
             }

@@ -36,18 +36,18 @@
 //! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call,
 //! from the stages of the last one: these converge with the iterates, to the same solution.
 //!
-//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians, and those
-//! whose states are periodic (`ocp.periodic("x")?`, `x₀ = x_N`).
+//! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians.
 //!
-//! Free end times are states: `dx/dτ = T f(x, u)`, `Ṫ = 0` over `τ ∈ [0, 1]`, with
-//! `ocp.free_initial_state()` and the other states at stage 0 given by equal bounds. So are
-//! parameters that are to be found.
+//! States may be periodic, `x₀ = x_N` (`ocp.periodic("x")?`), and controls the same at all stages
+//! (`ocp.shared("u.duration")?`). Such controls are parameters that are found, and free end times:
+//! `dx/dτ = T f(x, u)` over `τ ∈ [0, 1]`.
 //!
 //! Nothing here needs a heap: `problem.on_horizon(horizon, &DIMS, &mut memory)` takes memory whose
 //! length is a constant of the types ([`Problem::memory`]), and integrators with `Inline` memory
 //! are dynamics too.
 
 mod algebraic;
+mod arrival;
 mod bounds;
 mod check;
 mod constraint;
@@ -91,7 +91,7 @@ pub use instance::HeapOcp;
 pub use instance::Ocp;
 #[cfg(feature = "alloc")]
 pub use ipm::HeapIpm;
-pub use ipm::{Ipm, IpmOptions};
+pub use ipm::{Barrier, Ipm, IpmOptions};
 pub use least_squares::LeastSquaresCost;
 pub use linearise::{Curvature, Exact, GaussNewton};
 pub use log::{Iteration, Log, Outcome, Status, Times};

@@ -3,21 +3,34 @@
 use super::error::OcpError;
 use crate::function::{Function, MatrixYY};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Outputs};
+use crate::shape::Matrix;
 
-/// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of
-/// its diagonal: then the pivots of `W + δ diag(W)` are positive, but for outputs without weights.
-/// If none are `coupled`, there is the diagonal alone.
+/// Whether the weights of a function's outputs are those of a norm.
 ///
 /// # Errors
 /// [`OcpError::InvalidWeight`]
 pub(super) fn check<F: Function, T: Real>(weights: &MatrixYY<F, T>, coupled: bool) -> Result<(), OcpError> {
-    let ny = F::Outputs::NY;
+    check_matrix::<T, _>(weights, coupled).map_err(|Fault { place: outputs, value, allowed }| {
+        OcpError::InvalidWeight { function: F::STRUCTURE.name, outputs, value, allowed }
+    })
+}
+
+/// A weight that is none, and what it has to be.
+pub(super) struct Fault {
+    /// Its row and its column.
+    pub place: [usize; 2],
+    pub value: f64,
+    pub allowed: &'static str,
+}
+
+/// Whether weights are a symmetric, positive semidefinite matrix, up to `δ = √ε` in the units of
+/// its diagonal: then the pivots of `W + δ diag(W)` are positive, but for rows without weights.
+/// If none are `coupled`, there is the diagonal alone.
+pub(super) fn check_matrix<T: Real, V: Matrix<T>>(weights: &V, coupled: bool) -> Result<(), Fault> {
+    let ny = V::ROWS;
     let weight = |i: usize, j: usize| entry(weights.as_slice(), j * ny + i);
-    let fault = |i: usize, j: usize, allowed| {
-        let (function, value) = (F::STRUCTURE.name, weight(i, j).to_f64());
-        Err(OcpError::InvalidWeight { function, outputs: [i, j], value, allowed })
-    };
+    let fault =
+        |i: usize, j: usize, allowed| Err(Fault { place: [i, j], value: weight(i, j).to_f64(), allowed });
     for i in 0..ny {
         if !(weight(i, i) >= T::ZERO && weight(i, i).is_finite()) {
             return fault(i, i, "finite and not negative");
@@ -36,7 +49,7 @@ pub(super) fn check<F: Function, T: Real>(weights: &MatrixYY<F, T>, coupled: boo
             if !is_symmetric {
                 let (i, j) =
                     if weight(i, j).is_finite() && !weight(j, i).is_finite() { (j, i) } else { (i, j) };
-                return fault(i, j, "finite and the same as that of the same outputs in reverse");
+                return fault(i, j, "finite and the same as its mirror image");
             }
         }
     }
@@ -50,7 +63,7 @@ pub(super) fn check<F: Function, T: Real>(weights: &MatrixYY<F, T>, coupled: boo
         for i in k + 1..ny {
             let below = entry(rest, k * ny + i);
             if pivot == T::ZERO && below != T::ZERO {
-                return fault(i, k, "zero where one of the two outputs has no weight of its own");
+                return fault(i, k, "zero where one of the two has no weight of its own");
             }
             for j in k + 1..i + 1 {
                 let product = if pivot > T::ZERO { below * entry(rest, k * ny + j) / pivot } else { T::ZERO };

@@ -3,6 +3,7 @@
 //! Written from the definition of the problem, element by element: independent of every solver.
 
 use super::block::Block;
+use super::coupling::{self, is_marked};
 use super::error::{Field, QpError};
 use super::layout::StageDims;
 use super::problem::{Bounds, QpView, Stage};
@@ -150,10 +151,24 @@ pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     // π_k, and x_{k+1}
     let mut arriving: &[T] = &[];
     let mut stages = solution.stages().peekable();
-    for data in qp.stages() {
+    for (k, data) in qp.stages().enumerate() {
         let Some(point) = stages.next() else { break };
         let next = stages.peek().map_or(&[][..], |next| next.x);
-        objective += gradient(&data, &point, arriving, &mut result.stationarity);
+        for i in 0..point.x.len() {
+            let (residual, cost) = of_state(&data, &point, arriving, i);
+            objective += cost;
+            let is_end = k == 0 || k + 1 == qp.dims().len();
+            if !(is_end && is_marked(qp.periodic(), i)) {
+                largest(&mut result.stationarity, residual);
+            }
+        }
+        for i in 0..point.u.len() {
+            let (residual, cost) = of_control(&data, &point, i);
+            objective += cost;
+            if !is_marked(qp.shared(), i) {
+                largest(&mut result.stationarity, residual);
+            }
+        }
         for (i, &next) in next.iter().enumerate() {
             let mut sum = at(data.offset(), i) - next.to_f64();
             sum += row(&data.a(), i, point.x) + row(&data.b(), i, point.u);
@@ -167,10 +182,11 @@ pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
         objective += bounds(&data.g_bounds(), g, point.g_lower, point.g_upper, &mut result);
         arriving = point.dynamics;
     }
+    coupling::residuals(qp, solution, &mut result);
     (result, objective)
 }
 
-fn largest(of: &mut f64, value: f64) {
+pub(super) fn largest(of: &mut f64, value: f64) {
     *of = larger(*of, value.abs());
 }
 fn at<T: Real>(vector: &[T], index: usize) -> f64 {
@@ -193,32 +209,29 @@ fn symmetric<T: Real>(block: &Block<'_, T>, row: usize, x: &[T]) -> f64 {
     x.iter().enumerate().map(|(j, x)| lower(j) * x.to_f64()).sum()
 }
 
-/// Adds to the residual, and returns `½ vᵀ H v + hᵀ v`.
-fn gradient<T: Real>(
+/// The gradient of the Lagrangian in a state, and its part of `½ vᵀ H v + hᵀ v`.
+pub(super) fn of_state<T: Real>(
     data: &Stage<'_, T>,
     point: &SolutionStage<'_, T>,
     arriving: &[T],
-    residual: &mut f64,
-) -> f64 {
-    let mut objective = 0.0;
-    for (i, x) in point.x.iter().enumerate() {
-        let quadratic = symmetric(&data.q(), i, point.x) + column(&data.s(), i, point.u);
-        let linear = at(data.gradient_x(), i);
-        objective += x.to_f64() * (0.5 * quadratic + linear);
-        let dynamics = column(&data.a(), i, point.dynamics) - at(arriving, i);
-        let bounds = at(point.x_upper, i) - at(point.x_lower, i);
-        let general = column(&data.c(), i, point.g_upper) - column(&data.c(), i, point.g_lower);
-        largest(residual, quadratic + linear + dynamics + bounds + general);
-    }
-    for (i, u) in point.u.iter().enumerate() {
-        let quadratic = symmetric(&data.r(), i, point.u) + row(&data.s(), i, point.x);
-        let linear = at(data.gradient_u(), i);
-        objective += u.to_f64() * (0.5 * quadratic + linear);
-        let bounds = at(point.u_upper, i) - at(point.u_lower, i);
-        let general = column(&data.d(), i, point.g_upper) - column(&data.d(), i, point.g_lower);
-        largest(residual, quadratic + linear + column(&data.b(), i, point.dynamics) + bounds + general);
-    }
-    objective
+    i: usize,
+) -> (f64, f64) {
+    let quadratic = symmetric(&data.q(), i, point.x) + column(&data.s(), i, point.u);
+    let linear = at(data.gradient_x(), i);
+    let dynamics = column(&data.a(), i, point.dynamics) - at(arriving, i);
+    let bounds = at(point.x_upper, i) - at(point.x_lower, i);
+    let general = column(&data.c(), i, point.g_upper) - column(&data.c(), i, point.g_lower);
+    (quadratic + linear + dynamics + bounds + general, at(point.x, i) * (0.5 * quadratic + linear))
+}
+
+/// As [`of_state`], in a control.
+pub(super) fn of_control<T: Real>(data: &Stage<'_, T>, point: &SolutionStage<'_, T>, i: usize) -> (f64, f64) {
+    let quadratic = symmetric(&data.r(), i, point.u) + row(&data.s(), i, point.x);
+    let linear = at(data.gradient_u(), i);
+    let dynamics = column(&data.b(), i, point.dynamics);
+    let bounds = at(point.u_upper, i) - at(point.u_lower, i);
+    let general = column(&data.d(), i, point.g_upper) - column(&data.d(), i, point.g_lower);
+    (quadratic + linear + dynamics + bounds + general, at(point.u, i) * (0.5 * quadratic + linear))
 }
 
 /// Whether there are neither bounds nor multipliers: nothing can be wrong with either.

@@ -243,7 +243,7 @@ impl QpSolver<f64> for Clarabel {
                 Origin::Equation(i) => (&mut *lower, i, -z),
                 Origin::Lower(i) | Origin::Cone(i) => (&mut *lower, i, z),
                 Origin::Upper(i) => (&mut *upper, i, z),
-                Origin::Sign => continue,
+                Origin::Sign | Origin::Coupling => continue,
             };
             if let Some(to) = to.get_mut(index) {
                 *to = z;
@@ -287,7 +287,7 @@ fn infeasible(qp: QpView<'_, f64>, sparse: &Sparse, z: &[f64]) -> QpError {
             Origin::Equation(row) if *z > 0.0 => (row, Side::Upper),
             Origin::Equation(row) | Origin::Lower(row) | Origin::Cone(row) => (row, Side::Lower),
             Origin::Upper(row) => (row, Side::Upper),
-            Origin::Dynamics(_) | Origin::Sign => continue,
+            Origin::Dynamics(_) | Origin::Sign | Origin::Coupling => continue,
         };
         if z.abs() > largest.0 {
             largest = (z.abs(), row, side);

@@ -495,6 +495,9 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
     ) -> Result<Statistics, QpError> {
         super::check::check_all_bounds(qp)?;
         solution.fits(qp)?;
+        if qp.is_coupled() {
+            return Err(QpError::Coupled);
+        }
         self.plan(qp)?;
         let Self {
             solver, block, qp: Some((condensed, start_and_solution)), dims, rows, origins, work, ..

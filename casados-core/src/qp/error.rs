@@ -66,8 +66,8 @@ pub enum Side {
 
 /// Why there is no solution: what, at which stage, and the values that say so.
 ///
-/// After `Infeasible`, `MaxIterations`, `Stalled` and `NotConvex` the solution holds the best
-/// iterate.
+/// After `Infeasible`, `MaxIterations`, `OutOfTime`, `Stalled` and `NotConvex` the solution holds
+/// the best iterate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {
@@ -130,9 +130,19 @@ pub enum QpError {
         /// The pivot, which must be positive.
         pivot: f64,
     },
+    /// States are periodic or controls shared, and this solver has no such conditions:
+    /// [`InteriorPoint`](super::InteriorPoint) has.
+    Coupled,
     /// The iterations were used up.
     MaxIterations {
         /// How many.
+        iterations: usize,
+        /// What they reached.
+        residuals: Residuals,
+    },
+    /// The time was over.
+    OutOfTime {
+        /// The iterations.
         iterations: usize,
         /// What they reached.
         residuals: Residuals,
@@ -218,8 +228,14 @@ impl fmt::Display for QpError {
                 f,
                 "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is {pivot:e}"
             ),
+            Self::Coupled => f.write_str(
+                "states are periodic or controls shared: `InteriorPoint` solves such QPs, this solver does not",
+            ),
             Self::MaxIterations { iterations, residuals } => {
                 write!(f, "not solved after {iterations} iterations: {residuals}")
+            }
+            Self::OutOfTime { iterations, residuals } => {
+                write!(f, "the time was over after {iterations} iterations: {residuals}")
             }
             Self::Stalled { iterations, residuals } => {
                 write!(f, "no progress after {iterations} iterations: {residuals}")

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Dimensions may differ from stage to stage. The state at the start is fixed (two equal bounds),
-//! bounded or free.
+//! bounded or free. States may be periodic, and controls the same at all stages.
 //!
 //! - [`Qp`] is the data, [`Solution`] a point with multipliers; both in memory of their owner, on
 //!   the heap or not.
@@ -55,6 +55,7 @@ mod check;
 mod clarabel;
 #[cfg(feature = "alloc")]
 mod condense;
+mod coupling;
 mod error;
 pub(crate) mod interior;
 mod layout;
@@ -89,6 +90,7 @@ pub use statistics::{Residuals, Statistics};
 
 // What the optimal control problems write and read.
 pub(crate) use check::bounds as bound_residuals;
+pub(crate) use coupling::{is_marked, marked};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };

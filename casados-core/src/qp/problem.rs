@@ -20,6 +20,9 @@ use core::marker::PhantomData;
 pub struct Qp<T, D, M> {
     dims: D,
     memory: M,
+    /// How many numbers the stages take; behind them is a mark for every state and control of the
+    /// first one.
+    stages: usize,
     number: PhantomData<T>,
 }
 
@@ -32,6 +35,8 @@ pub type HeapQp<T = f64> = Qp<T, Vec<StageDims>, Vec<T>>;
 pub struct QpView<'a, T> {
     pub(crate) dims: &'a [StageDims],
     pub(super) data: &'a [T],
+    /// Periodic states and shared controls.
+    pub(super) marks: &'a [T],
 }
 
 /// The data of one stage.
@@ -413,7 +418,7 @@ impl<T: Real, D, M> Qp<T, D, M> {
     /// How many numbers the data takes; `usize::MAX` if they are more than that.
     #[must_use]
     pub const fn memory(dims: &[StageDims]) -> usize {
-        if is_absurd(dims) { usize::MAX } else { end::<T>(dims).data }
+        if is_absurd(dims) { usize::MAX } else { end::<T>(dims).data + marks(dims) }
     }
 }
 
@@ -430,7 +435,8 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         if found < expected {
             return Err(QpError::Dimension { field: Field::Data, stage: 0, expected, found });
         }
-        let mut qp = Self { dims, memory, number: PhantomData };
+        let stages = end::<T>(dims.as_ref()).data;
+        let mut qp = Self { dims, memory, stages, number: PhantomData };
         qp.clear();
         Ok(qp)
     }
@@ -442,7 +448,12 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     /// For solvers.
     #[must_use]
     pub fn view(&self) -> QpView<'_, T> {
-        QpView { dims: self.dims.as_ref(), data: self.memory.as_ref() }
+        let (dims, data) = (self.dims.as_ref(), self.memory.as_ref());
+        QpView { dims, data, marks: part(data, self.stages, marks(dims)) }
+    }
+    /// Periodic states and shared controls.
+    pub(super) fn marks_mut(&mut self) -> &mut [T] {
+        part_mut(self.memory.as_mut(), self.stages, marks(self.dims.as_ref()))
     }
     /// The dimensions of the stages.
     #[must_use]
@@ -480,6 +491,14 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
             penalties.fill(T::from_f64(f64::INFINITY));
         }
         Ok(())
+    }
+}
+
+/// States and controls of the first stage.
+const fn marks(dims: &[StageDims]) -> usize {
+    match dims.first() {
+        Some(first) => first.nx + first.nu,
+        None => 0,
     }
 }
 

@@ -1,6 +1,7 @@
 //! A QP as one sparse problem: `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then
 //! sides, then cones.
 
+use super::coupling::marked;
 use super::layout::Places;
 use super::problem::{Bounds, QpView, Stage};
 use alloc::vec::Vec;
@@ -18,6 +19,8 @@ pub enum Origin {
     Upper(usize),
     /// The sign of a violation.
     Sign,
+    /// A periodic state or a shared control, whose multipliers nobody asks for.
+    Coupling,
     /// An element of a cone.
     Cone(usize),
 }
@@ -134,6 +137,7 @@ impl Sparse {
                 sparse.k.add(row, next.map_or(0, |next| next + i), -1.0);
             }
         }
+        sparse.couple(qp);
         // Equations before inequalities, and these before cones.
         for pass in 0..2 {
             for (k, (stage, place)) in qp.stages().zip(Places::<f64>::new(qp.dims())).enumerate() {
@@ -172,6 +176,24 @@ impl Sparse {
             sparse.cones.push(cone.count);
         }
         sparse
+    }
+
+    /// Differences of variables that are one.
+    fn couple(&mut self, qp: QpView<'_, f64>) {
+        let columns = self.columns.clone();
+        let mut equal = |first: usize, other: usize| {
+            let row = self.row(Origin::Coupling, 0.0);
+            self.k.add(row, first, 1.0);
+            self.k.add(row, other, -1.0);
+        };
+        let ends = (columns.first().copied(), columns.last().copied());
+        let (Some(first), Some(last), Some(dims)) = (ends.0, ends.1, qp.dims().first()) else { return };
+        marked(qp.periodic()).for_each(|i| equal(first + i, last + i));
+        for j in marked(qp.shared()) {
+            for (dims_k, column) in qp.dims().iter().zip(&columns).skip(1).filter(|(dims, _)| j < dims.nu) {
+                equal(first + dims.nx + j, column + dims_k.nx + j);
+            }
+        }
     }
 
     fn row(&mut self, origin: Origin, b: f64) -> usize {

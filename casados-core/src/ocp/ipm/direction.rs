@@ -3,7 +3,7 @@
 
 use super::newton::step;
 use crate::qp::QpError;
-use crate::qp::interior::{Coupling, Iterate};
+use crate::qp::interior::Iterate;
 use crate::scalar::Real;
 
 /// The first `δ_w`.
@@ -26,19 +26,14 @@ impl Regularisation {
     ///
     /// # Errors
     /// Those of the recursion.
-    pub fn direction<T: Real>(
-        &mut self,
-        iterate: &mut Iterate<'_, T>,
-        coupling: &mut Option<Coupling<'_, T>>,
-        mu: T,
-    ) -> Result<f64, QpError> {
-        let mut failed = match self.attempt(iterate, coupling, mu, 0.0) {
+    pub fn direction<T: Real>(&mut self, iterate: &mut Iterate<'_, T>, mu: T) -> Result<f64, QpError> {
+        let mut failed = match self.attempt(iterate, mu, 0.0) {
             Ok(()) => return Ok(0.0),
             Err(failed) => failed,
         };
         let mut delta = if self.last > 0.0 { (self.last / 3.0).max(LEAST) } else { FIRST };
         while delta < MOST {
-            match self.attempt(iterate, coupling, mu, delta) {
+            match self.attempt(iterate, mu, delta) {
                 Ok(()) => {
                     self.last = delta;
                     return Ok(delta);
@@ -51,14 +46,8 @@ impl Regularisation {
     }
 
     /// One factorisation; a step that is not finite is no step.
-    fn attempt<T: Real>(
-        &self,
-        iterate: &mut Iterate<'_, T>,
-        coupling: &mut Option<Coupling<'_, T>>,
-        mu: T,
-        delta: f64,
-    ) -> Result<(), QpError> {
-        match step(iterate, coupling.as_mut(), mu, T::from_f64(delta)) {
+    fn attempt<T: Real>(&self, iterate: &mut Iterate<'_, T>, mu: T, delta: f64) -> Result<(), QpError> {
+        match step(iterate, mu, T::from_f64(delta)) {
             Ok(()) if !iterate.step.iter().all(|d| d.is_finite()) => {
                 Err(QpError::NotConvex { stage: 0, index: 0, pivot: f64::NAN })
             }

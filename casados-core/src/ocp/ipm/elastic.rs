@@ -21,7 +21,7 @@ const BARRIER: f64 = 0.1;
 /// The hard bound that is violated most while penalties stand for it.
 pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &Ocp<P, T, D, M>,
-    state: &State,
+    state: &State<'_>,
     given: &[T],
 ) -> Option<Worst> {
     state.elastic.and_then(|_| ocp.worst(given).0)
@@ -31,7 +31,7 @@ pub(super) fn worst<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<
 /// may help.
 pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
-    state: &mut State,
+    state: &mut State<'_>,
     given: &[T],
     options: &IpmOptions,
 ) -> Option<Status> {
@@ -49,7 +49,7 @@ pub(super) fn verdict<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRe
 /// Penalties in place of hard bounds; slacks begin anew.
 pub(super) fn soften<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     ocp: &mut Ocp<P, T, D, M>,
-    state: &mut State,
+    state: &mut State<'_>,
     given: &[T],
     penalty: f64,
 ) {

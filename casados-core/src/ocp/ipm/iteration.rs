@@ -1,14 +1,13 @@
 //! One iteration: residuals and barrier parameter, search direction, line search, step.
 
-use super::barrier;
-use super::line_search::{Accepted, Expected, Room, longest};
+use super::barrier::{self, Barrier};
+use super::line_search::{Accepted, Expected, Found, Room, longest};
 use super::measure;
 use super::newton::{Lengths, attach, dynamics_after, evaluate};
 use super::run::State;
 use super::work::Work;
-use super::{Ipm, elastic};
+use super::{Ipm, IpmOptions, elastic};
 use crate::ocp::convexify::Convexification;
-use crate::ocp::data::split;
 use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, Measure};
@@ -16,7 +15,7 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Exact;
 use crate::ocp::log::{Iteration, Status, Watch};
 use crate::ocp::problem::Formulation;
-use crate::qp::interior::{Iterate, Sides, add_scaled, set};
+use crate::qp::interior::{Iterate, Sides, set};
 use crate::qp::{QpError, Residuals, StageDims, Store};
 use crate::scalar::Real;
 
@@ -24,6 +23,8 @@ use crate::scalar::Real;
 pub(super) const MARGIN: f64 = 1e-8;
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.
 const MULTIPLIERS: f64 = 1e10;
+/// Variables that are larger have no end.
+const UNBOUNDED: f64 = 1e12;
 /// The Hessian of the Lagrangian as it is.
 const EXACT: Exact = Exact { convexification: Convexification::None };
 
@@ -59,7 +60,7 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &mut State,
+        state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<Option<Status>, OcpError>
     where
@@ -69,6 +70,9 @@ where
         self.linearise(ocp, capacity, state)?;
         let here = self.assess(ocp, capacity, state, row)?;
         row.times.linearise = watch.lap();
+        if (state.over)() {
+            return Ok(Some(Status::OutOfTime));
+        }
         match self.next(ocp, capacity, state, row) {
             Next::Direction => {}
             Next::NewPenalties => return Ok(None),
@@ -79,14 +83,22 @@ where
             Err(error) => return ocp.status_of_error(error).map(Some),
         };
         row.times.qp = watch.lap();
+        if (state.over)() {
+            return Ok(Some(Status::OutOfTime));
+        }
         let Self { options, trial, best, numbers, indices, work, .. } = self;
         let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
         let accepted = if direction.tiny {
             Some(Accepted { alpha: direction.primal, corrected: false })
         } else {
-            let mut room = Room { lengths: &state.lengths, numbers, indices, trial, work: &mut work };
+            let lengths = state.lengths;
+            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
             let Direction { expected, primal, tau, .. } = &direction;
-            room.search(ocp, &mut state.filter, expected, *primal, *tau)?
+            let found = room.search(ocp, state, expected, *primal, *tau)?;
+            if matches!(found, Found::OutOfTime) {
+                return Ok(Some(Status::OutOfTime));
+            }
+            found.accepted()
         };
         row.times.search = watch.lap();
         let Some(accepted) = accepted else {
@@ -109,7 +121,7 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &mut State,
+        state: &mut State<'_>,
     ) -> Result<(), OcpError>
     where
         P::Dynamics: SecondOrder<T>,
@@ -133,21 +145,17 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &mut State,
+        state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<Measure, OcpError> {
         let (residuals, objective) = ocp.residuals();
         let plain = ocp.objective.to_f64();
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
+        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         evaluate(&mut iterate, &mut solution.view_mut());
-        shrink_barrier(state, &iterate, &residuals, self.options.tolerance);
-        let mut here = measure::here(&iterate, plain, state.mu);
-        if let Some(coupling) = &mut work.coupling {
-            coupling.evaluate(iterate.qp, iterate.v);
-            here.violation += coupling.violation();
-        }
+        update_barrier(state, &iterate, &residuals, &self.options);
+        let here = measure::here(&iterate, plain, state.mu);
         if !state.has_filter {
             state.small_violation = 1e-4 * here.violation.max(1.0);
             state.filter = Filter::new(MARGIN, 1e4 * here.violation.max(1.0));
@@ -171,7 +179,7 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &mut State,
+        state: &mut State<'_>,
         row: &Iteration,
     ) -> Next {
         let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
@@ -181,6 +189,11 @@ where
         }
         if state.acceptable >= self.options.acceptable_iterations.max(1) {
             return Next::End(Status::Acceptable);
+        }
+        let is_feasible = row.residuals.dynamics.max(row.residuals.inequalities) <= self.options.tolerance;
+        let (v, _) = ocp.iterate.vectors();
+        if is_feasible && state.elastic.is_none() && v.iter().any(|v| v.abs().to_f64() > UNBOUNDED) {
+            return Next::End(Status::Unbounded);
         }
         if row.iteration >= self.options.max_iterations {
             return Next::End(Status::MaxIterations);
@@ -196,22 +209,16 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &mut State,
+        state: &mut State<'_>,
         here: Measure,
         row: &mut Iteration,
     ) -> Result<Direction, QpError> {
-        let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
-        let intervals = ocp.intervals();
-        let multipliers = &*split::<P, T>(ocp.data.as_mut(), intervals).coupling_multipliers;
+        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let mut iterate = attach(ocp.qp.view(), &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mu = T::from_f64(state.mu);
-        state.delta = state.regularisation.direction(&mut iterate, &mut work.coupling, mu)?;
+        state.delta = state.regularisation.direction(&mut iterate, mu)?;
         row.regularisation = state.delta;
-        let mut slope = measure::slope(&iterate, state.mu, work.scratch);
-        if let Some(coupling) = &work.coupling {
-            // The gradients of the QP have these terms of the Lagrangian.
-            slope -= coupling.slope(iterate.qp, multipliers, iterate.step).to_f64();
-        }
+        let slope = measure::slope(&iterate, state.mu, work.scratch);
         let expected = Expected {
             here,
             slope,
@@ -236,13 +243,11 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &State,
+        state: &State<'_>,
         direction: &Direction,
         accepted: Accepted,
     ) -> Result<(), OcpError> {
         let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
-        let intervals = ocp.intervals();
-        let coupling_multipliers = split::<P, T>(ocp.data.as_mut(), intervals).coupling_multipliers;
         let (qp, mut view) = (ocp.qp.view(), ocp.iterate.view_mut());
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let Accepted { alpha, corrected } = accepted;
@@ -255,9 +260,6 @@ where
         }
         dynamics_after(&mut iterate, &mut work, T::from_f64(state.delta));
         let part = T::from_f64(alpha);
-        if let Some(coupling) = &work.coupling {
-            add_scaled(coupling_multipliers, part, coupling.step);
-        }
         for (pi, &after) in view.dynamics.iter_mut().zip(&*work.pi) {
             *pi = *pi + part * (after - *pi);
         }
@@ -273,16 +275,20 @@ where
 }
 
 /// The next barrier parameter; another one has another filter.
-fn shrink_barrier<T: Real>(
-    state: &mut State,
+fn update_barrier<T: Real>(
+    state: &mut State<'_>,
     iterate: &Iterate<'_, T>,
     residuals: &Residuals,
-    tolerance: f64,
+    options: &IpmOptions,
 ) {
     let Sides { slack, multiplier, .. } = &iterate.sides;
     let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu));
     let before = state.mu;
-    state.mu = barrier::shrink(before, error, tolerance);
+    let tolerance = options.tolerance;
+    state.mu = match options.barrier {
+        Barrier::Monotone => barrier::shrink(before, error, tolerance),
+        Barrier::Adaptive => state.progress.next(before, error, [slack, multiplier], tolerance),
+    };
     if state.mu != before {
         state.filter.clear();
     }

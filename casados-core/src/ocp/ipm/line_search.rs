@@ -2,6 +2,7 @@
 
 use super::measure;
 use super::newton::{Lengths, attach, evaluate_values};
+use super::run::State;
 use super::work::Work;
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, MARGIN, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
@@ -77,6 +78,27 @@ pub(super) struct Accepted {
     pub corrected: bool,
 }
 
+/// What a line search finds.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Found {
+    /// A step.
+    Step(Accepted),
+    /// No step is short enough.
+    Nothing,
+    /// The time was over before.
+    OutOfTime,
+}
+
+impl Found {
+    /// The step.
+    pub fn accepted(self) -> Option<Accepted> {
+        match self {
+            Self::Step(accepted) => Some(accepted),
+            _ => None,
+        }
+    }
+}
+
 /// The memory that a line search works on.
 pub(super) struct Room<'r, 'w, T, D, M, N, I> {
     pub lengths: &'r Lengths,
@@ -101,28 +123,32 @@ where
     pub fn search<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
-        filter: &mut Filter,
+        state: &mut State<'_>,
         expected: &Expected,
         longest: f64,
         tau: f64,
-    ) -> Result<Option<Accepted>, OcpError> {
+    ) -> Result<Found, OcpError> {
+        let State { filter, over, .. } = state;
         let mut alpha = longest;
         let shortest = expected.shortest();
         while alpha >= shortest {
             let there = self.measure(ocp, expected.mu, alpha);
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
-                return Ok(Some(Accepted { alpha, corrected: false }));
+                return Ok(Found::Step(Accepted { alpha, corrected: false }));
             }
             let bends = there.is_some_and(|there| there.violation >= expected.here.violation);
             if alpha == longest
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
             {
-                return Ok(Some(Accepted { alpha, corrected: true }));
+                return Ok(Found::Step(Accepted { alpha, corrected: true }));
+            }
+            if over() {
+                return Ok(Found::OutOfTime);
             }
             alpha *= 0.5;
         }
-        Ok(None)
+        Ok(Found::Nothing)
     }
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
@@ -156,7 +182,7 @@ where
         let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
         let mut violation = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);
-        if let Some(coupling) = &mut self.work.coupling {
+        if let Some(coupling) = &mut iterate.coupling {
             coupling.evaluate(iterate.qp, self.work.rows);
             violation += coupling.violation();
         }
@@ -188,11 +214,7 @@ where
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
                 let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));
-                if let Some(coupling) = &mut self.work.coupling {
-                    // The conditions are linear: no correction of theirs.
-                    coupling.evaluate(iterate.qp, iterate.v);
-                }
-                let solved = super::newton::step(&mut iterate, self.work.coupling.as_mut(), mu, delta);
+                let solved = super::newton::step(&mut iterate, mu, delta);
                 (solved, longest(iterate.sides.slack, iterate.sides.slack_step, tau))
             };
             if solved.is_err() {

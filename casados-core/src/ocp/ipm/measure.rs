@@ -25,7 +25,8 @@ pub(super) fn penalties_and_barrier<T: Real>(sides: &Sides<'_, T>, slacks: &[T])
 pub(super) fn here<T: Real>(iterate: &Iterate<'_, T>, objective: f64, mu: f64) -> Measure {
     let sides = &iterate.sides;
     let size = |values: &[T]| values.iter().fold(0.0, |sum, r| sum + r.abs().to_f64());
-    let violation = size(iterate.dynamics) + size(sides.residual) + size(sides.equation_residual);
+    let coupling = iterate.coupling.as_ref().map_or(0.0, |coupling| coupling.violation());
+    let violation = size(iterate.dynamics) + size(sides.residual) + size(sides.equation_residual) + coupling;
     let (penalties, barrier) = penalties_and_barrier(sides, sides.slack);
     Measure { objective: objective + penalties + mu * barrier, violation }
 }

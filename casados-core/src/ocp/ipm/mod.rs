@@ -32,6 +32,7 @@ mod run;
 mod start;
 mod work;
 
+pub use barrier::Barrier;
 #[cfg(feature = "alloc")]
 pub use heap::HeapIpm;
 pub use options::IpmOptions;

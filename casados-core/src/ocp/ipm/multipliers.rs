@@ -5,11 +5,9 @@ use super::newton::{Lengths, attach, evaluate_values, least_squares};
 use super::run::State;
 use super::start::begin_sides;
 use super::work::Work;
-use crate::ocp::data::split;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
-use crate::qp::interior::add_scaled;
 use crate::qp::{StageDims, Store, assign};
 use crate::scalar::Real;
 
@@ -28,16 +26,14 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &mut State,
+        state: &mut State<'_>,
     ) -> Result<(), OcpError> {
         // Multipliers of hard bounds say nothing about penalties.
         let warm = self.options.warm_start && state.elastic.is_none();
         // Other penalties have their numbers at other places.
         self.numbers.as_mut().fill(T::ZERO);
         let ends = ocp.ends();
-        let intervals = ocp.intervals();
-        let coupling_multipliers = split::<P, T>(ocp.data.as_mut(), intervals).coupling_multipliers;
-        let (qp, solution) = (ocp.qp.view(), &mut ocp.iterate);
+        let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mut work = Work::new(qp.dims, ends, capacity, self.work.as_mut());
@@ -52,9 +48,6 @@ where
             let is_small = |y: &T| y.abs() <= T::from_f64(LARGEST);
             if work.pi.iter().chain(&*work.hessian_multipliers).all(is_small) {
                 assign(view.dynamics, work.pi);
-                if let Some(coupling) = &work.coupling {
-                    add_scaled(coupling_multipliers, T::ONE, coupling.step);
-                }
             } else {
                 view.dynamics.fill(T::ZERO);
                 work.hessian_multipliers.fill(T::ZERO);
@@ -69,7 +62,7 @@ where
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         capacity: &Lengths,
-        state: &State,
+        state: &State<'_>,
     ) -> Result<(), OcpError> {
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();

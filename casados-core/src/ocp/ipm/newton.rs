@@ -4,9 +4,7 @@
 //! of that of the nonlinear problem: same slacks, same multipliers, exact Hessians.
 
 use super::work::Work;
-use crate::qp::interior::{
-    Counts, Coupling, First, Iterate, Penalties, Reading, Sides, count, is_first_fixed,
-};
+use crate::qp::interior::{Counts, First, Iterate, Penalties, Reading, Sides, count, is_first_fixed};
 use crate::qp::{Field, InteriorPointOptions, Places, QpError, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers};
 
@@ -23,7 +21,7 @@ impl Lengths {
     pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
         let reading = reading(qp);
         let counts = count(qp, &reading);
-        Self { counts, fixed: reading.fixed, numbers: Iterate::<T>::memory(qp.dims, &counts) }
+        Self { counts, fixed: reading.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
     }
 
     /// Of the same problem with every bound soft, equations too.
@@ -31,7 +29,7 @@ impl Lengths {
         let Counts { lower, upper, equations, .. } = self.counts;
         let (lower, upper) = (lower + equations, upper + equations);
         let counts = Counts { lower, upper, soft: lower + upper, equations };
-        Self { counts, fixed: self.fixed, numbers: Iterate::<T>::memory(qp.dims, &counts) }
+        Self { counts, fixed: self.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
     }
 }
 
@@ -100,33 +98,24 @@ impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
 /// # Errors
 /// [`QpError::NotConvex`] where the reduced Hessian, with `δ` on the diagonal, is not positive
 /// definite.
-pub(super) fn step<T: Real>(
-    iterate: &mut Iterate<'_, T>,
-    coupling: Option<&mut Coupling<'_, T>>,
-    mu: T,
-    delta: T,
-) -> Result<(), QpError> {
+pub(super) fn step<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: T) -> Result<(), QpError> {
     let mut result = Ok(());
     iterate.proximal = delta;
-    T::registers(Step { iterate, coupling, mu, result: &mut result });
+    T::registers(Step { iterate, mu, result: &mut result });
     result
 }
 
-struct Step<'r, 'a, 'c, T> {
+struct Step<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
-    coupling: Option<&'r mut Coupling<'c, T>>,
     mu: T,
     result: &'r mut Result<(), QpError>,
 }
 
-impl<T: Real> Registers<T> for Step<'_, '_, '_, T> {
+impl<T: Real> Registers<T> for Step<'_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         self.iterate.sides.aim(self.mu);
-        *self.result = match self.coupling {
-            None => self.iterate.newton::<E>(true),
-            Some(coupling) => self.iterate.newton_coupled::<E>(coupling),
-        };
+        *self.result = self.iterate.newton::<E>(true);
     }
 }
 
@@ -137,23 +126,22 @@ pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut W
     assign(work.slacks, iterate.sides.multiplier);
     assign(work.ends, iterate.sides.free);
     iterate.proximal = delta;
-    T::registers(After { iterate, coupling: work.coupling.as_ref(), pi: work.pi });
+    T::registers(After { iterate, pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
     assign(iterate.sides.free, work.ends);
 }
 
-struct After<'r, 'a, 's, 'c, T> {
+struct After<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
-    coupling: Option<&'r Coupling<'c, T>>,
     pi: &'s mut [T],
 }
 
-impl<T: Real> Registers<T> for After<'_, '_, '_, '_, T> {
+impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
         self.iterate.go_without_slacks();
-        self.iterate.controlled_costates::<E>(self.pi, self.coupling);
+        self.iterate.controlled_costates::<E>(self.pi);
     }
 }
 
@@ -175,8 +163,7 @@ pub(super) fn least_squares<T: Real>(
     assign(work.slacks, iterate.sides.multiplier);
     general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
-    let coupling = work.coupling.as_mut();
-    T::registers(LeastSquares { iterate, coupling, pi: work.pi, result: &mut result });
+    T::registers(LeastSquares { iterate, pi: work.pi, result: &mut result });
     result?;
     let sides = &mut iterate.sides;
     assign(work.hessian_multipliers, sides.multiplier_step);
@@ -184,7 +171,7 @@ pub(super) fn least_squares<T: Real>(
     general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
     assign(work.rows, iterate.v);
     iterate.proximal = identity;
-    T::registers(After { iterate, coupling: work.coupling.as_ref(), pi: work.pi });
+    T::registers(After { iterate, pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
     Ok(())
@@ -217,17 +204,16 @@ pub(super) fn is_general<'a, T: Real>(qp: QpView<'a, T>, rows: &'a [u32]) -> imp
     })
 }
 
-struct LeastSquares<'r, 'a, 's, 'c, T> {
+struct LeastSquares<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
-    coupling: Option<&'r mut Coupling<'c, T>>,
     pi: &'s mut [T],
     result: &'r mut Result<(), QpError>,
 }
 
-impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, '_, T> {
+impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, coupling, pi, result } = self;
+        let Self { iterate, pi, result } = self;
         pi.fill(T::ZERO);
         iterate.evaluate_at::<E>(pi);
         let identity = T::from_f64(IDENTITY);
@@ -246,12 +232,9 @@ impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, '_, T> {
                 (*inverse, *multiplier) = (T::ONE, identity);
             }
         }
-        *result = match coupling {
-            None => iterate.newton::<E>(true),
-            Some(coupling) => {
-                coupling.residual.fill(T::ZERO);
-                iterate.newton_coupled::<E>(coupling)
-            }
-        };
+        if let Some(coupling) = &mut iterate.coupling {
+            coupling.residual.fill(T::ZERO);
+        }
+        *result = iterate.newton::<E>(true);
     }
 }

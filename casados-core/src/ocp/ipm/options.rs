@@ -1,5 +1,6 @@
 //! What can be chosen.
 
+use super::barrier::Barrier;
 use crate::ocp::error::OcpError;
 use crate::scalar::Real;
 
@@ -20,6 +21,8 @@ pub struct IpmOptions {
     pub max_iterations: usize,
     /// The first barrier parameter `μ`. Default 0.1.
     pub start_mu: f64,
+    /// What it follows. Default [`Barrier::Monotone`].
+    pub barrier: Barrier,
     /// Bounds are left by this at the start, relative to their size and to the room between them;
     /// at most 0.5. Default 1e-2.
     pub bound_push: f64,
@@ -46,6 +49,7 @@ impl IpmOptions {
             acceptable_iterations: 15,
             max_iterations: 200,
             start_mu: 0.1,
+            barrier: Barrier::Monotone,
             bound_push: 1e-2,
             warm_start: false,
             warm_push: 1e-6,

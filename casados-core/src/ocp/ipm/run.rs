@@ -1,6 +1,7 @@
 //! The iterations.
 
 use super::Ipm;
+use super::barrier::Progress;
 use super::direction::Regularisation;
 use super::iteration::MARGIN;
 use super::newton::Lengths;
@@ -16,15 +17,19 @@ use crate::ocp::linearise::Exact;
 use crate::ocp::log::reserve;
 use crate::ocp::log::{Iteration, Outcome, Status};
 use crate::ocp::problem::Formulation;
-use crate::qp::{Field, StageDims, Store, assign};
+use crate::qp::{Field, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
 /// What a run remembers from one iteration to the next.
-pub(super) struct State {
+pub(super) struct State<'c> {
+    /// Whether the time is over.
+    pub over: &'c mut dyn FnMut() -> bool,
     pub lengths: Lengths,
     /// The barrier parameter.
     pub mu: f64,
+    /// What an adaptive one remembers.
+    pub progress: Progress,
     pub filter: Filter,
     /// `θ_min`: below this violation the barrier function may decide.
     pub small_violation: f64,
@@ -64,7 +69,23 @@ where
     where
         P::Dynamics: SecondOrder<T>,
     {
-        self.solve_observed(ocp, &mut |_| ControlFlow::Continue(()))
+        self.run(ocp, &mut |_| ControlFlow::Continue(()), &mut || false)
+    }
+
+    /// As [`Ipm::solve`], until the time is over: `over` is asked after each evaluation of the
+    /// problem, factorisation and trial of the line search. A clock, or a counter of cycles.
+    ///
+    /// # Errors
+    /// As [`Ipm::solve`].
+    pub fn solve_until<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Outcome, OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
+        self.run(ocp, &mut |_| ControlFlow::Continue(()), over)
     }
 
     /// As [`Ipm::solve`], with an observer of the iterations that may stop the run.
@@ -79,14 +100,28 @@ where
     where
         P::Dynamics: SecondOrder<T>,
     {
+        self.run(ocp, observer, &mut || false)
+    }
+
+    fn run<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        observer: &mut dyn FnMut(&Iteration) -> ControlFlow<()>,
+        over: &mut dyn FnMut() -> bool,
+    ) -> Result<Outcome, OcpError>
+    where
+        P::Dynamics: SecondOrder<T>,
+    {
         ocp.fits(self.trial.dims())?;
         self.options.check()?;
         // Bounds of constraints are in the QP once it is written.
         ocp.linearise(Exact { convexification: Convexification::None })?;
         let (lengths, capacity) = self.prepare(ocp)?;
         let mut state = State {
+            over,
             lengths,
             mu: self.options.start_mu,
+            progress: Progress::default(),
             filter: Filter::new(MARGIN, f64::INFINITY),
             small_violation: f64::INFINITY,
             regularisation: Regularisation::default(),
@@ -131,6 +166,10 @@ where
         if outcome.status != Status::Converged && state.best_residual.is_finite() {
             ocp.iterate.copy_from(&self.best);
         }
+        let stuck = matches!(outcome.status, Status::NoProgress | Status::QpFailed(_));
+        if stuck && state.best_residual <= self.options.acceptable_tolerance {
+            outcome.status = Status::Acceptable;
+        }
         outcome.objective = state.best_iteration.objective;
         outcome.residuals = state.best_iteration.residuals;
         result.map(|()| outcome)
@@ -150,10 +189,7 @@ where
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
         push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());
-        // Which states are tied lies behind the penalties.
-        let begin = Work::<T>::before_coupling(ocp.qp().dims, ocp.ends(), capacity.counts.pairs());
-        let (tied, _) = ocp.coupling();
-        assign(self.work.as_mut().get_mut(begin..).unwrap_or_default(), tied);
+        ocp.join_controls();
         let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
         ocp.remember_penalties(work.penalties);
         Ok((lengths, capacity))

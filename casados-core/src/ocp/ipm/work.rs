@@ -3,7 +3,6 @@
 use super::newton::Lengths;
 use super::start::scratch;
 use crate::ocp::elastic;
-use crate::qp::interior::Coupling;
 use crate::qp::{StageDims, end, take_mut};
 use crate::scalar::Real;
 
@@ -28,22 +27,12 @@ pub(super) struct Work<'a, T> {
     pub scratch: &'a mut [T],
     /// Linear penalties as they were given.
     pub penalties: &'a mut [T],
-    /// Conditions between the first and the last state.
-    pub coupling: Option<Coupling<'a, T>>,
 }
 
 impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
     pub fn length(dims: &[StageDims], ends: usize, capacity: &Lengths) -> usize {
-        let pairs = capacity.counts.pairs();
-        Self::before_coupling(dims, ends, pairs)
-            + first_nx(dims)
-            + Coupling::<T>::memory(dims, first_nx(dims))
-    }
-
-    /// Where the list of tied states begins.
-    pub fn before_coupling(dims: &[StageDims], ends: usize, pairs: usize) -> usize {
-        let end = end::<T>(dims);
+        let (pairs, end) = (capacity.counts.pairs(), end::<T>(dims));
         ends + 2 * end.row + 4 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
     }
 
@@ -63,15 +52,6 @@ impl<'a, T: Real> Work<'a, T> {
             hessian_multipliers: take_mut(rest, pairs),
             scratch: take_mut(rest, scratch::<T>(dims)),
             penalties: take_mut(rest, elastic::memory(dims)),
-            coupling: {
-                let tied = &*take_mut(rest, first_nx(dims));
-                let coupled = tied.iter().any(|&tied| tied != T::ZERO);
-                coupled.then(|| Coupling::new(dims, tied, rest))
-            },
         }
     }
-}
-
-fn first_nx(dims: &[StageDims]) -> usize {
-    dims.first().map_or(0, |dims| dims.nx)
 }

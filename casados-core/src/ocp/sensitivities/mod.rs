@@ -111,7 +111,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is not fixed;
-    /// [`OcpError::Length`] if the memory is of another problem.
+    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::Coupled`].
     pub fn differentiate<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
@@ -144,6 +144,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     fn check_memory(&self, result: &Sensitivities<T>) -> Result<(), OcpError> {
+        self.is_uncoupled()?;
         if self.initial != Initial::Fixed {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }

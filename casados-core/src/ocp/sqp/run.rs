@@ -77,7 +77,6 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         C: Curvature<P::Dynamics, T>,
     {
         ocp.fits(self.solution.dims())?;
-        ocp.is_uncoupled()?;
         self.options.check()?;
         self.qp_solver.refine(self.options.tolerance);
         let mut state = State {
@@ -90,6 +89,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             best_iteration: Iteration::default(),
             number: PhantomData,
         };
+        // Steps are to solutions of QPs: what is one stays so.
+        ocp.join_controls();
+        ocp.join_states();
         self.weights.multipliers_mut().fill(T::ZERO);
         #[cfg(feature = "alloc")]
         {

@@ -17,7 +17,8 @@
 //! violated   λ = l − q d     until d > 0
 //! ```
 
-use super::iterate::{Iterate, Terms, at};
+use super::iterate::{Iterate, at};
+use super::residuals::Terms;
 use super::run::Limits;
 use super::sides::{Sides, set};
 use crate::qp::layout::{assign, part_mut};
@@ -90,7 +91,7 @@ impl<T: Real> Iterate<'_, T> {
                 return Err(Statistics { refinements: 0, ..statistics });
             }
             self.sides.unsettle();
-            self.riccati.no_dynamics();
+            self.no_dynamics();
         }
     }
 
@@ -108,6 +109,9 @@ impl<T: Real> Iterate<'_, T> {
         // A whole step leaves nothing of these.
         self.stationarity.fill(T::ZERO);
         self.dynamics.fill(T::ZERO);
+        if let Some(coupling) = &mut self.coupling {
+            coupling.advance(T::ONE);
+        }
         let sides = &mut self.sides;
         let equations = sides.equations.iter().zip(&mut *sides.free).zip(&mut *sides.equation_residual);
         for ((&row, free), residual) in equations {

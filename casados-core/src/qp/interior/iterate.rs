@@ -3,12 +3,12 @@
 use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
+use super::residuals::Terms;
 use super::riccati::{First, Riccati};
 use super::sides::{Counts, Sides};
-use super::vector::{larger, largest_product, largest_size};
+use super::vector::larger;
 use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
-use crate::qp::statistics::{Residuals, larger as larger_or_nan};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
@@ -27,6 +27,8 @@ pub struct Iterate<'a, T> {
     pub proximal: T,
     pub riccati: Riccati<'a, T>,
     pub sides: Sides<'a, T>,
+    /// What couples stages.
+    pub coupling: Option<Coupling<'a, T>>,
     /// `v` and `C x + D u`
     pub v: &'a mut [T],
     /// `Δ`
@@ -47,45 +49,15 @@ pub struct Iterate<'a, T> {
     pub terms: Terms<T>,
 }
 
-/// What residuals are sums of.
-#[derive(Clone, Copy)]
-pub struct Terms<T> {
-    /// In gradients: `H v`, `h`, forces of constraints, `π`.
-    pub forces: T,
-    /// In conditions: `v`, `C x + D u`, `b`.
-    pub values: T,
-}
-
-/// The residuals of the conditions of optimality, the largest element of each: see [`Residuals`].
-#[derive(Clone, Copy)]
-pub struct Largest<T> {
-    pub stationarity: T,
-    pub dynamics: T,
-    pub inequalities: T,
-    pub complementarity: T,
-}
-
-impl<T: Real> From<Largest<T>> for Residuals {
-    fn from(largest: Largest<T>) -> Self {
-        let Largest { stationarity, dynamics, inequalities, complementarity } = largest;
-        Self {
-            stationarity: stationarity.to_f64(),
-            dynamics: dynamics.to_f64(),
-            inequalities: inequalities.to_f64(),
-            complementarity: complementarity.to_f64(),
-        }
-    }
-}
-
 /// Where the multipliers `π` of the dynamics come from when a gradient is computed.
 #[derive(Clone, Copy)]
-pub enum Costates<'c, 'm, T> {
+pub enum Costates {
     /// The adjoint recursion: the gradient in the states vanishes.
     Adjoint,
     /// The adjoint recursion of the controlled system, with the last factors: where the gradient in
     /// the controls vanishes both are the same, and errors decay where the adjoint recursion lets
-    /// them grow. With the changes of the multipliers of a coupling.
-    Controlled(Option<&'c Coupling<'m, T>>),
+    /// them grow. With the changes of multipliers of periodic states.
+    Controlled,
     /// They are given.
     Given,
 }
@@ -96,7 +68,7 @@ struct Evaluate<'s, 'a, T, E> {
     iterate: &'s mut Iterate<'a, T>,
     values: bool,
     multipliers: Option<(&'s mut [T], &'s mut T)>,
-    costates: Costates<'s, 's, T>,
+    costates: Costates,
     register: PhantomData<E>,
 }
 
@@ -126,13 +98,22 @@ impl<'a, T: Real> Iterate<'a, T> {
         Riccati::<T>::memory(dims) + counts.numbers() + 5 * end.row + end.dynamics + first_nx(dims)
     }
 
+    /// How many numbers it takes for a QP.
+    pub fn memory_of(qp: QpView<'_, T>, counts: &Counts) -> usize {
+        Self::memory(qp.dims, counts) + Coupling::memory_of(qp)
+    }
+
     /// In memory that is zero.
     pub fn new(qp: QpView<'a, T>, first: First, sides: Sides<'a, T>, numbers: &mut &'a mut [T]) -> Self {
         let (riccati, initial) = (Riccati::new(qp.dims, numbers), first_nx(qp.dims));
         let end = riccati.end;
+        let coupling = Coupling::new(qp, first, numbers);
+        let found = if coupling.is_some() { First::Coupled } else { First::Free };
+        let first = if first == First::Fixed { first } else { found };
         Self {
             qp,
             first,
+            coupling,
             objective: true,
             proximal: T::ZERO,
             riccati,
@@ -172,12 +153,8 @@ impl<'a, T: Real> Iterate<'a, T> {
     }
 
     /// The multipliers `π` at the point, by the recursion of the controlled system.
-    pub fn controlled_costates<E: Packed<T>>(
-        &mut self,
-        multipliers: &mut [T],
-        coupling: Option<&Coupling<'_, T>>,
-    ) {
-        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled(coupling));
+    pub fn controlled_costates<E: Packed<T>>(&mut self, multipliers: &mut [T]) {
+        let _ = self.evaluate_parts::<E>(false, Some(multipliers), Costates::Controlled);
     }
 
     /// General constraints, dynamics, and what belongs to sides; the distances from the bounds are
@@ -197,7 +174,7 @@ impl<'a, T: Real> Iterate<'a, T> {
         &mut self,
         values: bool,
         multipliers: Option<&mut [T]>,
-        costates: Costates<'_, '_, T>,
+        costates: Costates,
     ) -> T {
         let (mut objective, register) = (T::ZERO, PhantomData);
         let multipliers = multipliers.map(|multipliers| (multipliers, &mut objective));
@@ -207,7 +184,7 @@ impl<'a, T: Real> Iterate<'a, T> {
 
     /// The multipliers `π`, the gradient in `u`, and the objective.
     #[inline(always)]
-    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates<'_, '_, T>) -> T {
+    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates) -> T {
         let sides = &mut self.sides;
         // Forces of the constraints, by rows.
         let forces = &mut *self.gradient;
@@ -217,7 +194,8 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
-        if let Costates::Controlled(coupling) = costates {
+        let controlled = matches!(costates, Costates::Controlled);
+        if controlled {
             // What keeps variables near where they are belongs to the step, not to the problem.
             for place in Places::<T>::new(self.qp.dims) {
                 let step = part(self.step, place.row, place.n);
@@ -225,9 +203,9 @@ impl<'a, T: Real> Iterate<'a, T> {
                     *force = *force + self.proximal * step;
                 }
             }
-            if let Some(coupling) = coupling {
-                coupling.push(self.qp, forces);
-            }
+        }
+        if let Some(coupling) = &self.coupling {
+            coupling.push(self.qp, controlled, forces);
         }
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
@@ -262,7 +240,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                 *minus = -force;
             }
             subtract::<T, E>(g, matrix, minus, n, next + ng);
-            if matches!(costates, Costates::Controlled(_)) {
+            if controlled {
                 let panel = part(self.riccati.panels, place.factor, ld * place.pivots);
                 let inverse = part(self.riccati.inverse, place.v + nx, place.nu);
                 let y = part_mut(self.riccati.y, place.v + nx, place.nu);
@@ -291,6 +269,9 @@ impl<'a, T: Real> Iterate<'a, T> {
                 given.fill(T::ZERO);
             }
         }
+        if let Some(coupling) = self.coupling.as_mut().filter(|_| !controlled) {
+            coupling.fold(self.qp, self.stationarity);
+        }
         self.terms.forces = largest;
         objective + self.penalties()
     }
@@ -318,6 +299,9 @@ impl<'a, T: Real> Iterate<'a, T> {
             add_transposed::<T, E>(dynamics, matrix, v, n, next);
         }
         self.terms.values = largest;
+        if let Some(coupling) = &mut self.coupling {
+            coupling.evaluate(self.qp, self.v);
+        }
         let sides = &mut self.sides;
         sides.gather(self.v, |value, bound| value - bound, |value, bound| bound - value);
         for ((residual, &value), &slack) in sides.residual.iter_mut().zip(&*sides.scratch).zip(&*sides.slack)
@@ -343,41 +327,6 @@ impl<'a, T: Real> Iterate<'a, T> {
         let (_, violations) = sides.slack.split_at_checked(sides.counts.sides()).unwrap_or_default();
         let costs = sides.linear.iter().zip(&*sides.quadratic).zip(violations);
         costs.fold(T::ZERO, |sum, ((&l, &q), &e)| sum + e * (l + T::from_f64(0.5) * q * e))
-    }
-
-    /// The residuals as [`qp::residuals`](crate::qp::residuals) has them, after
-    /// [`evaluate`](Self::evaluate).
-    #[inline(always)]
-    pub fn judged<E: Packed<T>>(&mut self) -> Largest<T> {
-        let Largest { stationarity, dynamics, .. } = self.residuals::<E>();
-        let (inequalities, complementarity) = self.sides.judge();
-        // The multipliers of the dynamics make gradients zero but for rounding, which is a part of
-        // the terms; in another order the sums of values are rounded otherwise.
-        let rounding = |terms| T::from_f64(T::EPSILON) * terms;
-        Largest {
-            stationarity: larger_or_nan(stationarity, rounding(self.terms.forces)),
-            dynamics: larger_or_nan(dynamics, rounding(self.terms.values)),
-            inequalities,
-            complementarity,
-        }
-    }
-
-    /// The residuals as they are known.
-    #[inline(always)]
-    pub fn residuals<E: Packed<T>>(&self) -> Largest<T> {
-        let sides = &self.sides;
-        let inequalities = larger_or_nan(
-            largest_size::<T, E>(sides.residual),
-            largest_size::<T, E>(sides.equation_residual),
-        );
-        // Products may lose NaN, their sum does not.
-        let products = largest_product::<T, E>(T::ZERO, sides.slack, sides.multiplier);
-        Largest {
-            stationarity: largest_size::<T, E>(self.stationarity),
-            dynamics: largest_size::<T, E>(self.dynamics),
-            inequalities,
-            complementarity: if self.mu.is_finite() { products } else { self.mu },
-        }
     }
 }
 

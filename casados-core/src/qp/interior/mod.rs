@@ -2,22 +2,26 @@
 //! whose linear systems are solved by a Riccati recursion.
 
 mod active;
+mod border;
 mod cholesky;
 mod coupling;
+mod curvature;
 mod iterate;
 mod kernels;
 mod newton;
 mod options;
 mod pairs;
+mod residuals;
 mod riccati;
 mod run;
+mod shared;
 mod sides;
+mod stage_factor;
 mod store;
 mod symmetric;
 mod vector;
 mod verdict;
 
-pub(crate) use coupling::Coupling;
 pub(crate) use iterate::{Iterate, at};
 pub(crate) use kernels::{
     Columns, add_symmetric, add_transposed, scale, splat, subtract, subtract_column, symmetric,
@@ -28,7 +32,7 @@ pub use options::InteriorPointOptions;
 pub(crate) use riccati::First;
 pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
 pub use store::Store;
-pub(crate) use vector::{add_scaled, dot};
+pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
 use super::error::{Field, QpError};
@@ -92,7 +96,8 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
     /// side for itself), soft ones among them, and equations (pairs of equal hard bounds) beside
     /// the state at the start.
     ///
-    /// To locate what makes a problem infeasible it takes as much as if all were soft.
+    /// To locate what makes a problem infeasible it takes as much as if all were soft. Periodic
+    /// states and shared controls take [`InteriorPoint::memory_of_coupling`] more.
     #[must_use]
     pub const fn memory(dims: &[StageDims], bounds: usize, soft: usize, equations: usize) -> (usize, usize) {
         if is_absurd(dims) {
@@ -100,6 +105,17 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
         }
         let counts = Counts { lower: bounds, upper: 0, soft, equations };
         (Iterate::<T>::memory(dims, &counts), counts.indices())
+    }
+}
+
+impl<T: Real, N, I> InteriorPoint<T, N, I> {
+    /// How many numbers more it takes for so many periodic states and shared controls.
+    #[must_use]
+    pub const fn memory_of_coupling(dims: &[StageDims], periodic: usize, shared: usize) -> usize {
+        if is_absurd(dims) {
+            return usize::MAX;
+        }
+        if periodic + shared == 0 { 0 } else { coupling::Coupling::<T>::memory(dims, periodic, shared) }
     }
 }
 
@@ -120,10 +136,11 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         &mut self,
         qp: QpView<'_, T>,
         attempt: Attempt,
+        over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
     ) -> (Result<Statistics, QpError>, bool) {
         let (mut result, mut infeasible) = (Ok(Statistics::default()), false);
-        let ran = self.prepared(qp, attempt, solution, (&mut result, &mut infeasible));
+        let ran = self.prepared(qp, attempt, over, solution, (&mut result, &mut infeasible));
         (ran.and(result), infeasible)
     }
 
@@ -131,13 +148,14 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         &mut self,
         qp: QpView<'_, T>,
         attempt: Attempt,
+        over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
         (result, infeasible): (&mut Result<Statistics, QpError>, &mut bool),
     ) -> Result<(), QpError> {
         let no_bound = T::from_f64(self.options.no_bound);
         let reading = Reading { fixed: is_first_fixed(qp), penalties: attempt.penalties, no_bound };
         let counts = count(qp, &reading);
-        let length = Iterate::<T>::memory(qp.dims, &counts);
+        let length = Iterate::<T>::memory_of(qp, &counts);
         let mut numbers = self.numbers.at_least(length, Field::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), Field::Indices)?;
         numbers.fill(T::ZERO);
@@ -150,6 +168,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             iterate: &mut iterate,
             options: &self.options,
             limits,
+            over,
             attempt,
             solution,
             result,
@@ -165,6 +184,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         qp: QpView<'_, T>,
         start: Start,
         mut error: QpError,
+        over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
         let (locate, most) = (self.options.locate, self.options.max_iterations);
@@ -189,7 +209,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             if locate && !located && violates {
                 located = true;
                 let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };
-                if let (_, true) = self.run(qp, soft, solution)
+                if let (_, true) = self.run(qp, soft, over, solution)
                     && let Some(infeasible) = verdict::worst(qp, solution, self.options.tolerance)
                 {
                     return Err(infeasible);
@@ -198,7 +218,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             if iterations >= attempt.iterations {
                 return Err(error);
             }
-            error = match self.run(qp, attempt, solution).0 {
+            error = match self.run(qp, attempt, over, solution).0 {
                 Err(error) => error,
                 solved => return solved,
             };
@@ -215,7 +235,28 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
         &mut self,
         qp: QpView<'_, T>,
         start: Start,
+        solution: SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
+        self.solve_until(qp, start, solution, &mut || false)
+    }
+
+    fn relax(&mut self, tolerance: f64) {
+        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
+    }
+}
+
+impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
+    /// As [`QpSolver::solve`], until the time is over: `over` is asked before each iteration of the
+    /// interior point. A clock, or a counter of cycles.
+    ///
+    /// # Errors
+    /// As [`QpSolver::solve`], and [`QpError::OutOfTime`]; then the solution holds the iterate.
+    pub fn solve_until(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: Start,
         mut solution: SolutionView<'_, T>,
+        over: &mut dyn FnMut() -> bool,
     ) -> Result<Statistics, QpError> {
         self.options.check::<T>()?;
         check_all_bounds(qp)?;
@@ -227,14 +268,12 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
             statistics: Statistics::default(),
             iterations: self.options.max_iterations,
         };
-        match self.run(qp, attempt, &mut solution).0 {
+        match self.run(qp, attempt, over, &mut solution).0 {
             // A number that is not finite is found here, not in every call.
-            Err(error) => super::check::check(qp).and_then(|()| self.again(qp, start, error, &mut solution)),
+            Err(error) => {
+                super::check::check(qp).and_then(|()| self.again(qp, start, error, over, &mut solution))
+            }
             solved => solved,
         }
-    }
-
-    fn relax(&mut self, tolerance: f64) {
-        self.relaxed = T::from_f64(if tolerance > 0.0 { tolerance } else { 0.0 });
     }
 }

@@ -27,11 +27,15 @@ impl<T: Real> Iterate<'_, T> {
             qp: self.qp,
             first: self.first,
             objective: self.objective,
+            indefinite: self.coupling.as_ref().is_some_and(|coupling| coupling.conditions > 0),
             weights: self.weights,
             gradient: self.gradient,
             dynamics: self.dynamics,
         };
-        self.riccati.solve::<E>(equations, factor, self.step)?;
+        match &mut self.coupling {
+            None => self.riccati.solve::<E>(equations, factor, self.step)?,
+            Some(coupling) => coupling.solve::<E>(&mut self.riccati, equations, factor, self.step)?,
+        }
         self.gather_step();
         Ok(())
     }
@@ -99,6 +103,9 @@ impl<T: Real> Iterate<'_, T> {
         add_scaled(self.v, alpha, self.step);
         shrink(self.stationarity, left);
         shrink(self.dynamics, left);
+        if let Some(coupling) = &mut self.coupling {
+            coupling.advance(alpha);
+        }
         let sides = &mut self.sides;
         shrink(sides.residual, left);
         let count = sides.counts.sides();
@@ -123,6 +130,18 @@ impl<T: Real> Iterate<'_, T> {
                 }
             }
         }
+        if let Some(coupling) = &mut self.coupling {
+            coupling.fold(self.qp, self.stationarity);
+        }
         self.mu = self.sides.mu::<E>();
+    }
+
+    /// The next solve with the same matrix has other residuals of the dynamics: none, but for
+    /// rounding.
+    pub fn no_dynamics(&mut self) {
+        self.riccati.no_dynamics();
+        if let Some(coupling) = &mut self.coupling {
+            coupling.offset.fill(T::ZERO);
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! The iterations.
 
-use super::iterate::{Iterate, Largest, Terms};
+use super::iterate::Iterate;
 use super::options::InteriorPointOptions;
+use super::residuals::{Largest, Terms};
 use super::riccati::First;
 use super::sides::Penalties;
 use super::vector::{dot, largest_size};
@@ -30,6 +31,8 @@ pub struct Run<'r, 'a, 's, T> {
     pub iterate: &'r mut Iterate<'a, T>,
     pub options: &'r InteriorPointOptions,
     pub limits: Limits<T>,
+    /// Whether the time is over.
+    pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
     pub solution: &'r mut SolutionView<'s, T>,
     pub result: &'r mut Result<Statistics, QpError>,
@@ -40,7 +43,7 @@ pub struct Run<'r, 'a, 's, T> {
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        let Self { iterate, options, limits, mut attempt, solution, result, infeasible } = self;
+        let Self { iterate, options, limits, over, mut attempt, solution, result, infeasible } = self;
         let warm = [&*solution.v, solution.lower, solution.upper];
         if attempt.start == Start::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
             attempt.start = Start::Cold;
@@ -55,7 +58,7 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
                     attempt.statistics = statistics;
                 }
                 iterate.begin::<E>(options, &attempt, solution);
-                iterate.iterations::<E>(&attempt, &limits, solution)
+                iterate.iterations::<E>(&attempt, &limits, over, solution)
             }
         };
         if attempt.penalties == Penalties::Hard {
@@ -162,8 +165,10 @@ impl<T: Real> Iterate<'_, T> {
         &mut self,
         attempt: &Attempt,
         limits: &Limits<T>,
+        over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
     ) -> Result<Statistics, QpError> {
+        let mut out_of_time = false;
         let Attempt { mut statistics, iterations: most, .. } = *attempt;
         let known_refinements = statistics.refinements;
         let (mut short, mut refine, mut share) = (0, false, T::from_f64(0.01));
@@ -200,7 +205,8 @@ impl<T: Real> Iterate<'_, T> {
             // Products far below the tolerance gain nothing, and make weights that swallow the
             // digits of everything else.
             let floor = share * limits.of(self.terms).forces;
-            if statistics.iterations >= most {
+            out_of_time = over();
+            if out_of_time || statistics.iterations >= most {
                 break false;
             }
             // NaN makes no progress.
@@ -251,7 +257,9 @@ impl<T: Real> Iterate<'_, T> {
             (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals);
             return Ok(statistics);
         }
-        Err(if stalled {
+        Err(if out_of_time {
+            QpError::OutOfTime { iterations, residuals }
+        } else if stalled {
             QpError::Stalled { iterations, residuals }
         } else {
             QpError::MaxIterations { iterations, residuals }

@@ -40,6 +40,11 @@ impl<'a, T: Real> Symmetric<'a, T> {
         factors
     }
 
+    /// What [`Symmetric::factor`] has left in its memory, to solve again.
+    pub fn factored(a: &'a mut [T], n: usize, exchanged: &'a mut [T]) -> Self {
+        Self { a, n, exchanged, negative: 0, vanished: 0 }
+    }
+
     fn get(&self, row: usize, column: usize) -> T {
         let (row, column) = if row < column { (column, row) } else { (row, column) };
         self.a.get(column * self.n + row).copied().unwrap_or(T::ZERO)

@@ -23,7 +23,10 @@ impl<T: Real> Iterate<'_, T> {
         let _ = self.evaluate::<E>(multipliers);
         let count = self.sides.counts.sides();
         let (forces, distances) = (part(self.sides.multiplier, 0, count), part(self.sides.scratch, 0, count));
-        let lagrangian = dot::<T, E>(multipliers, self.dynamics) - dot::<T, E>(forces, distances);
+        let mut lagrangian = dot::<T, E>(multipliers, self.dynamics) - dot::<T, E>(forces, distances);
+        if let Some(coupling) = &self.coupling {
+            lagrangian = lagrangian + dot::<T, E>(coupling.theta, coupling.residual);
+        }
         let gradient = largest_size::<T, E>(self.stationarity);
         let rounding = T::from_f64(64.0 * T::EPSILON) * self.terms.forces;
         let gradient = larger(gradient * T::from_f64(if T::EPSILON < FINE { 1e5 } else { 1e2 }), rounding);

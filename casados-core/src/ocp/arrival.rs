@@ -1,0 +1,83 @@
+//! The arrival cost of moving-horizon estimation: what is known of the first state from before the
+//! horizon.
+//!
+//! ```text
+//! ½ (x₀ − x̄)ᵀ W (x₀ − x̄)
+//! ```
+
+use super::check::Labels;
+use super::data::split;
+use super::dynamics::Dynamics;
+use super::error::{OcpError, Part};
+use super::instance::Ocp;
+use super::problem::Formulation;
+use super::weights::{Fault, check_matrix};
+use crate::qp::{Qp, Solution, StageDims};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+use bytemuck::Zeroable;
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Adds `½ (x₀ − x̄)ᵀ W (x₀ − x̄)` to the objective, in place of what was given before: the
+    /// arrival cost of moving-horizon estimation, with `W` the inverse of the covariance of `x̄`.
+    /// `weight` has the columns of `W`, which is symmetric; all zero if there is no such cost.
+    ///
+    /// C. V. Rao, J. B. Rawlings, D. Q. Mayne, IEEE Trans. Autom. Control 48 (2003).
+    ///
+    /// # Errors
+    /// [`OcpError::Length`]; [`OcpError::InvalidValue`] of `x̄`;
+    /// [`OcpError::InvalidArrivalWeight`].
+    pub fn set_arrival_cost(&mut self, mean: &[T], weight: &[T]) -> Result<&mut Self, OcpError> {
+        let nx = P::Shape::NX;
+        Labels::states::<P, T>(Part::InitialState, 0).check_vector(mean, nx)?;
+        Labels::states::<P, T>(Part::Arrival, 0).check_length(weight, nx * nx)?;
+        let mut matrix = <P::Shape as Shape>::MatrixXX::<T>::zeroed();
+        crate::qp::assign(matrix.as_mut_slice(), weight);
+        check_matrix::<T, _>(&matrix, true).map_err(|Fault { place, value, allowed }| {
+            let x = <P::Dynamics as Dynamics<T>>::NAMES.x;
+            let states = place.map(|state| x.get(state).copied().unwrap_or_default());
+            OcpError::InvalidArrivalWeight { states, value, allowed }
+        })?;
+        let intervals = self.intervals();
+        let arrival = split::<P, T>(self.data.as_mut(), intervals).arrival;
+        crate::qp::assign(arrival, mean);
+        crate::qp::assign(arrival.get_mut(nx..).unwrap_or_default(), weight);
+        Ok(self)
+    }
+}
+
+/// The cost at a point.
+pub(super) fn cost<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    arrival: &[T],
+    at: &Solution<T, D, M>,
+) -> T {
+    let Some(first) = at.stages().next() else { return T::ZERO };
+    let (mean, weight) = arrival.split_at_checked(first.x.len()).unwrap_or_default();
+    let distance = || first.x.iter().zip(mean).map(|(&x, &mean)| x - mean);
+    let columns = weight.chunks_exact(mean.len().max(1)).zip(distance());
+    let twice = columns.fold(T::ZERO, |sum, (column, d)| {
+        column.iter().zip(distance()).fold(sum, |sum, (&w, other)| sum + d * w * other)
+    });
+    T::from_f64(0.5) * twice
+}
+
+/// Adds it to a QP, whose variables are not changes: `W` and `−W x̄`.
+pub(super) fn add<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+    arrival: &[T],
+    qp: &mut Qp<T, D, M>,
+) {
+    let nx = qp.dims().first().map_or(0, |first| first.nx);
+    let (mean, weight) = arrival.split_at_checked(nx).unwrap_or_default();
+    if weight.iter().all(|&w| w == T::ZERO) {
+        return;
+    }
+    let Some(mut stage) = qp.stage_mut(0) else { return };
+    let arrays = stage.arrays();
+    let columns = arrays.hessian.chunks_exact_mut(arrays.ld.max(1)).zip(arrays.gradient);
+    for ((j, weight), (column, gradient)) in weight.chunks_exact(nx.max(1)).enumerate().zip(columns) {
+        for (h, &w) in column.iter_mut().zip(weight).skip(j) {
+            *h = *h + w;
+        }
+        *gradient = weight.iter().zip(mean).fold(*gradient, |sum, (&w, &mean)| sum - w * mean);
+    }
+}

@@ -1,0 +1,252 @@
+//! Newton's equations with parameters `q = (θ, w)`: multipliers of periodic states, and shared
+//! controls.
+//!
+//! ```text
+//! cost to go of stage k   ½ xᵀPx + xᵀΓq + ½ qᵀSq + pᵀx + sᵀq        Γ_N = (−E, 0)
+//! at the first stage      [P₀  Γ₀ + E] [x₀]     [p₀   ]
+//!                         [ ·    S   ] [q ] = − [s + c]            c = (x₀ − x_N, 0)
+//! ```
+//!
+//! Each parameter is a further right-hand side on the way back, and the way forth is gone once. `E`
+//! has a column for each periodic state; a shared control has its columns of `M` at every stage.
+//! Inertia adds up (E. V. Haynsworth, Linear Algebra Appl. 1, 1968): the step is one of a minimum
+//! where pivots of controls and of the border together have as many negative signs as there are
+//! conditions.
+
+use super::cholesky::eliminate;
+use super::coupling::Coupling;
+use super::kernels::{Columns, subtract};
+use super::riccati::{Equations, Riccati};
+use super::set;
+use super::shared::Shared;
+use super::symmetric::Symmetric;
+use crate::qp::error::QpError;
+use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
+use crate::qp::{QpView, marked};
+use crate::scalar::{Packed, Piece, Real};
+use core::marker::PhantomData;
+
+/// See [`Coupling::solve`].
+pub fn solve<T: Real, E: Packed<T>>(
+    coupling: &mut Coupling<'_, T>,
+    riccati: &mut Riccati<'_, T>,
+    equations: Equations<'_, T>,
+    factor: bool,
+    step: &mut [T],
+) -> Result<(), QpError> {
+    let mut result = Ok(());
+    let register = PhantomData::<E>;
+    E::vectorize(Solve { coupling, riccati, equations, factor, step, result: &mut result, register });
+    result
+}
+
+/// The solve as a function of its own.
+struct Solve<'s, 'a, 'c, T, E> {
+    coupling: &'s mut Coupling<'c, T>,
+    riccati: &'s mut Riccati<'a, T>,
+    equations: Equations<'s, T>,
+    factor: bool,
+    step: &'s mut [T],
+    result: &'s mut Result<(), QpError>,
+    register: PhantomData<E>,
+}
+
+impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { coupling, riccati, equations, factor, step, result, .. } = self;
+        let (length, shared) = (riccati.end.v, coupling.shared);
+        let mut apart = Shared::new(shared, coupling.columns, length);
+        *result = riccati.backward::<E>(&equations, factor, step, &mut apart);
+        if result.is_err() {
+            return;
+        }
+        let Equations { qp, dynamics, .. } = equations;
+        assign(coupling.first, riccati.g);
+        if factor {
+            coupling.schur.fill(T::ZERO);
+            for parameter in 0..coupling.count {
+                coupling.eliminate::<E>(qp, riccati, dynamics, parameter);
+            }
+        }
+        coupling.gather(qp, riccati);
+        *result = coupling.solve_border(riccati, factor);
+        if result.is_ok() {
+            coupling.spread(qp, riccati);
+            riccati.forward::<E>(&equations, step);
+        }
+    }
+}
+
+/// `aᵀ S b` with the signs `S` of pivots.
+#[inline(always)]
+fn signed<T: Real>(a: &[T], b: &[T], inverse: &[T]) -> T {
+    let products = a.iter().zip(b).zip(inverse);
+    products.fold(
+        T::ZERO,
+        |sum, ((&a, &b), &inverse)| {
+            if inverse < T::ZERO { sum - a * b } else { sum + a * b }
+        },
+    )
+}
+
+/// Adds to an element.
+#[inline(always)]
+fn add<T: Real>(slice: &mut [T], index: usize, value: T) {
+    if let Some(element) = slice.get_mut(index) {
+        *element = *element + value;
+    }
+}
+
+impl<T: Real> Coupling<'_, T> {
+    /// The right-hand side of one parameter on its way back: its columns of `Γ` and `S`, and what
+    /// residuals of the dynamics add to `s`.
+    #[inline(always)]
+    fn eliminate<E: Packed<T>>(
+        &mut self,
+        qp: QpView<'_, T>,
+        riccati: &mut Riccati<'_, T>,
+        dynamics: &[T],
+        c: usize,
+    ) {
+        let (end, count, nx0) = (riccati.end, self.count, self.first.len());
+        let last = qp.dims.len().saturating_sub(1);
+        let state = marked(self.periodic).nth(c);
+        let columns = match c.checked_sub(self.conditions) {
+            Some(control) => part(self.columns, control * end.v, end.v),
+            None => &[],
+        };
+        let mut offset = T::ZERO;
+        riccati.minus.fill(T::ZERO);
+        for place in Places::<T>::ending(qp.dims, end).rev() {
+            let Place { nx, nu, n, ld, next, .. } = place;
+            let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
+            let g = part_mut(riccati.g, 0, ld);
+            g.fill(T::ZERO);
+            assign(g, part(columns, place.v, ld));
+            if let Some(state) = state.filter(|_| place.stage == last) {
+                set(g, state, -T::ONE);
+            }
+            subtract::<T, E>(g, matrix, riccati.minus, n, next);
+            // `γ₊ᵀ r`
+            let r = part(dynamics, place.dynamics, next);
+            offset = riccati.minus.iter().zip(r).fold(offset, |sum, (&minus, &r)| sum - minus * r);
+            let panel = part(riccati.panels, place.factor, ld * place.pivots);
+            let inverse = part(riccati.inverse, place.v + nx, nu);
+            let (before, here) = self.eliminated.split_at_mut_checked(c * end.v).unwrap_or_default();
+            let y = part_mut(here, place.v + nx, nu);
+            eliminate::<T, E>(g, panel, ld, inverse, y, nx);
+            // Rows of shared controls were passed by: they belong to `S`, whose other half comes
+            // with the other column. What `M` has of both counts once.
+            for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
+                let (other, value) = (self.conditions + w, y.get(j).copied().unwrap_or(T::ZERO));
+                let of_both = columns.get(place.v + nx + j).copied().unwrap_or(T::ZERO);
+                let value = if c < other { value - of_both } else { value };
+                let value = if c == other { value + value - of_both } else { value };
+                add(self.schur, c.min(other) * count + c.max(other), value);
+                set(y, j, T::ZERO);
+            }
+            for b in 0..c {
+                let other = part(before, b * end.v + place.v + nx, nu);
+                add(self.schur, b * count + c, -signed(y, other, inverse));
+            }
+            add(self.schur, c * count + c, -signed(y, y, inverse));
+            for (minus, &g) in riccati.minus.iter_mut().zip(&*g).take(nx) {
+                *minus = -g;
+            }
+        }
+        assign(part_mut(self.gamma, c * nx0, nx0), riccati.g);
+        set(self.offset, c, offset);
+    }
+
+    /// `s`, from what the way back has left.
+    fn gather(&mut self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
+        assign(self.linear, self.offset);
+        let length = riccati.end.v;
+        for place in Places::<T>::new(qp.dims) {
+            let (begin, nu) = (place.v + place.nx, place.nu);
+            let y = part_mut(riccati.y, begin, nu);
+            for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
+                add(self.linear, self.conditions + w, y.get(j).copied().unwrap_or(T::ZERO));
+                set(y, j, T::ZERO);
+            }
+            let inverse = part(riccati.inverse, begin, nu);
+            for (c, linear) in self.linear.iter_mut().enumerate() {
+                *linear = *linear - signed(part(self.eliminated, c * length + begin, nu), y, inverse);
+            }
+        }
+    }
+
+    /// The first state and the changes of the parameters.
+    fn solve_border(&mut self, riccati: &Riccati<'_, T>, factor: bool) -> Result<(), QpError> {
+        let (nx, n) = (self.free, self.free + self.count);
+        if factor {
+            self.write_border(riccati);
+        }
+        for (right, &p) in self.right.iter_mut().zip(&*self.first).take(nx) {
+            *right = -p;
+        }
+        for (c, &linear) in self.linear.iter().enumerate() {
+            let gap = self.residual.get(c).copied().unwrap_or(T::ZERO);
+            set(self.right, nx + c, -(linear + gap));
+        }
+        let noise = T::from_f64(T::EPSILON);
+        let factors = if factor {
+            Symmetric::factor(self.matrix, n, self.exchanged, noise)
+        } else {
+            Symmetric::factored(self.matrix, n, self.exchanged)
+        };
+        let negative = factors.negative + riccati.negative;
+        let enough = negative + factors.vanished >= self.conditions;
+        if factor && (negative > self.conditions || !enough) {
+            return Err(QpError::NotConvex { stage: 0, index: 0, pivot: -1.0 });
+        }
+        factors.solve(part_mut(self.right, 0, n));
+        assign(self.step, self.right.get(nx..).unwrap_or_default());
+        Ok(())
+    }
+
+    /// `[P₀  Γ₀ + E; · S]`, the lower triangle.
+    fn write_border(&mut self, riccati: &Riccati<'_, T>) {
+        let (nx, nx0, count) = (self.free, self.first.len(), self.count);
+        let (n, ld) = (nx + count, pad::<T>(nx0));
+        self.matrix.fill(T::ZERO);
+        for j in 0..nx {
+            let p = riccati.p.get(j * ld..).unwrap_or_default();
+            for (i, &p) in p.iter().enumerate().take(nx).skip(j) {
+                set(self.matrix, j * n + i, p);
+            }
+            for c in 0..count {
+                let gamma = self.gamma.get(c * nx0 + j).copied().unwrap_or(T::ZERO);
+                set(self.matrix, j * n + nx + c, gamma);
+            }
+        }
+        for (c, i) in marked(self.periodic).enumerate().filter(|_| nx > 0) {
+            add(self.matrix, i * n + nx + c, T::ONE);
+        }
+        for b in 0..count {
+            for c in b..count {
+                let s = self.schur.get(b * count + c).copied().unwrap_or(T::ZERO);
+                set(self.matrix, (nx + b) * n + nx + c, s);
+            }
+        }
+    }
+
+    /// What the way forth needs of the first state and the parameters.
+    fn spread(&self, qp: QpView<'_, T>, riccati: &mut Riccati<'_, T>) {
+        let length = riccati.end.v;
+        for (c, &step) in self.step.iter().enumerate() {
+            for (y, &own) in riccati.y.iter_mut().zip(part(self.eliminated, c * length, length)) {
+                *y = *y + step * own;
+            }
+        }
+        let controls = self.step.get(self.conditions..).unwrap_or_default();
+        for place in Places::<T>::new(qp.dims) {
+            let y = part_mut(riccati.y, place.v + place.nx, place.nu);
+            for (j, &step) in marked(self.shared).zip(controls) {
+                set(y, j, -step);
+            }
+        }
+        assign(part_mut(riccati.y, 0, self.free), self.right);
+    }
+}
