@@ -104,7 +104,10 @@ fn as_casadi_calls_them() {
     assert_eq!(jacobian[1], expected.dx_du.as_slice());
     let inputs: [&[f64]; 8] = [&X0, &[1.5], &[], &[], &LAMBDA, &[], &[], &[]];
     let entries = count(jac_adj1_pendulum_sparsity_out(0));
-    let second = call(jac_adj1_pendulum, &inputs, &[entries], memory).unwrap();
+    // Three gradients by five inputs of the adjoint.
+    let mut lengths = [0; 15];
+    lengths[0] = entries;
+    let second = call(jac_adj1_pendulum, &inputs, &lengths, memory).unwrap();
     assert_eq!(pendulum_integrations(), begin + 1);
     for (place, value) in entries_of(jac_adj1_pendulum_sparsity_out(0)).into_iter().zip(&second[0]) {
         assert_eq!(expected.h_xx[place], *value);

@@ -55,7 +55,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         mut multipliers: Option<&mut [[ArrayK<M, T>; S]]>,
         along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
-        let columns = way.columns;
+        let columns = way.columns.min(R::LEN);
         M::jacobian_constants::<T>(&mut self.forward.jacobian);
         for lambda in &mut self.lambda.as_mut()[M::Shape::NX..] {
             lambda.as_mut()[..columns].fill(T::ZERO);
@@ -75,6 +75,7 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Sweep<M, T, R, S> {
         mut multipliers: Option<&mut [ArrayK<M, T>; S]>,
         along: &mut Along<'_, '_, M, T>,
     ) -> Result<(), Error> {
+        let columns = columns.min(R::LEN);
         for stage in (0..S).rev() {
             let at = Place { step, stage, iteration: 0 };
             self.stage_seed(scheme, grid.h, stage, columns);

@@ -51,7 +51,8 @@ impl<M: Dae, E: Lanes, const S: usize, const C: usize> Backward<M, E, S, C> {
     pub(crate) fn start(&mut self, seeds: &[E], nu: &[E]) {
         let nx = M::Shape::NX;
         for (state, row) in self.lambda.as_mut().iter_mut().enumerate() {
-            *row = core::array::from_fn(|column| seeds[column * nx + state]);
+            let seed = |column| seeds.get(column * nx + state).copied();
+            *row = core::array::from_fn(|column| seed(column).unwrap_or(E::from_f64(0.0)));
         }
         self.gradient.as_mut().fill([E::from_f64(0.0); C]);
         self.sourced = false;

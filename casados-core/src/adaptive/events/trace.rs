@@ -190,7 +190,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             for (g, v) in gradient.as_ref().iter().zip(self.v.as_ref().as_ref()) {
                 size += (*g * *v).to_f64().abs();
             }
-            if value.abs() > ROUNDING * T::EPSILON.to_f64() * size {
+            let is_apart = |size: f64| value.abs() > ROUNDING * T::EPSILON.to_f64() * size;
+            // A segment after an event begins where a function is zero but for the rounding of the
+            // time, which counts by the slope.
+            if k == 0 && is_apart(size) {
                 self.signs.push(value);
                 continue;
             }
@@ -200,6 +203,10 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             };
             let products = gradient.as_ref()[nx..2 * nx].iter().zip(y.as_ref());
             let total = products.fold(rate, |sum, (g, f)| sum + *g * *f);
+            if is_apart(size + (total * start).to_f64().abs()) {
+                self.signs.push(value);
+                continue;
+            }
             self.signs.push(forward * total.to_f64());
         }
         Ok(())

@@ -118,7 +118,7 @@ impl<M: Dae, T: Real, const S: usize> HessianPass<M, T, S> {
             if let Some((entry, value)) = not_finite(self.entries.as_ref().as_flattened()) {
                 return Err(Error::NonFiniteModel {
                     quantity: Quantity::Hessian,
-                    equation: M::STRUCTURE.hessian.at(entry / S).0,
+                    equation: M::STRUCTURE.hessian.get(entry / S).map_or(0, |(row, _)| row),
                     value,
                     at: Place { step: n, stage: entry % S, iteration: 0 },
                 });

@@ -83,7 +83,7 @@ impl<T: Real> Iterate<'_, T> {
             self.sides.settle();
             let objective = self.evaluate::<E>(solution.dynamics);
             let residuals = self.judged::<E>();
-            if limits.hold(residuals, self.terms) {
+            if objective.is_finite() && limits.hold(residuals, self.terms) {
                 (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                 return Ok(statistics);
             }

@@ -184,7 +184,7 @@ impl<T: Real> Iterate<'_, T> {
                 // are computed.
                 let objective = self.evaluate::<E>(solution.dynamics);
                 (residuals, known) = (self.judged::<E>(), self.mu);
-                if limits.hold(residuals, self.terms) {
+                if objective.is_finite() && limits.hold(residuals, self.terms) {
                     (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals.into());
                     return Ok(statistics);
                 }
@@ -253,7 +253,7 @@ impl<T: Real> Iterate<'_, T> {
         let objective = self.evaluate::<E>(solution.dynamics);
         let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
         let residuals = judged.into();
-        if limits.hold(judged, self.terms) {
+        if objective.is_finite() && limits.hold(judged, self.terms) {
             (statistics.objective, statistics.residuals) = (objective.to_f64(), residuals);
             return Ok(statistics);
         }
