@@ -8,6 +8,8 @@ mod chain_model;
 mod chain_problem;
 #[path = "../data/mod.rs"]
 mod data;
+#[path = "../runs/mod.rs"]
+mod runs;
 
 mod algebraic;
 mod bounds;
@@ -19,6 +21,7 @@ mod guesses;
 mod infeasible;
 mod ipm;
 mod lifted;
+mod random;
 mod real_time;
 mod sensitivities;
 
