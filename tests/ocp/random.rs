@@ -6,7 +6,7 @@
 use crate::Test;
 use crate::runs::{Counts, kind, seeds, shows};
 use casados::ocp::{
-    Constraint, Exact, GaussNewton, Globalisation, HeapIpm, HeapOcp, HeapRealTime, HeapSqp, Horizon,
+    Constraint, GaussNewton, Globalisation, HeapIpm, HeapOcp, HeapRealTime, HeapSqp, Horizon,
     LeastSquaresCost, Map, OcpError, Outcome, Problem, Status,
 };
 use casados::prelude::*;
@@ -298,12 +298,12 @@ fn nonconvex_problems() -> Test {
         let draw = Draw::new(random, pendulum_step);
         let globalisation = globalisation(random);
         let _ = runs!(sqp, seed, spoil(nonlinear(&draw), random), nonlinear(&draw), |ocp| {
-            let mut solver = HeapSqp::new(ocp)?;
+            let mut solver = HeapSqp::new(ocp)?.gauss_newton();
             solver.options.globalisation = globalisation;
             solver
         });
         let _ = runs!(exact, seed, spoil(nonlinear(&draw), random), nonlinear(&draw), |ocp| {
-            let mut solver = HeapSqp::new(ocp)?.exact(Exact::default());
+            let mut solver = HeapSqp::new(ocp)?;
             solver.options.globalisation = globalisation;
             solver
         });
