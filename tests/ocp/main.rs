@@ -8,6 +8,8 @@ mod chain_model;
 mod chain_problem;
 #[path = "../data/mod.rs"]
 mod data;
+#[path = "../runs/mod.rs"]
+mod runs;
 
 mod algebraic;
 mod arrival;
@@ -23,6 +25,7 @@ mod infeasible;
 mod ipm;
 mod lifted;
 mod options;
+mod random;
 mod real_time;
 mod sensitivities;
 mod weights;

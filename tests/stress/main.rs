@@ -22,7 +22,7 @@
 //! | 39 | rounding of the data | `stiffness` |
 //!
 //! Besides: random equations with known solutions (`properties`), anything into every entry
-//! (`tests/fuzz.rs`, which is compiled beside; into the macro in `casados-macros/src/fuzz.rs`),
+//! (`tests/fuzz/`, which is compiled beside; into the macro in `casados-macros/src/fuzz.rs`),
 //! single precision (`precision`).
 
 #[path = "../data/mod.rs"]
