@@ -348,10 +348,6 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             if !on_stage {
                 self.settle(t)?;
             }
-            if accepted_h.is_none() {
-                // The first step may be short: how fast it converged says nothing of the next one.
-                convergence.factor = 1.0;
-            }
             accepted_h = Some(h);
             current = false;
             if last {
