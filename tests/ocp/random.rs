@@ -6,8 +6,8 @@
 use crate::Test;
 use crate::runs::{Counts, kind, seeds, shows};
 use casados::ocp::{
-    Constraint, GaussNewton, Globalisation, HeapIpm, HeapOcp, HeapRealTime, HeapSqp, Horizon,
-    LeastSquaresCost, Map, OcpError, Outcome, Problem, Status,
+    Constraint, GaussNewton, Globalisation, HeapIpm, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map,
+    OcpError, Outcome, Problem, Status,
 };
 use casados::prelude::*;
 use casados::qp::residuals;
@@ -313,32 +313,5 @@ fn nonconvex_problems() -> Test {
     for counts in [sqp, exact, ipm] {
         assert!(2 * counts.of("Ok") >= counts.all(), "{counts}");
     }
-    Ok(())
-}
-
-/// One step of real-time iteration after another, with states that are anything now and then: a
-/// control is finite and within its bounds, or there is an error.
-#[test]
-fn real_time() -> Test {
-    let mut counts = Counts::new("real-time iteration, feedback");
-    for seed in seeds(50) {
-        let random = &mut Numbers(seed ^ (1 << 40));
-        let draw = Draw::new(random, pendulum_step);
-        let mut controller = HeapRealTime::new(nonlinear(&draw)?)?;
-        for _ in 0..6 {
-            let special = [f64::NAN, f64::INFINITY, 1e300, -1e30, 5e-324];
-            let mut x: [f64; 2] = core::array::from_fn(|i| draw.x[0][i] + 0.1 * random.next());
-            if random.below(4) == 0 {
-                x[random.below(2)] = special[random.below(special.len())];
-            }
-            let found = controller.prepare().and_then(|prepared| Ok(prepared.feedback(&x)?.u[0]));
-            if let Ok(u) = found {
-                assert!((u - draw.u[0]).abs() <= draw.distance[2] + 1e-6, "{seed}: {u}");
-            }
-            counts.result(&found);
-        }
-    }
-    println!("{counts}");
-    assert!(2 * counts.of("Ok") >= counts.all(), "{counts}");
     Ok(())
 }

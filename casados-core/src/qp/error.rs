@@ -131,7 +131,7 @@ pub enum QpError {
         pivot: f64,
     },
     /// States are periodic or controls shared, and this solver has no such conditions:
-    /// [`InteriorPoint`](super::InteriorPoint) has.
+    /// [`InteriorPoint`](super::InteriorPoint) has, with the feature `alloc`.
     Coupled,
     /// The iterations were used up.
     MaxIterations {
@@ -229,7 +229,8 @@ impl fmt::Display for QpError {
                 "the Hessian is not positive semidefinite: at stage {stage} the pivot of variable {index} is {pivot:e}"
             ),
             Self::Coupled => f.write_str(
-                "states are periodic or controls shared: `InteriorPoint` solves such QPs, this solver does not",
+                "states are periodic or controls shared: `InteriorPoint` with the feature `alloc` solves such QPs, this \
+                 solver does not",
             ),
             Self::MaxIterations { iterations, residuals } => {
                 write!(f, "not solved after {iterations} iterations: {residuals}")

@@ -10,6 +10,20 @@ use crate::qp::layout::{Place, Places, end, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::{Packed, Real};
 
+/// That there are couplings. Without the feature `alloc` there are none: no value of this type, so
+/// that programs that cannot ask for couplings do not contain them.
+#[cfg(feature = "alloc")]
+#[derive(Clone, Copy)]
+pub struct Exists;
+#[cfg(not(feature = "alloc"))]
+#[derive(Clone, Copy)]
+pub enum Exists {}
+
+#[cfg(feature = "alloc")]
+const EXISTS: Option<Exists> = Some(Exists);
+#[cfg(not(feature = "alloc"))]
+const EXISTS: Option<Exists> = None;
+
 /// What couples stages, in memory of its owner.
 pub struct Coupling<'a, T> {
     /// For every state of the first stage whether it is periodic.
@@ -46,6 +60,7 @@ pub struct Coupling<'a, T> {
     pub matrix: &'a mut [T],
     pub right: &'a mut [T],
     pub exchanged: &'a mut [T],
+    _exists: Exists,
 }
 
 impl<'a, T: Real> Coupling<'a, T> {
@@ -59,6 +74,9 @@ impl<'a, T: Real> Coupling<'a, T> {
 
     /// That of a QP.
     pub fn memory_of(qp: QpView<'_, T>) -> usize {
+        if EXISTS.is_none() {
+            return 0;
+        }
         let (conditions, shared) = (marked(qp.periodic()).count(), marked(qp.shared()).count());
         if conditions + shared == 0 { 0 } else { Self::memory(qp.dims, conditions, shared) }
     }
@@ -71,9 +89,11 @@ impl<'a, T: Real> Coupling<'a, T> {
         if count == 0 {
             return None;
         }
+        let _exists = EXISTS?;
         let (v, nx) = (end::<T>(qp.dims).v, first_nx(qp.dims));
         let n = nx + count;
         Some(Self {
+            _exists,
             periodic,
             shared,
             conditions,

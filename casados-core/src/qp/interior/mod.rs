@@ -97,7 +97,8 @@ impl<T: Real, N, I> InteriorPoint<T, N, I> {
     /// the state at the start.
     ///
     /// To locate what makes a problem infeasible it takes as much as if all were soft. Periodic
-    /// states and shared controls take [`InteriorPoint::memory_of_coupling`] more.
+    /// states and shared controls, for which the feature `alloc` is needed, take
+    /// [`InteriorPoint::memory_of_coupling`] more.
     #[must_use]
     pub const fn memory(dims: &[StageDims], bounds: usize, soft: usize, equations: usize) -> (usize, usize) {
         if is_absurd(dims) {
@@ -259,6 +260,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         over: &mut dyn FnMut() -> bool,
     ) -> Result<Statistics, QpError> {
         self.options.check::<T>()?;
+        if cfg!(not(feature = "alloc")) && qp.is_coupled() {
+            return Err(QpError::Coupled);
+        }
         check_all_bounds(qp)?;
         solution.fits(qp)?;
         let attempt = Attempt {
