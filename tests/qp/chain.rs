@@ -84,13 +84,6 @@ impl Chain {
         let found_x = solution.stages().flat_map(|stage| stage.x);
         let found_u = solution.stages().flat_map(|stage| stage.u);
         let pairs = found_x.zip(&x).chain(found_u.zip(&u));
-        if std::env::var("DBG").is_ok() {
-            for (i, (a, b)) in solution.stages().flat_map(|stage| stage.u).zip(&u).enumerate() {
-                if (a.to_f64() - b).abs() > 1e-8 {
-                    println!("{} {} : {a:?} {b}", i / 3, i % 3);
-                }
-            }
-        }
         Ok(pairs.map(|(found, expected)| (found.to_f64() - expected).abs()).fold(0.0, f64::max))
     }
 }
