@@ -1,9 +1,8 @@
 //! Elementary functions of `f64` for firmware: those of registers, with one number in each.
 //!
 //! No branch depends on the number, as long as an angle is below 1.6 · 10⁶; beyond that there is
-//! `libm`. With `libm` alone, whose reductions differ in length, a controller of a pendulum took
-//! 2.1 % more instructions where it hangs than where it stands (QEMU, Cortex-M7); now it takes the
-//! same number, 1.5 % more than those. Bounds of errors are those of `lanes/functions/mod.rs`.
+//! `libm`, whose reductions differ in length. So a controller takes the same number of instructions
+//! at every angle. Bounds of errors are those of `lanes/functions/mod.rs`.
 
 use super::lanes::functions::{self, Call};
 
