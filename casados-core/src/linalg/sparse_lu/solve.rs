@@ -23,21 +23,23 @@ macro_rules! packets {
     ($first:ty, $second:ty: $solve:expr) => {{
         let Solve { factors, rows } = $solve;
         let mut column = 0;
-        if const { size_of::<E>() <= 8 } {
+        if const { size_of::<E>() <= 8 && R::LEN >= 8 } {
             while column + 8 <= R::LEN {
                 sweeps::<A, M, E, R, S, 8, $first, $second>(factors, rows, column, &mut ());
                 column += 8;
             }
-            if column + 4 <= R::LEN {
-                sweeps::<A, M, E, R, S, 4, $first, $second>(factors, rows, column, &mut ());
-                column += 4;
+        }
+        if const { size_of::<E>() <= 8 && R::LEN % 8 >= 4 } {
+            sweeps::<A, M, E, R, S, 4, $first, $second>(factors, rows, column, &mut ());
+            column += 4;
+        }
+        if const { size_of::<E>() > 8 && R::LEN >= 2 || R::LEN % 4 >= 2 } {
+            while column + 2 <= R::LEN {
+                sweeps::<A, M, E, R, S, 2, $first, $second>(factors, rows, column, &mut ());
+                column += 2;
             }
         }
-        while column + 2 <= R::LEN {
-            sweeps::<A, M, E, R, S, 2, $first, $second>(factors, rows, column, &mut ());
-            column += 2;
-        }
-        if column < R::LEN {
+        if const { R::LEN % 2 == 1 } {
             sweeps::<A, M, E, R, S, 1, $first, $second>(factors, rows, column, &mut ());
         }
     }};
