@@ -5,7 +5,7 @@ use crate::qp::{
     Columns, QpView, Residuals, Solution, StageDims, add_transposed, assign, bound_residuals, dot, is_marked,
     larger, marked, pad, part, part_mut, scale, subtract, subtract_column, symmetric,
 };
-use crate::scalar::{Packed, Real, Registers};
+use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// The residuals, and penalties of soft bounds. Residuals as in
 /// [`qp::residuals`](crate::qp::residuals), which goes element by element and needs no scratch,
@@ -16,29 +16,37 @@ pub(super) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     scratch: &mut [T],
 ) -> (Residuals, f64) {
     let mut result = Default::default();
-    T::registers(Kkt { qp, at, scratch, result: &mut result });
+    T::compiled::<Conditions>(Kkt { qp, at: at.borrowed(), scratch, result: &mut result });
     result
 }
 
+/// A point that others own.
+type Point<'a, T> = Solution<T, &'a [StageDims], &'a [T]>;
+
 /// See [`residuals`].
-struct Kkt<'a, T, D, M> {
+struct Kkt<'a, T: Real> {
     qp: QpView<'a, T>,
-    at: &'a Solution<T, D, M>,
+    at: Point<'a, T>,
     scratch: &'a mut [T],
     result: &'a mut (Residuals, f64),
 }
 
-impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Registers<T> for Kkt<'_, T, D, M> {
+compiled! {
+    /// See [`residuals`].
+    Conditions: Kkt<'r, T>
+}
+
+impl<T: Real> Registers<T> for Kkt<'_, T> {
     #[inline(always)]
     fn run<E: Packed<T>>(self) {
-        *self.result = conditions::<T, E, D, M>(self.qp, self.at, self.scratch);
+        *self.result = conditions::<T, E>(self.qp, &self.at, self.scratch);
     }
 }
 
 #[inline(always)]
-fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+fn conditions<T: Real, E: Packed<T>>(
     qp: QpView<'_, T>,
-    at: &Solution<T, D, M>,
+    at: &Point<'_, T>,
     scratch: &mut [T],
 ) -> (Residuals, f64) {
     let mut residuals = Residuals::default();
@@ -113,12 +121,7 @@ fn conditions<T: Real, E: Packed<T>, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMu
 }
 
 /// Residuals of variables that are one, from the sums of their gradients.
-fn joint_residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-    qp: QpView<'_, T>,
-    at: &Solution<T, D, M>,
-    joint: &[T],
-    residuals: &mut Residuals,
-) {
+fn joint_residuals<T: Real>(qp: QpView<'_, T>, at: &Point<'_, T>, joint: &[T], residuals: &mut Residuals) {
     let mut stages = at.stages();
     let (Some(first), last) = (stages.next(), stages.next_back()) else { return };
     joint.iter().for_each(|&sum| grow(&mut residuals.stationarity, sum));

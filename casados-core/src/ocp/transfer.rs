@@ -1,7 +1,7 @@
 //! The linearised dynamics of an interval, in the layout of the QP.
 
 use crate::qp::{part, part_mut, splat};
-use crate::scalar::{Packed, Real, Registers};
+use crate::scalar::{Packed, Real, Registers, compiled};
 use bytemuck::Zeroable;
 
 /// More lanes than any register has.
@@ -24,9 +24,14 @@ pub(super) struct Transfer<'a, T> {
     pub offset: &'a mut [T],
 }
 
+compiled! {
+    /// See [`Transfer`].
+    Transfers: Transfer<'r, T>
+}
+
 impl<T: Real> Transfer<'_, T> {
     pub fn run(self) {
-        T::registers(self);
+        T::compiled::<Transfers>(self);
     }
 }
 

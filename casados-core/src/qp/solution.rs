@@ -110,6 +110,41 @@ impl<T: Real, D, M> Solution<T, D, M> {
     }
 }
 
+impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]>> Solution<T, D, M> {
+    /// All `v`, and all `π`.
+    pub(crate) fn vectors(&self) -> (&[T], &[T]) {
+        let ([v, dynamics, _], memory) = (self.lengths, self.memory.as_ref());
+        (part(memory, 0, v), part(memory, v, dynamics))
+    }
+    /// All stages, in order.
+    pub fn stages(&self) -> impl DoubleEndedIterator<Item = SolutionStage<'_, T>> + ExactSizeIterator {
+        let ([_, _, row], memory) = (self.lengths, self.memory.as_ref());
+        let (v, dynamics) = self.vectors();
+        let begin = v.len() + dynamics.len();
+        let (lower, upper) = (part(memory, begin, row), part(memory, begin + row, row));
+        Places::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
+            x: part(v, p.v, p.nx),
+            u: part(v, p.v + p.nx, p.nu),
+            dynamics: part(dynamics, p.dynamics, p.next),
+            x_lower: part(lower, p.row, p.nx),
+            x_upper: part(upper, p.row, p.nx),
+            u_lower: part(lower, p.row + p.nx, p.nu),
+            u_upper: part(upper, p.row + p.nx, p.nu),
+            g_lower: part(lower, p.row + p.ld, p.ng),
+            g_upper: part(upper, p.row + p.ld, p.ng),
+        })
+    }
+    /// The same, without owning it.
+    pub(crate) fn borrowed(&self) -> Solution<T, &[StageDims], &[T]> {
+        Solution {
+            dims: self.dims.as_ref(),
+            memory: self.memory.as_ref(),
+            lengths: self.lengths,
+            number: PhantomData,
+        }
+    }
+}
+
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, M> {
     /// A solution in given memory, of at least [`Solution::memory`] numbers.
     ///
@@ -139,11 +174,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
             lower: take_mut(&mut rest, row),
             upper: take_mut(&mut rest, row),
         }
-    }
-    /// All `v`, and all `π`.
-    pub(crate) fn vectors(&self) -> (&[T], &[T]) {
-        let ([v, dynamics, _], memory) = (self.lengths, self.memory.as_ref());
-        (part(memory, 0, v), part(memory, v, dynamics))
     }
     /// Everything, and what is padding.
     pub(crate) fn numbers(&self) -> &[T] {
@@ -175,24 +205,6 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     #[must_use]
     pub fn stage(&self, stage: usize) -> Option<SolutionStage<'_, T>> {
         self.stages().nth(stage)
-    }
-    /// All stages, in order.
-    pub fn stages(&self) -> impl DoubleEndedIterator<Item = SolutionStage<'_, T>> + ExactSizeIterator {
-        let ([_, _, row], memory) = (self.lengths, self.memory.as_ref());
-        let (v, dynamics) = self.vectors();
-        let begin = v.len() + dynamics.len();
-        let (lower, upper) = (part(memory, begin, row), part(memory, begin + row, row));
-        Places::<T>::new(self.dims.as_ref()).map(move |p| SolutionStage {
-            x: part(v, p.v, p.nx),
-            u: part(v, p.v + p.nx, p.nu),
-            dynamics: part(dynamics, p.dynamics, p.next),
-            x_lower: part(lower, p.row, p.nx),
-            x_upper: part(upper, p.row, p.nx),
-            u_lower: part(lower, p.row + p.nx, p.nu),
-            u_upper: part(upper, p.row + p.nx, p.nu),
-            g_lower: part(lower, p.row + p.ld, p.ng),
-            g_upper: part(upper, p.row + p.ld, p.ng),
-        })
     }
     /// A stage, to be written.
     pub fn stage_mut(&mut self, stage: usize) -> Option<SolutionStageMut<'_, T>> {

@@ -305,6 +305,41 @@ pub trait Widest<T> {
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
 }
 
+/// A computation on slices that is compiled with this crate, once for each number type and not again
+/// in each program: [`Real::compiled`] runs it. [`compiled`] makes one.
+#[doc(hidden)]
+pub trait Compiled {
+    /// The computation.
+    type Of<'r, 'a: 'r, 's: 'r, T: Real>: Registers<T>;
+    /// In double precision.
+    fn double<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f64>);
+    /// In single precision.
+    fn single<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f32>);
+}
+
+/// Makes a computation with the lifetimes `'r`, `'a` and `'s` and numbers `T` one that is
+/// [`Compiled`] here. Programs without `std` have it inside, where the optimiser sees all of it.
+macro_rules! compiled {
+    ($(#[$text:meta])* $visibility:vis $name:ident: $computation:ty) => {
+        $(#[$text])*
+        $visibility struct $name;
+        impl $crate::scalar::Compiled for $name {
+            type Of<'r, 'a: 'r, 's: 'r, T: $crate::scalar::Real> = $computation;
+            #[cfg_attr(feature = "std", inline(never))]
+            #[cfg_attr(not(feature = "std"), inline(always))]
+            fn double<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f64>) {
+                <f64 as $crate::scalar::Real>::registers(computation);
+            }
+            #[cfg_attr(feature = "std", inline(never))]
+            #[cfg_attr(not(feature = "std"), inline(always))]
+            fn single<'r, 'a: 'r, 's: 'r>(computation: Self::Of<'r, 'a, 's, f32>) {
+                <f32 as $crate::scalar::Real>::registers(computation);
+            }
+        }
+    };
+}
+pub(crate) use compiled;
+
 /// One real number: `f32` or `f64`. No other type can be one, as no other can have [`Lanes`].
 pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default {
     /// Zero.
@@ -320,6 +355,10 @@ pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + De
     fn min(self, other: Self) -> Self {
         if other < self { other } else { self }
     }
+
+    /// Runs a computation of this crate that is compiled for this number type.
+    #[doc(hidden)]
+    fn compiled<'r, 'a: 'r, 's: 'r, C: Compiled>(computation: C::Of<'r, 'a, 's, Self>);
 
     /// Runs a computation on slices, compiled for the widest registers that this machine has.
     #[doc(hidden)]

@@ -1,14 +1,14 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
-use super::{Field, Lanes, Packed, Real, Scalar, Sealed, own_cell};
+use super::{Compiled, Field, Lanes, Packed, Real, Scalar, Sealed, own_cell};
 #[cfg(not(feature = "std"))]
 use super::{double, single};
 
 /// The methods of one real type, from `std` where it is there, else from `libm`, `single` and
 /// `double`.
 macro_rules! real {
-    ($t:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
+    ($t:ident, $compiled:ident, $stagnation:literal, [$($registers:tt)*], $($name:ident = $from:ident::$function:ident),*; $powf:path, $atan2:path, $hypot:path, $sincos:path) => {
         impl Field for $t {
             type Mask = bool;
 
@@ -189,6 +189,10 @@ macro_rules! real {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            #[inline(always)]
+            fn compiled<'r, 'a: 'r, 's: 'r, C: Compiled>(computation: C::Of<'r, 'a, 's, Self>) {
+                C::$compiled(computation);
+            }
             widest_register!($($registers)*);
             packed_registers!($($registers)*);
             #[inline(always)]
@@ -199,12 +203,12 @@ macro_rules! real {
     };
 }
 
-real!(f64, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = libm::sqrt, cbrt = libm::cbrt, exp = double::exp,
+real!(f64, double, 3.666e-11, [F64x2 of 2, F64x4 of 4, F64x8 of 8], sqrt = libm::sqrt, cbrt = libm::cbrt, exp = double::exp,
     exp2 = libm::exp2, exp_m1 = libm::expm1, ln = libm::log, ln_1p = libm::log1p, log2 = libm::log2, log10 = libm::log10,
     sin = double::sin, cos = double::cos, tan = double::tan, asin = libm::asin, acos = libm::acos, atan = libm::atan,
     sinh = libm::sinh, cosh = libm::cosh, tanh = libm::tanh, asinh = libm::asinh, acosh = libm::acosh,
     atanh = libm::atanh; libm::pow, libm::atan2, libm::hypot, double::sin_cos);
-real!(f32, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = single::sqrt, cbrt = single::cbrt, exp = single::exp,
+real!(f32, single, 2.422e-5, [F32x4 of 4, F32x8 of 8, F32x16 of 16], sqrt = single::sqrt, cbrt = single::cbrt, exp = single::exp,
     exp2 = single::exp2, exp_m1 = libm::expm1f, ln = libm::logf, ln_1p = libm::log1pf, log2 = libm::log2f,
     log10 = libm::log10f, sin = single::sin, cos = single::cos, tan = single::tan, asin = single::asin,
     acos = libm::acosf, atan = libm::atanf, sinh = libm::sinhf, cosh = libm::coshf, tanh = libm::tanhf,

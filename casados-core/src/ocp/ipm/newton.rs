@@ -6,7 +6,7 @@
 use super::work::Work;
 use crate::qp::interior::{Counts, First, Iterate, Penalties, Reading, Sides, count, is_first_fixed};
 use crate::qp::{Field, InteriorPointOptions, Places, QpError, QpView, SolutionView, Store, assign};
-use crate::scalar::{Packed, Real, Registers};
+use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// What is known about the sides of a problem before any memory is touched.
 #[derive(Clone, Copy, Debug)]
@@ -62,13 +62,16 @@ pub(super) fn attach<'a, T: Real>(
 pub(super) fn evaluate<T: Real>(iterate: &mut Iterate<'_, T>, at: &mut SolutionView<'_, T>) {
     iterate.take_point(at);
     iterate.give_initial_state();
-    T::registers(Evaluate { iterate, pi: at.dynamics });
+    T::compiled::<EvaluateCompiled>(Evaluate { iterate, pi: at.dynamics });
 }
 
 struct Evaluate<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
 }
+
+compiled!(/// See [`Evaluate`].
+EvaluateCompiled: Evaluate<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
     #[inline(always)]
@@ -79,12 +82,15 @@ impl<T: Real> Registers<T> for Evaluate<'_, '_, '_, T> {
 
 /// Residuals of what is linear in the QP at the iterate, after its constants have changed.
 pub(super) fn evaluate_values<T: Real>(iterate: &mut Iterate<'_, T>) {
-    T::registers(EvaluateValues { iterate });
+    T::compiled::<EvaluateValuesCompiled>(EvaluateValues { iterate });
 }
 
 struct EvaluateValues<'r, 'a, T> {
     iterate: &'r mut Iterate<'a, T>,
 }
+
+compiled!(/// See [`EvaluateValues`].
+EvaluateValuesCompiled: EvaluateValues<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
     #[inline(always)]
@@ -101,7 +107,7 @@ impl<T: Real> Registers<T> for EvaluateValues<'_, '_, T> {
 pub(super) fn step<T: Real>(iterate: &mut Iterate<'_, T>, mu: T, delta: T) -> Result<(), QpError> {
     let mut result = Ok(());
     iterate.proximal = delta;
-    T::registers(Step { iterate, mu, result: &mut result });
+    T::compiled::<StepCompiled>(Step { iterate, mu, result: &mut result });
     result
 }
 
@@ -110,6 +116,9 @@ struct Step<'r, 'a, T> {
     mu: T,
     result: &'r mut Result<(), QpError>,
 }
+
+compiled!(/// See [`Step`].
+StepCompiled: Step<'r, 'a, T>);
 
 impl<T: Real> Registers<T> for Step<'_, '_, T> {
     #[inline(always)]
@@ -126,7 +135,7 @@ pub(super) fn dynamics_after<T: Real>(iterate: &mut Iterate<'_, T>, work: &mut W
     assign(work.slacks, iterate.sides.multiplier);
     assign(work.ends, iterate.sides.free);
     iterate.proximal = delta;
-    T::registers(After { iterate, pi: work.pi });
+    T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
     assign(iterate.sides.free, work.ends);
@@ -136,6 +145,9 @@ struct After<'r, 'a, 's, T> {
     iterate: &'r mut Iterate<'a, T>,
     pi: &'s mut [T],
 }
+
+compiled!(/// See [`After`].
+AfterCompiled: After<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for After<'_, '_, '_, T> {
     #[inline(always)]
@@ -163,7 +175,7 @@ pub(super) fn least_squares<T: Real>(
     assign(work.slacks, iterate.sides.multiplier);
     general_multipliers(iterate, |_| T::ZERO);
     let mut result = Ok(());
-    T::registers(LeastSquares { iterate, pi: work.pi, result: &mut result });
+    T::compiled::<LeastSquaresCompiled>(LeastSquares { iterate, pi: work.pi, result: &mut result });
     result?;
     let sides = &mut iterate.sides;
     assign(work.hessian_multipliers, sides.multiplier_step);
@@ -171,7 +183,7 @@ pub(super) fn least_squares<T: Real>(
     general_multipliers(iterate, |i| work.hessian_multipliers.get(i).copied().unwrap_or(T::ZERO));
     assign(work.rows, iterate.v);
     iterate.proximal = identity;
-    T::registers(After { iterate, pi: work.pi });
+    T::compiled::<AfterCompiled>(After { iterate, pi: work.pi });
     assign(iterate.v, work.rows);
     assign(iterate.sides.multiplier, work.slacks);
     Ok(())
@@ -209,6 +221,9 @@ struct LeastSquares<'r, 'a, 's, T> {
     pi: &'s mut [T],
     result: &'r mut Result<(), QpError>,
 }
+
+compiled!(/// See [`LeastSquares`].
+LeastSquaresCompiled: LeastSquares<'r, 'a, 's, T>);
 
 impl<T: Real> Registers<T> for LeastSquares<'_, '_, '_, T> {
     #[inline(always)]

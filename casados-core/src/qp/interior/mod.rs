@@ -45,7 +45,7 @@ use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
 use core::marker::PhantomData;
-use run::{Attempt, Limits, Run};
+use run::{Attempt, Limits, Run, Runs};
 
 /// An interior point that exploits the structure of optimal control.
 ///
@@ -165,7 +165,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
         iterate.objective = attempt.penalties == Penalties::Given;
         let limits = Limits::new(&self.options, self.relaxed, attempt.penalties);
-        T::registers(Run {
+        T::compiled::<Runs>(Run {
             iterate: &mut iterate,
             options: &self.options,
             limits,

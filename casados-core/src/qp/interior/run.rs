@@ -11,7 +11,7 @@ use crate::qp::layout::{Places, assign, part, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::solver::Start;
 use crate::qp::statistics::{Statistics, larger};
-use crate::scalar::{Packed, Real, Registers};
+use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// How a problem is to be solved.
 #[derive(Clone, Copy)]
@@ -38,6 +38,11 @@ pub struct Run<'r, 'a, 's, T> {
     pub result: &'r mut Result<Statistics, QpError>,
     /// Whether the multipliers prove that no point satisfies all constraints.
     pub infeasible: &'r mut bool,
+}
+
+compiled! {
+    /// See [`Run`].
+    pub Runs: Run<'r, 'a, 's, T>
 }
 
 impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
