@@ -28,6 +28,8 @@ const STEADY: (f64, f64) = (0.8, 1.2);
 const SETTLED: usize = 5;
 /// A step is not made longer by less than this: the factors of its matrix are worth more.
 const WORTHWHILE: f64 = 1.2;
+/// A run still looks for its step size while each step is longer than the last by this factor.
+const LONGER: f64 = 2.0;
 /// After so many singular matrices in a row the problem is.
 const SINGULAR: usize = 5;
 
@@ -147,6 +149,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             (h, last) = (span.end - t, true);
         }
         let mut accepted_h: Option<T> = None;
+        let mut starting = true;
         let mut need = Need::Jacobian;
         let (mut current, mut rejected) = (false, false);
         let (mut unexpected, mut much_shorter, mut same_matrix) = (false, false, false);
@@ -347,6 +350,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             if !on_stage {
                 self.settle(t)?;
+            }
+            if starting {
+                // How fast a short step converged says nothing of one that is much longer.
+                convergence.factor = Convergence::UNKNOWN;
+                starting = factor > LONGER;
             }
             accepted_h = Some(h);
             current = false;
