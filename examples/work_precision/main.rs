@@ -5,9 +5,9 @@
 //! cargo run --release --example work_precision [-- --only TEXT] [--without-peers] [--seconds S] [--out FOLDER] [--write FILE]
 //! ```
 //!
-//! Times are the least CPU time of a call in `S` seconds (0.05). A table is printed, and written
-//! between the marks `<!-- work_precision -->` and `<!-- end -->` of FILE; plots are drawn in
-//! FOLDER (`plots/work_precision`).
+//! Times are the least CPU time of a call in `S` seconds (0.05). Times at equal errors are printed,
+//! and written between the marks `<!-- work_precision -->` and `<!-- end -->` of FILE; then all
+//! runs are printed; plots are drawn in FOLDER (`plots/work_precision`).
 
 #[path = "../../tests/data/mod.rs"]
 mod data;
@@ -151,8 +151,8 @@ fn run() -> Result<(), Box<dyn Error>> {
             all.push(Measured { name: problem.name, title: problem.title, derivatives, runs });
         }
     }
-    let text = report::markdown(&all);
-    println!("{text}");
+    let text = report::times(&all);
+    println!("{text}\n{}", report::runs(&all));
     std::fs::create_dir_all(&arguments.out)?;
     for measured in &all {
         plot::draw(measured, &arguments.out)?;

@@ -14,11 +14,11 @@ fn milliseconds(seconds: f64) -> String {
 }
 
 fn entry(found: Option<(&Run, Outcome)>) -> String {
-    found.map_or("–".into(), |(run, outcome)| format!("{} ({})", milliseconds(outcome.time), run.solver))
+    found.map_or("–".into(), |(_, outcome)| milliseconds(outcome.time))
 }
 
-/// Times at equal errors, and everything at four tolerances.
-pub fn markdown(all: &[Measured]) -> String {
+/// Times at equal errors, of ours and of the fastest peer.
+pub fn times(all: &[Measured]) -> String {
     let mut text = String::new();
     for derivatives in [false, true] {
         let of = || all.iter().filter(|measured| measured.derivatives == derivatives);
@@ -26,27 +26,28 @@ pub fn markdown(all: &[Measured]) -> String {
             continue;
         }
         text += if derivatives { "\nWith forward sensitivities by `(x₀, p)`:\n\n" } else { "" };
-        text += "| problem | digits | casados, ms | fastest peer, ms | ratio |\n| --- | --- | --- | --- | --- |\n";
+        text += "| problem |";
+        for digits in DIGITS {
+            let _ = write!(text, " {digits} digits |");
+        }
+        text += "\n| --- | --- | --- | --- | --- |\n";
         for measured in of() {
+            let _ = write!(text, "| {} |", measured.title);
             for digits in DIGITS {
-                let error = 10f64.powi(-digits);
-                let (ours, peer) =
-                    (fastest(&measured.runs, true, error), fastest(&measured.runs, false, error));
-                let ratio = match (ours, peer) {
-                    (Some((_, ours)), Some((_, peer))) => format!("{:.1}", peer.time / ours.time),
-                    _ => "–".into(),
-                };
-                let _ = writeln!(
-                    text,
-                    "| {} | {digits} | {} | {} | {ratio} |",
-                    measured.title,
-                    entry(ours),
-                    entry(peer)
-                );
+                let [ours, peer] =
+                    [true, false].map(|ours| entry(fastest(&measured.runs, ours, 10f64.powi(-digits))));
+                let _ = write!(text, " {ours} / {peer} |");
             }
+            text += "\n";
         }
     }
-    text += "\n| problem | solver | tolerance or steps | error | steps | factorisations | ms |\n";
+    text
+}
+
+/// Everything at four tolerances.
+pub fn runs(all: &[Measured]) -> String {
+    let mut text = String::new();
+    text += "| problem | solver | tolerance or steps | error | steps | factorisations | ms |\n";
     text += "| --- | --- | --- | --- | --- | --- | --- |\n";
     for measured in all {
         let with = if measured.derivatives { ", with sensitivities" } else { "" };

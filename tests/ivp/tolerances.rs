@@ -25,7 +25,8 @@ fn in_tolerances(found: &[f64], expected: &[f64], tolerance: f64) -> f64 {
     found.iter().zip(expected).map(relative).fold(0.0, f64::max) / tolerance
 }
 
-fn tell(name: &str, tolerance: f64, error: f64, work: &AdaptiveStatistics) {
+/// A row of `docs/accuracy.md`.
+pub fn tell(name: &str, tolerance: f64, error: f64, work: &AdaptiveStatistics) {
     let AdaptiveStatistics { steps, rejected, residuals, .. } = work;
     println!("| {name} | {tolerance:e} | {error:.2} | {steps} | {rejected} | {residuals} |");
 }
@@ -68,17 +69,31 @@ fn spring_pendulum() {
     follows!("ivp/vibrations.json", "spring_pendulum", SpringPendulum, Gauss<3>, 4, allowed);
 }
 
-/// The equations do not keep the length of the rod: errors of the first steps grow to seventy of
-/// them within the five swings.
+/// The equations do not keep the length of the rod: errors of the first steps grow seventyfold
+/// within the five swings.
 #[test]
 fn rod_pendulum() {
-    follows!("ivp/vibrations.json", "rod_pendulum", RodPendulum, Gauss<4>, 4, [100.0; 4]);
-    follows!("ivp/vibrations.json", "rod_pendulum", RodPendulum, Radau, 4, [100.0; 4]);
+    follows!("ivp/vibrations.json", "rod_pendulum", RodPendulum, Gauss<4>, 4, [ALLOWED; 4]);
+    follows!("ivp/vibrations.json", "rod_pendulum", RodPendulum, Radau, 4, [ALLOWED; 4]);
 }
 
 #[test]
 fn kepler() {
     follows!("ivp/vibrations.json", "kepler", Kepler, DormandPrince8, 4, [ALLOWED; 4]);
+}
+
+/// Predators and prey, whose cycles nothing damps.
+#[ode]
+fn populations(x: [f64; 2]) -> [f64; 2] {
+    [x[0] * (1.0 - x[1]), x[1] * (x[0] - 1.0)]
+}
+
+/// Where a short step's iteration converges at once, the longer step that follows measures its own
+/// rate, and at no tolerance does one lucky rate end an iteration too early.
+#[test]
+fn cycles_of_populations() {
+    follows!("ivp/vibrations.json", "populations", Populations, Gauss<4>, 2, [ALLOWED; 4]);
+    follows!("ivp/vibrations.json", "populations", Populations, Radau, 2, [ALLOWED; 4]);
 }
 
 /// Close encounters make errors grow; SciPy's `DOP853` is off by 67, 38, 87 and 190.

@@ -5,6 +5,7 @@
 //! are allowed: the errors of hundreds of steps, which stay where nothing is damped, each a part of
 //! its tolerance.
 
+use super::tolerances::tell;
 use crate::data::Record;
 use crate::models::ivp::vibrations::{Beam, Modes, Rope, SpringPendulum, Turning};
 use casados::{Adaptive, AdaptiveOptions, Radau};
@@ -60,6 +61,8 @@ macro_rules! follows {
                 let x = adaptive.solve(&x0, &SVector::zeros(), t).expect("a solution").x;
                 let expected = end.list("y").expect("values");
                 let error = in_tolerances(x.as_slice(), &expected, tolerance);
+                let name = concat!($name, " | ", stringify!($method));
+                tell(&format!("{name} | {t}"), tolerance, error, adaptive.statistics());
                 assert!(error <= $allowed, "t = {t}: {error} tolerances of {tolerance:e}");
             }
         }

@@ -7,6 +7,9 @@
 //! Stages lie side by side in `G` groups of four, registers of the usual machine; what is left of
 //! the last repeats the last stage.
 
+mod estimate;
+mod points;
+
 use super::defect_filter::DefectFilter;
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
@@ -105,146 +108,6 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
             memory,
             method: PhantomData,
         })
-    }
-
-    /// The Lagrange polynomials of the nodes, without a division.
-    fn polynomials(&self, theta: f64) -> [f64; S] {
-        let c = self.tableau.c();
-        let (mut before, mut after) = (1.0, 1.0);
-        let mut values = self.factors;
-        for (value, c) in values.iter_mut().zip(c) {
-            *value *= before;
-            before *= theta - c;
-        }
-        for (value, c) in values.iter_mut().zip(c).rev() {
-            *value *= after;
-            after *= theta - c;
-        }
-        values
-    }
-
-    /// The residual at all stages, and from there to the rows of the linear systems.
-    fn evaluate(&mut self) {
-        let Memory { points, f, rows, point, f_point, .. } = &mut *self.memory;
-        for (group, (points, f)) in points.iter().zip(f.iter_mut()).enumerate() {
-            if let Err(call) = T::side_by_side(Residual::<M, T> { points, f }) {
-                let Residual { points, f } = call;
-                for lane in 0..GROUP.min(S - GROUP * group) {
-                    for (to, from) in point.as_mut().iter_mut().zip(points.as_ref()) {
-                        *to = from[lane];
-                    }
-                    M::residual::<T>(point, f_point);
-                    for (to, from) in f.as_mut().iter_mut().zip(f_point.as_ref()) {
-                        to[lane..].fill(*from);
-                    }
-                }
-            }
-        }
-        dispatch(Split::<M, T, S, G> {
-            left: self.basis.left(),
-            f: from_fn(|group| f[group].as_ref()),
-            rows: rows.as_mut(),
-            model: PhantomData,
-        });
-    }
-
-    /// `y ← y − Δ` with `Δ` from the rows if there are any, and the stages moved there: the sum of
-    /// the squares of the changes of `(ξ, z)` relative to what is tolerated.
-    fn advance(&mut self, start: &Start<'_, M, T>, increment: bool) -> f64 {
-        let Memory { y, points, rows, .. } = &mut *self.memory;
-        let mut points = points.each_mut().map(|points| points.as_mut());
-        let (re, im) = self.right.split_at(PARTS / 2);
-        let sum = dispatch(Advance {
-            minus_ha: &self.minus_ha,
-            // Of the lanes that there are eigenvalues for.
-            right: [&re[..S.div_ceil(2)], &im[..S.div_ceil(2)]],
-            x: &start.point.as_ref()[M::Shape::NX..2 * M::Shape::NX],
-            scale: start.scale.as_ref(),
-            rows: if increment { rows.as_ref() } else { &[] },
-            y: y.as_mut(),
-            points: &mut points,
-        });
-        // Each stage once.
-        sum.as_flattened()[..S].iter().fold(T::ZERO, |total, sum| total + *sum).to_f64()
-    }
-
-    /// `x_n + h Σ_i b_i k_i`, and the polynomials of `ẋ` and `z` at the end.
-    fn extrapolate(&self, h: T, point: &mut ArrayV<M, T>) {
-        let (nx, point) = (M::Shape::NX, point.as_mut());
-        let (b, end) = (self.tableau.b().map(T::from_f64), self.polynomials(1.0).map(T::from_f64));
-        for (index, y) in self.memory.y.as_ref().iter().enumerate() {
-            let Some(y) = y.as_flattened().first_chunk() else { continue };
-            if index < nx {
-                point[index] = dot(&end, y);
-                point[nx + index] = point[nx + index] + h * dot(&b, y);
-            } else {
-                point[nx + index] = dot(&end, y);
-            }
-        }
-    }
-
-    /// The larger one of the two estimates, from the defect at the point that is there.
-    ///
-    /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where
-    /// nothing is a stage it is how far the extrapolated derivative is from the solution at the
-    /// state that was reached: of stiff components this is their error, which no method with
-    /// `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the solve takes it out of
-    /// the estimate. The second, of the states, is that of [`DefectFilter`].
-    fn estimate(
-        &mut self,
-        start: &Start<'_, M, T>,
-        at_end: bool,
-        residuals: &mut usize,
-    ) -> Result<f64, Failure> {
-        self.defect(start.h, residuals)?;
-        let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
-        let errors = self.memory.error.as_ref().get(..counted).unwrap_or_default();
-        let first = norm(errors, start.scale.as_ref());
-        let larger = self.second(first, start);
-        if at_end || !start.known || larger <= first.max(UNDOUBTED) {
-            return Ok(larger);
-        }
-        // Newton's method leaves a residual of algebraic equations at the start, which does not
-        // shrink with the step: not of this step, and without it only the second estimate is below
-        // its tolerance.
-        let mut defect = self.memory.f_point;
-        self.memory.point = *start.point;
-        self.evaluate_point(residuals)?;
-        for (defect, left) in defect.as_mut().iter_mut().zip(self.memory.f_point.as_ref()) {
-            *defect = *defect - *left;
-        }
-        self.filter(start.h, &mut defect);
-        Ok(self.second(first, start))
-    }
-
-    /// The larger one of an estimate and the second one, of the defect that was filtered last.
-    fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
-        let [error, divided] = self.filtered_defect(start.h);
-        let asked =
-            start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
-        let relative = error.as_ref().iter().zip(divided.as_ref()).zip(asked);
-        self.defect_filter.larger(
-            first,
-            start.finer,
-            relative.map(|((error, divided), asked)| (*error * asked, *divided * asked)),
-        )
-    }
-
-    /// The residual at the point that is there.
-    fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
-        let Memory { point, f_point, .. } = &mut *self.memory;
-        *residuals += 1;
-        M::residual::<T>(point, f_point);
-        if not_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
-    }
-
-    /// The estimated error of `(x, z)` from the defect at the point that is there.
-    fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
-        self.evaluate_point(residuals)?;
-        let mut error = self.memory.f_point;
-        self.filter(h, &mut error);
-        self.memory.error = error;
-        Ok(())
     }
 }
 

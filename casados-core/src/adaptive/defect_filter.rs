@@ -32,8 +32,9 @@ use crate::scalar::{Real, Scalar};
 /// Errors of components that decay are damped by the steps that follow: no more than one of them is
 /// there at a time, and it may be some tolerances.
 const DAMPED: f64 = 0.2;
-/// The errors of oscillations add up: over more steps the more accurate these are.
-const KEPT: f64 = 4.0;
+/// The errors of oscillations add up, over more steps the more accurate these are: from where the
+/// second estimate says little to where it says all, they count so often.
+const KEPT: [f64; 2] = [4.0, 12.0];
 /// Where the first estimate is asked for this much less than the solution, or even less, its
 /// tolerance says nothing of components that lose their order; where it is asked for about as much,
 /// it says all, and the second one fades out.
@@ -110,7 +111,8 @@ impl DefectFilter {
         // The square of the cosine between them, where they point against each other.
         let against = if product < 0.0 { product / square * (product / divided_square) } else { 0.0 };
         let needed = Scalar::powi((finer / LENIENT).min(1.0), 4);
-        let share = needed * (DAMPED + (KEPT - DAMPED) * against);
+        let kept = KEPT[0] + (KEPT[1] - KEPT[0]) * needed;
+        let share = needed * (DAMPED + (kept - DAMPED) * against);
         let second = share * Scalar::sqrt(square / count.max(1) as f64);
         // Written so that NaN stays.
         if first.is_nan() || second <= first && second <= 1.0 {

@@ -165,22 +165,7 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let error = step.take(t, h).and_then(|()| {
-            let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
-            step.error(t, h, rtol, atol)
-        });
-        let error = error.unwrap_or(f64::NAN);
-        let error = match &mut run.sensitivities {
-            Some(sensitivities) if error <= 1.0 => {
-                let Base { point, u, parameters, rtol, atol, .. } = &*run.base;
-                let taken = Taken { at: At { x: &x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
-                let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
-                let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
-                // Written so that NaN stays.
-                other.map_or(f64::NAN, |other| if error >= other { error } else { other })
-            }
-            _ => error,
-        };
+        let error = attempt::<M, B, T, S>(step, run, &x, t, h);
         if !error.is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -225,6 +210,33 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         rejected = false;
         h = T::from_f64(direction * next);
+    }
+}
+
+/// Takes a step from `x`: its error relative to what is tolerated, of derivatives too if they take
+/// part; NaN if there is none.
+fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
+    step: &mut dyn Take<M, T>,
+    run: &mut Run<'_, M, T>,
+    x: &VectorX<M, T>,
+    t: T,
+    h: T,
+) -> f64 {
+    let error = step.take(t, h).and_then(|()| {
+        let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
+        step.error(t, h, rtol, atol)
+    });
+    let error = error.unwrap_or(f64::NAN);
+    match &mut run.sensitivities {
+        Some(sensitivities) if error <= 1.0 => {
+            let Base { point, u, parameters, rtol, atol, .. } = &*run.base;
+            let taken = Taken { at: At { x, u, p: parameters, t }, h, y: &[], level: 0, near: true };
+            let tolerances = rtol.as_ref().iter().copied().zip(atol.as_ref().iter().copied());
+            let other = sensitivities.explicit::<B, S>(&taken, step.end(), point.as_ref(), tolerances);
+            // Written so that NaN stays.
+            other.map_or(f64::NAN, |other| if error >= other { error } else { other })
+        }
+        _ => error,
     }
 }
 

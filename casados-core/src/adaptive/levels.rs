@@ -1,11 +1,9 @@
 //! The methods of a family, opened when they are needed.
 
-use super::run::{After, Run, Span};
-use super::sealed::{Engine, Family, Kind};
+use super::sealed::Family;
 use super::stages::{MOST, Stages};
-use super::tape::Entry;
 use crate::error::Error;
-use crate::model::{Dae, VectorX};
+use crate::model::Dae;
 use crate::result::Dense;
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -75,53 +73,5 @@ pub(super) fn interpolate<M: Dae, T: Real>(
     }
     for (to, z) in dense.z.as_mut_slice().iter_mut().zip(unknowns) {
         *to = sum(&lagrange, z);
-    }
-}
-
-/// What a family remembers: the steps that it takes, and those that it takes again.
-pub struct Implicit<M: Dae, B: Family, T: Real> {
-    levels: Levels<M, T>,
-    replays: B::Replays<M, T>,
-}
-
-impl<M: Dae, B: Family, T: Real> Default for Implicit<M, B, T> {
-    fn default() -> Self {
-        Self { levels: Levels::default(), replays: Default::default() }
-    }
-}
-
-impl<M: Dae, B: Family, T: Real> Kind<M, T> for B {
-    type State = Implicit<M, B, T>;
-}
-
-impl<M: Dae, B: Family, T: Real> Engine<M, T> for B {
-    const ENDS_ON_STAGE: bool = B::ENDS_ON_STAGE;
-    type Replays = B::Replays<M, T>;
-
-    fn integrate(
-        state: &mut Self::State,
-        run: &mut Run<'_, M, T>,
-        x0: &VectorX<M, T>,
-        span: Span<T>,
-        after: After<'_, M, T>,
-    ) -> Result<(), Error> {
-        run.integrate::<B>(&mut state.levels, x0, span, after)
-    }
-
-    fn interpolate(
-        state: &mut Self::State,
-        _: &[T],
-        entry: &Entry<T>,
-        (x, y): (&[T], &[T]),
-        t: T,
-        dense: &mut Dense<M, T>,
-    ) -> Result<(), Error> {
-        let stages = state.levels.get::<B>(entry.level)?;
-        interpolate(stages, x, y, t - entry.t, entry.h, dense);
-        Ok(())
-    }
-
-    fn replays(state: &mut Self::State) -> &mut Self::Replays {
-        &mut state.replays
     }
 }

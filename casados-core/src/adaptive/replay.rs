@@ -27,7 +27,8 @@ pub struct Taken<'a, M: Dae, T: Real> {
     pub y: &'a [T],
     /// Which method of the family took it.
     pub level: usize,
-    /// Whether these values are those of the step but for their last digits.
+    /// Whether these values are those of the step but for their last digits: then the step is
+    /// differentiated at them where Newton's method leads away, and never fails to converge.
     pub near: bool,
 }
 

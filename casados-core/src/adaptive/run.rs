@@ -1,5 +1,8 @@
 //! The steps of an interval.
 
+mod checked;
+mod tolerances;
+
 use super::consistent::{At, Consistent};
 use super::control::{IMPLICIT, Predictive};
 use super::defect_filter::LENIENT;
@@ -28,6 +31,8 @@ const STEADY: (f64, f64) = (0.8, 1.2);
 const SETTLED: usize = 5;
 /// A step is not made longer by less than this: the factors of its matrix are worth more.
 const WORTHWHILE: f64 = 1.2;
+/// A run still looks for its step size while each step is longer than the last by this factor.
+const LONGER: f64 = 2.0;
 /// After so many singular matrices in a row the problem is.
 const SINGULAR: usize = 5;
 
@@ -147,6 +152,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             (h, last) = (span.end - t, true);
         }
         let mut accepted_h: Option<T> = None;
+        let mut starting = true;
         let mut need = Need::Jacobian;
         let (mut current, mut rejected) = (false, false);
         let (mut unexpected, mut much_shorter, mut same_matrix) = (false, false, false);
@@ -348,6 +354,11 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             if !on_stage {
                 self.settle(t)?;
             }
+            if starting {
+                // How fast a short step converged says nothing of one that is much longer.
+                convergence.factor = Convergence::UNKNOWN;
+                starting = factor > LONGER;
+            }
             accepted_h = Some(h);
             current = false;
             if last {
@@ -376,90 +387,5 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             }
             need = if fast { Need::Factors } else { Need::Jacobian };
         }
-    }
-
-    /// The identity, if derivatives take part.
-    ///
-    /// # Errors
-    /// As [`Consistent::forward`].
-    pub fn begin_sensitivities(&mut self, x0: &VectorX<M, T>, t: T) -> Result<(), Error> {
-        let Some(sensitivities) = &mut self.sensitivities else { return Ok(()) };
-        let Base { u, parameters, start, magnitudes, .. } = &*self.base;
-        sensitivities.begin(&At { x: x0, u, p: parameters, t }, start, magnitudes, self.consistent)
-    }
-
-    /// Tolerances of the estimate: it is of lower order than the method, `s` instead of `2s − 1`.
-    fn tighten<B: Family>(&mut self, stages: usize) {
-        let s = stages as f64;
-        let exponent = (s + 1.0) / (2.0 * s);
-        let Base { tight, asked, finer, rtol, atol, newton_tolerance, .. } = &mut *self.base;
-        let mut finest: f64 = 1.0;
-        *finer = 0.0;
-        let mut before = (T::ZERO, T::ZERO);
-        let asked = asked.as_mut().iter_mut();
-        for (((tight, asked), rtol), atol) in
-            tight.as_mut().iter_mut().zip(asked).zip(rtol.as_ref()).zip(atol.as_ref())
-        {
-            // Mostly they are all the same.
-            if before.0 != *rtol {
-                before = (*rtol, T::from_f64(0.1 * Scalar::powf(rtol.to_f64(), exponent)));
-            }
-            *asked = before.1 / *rtol;
-            *finer = finer.max(asked.to_f64());
-            *tight = (before.1, *asked * *atol);
-            finest = finest.min(before.1.to_f64());
-        }
-        // Where the error of the iteration is small beside that of the step. It is the same in step
-        // after step, and what is not damped adds up over as many as there are, like the tolerance
-        // to the power of −1/(2s): of Gauss methods, which damp nothing, it is smaller by that, and
-        // of Radau methods by a power of what superconvergence takes for granted. It stays above
-        // rounding.
-        let wanted = if B::ENDS_ON_STAGE {
-            let spread = (LENIENT / *finer).min(1.0);
-            Scalar::powf(finest, (s - 1.0) / (s + 1.0)).min(0.03) * Scalar::sqrt(spread)
-        } else {
-            Scalar::powf(finest, s / (s + 1.0)).min(0.03)
-        };
-        *newton_tolerance = wanted.max(10.0 * T::EPSILON.to_f64() / finest);
-        self.measure();
-    }
-
-    /// What is tolerated at the time that was reached.
-    pub(super) fn measure(&mut self) {
-        let Base { tight, scale, point, .. } = &mut *self.base;
-        let states = &point.as_ref()[M::Shape::NX..];
-        for ((scale, (rtol, atol)), state) in scale.as_mut().iter_mut().zip(tight.as_ref()).zip(states) {
-            *scale = T::ONE / (*atol + *rtol * state.abs());
-        }
-    }
-
-    /// At the point that was reached, or in the middle of the step.
-    ///
-    /// # Errors
-    /// A value that is not finite.
-    fn evaluate_jacobian(&mut self, middle: bool, step: usize) -> Result<(), Error> {
-        let Base { point, middle: foreseen, f, jacobian, .. } = &mut *self.base;
-        self.statistics.jacobians += 1;
-        M::residual_jacobian::<T>(if middle { foreseen } else { point }, f, jacobian);
-        let at = Place { step, stage: 0, iteration: 0 };
-        if let Some((equation, value)) = not_finite(f.as_ref()) {
-            return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });
-        }
-        if let Some((entry, value)) = not_finite(jacobian.as_ref()) {
-            let equation = M::STRUCTURE.jacobian.at(entry).0;
-            return Err(Error::NonFiniteModel { quantity: Quantity::Jacobian, equation, value, at });
-        }
-        Ok(())
-    }
-
-    /// # Errors
-    /// [`Error::StepSizeUnderflow`]
-    pub fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
-        let size = h.to_f64().abs();
-        let tenth = T::from_f64(0.1) * h;
-        if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + tenth == t {
-            return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason });
-        }
-        Ok(())
     }
 }

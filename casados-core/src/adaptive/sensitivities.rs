@@ -9,6 +9,11 @@
 //! An integrand takes part step by step: forwards with the derivatives of its stages by
 //! `(x₀, u, p)`, backwards in `λ_n`.
 
+mod blocks;
+
+use blocks::{algebraic, finite, in_step};
+pub(super) use blocks::{fill, place};
+
 use super::consistent::{At, Consistent};
 use super::replay::{Replay, Taken};
 use super::run::{Base, Span};
@@ -358,77 +363,4 @@ pub(super) fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
         Some(integrand) => Some(integrand),
         None => None,
     }
-}
-
-/// Derivatives of `z` at the end of a step in all directions, row by row.
-fn algebraic<M: Dae, T: Real>(
-    forward: &Forward<M, T>,
-    v: &ArrayX<M, ArrayW<M, T>>,
-    row: &mut ArrayW<M, T>,
-    mut write: impl FnMut(&[T], usize),
-) {
-    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-    for i in 0..M::Shape::NZ {
-        for (w, element) in row.as_mut().iter_mut().enumerate() {
-            *element = if w < nx {
-                T::ZERO
-            } else if w < nx + nu {
-                forward.dz_du[(i, w - nx)]
-            } else {
-                forward.dz_dp[(i, w - nx - nu)]
-            };
-        }
-        for (j, v) in v.as_ref().iter().enumerate() {
-            axpy(forward.dz_dx0[(i, j)], v.as_ref(), row.as_mut());
-        }
-        write(row.as_ref(), i);
-    }
-}
-
-/// The blocks of a Hessian as one matrix.
-pub(super) fn place<M: Dae, T: Real>(from: &Hessian<M, T>, to: &mut ArrayW<M, ArrayW<M, T>>) {
-    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-    for (r, row) in to.as_mut().iter_mut().enumerate() {
-        for (c, element) in row.as_mut().iter_mut().enumerate() {
-            let (i, j) = (r.min(c), r.max(c));
-            *element = if j < nx {
-                from.h_xx[(i, j)]
-            } else if j < nx + nu {
-                if i < nx { from.h_xu[(i, j - nx)] } else { from.h_uu[(i - nx, j - nx)] }
-            } else if i < nx {
-                from.h_xp[(i, j - nx - nu)]
-            } else if i < nx + nu {
-                from.h_up[(i - nx, j - nx - nu)]
-            } else {
-                from.h_pp[(i - nx - nu, j - nx - nu)]
-            };
-        }
-    }
-}
-
-pub(super) fn fill<T, A: Matrix<T>>(matrix: &mut A, element: impl Fn(usize, usize) -> T) {
-    for c in 0..A::COLUMNS {
-        for r in 0..A::ROWS {
-            matrix[(r, c)] = element(r, c);
-        }
-    }
-}
-
-/// # Errors
-/// [`Error::Overflow`]
-fn finite<T: Real>(values: &[T]) -> Result<(), Error> {
-    not_finite(values).map_or(Ok(()), |(index, _)| Err(Error::Overflow { step: 0, index }))
-}
-
-/// An error of a step is one of the run.
-fn in_step(mut error: Error, number: usize) -> Error {
-    match &mut error {
-        Error::NonFiniteModel { at, .. }
-        | Error::NonFiniteFunction { at, .. }
-        | Error::Singular { at, .. }
-        | Error::NotConverged { at, .. } => at.step = number,
-        Error::Overflow { step, .. } => *step = number,
-        _ => {}
-    }
-    error
 }

@@ -59,8 +59,13 @@ pub struct Convergence {
 
 impl Default for Convergence {
     fn default() -> Self {
-        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: 1.0 }
+        Self { iterations: 0, most: ITERATIONS as usize, rate: 0.0, factor: Self::UNKNOWN }
     }
+}
+
+impl Convergence {
+    /// The factor where no step tells: an increment counts as what is left after it.
+    pub(super) const UNKNOWN: f64 = 1.0;
 }
 
 /// An error of the states, and `(hJ)⁻²` times it.

@@ -122,6 +122,13 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         Ok(())
     }
 
+    /// What a call needs before its steps. A call that is refused without it has used up a solution
+    /// that it was given.
+    pub fn needs<R>(&mut self, result: Result<R, Error>) -> Result<R, Error> {
+        self.solved &= result.is_ok();
+        result
+    }
+
     /// The steps of a call, with `after` called after each.
     pub fn steps(
         &mut self,
@@ -135,6 +142,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     ) -> Result<Parts<'_, M, T, S, W::Fallback>, Error> {
         let Self { options, coefficients, statistics, work, tapes, .. } = self;
         *statistics = Statistics::default();
+        // Of this call alone, refused or not.
+        let solved = core::mem::take(&mut self.solved);
         check_input(Argument::X0, arguments.x0.as_slice())?;
         check_input(Argument::U, arguments.u.as_slice())?;
         check_input(Argument::H, &[arguments.h])?;
@@ -155,7 +164,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         let steps = W::tape(running, options.steps)?;
         let last = W::tape(last, options.steps)?;
         let guess = match options.start {
-            _ if core::mem::take(&mut self.solved) => InitialGuess::Solution(last),
+            _ if solved => InitialGuess::Solution(last),
             Start::Zero => InitialGuess::Zero,
             Start::Given if !self.given => return Err(Error::StartNotGiven),
             Start::Warm if self.warm => InitialGuess::Previous(last),

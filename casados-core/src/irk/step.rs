@@ -136,6 +136,12 @@ impl<M: Dae, T: Real, const S: usize, F: Fallback> Work<M, T, S, F> {
                 None => Ok(false),
             },
             Ok(()) => Ok(false),
+            // Start values that are solutions but for their last digits are taken for solutions
+            // where Newton's method leads away from them.
+            Err(_) if cfg!(feature = "alloc") && self.near => {
+                self.start(coefficients, guess, n, None, y);
+                Ok(false)
+            }
             Err(error) if n == 0 => Err(self.explain_start(error, guess)),
             Err(error) => Err(error),
         }

@@ -122,8 +122,24 @@ fn derivatives_of_coarse_runs() {
         let error = (forward.dx_dp[0] - expected).abs();
         println!("{rtol:e}: {apart:e} {error:e}");
         assert!(apart <= 3.0 * rtol * (1.0 + solved[0].abs()), "{rtol:e}: {} {}", forward.x[0], solved[0]);
-        // At the coarsest two the period itself is wrong.
-        assert!(rtol > 1e-2 || error <= 20.0 * rtol, "{rtol:e}: {error:e}");
+        // As of states; at the coarsest two the period itself is wrong.
+        assert!(rtol > 1e-2 || error <= 30.0 * rtol, "{rtol:e}: {error:e}");
+    }
+}
+
+/// Wherever a run ends well it has derivatives, however coarsely its stages were solved.
+#[test]
+fn coarse_runs_have_derivatives() {
+    let (x0, p) = problem("van_der_pol_1e3");
+    let (x0, u, t) = (SVector::<f64, 2>::from_column_slice(&x0), SVector::zeros(), 2000.0);
+    for k in 0..=30 {
+        let rtol = 10f64.powf(-1.0 - f64::from(k) / 10.0);
+        let mut adaptive = integrator::<VanDerPol, 1>(&p, rtol, rtol);
+        let solved = adaptive.solve(&x0, &u, t).expect("a solution").x;
+        let end = adaptive.forward(&x0, &u, t).expect("derivatives").x;
+        // The last step begins within the tolerance of where it began.
+        assert!((end[0] - solved[0]).abs() <= 3.0 * rtol * (1.0 + solved[0].abs()), "{rtol:e}");
+        adaptive.adjoint(&x0, &u, t, &SVector::from([1.0, 0.0])).expect("a gradient");
     }
 }
 

@@ -3,7 +3,8 @@
 
 use super::super::run::Span;
 use super::super::sealed::Engine;
-use super::trace::{ITERATIONS, evaluate, finite};
+use super::evaluate::{evaluate, finite};
+use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
 use crate::error::{Argument, Error, Refusal};
 use crate::irk::check;

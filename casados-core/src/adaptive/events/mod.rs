@@ -13,12 +13,17 @@
 //! derivatives are those of the steps that were taken. At events they are those of the solution: a
 //! step's derivative by its length is `ẋ`, but for the error of the step.
 
+mod evaluate;
 mod event;
+mod forward;
 mod frozen;
+mod jump;
+mod results;
 mod second;
 mod trace;
 
 pub use event::{Crossing, Event};
+pub use results::{HybridAdjoint, HybridForward, Occurrence, Solution, TimeGradient};
 pub use second::HybridHessian;
 
 use super::integrator::Integrator;
@@ -89,74 +94,6 @@ pub struct Hybrid<M: Dae, B: Engine<M, T>, T: Real> {
 type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
 /// The events of a call that happened, in order.
 type Moments<M, T> = Vec<(Event<M, T>, Moment<M, T>)>;
-
-/// An event that happened.
-pub struct Occurrence<M: Dae, T: Real = f64> {
-    /// Which.
-    pub event: usize,
-    /// The time at which it happened: that of the model, not since the start of the interval.
-    pub t: T,
-    /// The state before it.
-    pub before: VectorX<M, T>,
-    /// The state after it.
-    pub after: VectorX<M, T>,
-}
-
-/// The solution at the end, and what happened before.
-pub struct Solution<M: Dae, T: Real = f64> {
-    /// `x` and `z` at the end, `z0` at the start.
-    pub nominal: Nominal<M, T>,
-    /// The time at the end: that of the interval, or the time of the event that ended the
-    /// integration.
-    pub t: T,
-    /// Whether an event ended it: the last of the occurrences.
-    pub terminal: bool,
-    /// The events, one after the other.
-    pub occurrences: Vec<Occurrence<M, T>>,
-}
-
-/// The solution at the end and its derivatives; if an event ended the integration, with the change
-/// of its time.
-pub struct HybridForward<M: Dae, T: Real = f64> {
-    /// The solution.
-    pub solution: Solution<M, T>,
-    /// `∂x/∂x₀`
-    pub dx_dx0: MatrixXX<M, T>,
-    /// `∂x/∂u`
-    pub dx_du: MatrixXU<M, T>,
-    /// `∂x/∂p`
-    pub dx_dp: MatrixXP<M, T>,
-    /// Of the time of each event: its derivatives with respect to `x₀`, `u` and `p`.
-    pub times: Vec<TimeGradient<M, T>>,
-}
-
-/// The derivatives of the time of an event.
-pub struct TimeGradient<M: Dae, T: Real = f64> {
-    /// `∂t/∂x₀`
-    pub x0: VectorX<M, T>,
-    /// `∂t/∂u`
-    pub u: VectorU<M, T>,
-    /// `∂t/∂p`
-    pub p: VectorP<M, T>,
-}
-
-/// The solution at the end and the gradient of `λᵀx`.
-pub struct HybridAdjoint<M: Dae, T: Real = f64> {
-    /// The solution.
-    pub solution: Solution<M, T>,
-    /// `∇(λᵀx)` with respect to `x₀`
-    pub grad_x0: VectorX<M, T>,
-    /// `∇(λᵀx)` with respect to `u`
-    pub grad_u: VectorU<M, T>,
-    /// `∇(λᵀx)` with respect to `p`
-    pub grad_p: VectorP<M, T>,
-}
-
-plain!([M: Dae, T: Real] Occurrence<M, T> { event, t, before, after });
-plain!([M: Dae, T: Real] TimeGradient<M, T> { x0, u, p });
-listed!([M: Dae, T: Real] Solution<M, T> { nominal, t, terminal, occurrences });
-listed!([M: Dae, T: Real] HybridForward<M, T> { solution, dx_dx0, dx_du, dx_dp, times });
-listed!([M: Dae, T: Real] HybridAdjoint<M, T> { solution, grad_x0, grad_u, grad_p });
 
 /// What is known about the moment of an event.
 struct Moment<M: Dae, T: Real> {
@@ -258,112 +195,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         let (result, moments) = self.sweep(x0, false, along)?;
         (self.moments, self.asked) = (moments, Some(span));
         Ok(result)
-    }
-
-    /// Derivatives of all steps and over all events, and what is known about the moments of these;
-    /// for `second` derivatives, what these need.
-    #[allow(clippy::type_complexity)]
-    fn sweep(
-        &mut self,
-        x0: &VectorX<M, T>,
-        second: bool,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
-        begin(&mut along);
-        let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-        let bytes = size_of::<ArrayX<M, ArrayW<M, T>>>();
-        let zeroed = || try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes });
-        let [mut v, mut next] = match self.sensitivities.take() {
-            Some(there) => there,
-            None => [zeroed()?, zeroed()?],
-        };
-        for (x, row) in v.as_mut().as_mut().iter_mut().enumerate() {
-            row.as_mut().fill(T::ZERO);
-            row[x] = T::ONE;
-        }
-        let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
-        moments.clear();
-        let mut x = *x0;
-        for k in 0..self.count {
-            let Self { integrator, segments, solution, .. } = self;
-            let Some(segment) = segments.get_mut(k) else { break };
-            segment.x = x;
-            let mut history = core::mem::take(&mut segment.history);
-            let mut own = core::mem::take(&mut segment.v);
-            history.clear();
-            let (mut frozen, state, memory, _) = segment.open(integrator)?;
-            // Its derivatives by where a segment begins are multiplied by those of that.
-            let mut part = chain(&mut along, Some(&*v), false);
-            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
-            let local = &memory.hessian.first.forward;
-            if k == 0 {
-                solution.nominal.z0 = local.nominal.z0;
-            }
-            for (r, row) in next.as_mut().as_mut().iter_mut().enumerate() {
-                let row = row.as_mut();
-                row.fill(T::ZERO);
-                for (c, v) in v.as_ref().as_ref().iter().enumerate() {
-                    axpy(local.dx_dx0[(r, c)], v.as_ref(), row);
-                }
-                for (c, element) in row[nx..].iter_mut().enumerate() {
-                    let part = if c < nu { local.dx_du[(r, c)] } else { local.dx_dp[(r, c - nu)] };
-                    *element = *element + part;
-                }
-            }
-            core::mem::swap(&mut v, &mut next);
-            if second {
-                // Over this segment alone.
-                refill(&mut own, nx * nw, T::ZERO)?;
-                for (index, element) in own.iter_mut().enumerate() {
-                    let (r, w) = (index / nw, index % nw);
-                    *element = if w < nx {
-                        local.dx_dx0[(r, w)]
-                    } else if w < nx + nu {
-                        local.dx_du[(r, w - nx)]
-                    } else {
-                        local.dx_dp[(r, w - nx - nu)]
-                    };
-                }
-            }
-            (segment.history, segment.v) = (history, own);
-            let Some((event, moment)) = self.moment(k)? else { break };
-            let [v, next] = [&mut v, &mut next].map(|v| ArrayW::<M, T>::flat_mut(v.as_mut().as_mut()));
-            let time = self.forward_jump(event, &moment, v, next)?;
-            if let Some(integrand) = &mut along {
-                self.beside(k, &event, &moment, &mut **integrand, |integrand, sign, at| {
-                    integrand.prolong(sign, &time, at)
-                })?;
-            }
-            let mut gradient =
-                TimeGradient::<M, T> { x0: Zeroable::zeroed(), u: Zeroable::zeroed(), p: Zeroable::zeroed() };
-            gradient.x0.as_mut_slice().copy_from_slice(&time.as_ref()[..nx]);
-            gradient.u.as_mut_slice().copy_from_slice(&time.as_ref()[nx..nx + nu]);
-            gradient.p.as_mut_slice().copy_from_slice(&time.as_ref()[nx + nu..]);
-            times.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&gradient) })?;
-            times.push(gradient);
-            let moment = (event, moment);
-            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
-            moments.push(moment);
-            x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
-        }
-        self.collect();
-        finish(&mut along)?;
-        let [v, _] = self.sensitivities.insert([v, next]);
-        let v = ArrayW::<M, T>::flat(v.as_ref().as_ref());
-        if let Some((index, _)) = not_finite(v) {
-            return Err(Error::Overflow { step: 0, index });
-        }
-        let mut result = HybridForward {
-            solution: self.solution.clone(),
-            dx_dx0: Zeroable::zeroed(),
-            dx_du: Zeroable::zeroed(),
-            dx_dp: Zeroable::zeroed(),
-            times,
-        };
-        fill(&mut result.dx_dx0, |r, c| v[r * nw + c]);
-        fill(&mut result.dx_du, |r, c| v[r * nw + nx + c]);
-        fill(&mut result.dx_dp, |r, c| v[r * nw + nx + nu + c]);
-        Ok((result, moments))
     }
 
     /// The solution at the end, and the gradient of `λᵀx`.
@@ -471,100 +302,5 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         if let (true, Some(last)) = (*terminal, occurrences.last()) {
             nominal.x = last.before;
         }
-    }
-
-    /// `V⁻` becomes `V⁺`, or the derivative of the last state; the derivative of the time.
-    fn forward_jump(
-        &mut self,
-        event: Event<M, T>,
-        moment: &Moment<M, T>,
-        v: &mut [T],
-        next: &mut [T],
-    ) -> Result<ArrayW<M, T>, Error> {
-        let (nx, nz, nw) = (M::Shape::NX, M::Shape::NZ, M::Shape::NW);
-        let guard = moment.guard.as_ref();
-        let factor = -(T::ONE / moment.rate);
-        let mut time = ArrayW::<M, T>::zeroed();
-        for (w, element) in time.as_mut().iter_mut().enumerate().skip(nx) {
-            *element = factor * guard[nx + nz + w];
-        }
-        for (g, v) in guard[nx..].iter().zip(v.chunks_exact(nw.max(1))) {
-            axpy(factor * *g, v, time.as_mut());
-        }
-        for (f, v) in moment.before.as_ref().iter().zip(v.chunks_exact_mut(nw.max(1))) {
-            axpy(*f, time.as_ref(), v);
-        }
-        let Some(jump) = event.jump else { return Ok(time) };
-        for (r, row) in next.chunks_exact_mut(nw.max(1)).enumerate() {
-            let unit = ArrayX::<M, T>::from_fn(|x| if x == r { T::ONE } else { T::ZERO });
-            let (gradient, rate) = jump.gradient(&self.v, unit.as_ref());
-            row.fill(T::ZERO);
-            row[nx..].copy_from_slice(&gradient.as_ref()[2 * nx + nz..2 * nx + nz + nw - nx]);
-            for (j, v) in gradient.as_ref()[nx..2 * nx].iter().zip(v.chunks_exact(nw.max(1))) {
-                axpy(*j, v, row);
-            }
-            axpy(rate - moment.after.as_ref()[r], time.as_ref(), row);
-        }
-        v.copy_from_slice(next);
-        Ok(time)
-    }
-
-    /// Shows an integrand what is before an event, and with the sign of a lower limit what is after
-    /// it.
-    fn beside(
-        &mut self,
-        k: usize,
-        event: &Event<M, T>,
-        moment: &Moment<M, T>,
-        integrand: &mut dyn Integrand<M, T>,
-        mut each: impl FnMut(&mut dyn Integrand<M, T>, T, Place) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        self.go(k);
-        let Some(occurrence) = self.solution.occurrences.get(k) else { return Ok(()) };
-        let (nx, nk, at) = (M::Shape::NX, M::Shape::NK, Place { step: k, stage: 0, iteration: 0 });
-        let sides =
-            [(&occurrence.before, &moment.before, T::ONE), (&occurrence.after, &moment.after, -T::ONE)];
-        for (x, y, sign) in sides.into_iter().take(if event.jump.is_some() { 2 } else { 1 }) {
-            let (point, _) = integrand.point();
-            point.copy_from_slice(self.v.as_ref().as_ref());
-            point[nx..2 * nx].copy_from_slice(x.as_slice());
-            point[2 * nx..nx + nk].copy_from_slice(&y.as_ref()[nx..]);
-            each(integrand, sign, at)?;
-        }
-        Ok(())
-    }
-
-    /// `λ⁺` becomes `λ⁻`; `κ = −σ/ġ`. `density` is what an integrand gains where the event is
-    /// later.
-    fn adjoint_jump(
-        &mut self,
-        k: usize,
-        event: Event<M, T>,
-        moment: &Moment<M, T>,
-        density: T,
-        result: &mut HybridAdjoint<M, T>,
-    ) -> T {
-        let (nx, nz, nu) = (M::Shape::NX, M::Shape::NZ, M::Shape::NU);
-        let dot = |a: &[T], b: &[T]| a.iter().zip(b).fold(T::ZERO, |sum, (a, b)| sum + *a * *b);
-        let inputs = 2 * nx + nz;
-        let sigma = match event.jump {
-            None => dot(result.grad_x0.as_slice(), moment.before.as_ref()),
-            Some(jump) => {
-                self.go(k);
-                let lambda = result.grad_x0;
-                let (gradient, rate) = jump.gradient(&self.v, lambda.as_slice());
-                let gradient = gradient.as_ref();
-                result.grad_x0.as_mut_slice().copy_from_slice(&gradient[nx..2 * nx]);
-                axpy(T::ONE, &gradient[inputs..inputs + nu], result.grad_u.as_mut_slice());
-                axpy(T::ONE, &gradient[inputs + nu..], result.grad_p.as_mut_slice());
-                dot(&gradient[nx..2 * nx], moment.before.as_ref()) + rate
-                    - dot(lambda.as_slice(), moment.after.as_ref())
-            }
-        };
-        let (factor, guard) = (-((sigma + density) / moment.rate), moment.guard.as_ref());
-        axpy(factor, &guard[nx..2 * nx], result.grad_x0.as_mut_slice());
-        axpy(factor, &guard[inputs..inputs + nu], result.grad_u.as_mut_slice());
-        axpy(factor, &guard[inputs + nu..], result.grad_p.as_mut_slice());
-        factor
     }
 }

@@ -6,10 +6,11 @@ use super::super::run::Span;
 use super::super::sealed::Engine;
 use super::super::segment::add;
 use super::super::statistics::AdaptiveStatistics;
+use super::evaluate::{evaluate, finite, place};
 use super::{Event, Hybrid, Moment, Occurrence};
-use crate::error::{Argument, Error, Place};
-use crate::irk::{check, not_finite};
-use crate::model::{ArrayK, ArrayV, Dae, VectorP, VectorU, VectorX};
+use crate::error::{Argument, Error};
+use crate::irk::check;
+use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
@@ -371,39 +372,5 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
             return Err(Error::Grazing { event: index, t });
         }
         Ok(())
-    }
-}
-
-/// The state and the time to where they lie among the variables.
-fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, t: T) {
-    let nx = M::Shape::NX;
-    let v = v.as_mut();
-    v[nx..2 * nx].copy_from_slice(x.as_slice());
-    if let Some(time) = v.last_mut() {
-        *time = t;
-    }
-}
-
-/// The function of an event at a state.
-pub(super) fn evaluate<M: Dae, T: Real>(
-    event: &Event<M, T>,
-    v: &mut ArrayV<M, T>,
-    x: &VectorX<M, T>,
-    t: T,
-    k: usize,
-) -> Result<f64, Error> {
-    place::<M, T>(v, x, t);
-    let value = event.guard.first(v);
-    finite(event.guard.name, &[value], k)?;
-    Ok(value.to_f64())
-}
-
-/// # Errors
-/// [`Error::NonFiniteFunction`]
-pub(super) fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
-    let at = Place { step, stage: 0, iteration: 0 };
-    match not_finite(values) {
-        None => Ok(()),
-        Some((output, value)) => Err(Error::NonFiniteFunction { function, output, value, at }),
     }
 }

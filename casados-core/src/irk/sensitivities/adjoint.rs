@@ -83,9 +83,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<C>,
     {
-        check_input(Argument::Lambda, seeds)?;
+        self.run.needs(check_input(Argument::Lambda, seeds))?;
         begin(&mut along);
-        let memory = W::adjoint(&mut self.adjoint)?;
+        let memory = self.run.needs(W::adjoint(&mut self.adjoint))?;
         let count = self.run.options.steps;
         // On the way forth only the last step is linearised: it is where the way back begins.
         let mut parts = self.run.steps(arguments, |parts, n, step, exact| {

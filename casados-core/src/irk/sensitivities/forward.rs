@@ -98,7 +98,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check_input(Argument::Lambda, lambda.as_slice())?;
+        self.run.needs(check_input(Argument::Lambda, lambda.as_slice()))?;
         self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
         gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
         self.keep_forward()?;
@@ -117,7 +117,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        check_input(Argument::Lambda, lambda)?;
+        self.run.needs(check_input(Argument::Lambda, lambda))?;
         self.differentiate::<false>(arguments, None, Some(&mut to.forward))?;
         gradient(to, lambda)?;
         self.keep_forward().map(|_| ())
@@ -135,7 +135,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     {
         self.sweep = None;
         begin(&mut along);
-        let ForwardMemory { result, pass, .. } = W::forward(&mut self.forward)?;
+        let ForwardMemory { result, pass, .. } = self.run.needs(W::forward(&mut self.forward))?;
         let distant = to.is_some();
         let to = to.unwrap_or(&mut result.forward);
         let count = self.run.options.steps;
@@ -245,10 +245,10 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithDirectional<C>,
     {
-        check_input(Argument::SeedX, seeds.x0.as_slice())?;
-        check_input(Argument::SeedU, seeds.u.as_slice())?;
-        check_input(Argument::SeedP, seeds.p.as_slice())?;
-        let memory = W::directional(&mut self.directional)?;
+        self.run.needs(check_input(Argument::SeedX, seeds.x0.as_slice()))?;
+        self.run.needs(check_input(Argument::SeedU, seeds.u.as_slice()))?;
+        self.run.needs(check_input(Argument::SeedP, seeds.p.as_slice()))?;
+        let memory = self.run.needs(W::directional(&mut self.directional))?;
         memory.seed(seeds);
         let count = self.run.options.steps;
         let parts = self.run.steps(&Arguments { x0, u, h }, |parts, n, step, exact| {

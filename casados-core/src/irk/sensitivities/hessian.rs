@@ -108,16 +108,16 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        check_input(Argument::Lambda, lambda)?;
-        check_input(Argument::Nu, nu)?;
+        self.run.needs(check_input(Argument::Lambda, lambda))?;
+        self.run.needs(check_input(Argument::Nu, nu))?;
         begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;
-        let forward = &mut W::forward(&mut self.forward)?.pass;
-        let HessianMemory { result, pass } = W::hessian(&mut self.hessian)?;
+        let forward = &mut self.run.needs(W::forward(&mut self.forward))?.pass;
+        let HessianMemory { result, pass } = self.run.needs(W::hessian(&mut self.hessian))?;
         let distant = to.is_some();
         let to = to.unwrap_or(result);
-        let records = W::hessian_tape(&mut self.hessian_tape, count)?;
+        let records = self.run.needs(W::hessian_tape(&mut self.hessian_tape, count))?;
         let parts = self.run.steps(arguments, |parts, n, step, exact| {
             parts.linearize(n, step, exact)?;
             let Some(record) = records.get_mut(n) else { return Ok(()) };

@@ -322,6 +322,39 @@ mod logistic {
         assert!(report.rows.iter().all(|row| row.tolerance < 1e-12), "{report}");
     }
 
+    /// Stages that are given as the solution of one call are none of the next, if the first is
+    /// refused: its results are those of an integrator that never had them.
+    #[cfg(feature = "alloc")]
+    #[test]
+    fn a_refused_call_uses_up_its_solution() {
+        let v = SVector::<f64, 1>::new;
+        let [x0, u, p] = AT.map(v);
+        let none = v(f64::NAN);
+        let fresh = || {
+            let mut irk = Irk::<Logistic, Gauss<5>>::new(options(2)).expect("options are valid");
+            irk.set_parameters(&p).expect("finite");
+            irk
+        };
+        let expected = *fresh().hessian(&x0, &u, T, &v(1.0)).expect("a solution");
+        let mut irk = fresh();
+        let stages = [[[7.0; 5]]; 2];
+        type Refused = fn(&mut Irk<Logistic, Gauss<5>>, [&SVector<f64, 1>; 3]) -> bool;
+        let refused: [Refused; 6] = [
+            |irk, [_, u, none]| irk.solve(none, u, T).is_err(),
+            |irk, [x0, u, none]| irk.adjoint(x0, u, T, none).is_err(),
+            |irk, [x0, u, none]| irk.hessian(x0, u, T, none).is_err(),
+            |irk, [x0, u, none]| irk.forward_adjoint(x0, u, T, none).is_err(),
+            |irk, [x0, _, none]| irk.forward(x0, none, T).is_err(),
+            |irk, [x0, u, _]| irk.forward(x0, u, f64::INFINITY).is_err(),
+        ];
+        for refused in refused {
+            irk.set_solution(&stages).expect("memory");
+            assert!(refused(&mut irk, [&x0, &u, &none]));
+            let found = irk.hessian(&x0, &u, T, &v(1.0)).expect("a solution");
+            assert_eq!((found.x, found.dx_dx0, found.h_xx), (expected.x, expected.dx_dx0, expected.h_xx));
+        }
+    }
+
     #[test]
     fn implicit() {
         check(|steps| Irk::<Logistic, Gauss<5>>::new(options(steps)), 32);

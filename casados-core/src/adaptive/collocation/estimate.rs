@@ -1,0 +1,69 @@
+//! The estimated error of a step.
+
+use super::*;
+
+impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
+    /// The larger one of the two estimates, from the defect at the point that is there.
+    ///
+    /// The first is what the matrix of one eigenvalue makes of it. At the end of a step where
+    /// nothing is a stage it is how far the extrapolated derivative is from the solution at the
+    /// state that was reached: of stiff components this is their error, which no method with
+    /// `|R(∞)| = 1` damps. What is extrapolated of `z` is not kept, and the solve takes it out of
+    /// the estimate. The second, of the states, is that of [`DefectFilter`].
+    pub(super) fn estimate(
+        &mut self,
+        start: &Start<'_, M, T>,
+        at_end: bool,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure> {
+        self.defect(start.h, residuals)?;
+        let counted = if at_end { M::Shape::NX } else { M::Shape::NK };
+        let errors = self.memory.error.as_ref().get(..counted).unwrap_or_default();
+        let first = norm(errors, start.scale.as_ref());
+        let larger = self.second(first, start);
+        if at_end || !start.known || larger <= first.max(UNDOUBTED) {
+            return Ok(larger);
+        }
+        // Newton's method leaves a residual of algebraic equations at the start, which does not
+        // shrink with the step: not of this step, and without it only the second estimate is below
+        // its tolerance.
+        let mut defect = self.memory.f_point;
+        self.memory.point = *start.point;
+        self.evaluate_point(residuals)?;
+        for (defect, left) in defect.as_mut().iter_mut().zip(self.memory.f_point.as_ref()) {
+            *defect = *defect - *left;
+        }
+        self.filter(start.h, &mut defect);
+        Ok(self.second(first, start))
+    }
+
+    /// The larger one of an estimate and the second one, of the defect that was filtered last.
+    fn second(&self, first: f64, start: &Start<'_, M, T>) -> f64 {
+        let [error, divided] = self.filtered_defect(start.h);
+        let asked =
+            start.scale.as_ref().iter().zip(start.asked.as_ref()).map(|(scale, asked)| *scale * *asked);
+        let relative = error.as_ref().iter().zip(divided.as_ref()).zip(asked);
+        self.defect_filter.larger(
+            first,
+            start.finer,
+            relative.map(|((error, divided), asked)| (*error * asked, *divided * asked)),
+        )
+    }
+
+    /// The residual at the point that is there.
+    fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
+        let Memory { point, f_point, .. } = &mut *self.memory;
+        *residuals += 1;
+        M::residual::<T>(point, f_point);
+        if not_finite(f_point.as_ref()).is_some() { Err(Failure::NotFinite) } else { Ok(()) }
+    }
+
+    /// The estimated error of `(x, z)` from the defect at the point that is there.
+    fn defect(&mut self, h: T, residuals: &mut usize) -> Result<(), Failure> {
+        self.evaluate_point(residuals)?;
+        let mut error = self.memory.f_point;
+        self.filter(h, &mut error);
+        self.memory.error = error;
+        Ok(())
+    }
+}

@@ -1,0 +1,42 @@
+//! Functions of events, and whether they are finite.
+
+use super::Event;
+use crate::error::{Error, Place};
+use crate::irk::not_finite;
+use crate::model::{ArrayV, Dae, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Matrix, Shape};
+
+/// The state and the time to where they lie among the variables.
+pub(super) fn place<M: Dae, T: Real>(v: &mut ArrayV<M, T>, x: &VectorX<M, T>, t: T) {
+    let nx = M::Shape::NX;
+    let v = v.as_mut();
+    v[nx..2 * nx].copy_from_slice(x.as_slice());
+    if let Some(time) = v.last_mut() {
+        *time = t;
+    }
+}
+
+/// The function of an event at a state.
+pub(super) fn evaluate<M: Dae, T: Real>(
+    event: &Event<M, T>,
+    v: &mut ArrayV<M, T>,
+    x: &VectorX<M, T>,
+    t: T,
+    k: usize,
+) -> Result<f64, Error> {
+    place::<M, T>(v, x, t);
+    let value = event.guard.first(v);
+    finite(event.guard.name, &[value], k)?;
+    Ok(value.to_f64())
+}
+
+/// # Errors
+/// [`Error::NonFiniteFunction`]
+pub(super) fn finite<T: Real>(function: &'static str, values: &[T], step: usize) -> Result<(), Error> {
+    let at = Place { step, stage: 0, iteration: 0 };
+    match not_finite(values) {
+        None => Ok(()),
+        Some((output, value)) => Err(Error::NonFiniteFunction { function, output, value, at }),
+    }
+}

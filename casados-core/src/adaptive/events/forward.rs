@@ -1,0 +1,127 @@
+//! Derivatives over the parts between events, forwards.
+
+use super::*;
+use crate::result::Forward;
+
+impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
+    /// Derivatives of all steps and over all events, and what is known about the moments of these;
+    /// for `second` derivatives, what these need.
+    #[allow(clippy::type_complexity)]
+    pub(super) fn sweep(
+        &mut self,
+        x0: &VectorX<M, T>,
+        second: bool,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<(HybridForward<M, T>, Moments<M, T>), Error> {
+        begin(&mut along);
+        let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+        let bytes = size_of::<ArrayX<M, ArrayW<M, T>>>();
+        let zeroed = || try_zeroed_box().map_err(|()| Error::OutOfMemory { bytes });
+        let [mut v, mut next] = match self.sensitivities.take() {
+            Some(there) => there,
+            None => [zeroed()?, zeroed()?],
+        };
+        for (x, row) in v.as_mut().as_mut().iter_mut().enumerate() {
+            row.as_mut().fill(T::ZERO);
+            row[x] = T::ONE;
+        }
+        let (mut times, mut moments) = (Vec::new(), core::mem::take(&mut self.moments));
+        moments.clear();
+        let mut x = *x0;
+        for k in 0..self.count {
+            let Self { integrator, segments, solution, .. } = self;
+            let Some(segment) = segments.get_mut(k) else { break };
+            segment.x = x;
+            let mut history = core::mem::take(&mut segment.history);
+            let mut own = core::mem::take(&mut segment.v);
+            history.clear();
+            let (mut frozen, state, memory, _) = segment.open(integrator)?;
+            // Its derivatives by where a segment begins are multiplied by those of that.
+            let mut part = chain(&mut along, Some(&*v), false);
+            frozen.forward::<B>(state, &x, memory, second.then_some(&mut history), dynamic(&mut part))?;
+            let local = &memory.hessian.first.forward;
+            if k == 0 {
+                solution.nominal.z0 = local.nominal.z0;
+            }
+            advance(local, &v, &mut next);
+            core::mem::swap(&mut v, &mut next);
+            if second {
+                rows_of(local, &mut own)?;
+            }
+            (segment.history, segment.v) = (history, own);
+            let Some((event, moment)) = self.moment(k)? else { break };
+            let [v, next] = [&mut v, &mut next].map(|v| ArrayW::<M, T>::flat_mut(v.as_mut().as_mut()));
+            let time = self.forward_jump(event, &moment, v, next)?;
+            if let Some(integrand) = &mut along {
+                self.beside(k, &event, &moment, &mut **integrand, |integrand, sign, at| {
+                    integrand.prolong(sign, &time, at)
+                })?;
+            }
+            let mut gradient =
+                TimeGradient::<M, T> { x0: Zeroable::zeroed(), u: Zeroable::zeroed(), p: Zeroable::zeroed() };
+            gradient.x0.as_mut_slice().copy_from_slice(&time.as_ref()[..nx]);
+            gradient.u.as_mut_slice().copy_from_slice(&time.as_ref()[nx..nx + nu]);
+            gradient.p.as_mut_slice().copy_from_slice(&time.as_ref()[nx + nu..]);
+            times.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&gradient) })?;
+            times.push(gradient);
+            let moment = (event, moment);
+            moments.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&moment) })?;
+            moments.push(moment);
+            x = self.solution.occurrences.get(k).map_or(x, |occurrence| occurrence.after);
+        }
+        self.collect();
+        finish(&mut along)?;
+        let [v, _] = self.sensitivities.insert([v, next]);
+        let v = ArrayW::<M, T>::flat(v.as_ref().as_ref());
+        if let Some((index, _)) = not_finite(v) {
+            return Err(Error::Overflow { step: 0, index });
+        }
+        let mut result = HybridForward {
+            solution: self.solution.clone(),
+            dx_dx0: Zeroable::zeroed(),
+            dx_du: Zeroable::zeroed(),
+            dx_dp: Zeroable::zeroed(),
+            times,
+        };
+        fill(&mut result.dx_dx0, |r, c| v[r * nw + c]);
+        fill(&mut result.dx_du, |r, c| v[r * nw + nx + c]);
+        fill(&mut result.dx_dp, |r, c| v[r * nw + nx + nu + c]);
+        Ok((result, moments))
+    }
+}
+
+/// `V⁺ = ∂x⁺/∂x V + ∂x⁺/∂w` over a segment.
+fn advance<M: Dae, T: Real>(local: &Forward<M, T>, v: &Rows<M, T>, next: &mut Rows<M, T>) {
+    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    for (r, row) in next.as_mut().iter_mut().enumerate() {
+        let row = row.as_mut();
+        row.fill(T::ZERO);
+        for (c, v) in v.as_ref().iter().enumerate() {
+            axpy(local.dx_dx0[(r, c)], v.as_ref(), row);
+        }
+        for (c, element) in row[nx..].iter_mut().enumerate() {
+            let part = if c < nu { local.dx_du[(r, c)] } else { local.dx_dp[(r, c - nu)] };
+            *element = *element + part;
+        }
+    }
+}
+
+/// The derivatives over a segment alone, row by row.
+///
+/// # Errors
+/// [`Error::OutOfMemory`]
+fn rows_of<M: Dae, T: Real>(local: &Forward<M, T>, own: &mut Vec<T>) -> Result<(), Error> {
+    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
+    refill(own, nx * nw, T::ZERO)?;
+    for (index, element) in own.iter_mut().enumerate() {
+        let (r, w) = (index / nw, index % nw);
+        *element = if w < nx {
+            local.dx_dx0[(r, w)]
+        } else if w < nx + nu {
+            local.dx_du[(r, w - nx)]
+        } else {
+            local.dx_dp[(r, w - nx - nu)]
+        };
+    }
+    Ok(())
+}

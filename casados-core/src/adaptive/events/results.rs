@@ -1,0 +1,71 @@
+//! What calls with events return.
+
+use super::*;
+
+/// An event that happened.
+pub struct Occurrence<M: Dae, T: Real = f64> {
+    /// Which.
+    pub event: usize,
+    /// The time at which it happened: that of the model, not since the start of the interval.
+    pub t: T,
+    /// The state before it.
+    pub before: VectorX<M, T>,
+    /// The state after it.
+    pub after: VectorX<M, T>,
+}
+
+/// The solution at the end, and what happened before.
+pub struct Solution<M: Dae, T: Real = f64> {
+    /// `x` and `z` at the end, `z0` at the start.
+    pub nominal: Nominal<M, T>,
+    /// The time at the end: that of the interval, or the time of the event that ended the
+    /// integration.
+    pub t: T,
+    /// Whether an event ended it: the last of the occurrences.
+    pub terminal: bool,
+    /// The events, one after the other.
+    pub occurrences: Vec<Occurrence<M, T>>,
+}
+
+/// The solution at the end and its derivatives; if an event ended the integration, with the change
+/// of its time.
+pub struct HybridForward<M: Dae, T: Real = f64> {
+    /// The solution.
+    pub solution: Solution<M, T>,
+    /// `∂x/∂x₀`
+    pub dx_dx0: MatrixXX<M, T>,
+    /// `∂x/∂u`
+    pub dx_du: MatrixXU<M, T>,
+    /// `∂x/∂p`
+    pub dx_dp: MatrixXP<M, T>,
+    /// Of the time of each event: its derivatives with respect to `x₀`, `u` and `p`.
+    pub times: Vec<TimeGradient<M, T>>,
+}
+
+/// The derivatives of the time of an event.
+pub struct TimeGradient<M: Dae, T: Real = f64> {
+    /// `∂t/∂x₀`
+    pub x0: VectorX<M, T>,
+    /// `∂t/∂u`
+    pub u: VectorU<M, T>,
+    /// `∂t/∂p`
+    pub p: VectorP<M, T>,
+}
+
+/// The solution at the end and the gradient of `λᵀx`.
+pub struct HybridAdjoint<M: Dae, T: Real = f64> {
+    /// The solution.
+    pub solution: Solution<M, T>,
+    /// `∇(λᵀx)` with respect to `x₀`
+    pub grad_x0: VectorX<M, T>,
+    /// `∇(λᵀx)` with respect to `u`
+    pub grad_u: VectorU<M, T>,
+    /// `∇(λᵀx)` with respect to `p`
+    pub grad_p: VectorP<M, T>,
+}
+
+plain!([M: Dae, T: Real] Occurrence<M, T> { event, t, before, after });
+plain!([M: Dae, T: Real] TimeGradient<M, T> { x0, u, p });
+listed!([M: Dae, T: Real] Solution<M, T> { nominal, t, terminal, occurrences });
+listed!([M: Dae, T: Real] HybridForward<M, T> { solution, dx_dx0, dx_du, dx_dp, times });
+listed!([M: Dae, T: Real] HybridAdjoint<M, T> { solution, grad_x0, grad_u, grad_p });

@@ -1,0 +1,35 @@
+//! What a step needs, and errors where it is not there: a finite Jacobian, a length.
+
+use super::*;
+
+impl<M: Dae, T: Real> Run<'_, M, T> {
+    /// At the point that was reached, or in the middle of the step.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    pub(super) fn evaluate_jacobian(&mut self, middle: bool, step: usize) -> Result<(), Error> {
+        let Base { point, middle: foreseen, f, jacobian, .. } = &mut *self.base;
+        self.statistics.jacobians += 1;
+        M::residual_jacobian::<T>(if middle { foreseen } else { point }, f, jacobian);
+        let at = Place { step, stage: 0, iteration: 0 };
+        if let Some((equation, value)) = not_finite(f.as_ref()) {
+            return Err(Error::NonFiniteModel { quantity: Quantity::Residual, equation, value, at });
+        }
+        if let Some((entry, value)) = not_finite(jacobian.as_ref()) {
+            let equation = M::STRUCTURE.jacobian.at(entry).0;
+            return Err(Error::NonFiniteModel { quantity: Quantity::Jacobian, equation, value, at });
+        }
+        Ok(())
+    }
+
+    /// # Errors
+    /// [`Error::StepSizeUnderflow`]
+    pub(in crate::adaptive) fn check_step(&self, t: T, h: T, reason: Refusal) -> Result<(), Error> {
+        let size = h.to_f64().abs();
+        let tenth = T::from_f64(0.1) * h;
+        if size.is_nan() || size <= 0.0 || size < self.options.min_step || t + tenth == t {
+            return Err(Error::StepSizeUnderflow { t: t.to_f64(), h: h.to_f64(), reason });
+        }
+        Ok(())
+    }
+}
