@@ -267,7 +267,7 @@ impl<'a, T: Real> Iterate<'a, T> {
                 let given = part_mut(g, 0, nx);
                 assign(part_mut(self.initial, 0, nx), given);
                 // Zero, or NaN where it is not finite: that is seen among the residuals.
-                given.iter_mut().for_each(|g| *g = *g - *g);
+                given.iter_mut().for_each(|g| *g = T::ZERO * *g);
             }
         }
         if let Some(coupling) = self.coupling.as_mut().filter(|_| !controlled) {
