@@ -4,6 +4,7 @@
 
 #[path = "../data/mod.rs"]
 mod data;
+mod guesses;
 mod limits;
 #[path = "../../examples/models/ocps/mod.rs"]
 mod ocps;

@@ -70,6 +70,20 @@ fn not_finite() -> Test {
     Ok(())
 }
 
+/// So are those of a row without bounds, at the state that is given, too: a single stage has no
+/// other.
+#[test]
+fn not_finite_where_nothing_is_bounded() -> Test {
+    let mut qp = HeapQp::new(&[StageDims::new(2, 0, 1)])?;
+    qp.fix_initial_state(&[1.0, 2.0])?;
+    qp.stage_mut(0).ok_or("no stage")?.c_mut().set(0, 1, f64::NAN);
+    let QpError::InvalidValue { field, stage, index, .. } = error_of(&qp)? else {
+        return Err("another error".into());
+    };
+    assert_eq!((field, stage, index), (Field::C, 0, 1));
+    Ok(())
+}
+
 #[test]
 fn negative_penalty() -> Test {
     let mut qp = problem()?;

@@ -12,7 +12,7 @@
 
 use super::constraint::Constraints;
 use super::cost::{At, Cost};
-use super::data::{Node, inputs, is_algebraic, split};
+use super::data::{Node, get, inputs, is_algebraic, kept, sizes, split};
 use super::dynamics::{Dynamics, Step};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
@@ -25,26 +25,9 @@ use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
 
-/// `NX + NU` and `NZ`.
-const fn lengths<S: Shape>() -> [usize; 2] {
-    [S::NX + S::NU, S::NZ]
-}
-
-/// How many numbers a stage keeps: `z`, and `∂z/∂(x, u)` row after row.
-pub(super) const fn kept<S: Shape>() -> usize {
-    let [n, nz] = lengths::<S>();
-    nz * (1 + n)
-}
-
-/// How many numbers [`Extended`] takes, for stages with so many constraints.
-pub(super) const fn extended<S: Shape>(rows: usize) -> usize {
-    let [n, nz] = lengths::<S>();
-    if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
-}
-
 /// Keeps what an interval says about the algebraic states at its start.
 pub(super) fn keep<S: Shape, T: Real>(all: &mut [T], k: usize, step: &Step<'_, T>) {
-    let [n, nz] = lengths::<S>();
+    let [n, nz] = sizes::<S>();
     if nz == 0 {
         return;
     }
@@ -76,7 +59,7 @@ impl<'a, T: Real> Extended<'a, T> {
     /// Zeros; nothing if there are no algebraic states.
     pub(super) fn new<S: Shape>(memory: &'a mut [T]) -> Self {
         memory.fill(T::ZERO);
-        let [n, nz] = lengths::<S>();
+        let [n, nz] = sizes::<S>();
         let ld = n + nz;
         let (gradient, rest) = memory.split_at_mut_checked(ld).unwrap_or_default();
         let (hessian, columns) = rest.split_at_mut_checked(ld * ld).unwrap_or_default();
@@ -91,7 +74,7 @@ impl<'a, T: Real> Extended<'a, T> {
     /// Adds all that follows by `dz`, the rows of `∂z/∂(x, u)`, to derivatives over `(x, u)`; of
     /// the constraints it is all there is.
     pub(super) fn fold<S: Shape>(&self, dz: &[T], to: &mut Terms<'_, T>, columns: &mut [T], ld: usize) {
-        let [n, _] = lengths::<S>();
+        let [n, _] = sizes::<S>();
         let rows = || dz.chunks_exact(n.max(1)).enumerate();
         // `a_j + Σ_i a_zi ∂z_i/∂v_j`
         let total = |a: &dyn Fn(usize) -> T, j: usize| {
@@ -124,7 +107,7 @@ impl<'a, T: Real> Extended<'a, T> {
         to: &mut Cross<'_, T>,
         slopes: &mut [T],
     ) {
-        let [n, nz] = lengths::<S>();
+        let [n, nz] = sizes::<S>();
         for (p, (direct, dp)) in
             direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate()
         {
@@ -181,10 +164,4 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         Ok(())
     }
-}
-
-/// An element; zero where there is none.
-#[inline(always)]
-pub(super) fn get<T: Real>(values: &[T], index: usize) -> T {
-    values.get(index).copied().unwrap_or(T::ZERO)
 }

@@ -2,9 +2,10 @@
 
 use super::check::{Labels, first, range};
 use super::data::split;
-use super::dynamics::{Dynamics, Names};
+use super::dynamics::Dynamics;
 use super::error::{ConstraintName, OcpError, Part, Text};
 use super::instance::{Initial, Ocp};
+use super::names::Names;
 use super::problem::Formulation;
 use super::{constraint::Constraints, cost::Cost};
 use crate::qp::{BoundsMut, Field, QpError, Side, StageDims, check};

@@ -1,10 +1,6 @@
 //! Checks of what a problem is given. What they refuse they name as the model does.
 
-use super::constraint::Constraints;
-use super::cost::Cost;
-use super::dynamics::{Dynamics, Names};
 use super::error::{OcpError, Part};
-use super::problem::Formulation;
 use crate::scalar::Real;
 use core::ops::{Bound, Range, RangeBounds};
 
@@ -17,38 +13,7 @@ pub(super) struct Labels {
     pub name: fn(usize) -> (&'static str, usize),
 }
 
-const fn names<P: Formulation<T>, T: Real>() -> Names {
-    <P::Dynamics as Dynamics<T>>::NAMES
-}
-
-fn listed(names: &[&'static str], index: usize) -> (&'static str, usize) {
-    (names.get(index).copied().unwrap_or(""), index)
-}
-
 impl Labels {
-    /// Of states: of the iterate, of the start, or of bounds.
-    pub fn states<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        Self { part, stage, name: |index| listed(names::<P, T>().x, index) }
-    }
-    /// Of controls.
-    pub fn controls<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        Self { part, stage, name: |index| listed(names::<P, T>().u, index) }
-    }
-    /// Of parameters.
-    pub fn parameters<P: Formulation<T>, T: Real>(stage: usize) -> Self {
-        Self { part: Part::Parameters, stage, name: |index| listed(names::<P, T>().p, index) }
-    }
-    /// Of constraints.
-    pub fn constraints<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        let name = if part == Part::TerminalBounds { P::Terminal::name } else { P::Path::name };
-        Self { part, stage, name }
-    }
-    /// Of references.
-    pub fn references<P: Formulation<T>, T: Real>(part: Part, stage: usize) -> Self {
-        let name = if part == Part::TerminalReference { P::TerminalCost::name } else { P::StageCost::name };
-        Self { part, stage, name }
-    }
-
     fn invalid(self, index: usize, value: f64) -> OcpError {
         let Self { part, stage, name } = self;
         let (name, index) = name(index);

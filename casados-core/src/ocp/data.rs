@@ -1,6 +1,5 @@
 //! What a problem on a horizon remembers beside its QP and its iterate, in one memory.
 
-use super::algebraic::{extended, get, kept};
 use super::constraint::Constraints;
 use super::cost::Cost;
 use super::problem::Formulation;
@@ -125,4 +124,27 @@ pub(super) const fn stage<P: Formulation<T>, T: Real>(last: bool) -> StageDims {
     } else {
         StageDims::new(P::Shape::NX, P::Shape::NU, P::Path::ROWS)
     }
+}
+
+/// `NX + NU` and `NZ`.
+pub(super) const fn sizes<S: Shape>() -> [usize; 2] {
+    [S::NX + S::NU, S::NZ]
+}
+
+/// How many numbers a stage keeps: `z`, and `∂z/∂(x, u)` row after row.
+pub(super) const fn kept<S: Shape>() -> usize {
+    let [n, nz] = sizes::<S>();
+    nz * (1 + n)
+}
+
+/// How many numbers `algebraic::Extended` takes, for stages with so many constraints.
+pub(super) const fn extended<S: Shape>(rows: usize) -> usize {
+    let [n, nz] = sizes::<S>();
+    if nz > 0 { (n + nz) * (1 + n + nz + rows) } else { 0 }
+}
+
+/// An element; zero where there is none.
+#[inline(always)]
+pub(super) fn get<T: Real>(values: &[T], index: usize) -> T {
+    values.get(index).copied().unwrap_or(T::ZERO)
 }

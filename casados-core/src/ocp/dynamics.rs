@@ -1,23 +1,11 @@
 //! What happens between two nodes of a horizon.
 
 use super::error::OcpError;
+use super::names::Names;
 use crate::model::Dae;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
-
-/// Names of the variables of a model.
-#[derive(Clone, Copy, Debug)]
-pub struct Names {
-    /// Of the model.
-    pub model: &'static str,
-    /// States.
-    pub x: &'static [&'static str],
-    /// Controls.
-    pub u: &'static [&'static str],
-    /// Parameters.
-    pub p: &'static [&'static str],
-}
 
 /// What is given of one interval.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Every mistake in a problem, and what can go wrong where it is evaluated; `messages` say it.
 
-use super::dynamics::Names;
+use super::names::Names;
 use crate::error::Error;
 use crate::qp::{Field, QpError, Side};
 use core::fmt;

@@ -73,9 +73,9 @@ pub enum Status {
     /// Variables grow without end at points that satisfy all constraints: something is missing that
     /// bounds the objective.
     Unbounded,
-    /// Near the iterate no point satisfies all constraints: no direction makes the sum of its gaps
-    /// and violations smaller by a thousandth, to first order. This is the constraint that the
-    /// iterate violates most.
+    /// Locally infeasible: gaps are less than violations, and no step makes the sum of both smaller
+    /// by a thousandth, to first order. Elsewhere there may be points that satisfy all constraints.
+    /// This is the one that the iterate violates most.
     Infeasible {
         /// The constraint.
         constraint: ConstraintName,
@@ -155,7 +155,7 @@ impl fmt::Display for Status {
                 "unbounded: variables grow without end; bounds of states and controls, or a cost of them, are missing",
             ),
             Self::Infeasible { constraint, violation } => {
-                write!(f, "infeasible near the iterate: {constraint} is violated by {violation:e}; another guess may help")
+                write!(f, "locally infeasible: {constraint} is violated by {violation:e}; another guess may help")
             }
             Self::InfeasibleQp { constraint, violation } => {
                 write!(

@@ -1,7 +1,8 @@
 //! A function as dynamics: discrete time.
 
-use super::dynamics::{Dynamics, Names, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
+use super::names::Names;
 use super::point::{parameter, position, read};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;

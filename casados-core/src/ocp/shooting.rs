@@ -1,7 +1,8 @@
 //! A batch as dynamics: all intervals in one call.
 
-use super::dynamics::{Dynamics, Names, Nodes, SecondOrder, Sink, vector};
+use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
+use super::names::Names;
 use super::single::names;
 use crate::batch::{BatchError, Integrator, Intervals};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};

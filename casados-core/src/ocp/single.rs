@@ -1,8 +1,9 @@
 //! Integrators of single intervals as dynamics: one interval after the other, without other memory
 //! than theirs.
 
-use super::dynamics::{Dynamics, IntegralTerms, Interval, Names, Nodes, SecondOrder, Sink, Step, vector};
+use super::dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
+use super::names::Names;
 use crate::error::Error;
 use crate::function::Function;
 use crate::memory::{Memory, WithForward, WithHessian};

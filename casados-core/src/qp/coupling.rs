@@ -8,11 +8,8 @@
 //! no multipliers in a solution: the gradient of the Lagrangian in variables that are one is the
 //! sum of its elements in all of them.
 
-use super::check::{largest, of_control, of_state};
 use super::layout::StageDims;
-use super::problem::{Qp, QpView, Stage};
-use super::solution::{Solution, SolutionStage};
-use super::statistics::Residuals;
+use super::problem::{Qp, QpView};
 use crate::scalar::Real;
 
 impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
@@ -69,36 +66,4 @@ pub(crate) fn is_marked<T: Real>(marks: &[T], index: usize) -> bool {
 /// The first and the last dimensions.
 fn ends(dims: &[StageDims]) -> (StageDims, StageDims) {
     (dims.first().copied().unwrap_or_default(), dims.last().copied().unwrap_or_default())
-}
-
-/// Residuals of variables that are one: sums of gradients, and differences.
-pub(super) fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-    qp: QpView<'_, T>,
-    solution: &Solution<T, D, M>,
-    result: &mut Residuals,
-) {
-    type Pair<'a, T> = (Stage<'a, T>, SolutionStage<'a, T>);
-    let pairs = || qp.stages().zip(solution.stages());
-    let (Some(first), Some(last)): (Option<Pair<'_, T>>, _) = (pairs().next(), pairs().next_back()) else {
-        return;
-    };
-    let arriving = solution.stages().rev().nth(1).map_or(&[][..], |before| before.dynamics);
-    for i in marked(qp.periodic()) {
-        let sum = of_state(&first.0, &first.1, &[], i).0 + of_state(&last.0, &last.1, arriving, i).0;
-        largest(&mut result.stationarity, sum);
-        let at = |x: &[T]| x.get(i).map_or(0.0, |x| x.to_f64());
-        largest(&mut result.dynamics, at(first.1.x) - at(last.1.x));
-    }
-    for j in marked(qp.shared()) {
-        let at = |u: &[T]| u.get(j).map(|u| u.to_f64());
-        let sum: f64 = pairs()
-            .filter(|(_, point)| at(point.u).is_some())
-            .map(|(data, point)| of_control(&data, &point, j).0)
-            .sum();
-        largest(&mut result.stationarity, sum);
-        let of_first = at(first.1.u).unwrap_or(0.0);
-        pairs()
-            .filter_map(|(_, point)| at(point.u))
-            .for_each(|u| largest(&mut result.dynamics, u - of_first));
-    }
 }

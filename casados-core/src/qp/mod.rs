@@ -50,6 +50,7 @@ solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
 )]
 
 mod block;
+mod bounds;
 mod check;
 #[cfg(feature = "clarabel")]
 mod clarabel;
@@ -62,14 +63,18 @@ mod layout;
 #[cfg(feature = "alloc")]
 mod memory;
 mod problem;
+mod residuals;
 mod solution;
 mod solver;
 #[cfg(feature = "clarabel")]
 mod sparse;
+mod stage;
 mod statistics;
+mod violation;
 
 pub use block::{Block, BlockMut};
-pub use check::{check, residuals};
+pub use bounds::{Bounds, BoundsMut};
+pub use check::check;
 #[cfg(feature = "clarabel")]
 pub use clarabel::{Clarabel, SecondOrderCone};
 #[cfg(feature = "alloc")]
@@ -81,19 +86,22 @@ pub use interior::{InteriorPoint, InteriorPointOptions, Store};
 pub use layout::StageDims;
 #[cfg(feature = "alloc")]
 pub use problem::HeapQp;
-pub use problem::{Bounds, BoundsMut, Qp, QpView, Stage, StageMut};
+pub use problem::{Qp, QpView};
+pub use residuals::residuals;
 #[cfg(feature = "alloc")]
 pub use solution::HeapSolution;
 pub use solution::{Solution, SolutionStage, SolutionStageMut, SolutionView};
 pub use solver::{QpSolver, Start};
+pub use stage::{Stage, StageMut};
 pub use statistics::{Residuals, Statistics};
 
 // What the optimal control problems write and read.
-pub(crate) use check::bounds as bound_residuals;
 pub(crate) use coupling::{is_marked, marked};
 pub(crate) use interior::{
     Columns, add_symmetric, add_transposed, dot, scale, splat, subtract, subtract_column, symmetric,
 };
 pub(crate) use layout::{Places, assign, end, pad, part, part_mut, take_mut};
-pub(crate) use problem::Arrays;
+pub(crate) use residuals::bounds as bound_residuals;
+pub(crate) use stage::Arrays;
 pub(crate) use statistics::larger;
+pub(crate) use violation::{Violation, worst};

@@ -1,9 +1,11 @@
 //! A QP as one sparse problem: `min ½ zᵀ P z + qᵀ z`, `K z + s = b`, with rows of equations, then
 //! sides, then cones.
 
+use super::bounds::Bounds;
 use super::coupling::marked;
 use super::layout::Places;
-use super::problem::{Bounds, QpView, Stage};
+use super::problem::QpView;
+use super::stage::Stage;
 use alloc::vec::Vec;
 
 /// Where a row comes from.

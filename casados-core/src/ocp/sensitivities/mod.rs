@@ -4,7 +4,7 @@ mod active;
 mod parameters;
 mod recursion;
 
-use super::algebraic::get;
+use super::data::get;
 use super::error::{OcpError, Part};
 use super::instance::{Initial, Ocp};
 use super::linearise::Curvature;

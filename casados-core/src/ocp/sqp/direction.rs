@@ -2,9 +2,10 @@
 //! penalties where it is infeasible.
 
 use super::Sqp;
-use super::run::State;
+use super::state::State;
 use crate::ocp::convexify::Convexification;
 use crate::ocp::elastic::Worst;
+use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Curvature;
 use crate::ocp::log::Iteration;
@@ -28,6 +29,10 @@ const MOST_ELASTIC: f64 = 1e4;
 const DIGITS: f64 = 1e-13;
 /// No direction makes violations smaller if the best one leaves this part of them.
 const STAYS: f64 = 1.0 - 1e-3;
+/// Gaps are closed that are no more than this part of the violations of bounds.
+const CLOSED: f64 = 1e-2;
+/// The curvature that keeps a point near the iterate, as a part of the penalty.
+const FLAT: f64 = 2e-5;
 
 /// What came of a QP.
 pub(super) enum Direction {
@@ -79,36 +84,45 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<T>,
         row: &mut Iteration,
-    ) -> Result<Direction, QpError>
+    ) -> Result<Result<Direction, QpError>, OcpError>
     where
         C: Curvature<P::Dynamics, T>,
     {
+        state.nearest = false;
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
         self.qp_solver.relax(self.options.qp_accuracy * row.residuals.largest());
         let start = if warm { Start::Warm } else { Start::Cold };
-        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Direction::Step) };
+        let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Ok(Direction::Step)) };
         let may_help = matches!(
             error,
             QpError::Infeasible { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. }
         );
         if !(may_help && self.options.elastic) {
-            return Err(error);
+            return Ok(Err(error));
         }
         // What is violated and what is possible are compared: by exact solutions.
         let mut penalty = self.options.elastic_penalty.max(state.penalty);
         self.set_elastic(ocp, state, penalty);
         self.qp_solver.relax(DIGITS * penalty);
         row.elastic = true;
-        // What made it infeasible says more than what happened afterwards.
-        self.regularised(ocp, state, Start::Cold, row).map_err(|_| error)?;
         let (worst, bounds) = ocp.worst(self.penalties(ocp));
-        let before = bounds + ocp.gaps();
+        let gaps = ocp.gaps();
+        let before = bounds + gaps;
+        if self.regularised(ocp, state, Start::Cold, row).is_err() {
+            // Without objective and curvature it is nearly a linear program.
+            if self.nearest(ocp, state, row, before).is_err() {
+                return Ok(Err(error));
+            }
+            (state.nearest, row.regularisation) = (true, 0.0);
+            ocp.linearise(self.curvature)?;
+            return Ok(Ok(Direction::Step));
+        }
         let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
-            return Ok(Direction::Step);
+            return Ok(Ok(Direction::Step));
         };
         if self.violation_of_solution(ocp) < STAYS * before {
-            return Ok(Direction::Step);
+            return Ok(Ok(Direction::Step));
         }
         // The objective may be what holds it back: with larger penalties it counts less.
         self.trial.copy_from(&self.solution);
@@ -123,16 +137,55 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if stays && self.violation_of_solution(ocp) < STAYS * before {
                 // It is, and from now on it does.
                 state.penalty = penalty;
-                return Ok(Direction::Step);
+                return Ok(Ok(Direction::Step));
             }
         }
-        if stays {
-            return Ok(Direction::Infeasible(worst));
+        // The Hessian may, too: nearly a linear program is what tells where gaps are closed.
+        if stays && gaps <= CLOSED * bounds {
+            if self.nearest(ocp, state, row, before).is_err() {
+                return Ok(Err(error));
+            }
+            if self.violation_of_solution(ocp) >= STAYS * before {
+                return Ok(Ok(Direction::Infeasible(worst)));
+            }
+            (state.nearest, row.regularisation) = (true, 0.0);
+            ocp.linearise(self.curvature)?;
+            return Ok(Ok(Direction::Step));
+        }
+        // Gaps are to be closed first, whatever that leaves of bounds.
+        if stays && gaps <= bounds {
+            return Ok(Ok(Direction::Infeasible(worst)));
         }
         state.penalty = 0.0;
         self.set_elastic(ocp, state, self.options.elastic_penalty);
         core::mem::swap(&mut self.solution, &mut self.trial);
-        Ok(Direction::Step)
+        Ok(Ok(Direction::Step))
+    }
+
+    /// The point that violates the linearisation least, near the iterate:
+    ///
+    /// ```text
+    /// min  θ(v) + ½ ε ‖v − v̄‖² / θ₀        θ: violations of bounds, θ₀: those at v̄, and gaps
+    /// ```
+    ///
+    /// Afterwards penalties are those beside which the objective counts nothing.
+    fn nearest<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+        violation: f64,
+    ) -> Result<(), QpError> {
+        let (one, alone) = (self.options.elastic_penalty, MOST_ELASTIC * self.options.elastic_penalty);
+        // Of soft bounds that were given there are costs.
+        let soft = self.penalties(ocp).iter().any(|penalty| penalty.is_finite());
+        let penalty = if soft { alone } else { one };
+        self.set_elastic(ocp, state, penalty);
+        ocp.forget_objective(T::from_f64(FLAT * penalty / violation));
+        self.qp_solver.relax(DIGITS * penalty);
+        let result = self.solve_qp(ocp, Start::Cold, row);
+        self.set_elastic(ocp, state, alone);
+        result
     }
 
     /// The sum of violations that the solution of the QP leaves, by its linearisation.
@@ -156,6 +209,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     {
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let mut unknown = 0;
+        if state.damping > row.regularisation {
+            ocp.regularise(T::from_f64(state.damping - row.regularisation));
+            row.regularisation = state.damping;
+        }
         loop {
             let error = match self.solve_qp(ocp, start, row) {
                 Ok(()) => break,
@@ -181,7 +238,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             };
             ocp.regularise(T::from_f64(more - row.regularisation));
             row.regularisation = more;
-            state.regularisation = more;
+            state.regularisation = more.min(MOST);
         }
         if row.regularisation == 0.0 {
             state.regularisation /= FACTOR;

@@ -11,12 +11,15 @@
 //! | `search` | how far a step goes, by what `measure` finds at trial points |
 //! | `run` | the iterations, and how they end |
 
+mod acceptance;
 mod direction;
 mod measure;
 mod multipliers;
 mod options;
 mod run;
 mod search;
+mod start;
+mod state;
 
 pub use options::{Globalisation, SqpOptions};
 

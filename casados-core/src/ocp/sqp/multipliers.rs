@@ -40,7 +40,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let ends = ocp.ends();
         ocp.remember_penalties(self.work.as_mut().get_mut(ends..).unwrap_or_default());
         ocp.ignore_inequalities();
-        ocp.flatten(T::from_f64(SMALL));
+        ocp.flatten(T::from_f64(SMALL), T::ONE);
         self.solution.copy_from(&ocp.iterate);
         self.qp_solver.relax(self.options.tolerance);
         let result = self.qp_solver.solve(ocp.qp(), Start::Warm, self.solution.view_mut());
@@ -62,8 +62,13 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         })
     }
 
-    /// `½ ε ‖v − v̄‖² + ∇fᵀv` as the objective of the QP at the iterate `v̄`.
-    fn flatten(&mut self, small: T) {
+    /// `½ ε ‖v − v̄‖²` as the objective of the QP at the iterate `v̄`.
+    pub(super) fn forget_objective(&mut self, small: T) {
+        self.flatten(small, T::ZERO);
+    }
+
+    /// `½ ε ‖v − v̄‖² + s ∇fᵀv` as the objective of the QP at the iterate `v̄`.
+    fn flatten(&mut self, small: T, share: T) {
         let (v, _) = self.iterate.vectors();
         let mut begin = 0;
         for mut stage in self.qp.stages_mut() {
@@ -71,6 +76,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let here = part(v, begin, ld);
             begin += ld;
             add_symmetric(gradient, hessian, ld, here, n);
+            gradient.iter_mut().for_each(|g| *g = share * *g);
             hessian.fill(T::ZERO);
             let diagonal = hessian.iter_mut().step_by(ld + 1).take(n);
             for ((h, gradient), &v) in diagonal.zip(gradient).zip(here) {

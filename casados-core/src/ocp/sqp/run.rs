@@ -1,9 +1,11 @@
 //! The iterations.
 
 use super::Sqp;
+use super::acceptance::Search;
 use super::direction::Direction;
 use super::options::Globalisation;
-use super::search::Search;
+use super::state::{State, Taken};
+use crate::ocp::convexify::Convexification;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Curvature;
@@ -11,7 +13,7 @@ use crate::ocp::linearise::Curvature;
 use crate::ocp::log::reserve;
 use crate::ocp::log::{Iteration, Outcome, Status, Watch};
 use crate::ocp::problem::Formulation;
-use crate::qp::{QpSolver, StageDims};
+use crate::qp::{QpError, QpSolver, StageDims};
 use crate::scalar::Real;
 use core::marker::PhantomData;
 use core::ops::ControlFlow;
@@ -24,29 +26,8 @@ const ROOM: usize = 64;
 /// its curvature counts.
 const PASSING: usize = 4;
 
-/// What a run remembers from one iteration to the next.
-pub(super) struct State<T> {
-    pub search: Search,
-    /// Whether bounds have penalties.
-    pub elastic: bool,
-    /// The regularisation of the last QP that needed one, and less after those that did not.
-    pub regularisation: f64,
-    /// Steps with penalties in a row.
-    elastic_steps: usize,
-    /// The penalty that violations were found to need; zero at first.
-    pub(super) penalty: f64,
-    /// The largest residual of the best iterate.
-    best_residual: f64,
-    /// That iterate.
-    best_iteration: Iteration,
-    number: PhantomData<T>,
-}
-
-/// What a step was.
-pub(super) struct Taken {
-    pub length: f64,
-    pub corrected: bool,
-}
+/// The regularisation of directions, where no step along the one before is short enough.
+const DAMPING: [f64; 4] = [0.0, 1e-2, 1e0, 1e2];
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// Solves a problem, from its iterate on; afterwards this is the best one, whatever the status.
@@ -83,8 +64,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             search: Search::new(),
             elastic: false,
             regularisation: 0.0,
-            elastic_steps: 0,
+            damping: 0.0,
+            nearest: false,
             penalty: 0.0,
+            elastic_steps: 0,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
             number: PhantomData,
@@ -153,6 +136,10 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut watch = Watch::start();
         row.times.linearise = match state.search.linearised.take() {
             Some(seconds) => seconds,
+            None if row.iteration == 0 => {
+                self.begin(ocp)?;
+                watch.lap()
+            }
             None => {
                 ocp.linearise(self.curvature)?;
                 watch.lap()
@@ -176,27 +163,14 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         if row.iteration >= self.options.max_iterations {
             return Ok(Some(Status::MaxIterations));
         }
-        let direction = self.direction(ocp, state, row);
-        row.times.qp = watch.lap();
-        match direction {
-            Ok(Direction::Step) => {}
-            Ok(Direction::Infeasible(worst)) => {
-                state.best_iteration = *row;
-                return Ok(Some(ocp.status_of_worst(&worst)));
-            }
-            Err(error) => return ocp.status_of_error(error).map(Some),
-        }
-        let taken = if self.options.globalisation == Globalisation::FullStep {
-            core::mem::swap(&mut ocp.iterate, &mut self.solution);
-            Some(Taken { length: 1.0, corrected: false })
-        } else {
-            self.search(ocp, state, row)?
+        let taken = match self.step(ocp, state, row, &mut watch)? {
+            ControlFlow::Continue(taken) => taken,
+            ControlFlow::Break(status) => return Ok(Some(status)),
         };
-        row.times.search = watch.lap() - state.search.linearised.unwrap_or(0.0);
-        let Some(taken) = taken else { return Ok(Some(Status::NoProgress)) };
         (row.step, row.corrected) = (taken.length, taken.corrected);
+        state.damp(row);
         state.elastic_steps = if row.elastic { state.elastic_steps + 1 } else { 0 };
-        if row.elastic && C::EXACT && state.elastic_steps <= PASSING {
+        if row.elastic && C::EXACT && (state.nearest || state.elastic_steps <= PASSING) {
             // On the way to a feasible point forces of penalties are no multipliers: curvatures
             // would be far too large.
             ocp.iterate.multipliers_mut().fill(T::ZERO);
@@ -204,5 +178,74 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.weights.multipliers_mut().fill(T::ZERO);
         }
         Ok(None)
+    }
+
+    /// The full step, or one that a line search finds.
+    fn go<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+    ) -> Result<Option<Taken>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if self.options.globalisation != Globalisation::FullStep {
+            return self.search(ocp, state, row);
+        }
+        core::mem::swap(&mut ocp.iterate, &mut self.solution);
+        Ok(Some(Taken { length: 1.0, corrected: false }))
+    }
+
+    /// A step in the direction of the QP, or of one with more regularisation where none is short
+    /// enough or the QP has no solution.
+    fn step<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+        watch: &mut Watch,
+    ) -> Result<ControlFlow<Status, Taken>, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        let mut failure = None;
+        for damping in DAMPING {
+            if damping > 0.0 {
+                if failure.is_some() {
+                    // The curvature that multipliers have is no help.
+                    ocp.iterate.multipliers_mut().fill(T::ZERO);
+                }
+                ocp.linearise(self.curvature)?;
+                self.leave_elastic(ocp, state);
+                (row.regularisation, state.damping) = (0.0, damping);
+            }
+            let direction = self.direction(ocp, state, row)?;
+            row.times.qp += watch.lap();
+            failure = direction.as_ref().err().copied();
+            match direction {
+                Ok(Direction::Step) => {
+                    let taken = self.go(ocp, state, row)?;
+                    row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
+                    if let Some(taken) = taken {
+                        return Ok(ControlFlow::Continue(taken));
+                    }
+                }
+                Ok(Direction::Infeasible(worst)) => {
+                    state.best_iteration = *row;
+                    return Ok(ControlFlow::Break(ocp.status_of_worst(&worst)));
+                }
+                Err(QpError::Infeasible { .. }) if self.options.elastic => {}
+                Err(QpError::NotConvex { .. } | QpError::MaxIterations { .. } | QpError::Stalled { .. })
+                    if self.curvature.convexification() == Convexification::Reduced => {}
+                Err(error) => return ocp.status_of_error(error).map(ControlFlow::Break),
+            }
+        }
+        let status = match failure {
+            // That the QP at one iterate has no solution says nothing of the problem.
+            None | Some(QpError::Infeasible { .. }) => Status::NoProgress,
+            Some(error) => ocp.status_of_error(error)?,
+        };
+        Ok(ControlFlow::Break(status))
     }
 }

@@ -1,21 +1,16 @@
-//! How far a step goes: merit function and filter.
+//! How far a step goes.
 
 use super::Sqp;
-use super::options::{Globalisation, SqpOptions};
-use super::run::{State, Taken};
+use super::acceptance::Line;
+use super::options::Globalisation;
+use super::state::{State, Taken};
 use crate::ocp::error::OcpError;
-use crate::ocp::filter::{Filter, Measure, objective_decides};
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::Curvature;
 use crate::ocp::log::{Iteration, Watch};
 use crate::ocp::problem::Formulation;
 use crate::qp::{QpSolver, Solution, StageDims, Start};
 use crate::scalar::Real;
-
-/// `γ_φ`: what the objective of a new iterate must be better by, as a part of the violation.
-const MARGIN: f64 = 1e-5;
-/// The part of the expected decrease that is enough.
-const ARMIJO: f64 = 1e-4;
 
 /// Weights are at least this part of the largest multiplier: constraints without a force, as at
 /// states that cost nothing, would be left far behind otherwise.
@@ -24,58 +19,6 @@ const LEAST: f64 = 1e-2;
 /// order, where the Hessian curves downwards along the step, too (J. Nocedal, S. J. Wright,
 /// "Numerical Optimization", equation (18.36)).
 const SHARE: f64 = 0.1;
-
-/// What a line search remembers.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    pub filter: Filter,
-    /// Whether the last step was a full one: then the next full step is tried by linearising there,
-    /// which is not to be done again.
-    full: bool,
-    /// Seconds of the linearisation at the iterate, if there is one.
-    pub linearised: Option<f64>,
-}
-
-/// A line search: where it begins, and what it expects.
-#[derive(Clone, Copy)]
-struct Line {
-    here: Measure,
-    /// Of the objective.
-    slope: f64,
-}
-
-impl Search {
-    pub fn new() -> Self {
-        Self { filter: Filter::new(MARGIN, f64::INFINITY), full: true, linearised: None }
-    }
-
-    /// Whether a point is good enough after a step of this length.
-    fn accepts(&mut self, options: &SqpOptions, length: f64, line: &Line, there: &Measure) -> bool {
-        let Line { here, slope } = line;
-        if !there.is_finite() {
-            return false;
-        }
-        // Near the solution, differences are roundings.
-        let noise = 1e4 * f64::EPSILON * (1.0 + here.objective.abs() + here.violation);
-        match options.globalisation {
-            Globalisation::FullStep => true,
-            Globalisation::Merit => {
-                let merit = |m: &Measure| m.objective + m.violation;
-                let slope = slope - here.violation;
-                merit(there) <= merit(here) + ARMIJO * length * slope.min(0.0) + noise
-            }
-            Globalisation::Filter => {
-                if !self.filter.admits(there, noise) {
-                    return false;
-                }
-                if objective_decides(length, *slope, here.violation) {
-                    return there.objective <= here.objective + ARMIJO * length * slope + noise;
-                }
-                self.filter.improves(there, here, noise)
-            }
-        }
-    }
-}
 
 impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
     /// A line search from the iterate towards the solution of its QP. Nothing, if no step is short

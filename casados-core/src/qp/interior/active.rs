@@ -18,9 +18,9 @@
 //! ```
 
 use super::iterate::{Iterate, at};
-use super::residuals::Terms;
 use super::run::Limits;
 use super::sides::{Sides, set};
+use super::terms::Terms;
 use crate::qp::layout::{assign, part_mut};
 use crate::qp::solution::SolutionView;
 use crate::qp::statistics::Statistics;

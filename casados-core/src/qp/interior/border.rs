@@ -26,7 +26,10 @@ use crate::qp::{QpView, marked};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 
-/// See [`Coupling::solve`].
+/// Solves Newton's equations with the parameters; see [`Riccati::solve`].
+///
+/// # Errors
+/// [`QpError::NotConvex`] where the inertia is not that of a minimum.
 pub fn solve<T: Real, E: Packed<T>>(
     coupling: &mut Coupling<'_, T>,
     riccati: &mut Riccati<'_, T>,

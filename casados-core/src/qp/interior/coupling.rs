@@ -3,12 +3,11 @@
 //! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
-use super::riccati::{First, Riccati};
+use super::riccati::First;
 use super::vector::{add_scaled, shrink};
-use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, end, take_mut};
 use crate::qp::{QpView, StageDims, marked};
-use crate::scalar::{Packed, Real};
+use crate::scalar::Real;
 
 /// That there are couplings. Without the feature `alloc` there are none: no value of this type, so
 /// that programs that cannot ask for couplings do not contain them.
@@ -170,20 +169,6 @@ impl<'a, T: Real> Coupling<'a, T> {
                 join(first.nx + j, row + nx + j);
             }
         }
-    }
-
-    /// Solves Newton's equations with the parameters; see [`Riccati::solve`].
-    ///
-    /// # Errors
-    /// [`QpError::NotConvex`] where the inertia is not that of a minimum.
-    pub fn solve<E: Packed<T>>(
-        &mut self,
-        riccati: &mut Riccati<'_, T>,
-        equations: super::riccati::Equations<'_, T>,
-        factor: bool,
-        step: &mut [T],
-    ) -> Result<(), QpError> {
-        super::border::solve::<T, E>(self, riccati, equations, factor, step)
     }
 }
 

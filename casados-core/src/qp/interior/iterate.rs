@@ -3,9 +3,9 @@
 use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, add_transposed, subtract, symmetric};
-use super::residuals::Terms;
 use super::riccati::{First, Riccati};
 use super::sides::{Counts, Sides};
+use super::terms::Terms;
 use super::vector::larger;
 use crate::qp::layout::{Place, Places, StageDims, assign, end, pad, part, part_mut, take_mut};
 use crate::qp::problem::QpView;
@@ -266,7 +266,8 @@ impl<'a, T: Real> Iterate<'a, T> {
                 // What is left is the multiplier of the given state.
                 let given = part_mut(g, 0, nx);
                 assign(part_mut(self.initial, 0, nx), given);
-                given.fill(T::ZERO);
+                // Zero, or NaN where it is not finite: that is seen among the residuals.
+                given.iter_mut().for_each(|g| *g = T::ZERO * *g);
             }
         }
         if let Some(coupling) = self.coupling.as_mut().filter(|_| !controlled) {

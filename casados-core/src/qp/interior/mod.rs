@@ -19,6 +19,7 @@ mod sides;
 mod stage_factor;
 mod store;
 mod symmetric;
+mod terms;
 mod vector;
 mod verdict;
 
@@ -41,6 +42,7 @@ use super::problem::QpView;
 use super::solution::SolutionView;
 use super::solver::{QpSolver, Start};
 use super::statistics::Statistics;
+use super::violation::{self, linear_penalties};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -211,9 +213,11 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
                 located = true;
                 let soft = Attempt { penalties: Penalties::Hard, proximal: true, ..attempt };
                 if let (_, true) = self.run(qp, soft, over, solution)
-                    && let Some(infeasible) = verdict::worst(qp, solution, self.options.tolerance)
+                    && let (Some(worst), _) =
+                        violation::worst(qp, solution.v, |place, row| linear_penalties(qp, place, row))
+                    && worst.violation > self.options.tolerance
                 {
-                    return Err(infeasible);
+                    return Err(worst.into());
                 }
             }
             if iterations >= attempt.iterations {

@@ -34,7 +34,9 @@ impl<T: Real> Iterate<'_, T> {
         };
         match &mut self.coupling {
             None => self.riccati.solve::<E>(equations, factor, self.step)?,
-            Some(coupling) => coupling.solve::<E>(&mut self.riccati, equations, factor, self.step)?,
+            Some(coupling) => {
+                super::border::solve::<T, E>(coupling, &mut self.riccati, equations, factor, self.step)?;
+            }
         }
         self.gather_step();
         Ok(())

@@ -5,15 +5,6 @@ use super::vector::{largest_product, largest_size};
 use crate::qp::statistics::{Residuals, larger};
 use crate::scalar::{Packed, Real};
 
-/// What residuals are sums of.
-#[derive(Clone, Copy)]
-pub struct Terms<T> {
-    /// In gradients: `H v`, `h`, forces of constraints, `π`.
-    pub forces: T,
-    /// In conditions: `v`, `C x + D u`, `b`.
-    pub values: T,
-}
-
 /// The residuals of the conditions of optimality, the largest element of each: see [`Residuals`].
 #[derive(Clone, Copy)]
 pub struct Largest<T> {

@@ -2,9 +2,10 @@
 
 use super::iterate::Iterate;
 use super::options::InteriorPointOptions;
-use super::residuals::{Largest, Terms};
+use super::residuals::Largest;
 use super::riccati::First;
 use super::sides::Penalties;
+use super::terms::Terms;
 use super::vector::{dot, largest_size};
 use crate::qp::error::QpError;
 use crate::qp::layout::{Places, assign, part, part_mut};

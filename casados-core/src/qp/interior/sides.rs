@@ -7,7 +7,8 @@
 //! are an equation, with a multiplier without sign.
 
 use crate::qp::layout::{Places, part, take_mut};
-use crate::qp::problem::{QpView, Row};
+use crate::qp::problem::QpView;
+use crate::qp::stage::Row;
 use crate::scalar::Real;
 
 /// What violations of bounds cost.

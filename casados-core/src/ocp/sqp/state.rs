@@ -1,0 +1,54 @@
+//! What a run remembers.
+
+use super::acceptance::Search;
+use crate::ocp::log::Iteration;
+use core::marker::PhantomData;
+
+/// What a run remembers from one iteration to the next.
+pub(super) struct State<T> {
+    pub search: Search,
+    /// Whether bounds have penalties.
+    pub elastic: bool,
+    /// The regularisation of the last QP that needed one, and less after those that did not.
+    pub regularisation: f64,
+    /// The least regularisation, where steps without were too far from being one of descent.
+    pub damping: f64,
+    /// Whether the last direction was that of the violations alone.
+    pub nearest: bool,
+    /// Steps with penalties in a row.
+    pub elastic_steps: usize,
+    /// The penalty that violations were found to need; zero at first.
+    pub penalty: f64,
+    /// The largest residual of the best iterate.
+    pub best_residual: f64,
+    /// That iterate.
+    pub best_iteration: Iteration,
+    pub number: PhantomData<T>,
+}
+
+/// Steps that are no longer are followed by more damping, by that factor; others by less.
+const SHORT: f64 = 1.0 / 16.0;
+const GROWTH: f64 = 4.0;
+const RELIEF: f64 = 0.1;
+/// The least and the most of it.
+const LEAST: f64 = 1e-3;
+const MOST: f64 = 1e2;
+
+impl<T> State<T> {
+    /// Damping of the next direction, after a step.
+    pub fn damp(&mut self, row: &Iteration) {
+        self.damping = if row.step <= SHORT {
+            (GROWTH * row.regularisation).clamp(LEAST, MOST)
+        } else if self.damping > RELIEF * LEAST {
+            RELIEF * self.damping
+        } else {
+            0.0
+        };
+    }
+}
+
+/// What a step was.
+pub(super) struct Taken {
+    pub length: f64,
+    pub corrected: bool,
+}

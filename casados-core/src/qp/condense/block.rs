@@ -1,0 +1,245 @@
+//! The condensed problem: the recursion over the stages of a block.
+
+use super::plan::{Kind, Origin, blocks, limits};
+use super::{get, set};
+use crate::qp::interior::{Columns, MORE, Part, Source, product, subtract};
+use crate::qp::layout::{Place, Places, StageDims, assign, pad, part, part_mut, take_mut};
+use crate::qp::problem::QpView;
+use crate::qp::stage::Row;
+use crate::scalar::{Packed, Real, Registers};
+use alloc::vec::Vec;
+
+/// The matrices of the recursion, in one memory.
+pub struct Work<'a, T> {
+    /// `Z`, of the next state, then of `(x, u)`
+    z: &'a mut [T],
+    z_next: &'a mut [T],
+    /// `V`, and its next value
+    v: &'a mut [T],
+    m: &'a mut [T],
+    /// `−[A B]ᵀ`
+    minus: &'a mut [T],
+    /// `−[A B]ᵀ V`
+    w: &'a mut [T],
+    /// What is constant in rows of `Z`, or their gradient.
+    constant: &'a mut [T],
+    /// Gradient with respect to the next state, and to `(x, u)`
+    g: &'a mut [T],
+    g_next: &'a mut [T],
+    offset: &'a mut [T],
+    ld_z: usize,
+}
+
+/// The largest dimensions.
+pub struct Largest {
+    pub n: usize,
+    pub nx: usize,
+    pub rows: usize,
+}
+
+impl<'a, T: Real> Work<'a, T> {
+    pub fn lengths(largest: &Largest) -> [usize; 10] {
+        let (ld, ld_x, ld_z) = (pad::<T>(largest.n), pad::<T>(largest.nx), pad::<T>(largest.rows));
+        let n = largest.n + MORE;
+        [ld_z * n, ld_z * n, ld_x * n, ld * n, ld * n, ld * n, ld_z, ld, ld, ld_x]
+    }
+    pub fn new(largest: &Largest, mut memory: &'a mut [T]) -> Self {
+        let mut parts = Self::lengths(largest).into_iter().map(|length| take_mut(&mut memory, length));
+        let mut next = || parts.next().unwrap_or_default();
+        Self {
+            z: next(),
+            z_next: next(),
+            v: next(),
+            m: next(),
+            minus: next(),
+            w: next(),
+            constant: next(),
+            g: next(),
+            g_next: next(),
+            offset: next(),
+            ld_z: pad::<T>(largest.rows),
+        }
+    }
+}
+
+/// Writes the condensed problem.
+pub struct Condense<'a, T> {
+    pub qp: QpView<'a, T>,
+    pub block: usize,
+    pub rows: &'a [Origin],
+    pub work: Work<'a, T>,
+    pub dims: &'a [StageDims],
+    pub target: &'a mut [T],
+    /// Room for what the rows of `Z` are.
+    pub origins: &'a mut Vec<Origin>,
+}
+
+impl<T: Real> Registers<T> for Condense<'_, T> {
+    #[inline(always)]
+    fn run<E: Packed<T>>(mut self) {
+        let mut rows = self.rows;
+        let targets = Places::<T>::new(self.dims);
+        for (block, to) in blocks(self.qp.dims.len(), self.block).zip(targets) {
+            let (here, others) = rows.split_at_checked(to.ng).unwrap_or_default();
+            rows = others;
+            self.block::<E>(block, &to, here);
+        }
+    }
+}
+
+impl<T: Real> Condense<'_, T> {
+    /// One block.
+    #[inline(always)]
+    fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &Place, rows: &[Origin]) {
+        let Work { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = &mut self.work;
+        let (ld_z, origins) = (*ld_z, &mut *self.origins);
+        let target = part_mut(self.target, to.data, to.data_len());
+        part_mut(target, 0, to.matrix()).fill(T::ZERO);
+        origins.clear();
+        let mut controls = 0;
+        let mut first = true;
+        let stages = Places::<T>::new(self.qp.dims).skip(block.start).take(block.len());
+        for place in stages.rev() {
+            let Place { nx, nu, n, ld, next, ld_next, stage, .. } = place;
+            let data = part(self.qp.data, place.data, place.data_len());
+            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+            let negative = part_mut(minus, 0, ld * next);
+            for (negative, &element) in negative.iter_mut().zip(matrix.data) {
+                *negative = -element;
+            }
+            let negative = Columns { data: &*negative, ld };
+            let linear = part(data, place.gradient(), ld);
+            let b = part(data, place.offset(), next);
+            g_next.iter_mut().zip(linear).for_each(|(g, &linear)| *g = linear);
+            let old = origins.len();
+            if first {
+                // x at the end of the block is A x + B u + b, and costs nothing here.
+                for i in 0..next {
+                    origins.push(Origin { kind: Kind::State, stage: stage + 1, index: i });
+                    for (j, &element) in part(matrix.data, i * ld, n).iter().enumerate() {
+                        set(z_next, j * ld_z + i, element);
+                    }
+                    set(constant, i, b.get(i).copied().unwrap_or(T::ZERO));
+                }
+                let hessian = part(data, place.matrix(), place.hessian());
+                assign(part_mut(m, 0, hessian.len()), hessian);
+            } else {
+                // g + V b, and constants + Z b
+                for (offset, &b) in offset.iter_mut().zip(b) {
+                    *offset = -b;
+                }
+                subtract::<T, E>(g, Columns { data: v, ld: ld_next }, offset, next, next);
+                subtract::<T, E>(constant, Columns { data: z, ld: ld_z }, offset, old, next);
+                subtract::<T, E>(g_next, negative, g, n, next);
+                let y = Columns { data: v, ld: ld_next };
+                product::<T, E>(w, ld, Source::Zero, matrix, y, (n, 0..next, next), Part::Full);
+                let hessian =
+                    Source::Matrix(Columns { data: part(data, place.matrix(), place.hessian()), ld });
+                let y = Columns { data: w, ld };
+                product::<T, E>(m, ld, hessian, matrix, y, (n, 0..n, next), Part::Lower);
+                let x = Columns { data: z, ld: ld_z };
+                product::<T, E>(z_next, ld_z, Source::Zero, x, negative, (old, 0..n, next), Part::Full);
+            }
+            first = false;
+            // What belongs to the controls of this stage is done.
+            for i in 0..nu {
+                let column = part(z_next, (nx + i) * ld_z, origins.len());
+                for (origin, &element) in origins.iter().zip(column) {
+                    set(target, at(to, origin, to.nx + controls + i), element);
+                }
+                for j in i..nu {
+                    let element = get(m, (nx + i) * ld + nx + j);
+                    let (row, column) = (to.nx + controls + j, to.nx + controls + i);
+                    set(target, to.matrix() + column * to.ld + row, element);
+                }
+                for (vector, value) in limits(data, &place, nx + i).into_iter().enumerate() {
+                    set(target, to.row_data(Row::Lower) + vector * to.rows + to.nx + controls + i, value);
+                }
+            }
+            // Its rows of Z: mixed derivatives with respect to its controls, and its constraints.
+            for i in 0..nu {
+                let row = origins.len();
+                origins.push(Origin { kind: Kind::Control, stage, index: controls + i });
+                for j in 0..nx {
+                    set(z_next, j * ld_z + row, get(m, j * ld + nx + i));
+                }
+                set(constant, row, get(g_next, nx + i));
+            }
+            controls += nu;
+            for (index, origin) in rows.iter().enumerate().filter(|(_, origin)| origin.stage == stage) {
+                let row = origins.len();
+                origins.push(Origin { index, ..*origin });
+                let general = origin.index.checked_sub(ld);
+                for j in 0..n {
+                    let element = match general {
+                        Some(general) => get(matrix.data, (next + general) * ld + j),
+                        None if origin.index == j => T::ONE,
+                        None => T::ZERO,
+                    };
+                    if j < nx {
+                        set(z_next, j * ld_z + row, element);
+                    } else {
+                        let column = to.nx + controls - nu + j - nx;
+                        set(target, (to.next + index) * to.ld + column, element);
+                    }
+                }
+                set(constant, row, T::ZERO);
+                for (vector, value) in limits(data, &place, origin.index).into_iter().enumerate() {
+                    set(target, to.row_data(Row::Lower) + vector * to.rows + to.ld + index, value);
+                }
+            }
+            // What is left is a function of this stage's state.
+            core::mem::swap(z, z_next);
+            let ld_x = pad::<T>(nx);
+            for j in 0..nx {
+                for i in j..nx {
+                    let element = get(m, j * ld + i);
+                    set(v, j * ld_x + i, element);
+                    set(v, i * ld_x + j, element);
+                }
+            }
+            assign(part_mut(g, 0, nx), part(g_next, 0, nx));
+            part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
+            if stage == block.start {
+                for j in 0..nx {
+                    for i in j..nx {
+                        set(target, to.matrix() + j * to.ld + i, get(m, j * ld + i));
+                    }
+                    for (row, origin) in origins.iter().enumerate() {
+                        set(target, at(to, origin, j), get(z, j * ld_z + row));
+                    }
+                    set(target, to.gradient() + j, get(g, j));
+                    for (vector, value) in limits(data, &place, j).into_iter().enumerate() {
+                        set(target, to.row_data(Row::Lower) + vector * to.rows + j, value);
+                    }
+                }
+            }
+        }
+        for (row, origin) in origins.iter().enumerate() {
+            let constant = get(constant, row);
+            match origin.kind {
+                Kind::State => set(target, to.offset() + origin.index, constant),
+                Kind::Control => set(target, to.gradient() + to.nx + origin.index, constant),
+                Kind::Constraint => {
+                    for vector in [Row::Lower, Row::Upper] {
+                        let at = to.row_data(vector) + to.ld + origin.index;
+                        let bound = get(target, at);
+                        set(target, at, bound - constant);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Where the element of a row of `Z` with a variable of the condensed stage lies.
+fn at(to: &Place, origin: &Origin, variable: usize) -> usize {
+    match origin.kind {
+        Kind::State => origin.index * to.ld + variable,
+        Kind::Constraint => (to.next + origin.index) * to.ld + variable,
+        // Below the diagonal: a later control comes first, so this is its row with states, and its
+        // column with controls.
+        Kind::Control if variable < to.nx => to.matrix() + variable * to.ld + to.nx + origin.index,
+        Kind::Control => to.matrix() + (to.nx + origin.index) * to.ld + variable,
+    }
+}

@@ -1,0 +1,168 @@
+//! Partial condensing: the states inside of blocks of intervals are eliminated.
+//!
+//! A block of stages `k .. k + m` becomes one stage with the state `x_k` and the controls
+//! `(u_{k+m−1}, …, u_k)`, latest first. Bounds of eliminated states become general constraints.
+//! Backwards over the block, with `V` the Hessian of what comes later and `Z` the rows that depend
+//! on `x_{j+1}` (mixed second derivatives, constraints, and `x_{k+m}` itself):
+//!
+//! ```text
+//! V ← H_j + [A B]ᵀ V [A B]        Z ← Z [A B]
+//! ```
+//!
+//! Short blocks pay where there are few controls: the Riccati recursion then goes over larger
+//! matrices fewer times, and less memory passes by in each iteration.
+
+mod block;
+mod expand;
+mod plan;
+
+use super::error::QpError;
+use super::layout::{Places, StageDims, pad, part};
+use super::memory::reserve;
+use super::problem::{HeapQp, QpView};
+use super::solution::{HeapSolution, SolutionView};
+use super::solver::{QpSolver, Start};
+use super::statistics::Statistics;
+use crate::scalar::Real;
+use alloc::vec::Vec;
+use block::{Condense, Largest, Work};
+use expand::{Expand, copy, quadratic};
+use plan::{Kind, Origin, blocks, is_bounded, limits, translate};
+
+/// A solver that sees problems condensed in blocks of some intervals.
+///
+/// Memory is on the heap, and allocated by the first call and by those with larger problems.
+#[derive(Clone, Debug)]
+pub struct Condensing<T, S> {
+    /// The solver of condensed problems.
+    pub solver: S,
+    /// Intervals of a block.
+    block: usize,
+    qp: Option<(HeapQp<T>, HeapSolution<T>)>,
+    dims: Vec<StageDims>,
+    /// The dimensions of the call before.
+    old: Vec<StageDims>,
+    /// Where general constraints come from.
+    rows: Vec<Origin>,
+    /// What the rows of `Z` are.
+    origins: Vec<Origin>,
+    work: Vec<T>,
+}
+
+impl<T: Real, S> Condensing<T, S> {
+    /// A solver for blocks of `block` intervals. With one interval, or zero, nothing is condensed;
+    /// with as many as there are, or more, one state is left.
+    #[must_use]
+    pub fn new(block: usize, solver: S) -> Self {
+        let (dims, old, rows, origins, work) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { solver, block: block.max(1), qp: None, dims, old, rows, origins, work }
+    }
+}
+
+impl<T: Real, S> Condensing<T, S> {
+    /// Dimensions of the condensed problem, and where its general constraints come from, stage by
+    /// stage.
+    fn plan(&mut self, qp: QpView<'_, T>) -> Result<(), QpError> {
+        core::mem::swap(&mut self.dims, &mut self.old);
+        self.dims.clear();
+        self.rows.clear();
+        // As much as there can be, so that no later call needs more.
+        let stages = self.dims.try_reserve(qp.dims.len());
+        let most = qp.dims.iter().map(|d| d.nx + d.ng).sum();
+        stages.and(self.rows.try_reserve(most)).map_err(|_| QpError::OutOfMemory { bytes: most })?;
+        let mut places = Places::<T>::new(qp.dims);
+        for block in blocks(qp.dims.len(), self.block) {
+            let mut condensed = StageDims::default();
+            for stage in block.clone() {
+                let Some(place) = places.next() else { break };
+                let data = part(qp.data, place.data, place.data_len());
+                condensed.nu += place.nu;
+                if stage == block.start {
+                    condensed.nx = place.nx;
+                }
+                let inner = if stage > block.start { 0..place.nx } else { 0..0 };
+                for index in inner.chain(place.ld..place.ld + place.ng) {
+                    if index >= place.ld || is_bounded(limits(data, &place, index)) {
+                        condensed.ng += 1;
+                        self.rows.push(Origin { kind: Kind::Constraint, stage, index });
+                    }
+                }
+            }
+            self.dims.push(condensed);
+        }
+        if self.dims != self.old || self.qp.is_none() {
+            self.qp = Some((HeapQp::new(&self.dims)?, HeapSolution::new(&self.dims)?));
+        }
+        Ok(())
+    }
+}
+
+impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
+    fn relax(&mut self, tolerance: f64) {
+        self.solver.relax(tolerance);
+    }
+    fn refine(&mut self, tolerance: f64) {
+        self.solver.refine(tolerance);
+    }
+
+    fn solve(
+        &mut self,
+        qp: QpView<'_, T>,
+        start: Start,
+        mut solution: SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
+        super::check::check_all_bounds(qp)?;
+        solution.fits(qp)?;
+        if qp.is_coupled() {
+            return Err(QpError::Coupled);
+        }
+        self.plan(qp)?;
+        let Self {
+            solver, block, qp: Some((condensed, start_and_solution)), dims, rows, origins, work, ..
+        } = self
+        else {
+            return Err(QpError::OutOfMemory { bytes: 0 });
+        };
+        let places = Places::<T>::new(qp.dims);
+        let largest = Largest {
+            n: places.clone().map(|p| p.n).max().unwrap_or(0),
+            nx: places.clone().map(|p| p.nx).max().unwrap_or(0),
+            rows: Places::<T>::new(dims).map(|p| p.next + p.nu + p.ng).max().unwrap_or(0),
+        };
+        let most = places.map(|p| pad::<T>(p.next + p.ng)).max().unwrap_or(0);
+        let condensed_n = dims.iter().map(|d| d.nx + d.nu).max().unwrap_or(0);
+        let room = most + pad::<T>(largest.n) + pad::<T>(condensed_n);
+        let length = Work::<T>::lengths(&largest).iter().sum::<usize>() + room;
+        reserve(work, length)?;
+        origins.clear();
+        origins.try_reserve(largest.rows).map_err(|_| QpError::OutOfMemory { bytes: largest.rows })?;
+        let target = condensed.data_mut();
+        let matrices = Work::new(&largest, work);
+        T::registers(Condense { qp, block: *block, rows, work: matrices, dims, target, origins });
+        if start == Start::Warm {
+            copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), false);
+        }
+        let result = solver.solve(condensed.view(), start, start_and_solution.view_mut());
+        copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), true);
+        let (minus, g) = work.split_at_mut_checked(most).unwrap_or_default();
+        T::registers(Expand { qp, block: *block, solution: solution.reborrow(), minus, g });
+        result.map_err(|error| translate(error, qp, *block, dims, rows)).map(|statistics| {
+            // Penalties are the same; what is constant in eliminated states is in none of the
+            // condensed costs.
+            let g = work.get_mut(..pad::<T>(largest.n.max(condensed_n))).unwrap_or_default();
+            let difference = quadratic(qp, solution.v, g)
+                - quadratic(condensed.view(), start_and_solution.view_mut().v, g);
+            Statistics { objective: statistics.objective + difference, ..statistics }
+        })
+    }
+}
+
+fn get<T: Real>(slice: &[T], index: usize) -> T {
+    slice.get(index).copied().unwrap_or(T::ZERO)
+}
+
+fn set<T>(slice: &mut [T], index: usize, value: T) {
+    if let Some(element) = slice.get_mut(index) {
+        *element = value;
+    }
+}

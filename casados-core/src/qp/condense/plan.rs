@@ -1,0 +1,102 @@
+//! Which stages become one, and what their constraints were before.
+
+use crate::qp::error::{Field, QpError};
+use crate::qp::layout::{Place, Places, StageDims, part};
+use crate::qp::problem::QpView;
+use crate::qp::stage::Row;
+use crate::scalar::Real;
+
+/// What a row of `Z` is, or where a constraint of the condensed problem comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    pub kind: Kind,
+    /// The stage it comes from.
+    pub stage: usize,
+    /// A state or control of it, or its row in vectors over constraints.
+    pub index: usize,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// A state at the end of the block.
+    #[default]
+    State,
+    /// A control.
+    Control,
+    /// A general constraint, or a bound of an eliminated state.
+    Constraint,
+}
+
+/// Bounds and penalties of one row.
+pub fn limits<T: Real>(data: &[T], place: &Place, row: usize) -> [T; 6] {
+    let all = [
+        Row::Lower,
+        Row::Upper,
+        Row::LowerLinear,
+        Row::LowerQuadratic,
+        Row::UpperLinear,
+        Row::UpperQuadratic,
+    ];
+    all.map(|vector| part(data, place.row_data(vector) + row, 1).first().copied().unwrap_or(T::ZERO))
+}
+
+/// Whether a row has a bound.
+pub fn is_bounded<T: Real>([lower, upper, ..]: [T; 6]) -> bool {
+    lower.is_finite() || upper.is_finite()
+}
+
+/// The stages of the blocks: all but the last stage in blocks, and the last one by itself.
+pub fn blocks(stages: usize, block: usize) -> impl Iterator<Item = core::ops::Range<usize>> {
+    let last = stages.saturating_sub(1);
+    (0..last).step_by(block).map(move |k| k..(k + block).min(last)).chain(core::iter::once(last..stages))
+}
+
+/// An error in terms of the problem that was not condensed.
+pub fn translate<T: Real>(
+    error: QpError,
+    qp: QpView<'_, T>,
+    size: usize,
+    dims: &[StageDims],
+    rows: &[Origin],
+) -> QpError {
+    let find = |stage: usize, field: Field, index: usize| {
+        let range = blocks(qp.dims.len(), size).nth(stage)?;
+        match field {
+            Field::GeneralBounds => {
+                let before = dims.get(..stage)?.iter().map(|d| d.ng).sum::<usize>();
+                let origin = rows.get(before + index)?;
+                let place = Places::<T>::new(qp.dims).nth(origin.stage)?;
+                let (field, index) = place.name(origin.index);
+                Some((origin.stage, field, index))
+            }
+            Field::ControlBounds => {
+                let mut left = index;
+                for stage in range.rev() {
+                    let nu = qp.dims.get(stage)?.nu;
+                    if left < nu {
+                        return Some((stage, field, left));
+                    }
+                    left -= nu;
+                }
+                None
+            }
+            _ => Some((range.start, field, index)),
+        }
+    };
+    match error {
+        QpError::Infeasible { field, stage, index, side, violation } => {
+            let (stage, field, index) = find(stage, field, index).unwrap_or((stage, field, index));
+            QpError::Infeasible { field, stage, index, side, violation }
+        }
+        QpError::NotConvex { stage, index, pivot } => {
+            let found = find(stage, Field::ControlBounds, index);
+            let (stage, _, index) = found.unwrap_or((stage, Field::ControlBounds, index));
+            QpError::NotConvex { stage, index, pivot }
+        }
+        QpError::InvalidValue { .. } | QpError::CrossedBounds { .. } => match crate::qp::check::check(qp) {
+            Err(found) => found,
+            Ok(()) => error,
+        },
+        others => others,
+    }
+}

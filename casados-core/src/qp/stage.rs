@@ -1,0 +1,290 @@
+//! The data of one stage: matrices, vectors and bounds, read or written.
+
+use super::block::{Block, BlockMut, Shape};
+use super::bounds::{Bounds, BoundsMut};
+use super::error::Field;
+use super::layout::{Place, StageDims, part, part_mut, take_mut};
+use crate::scalar::Real;
+
+/// The data of one stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'a, T> {
+    pub(super) place: Place,
+    pub(super) data: &'a [T],
+}
+
+/// The data of one stage, to be written.
+#[derive(Debug)]
+pub struct StageMut<'a, T> {
+    pub(super) place: Place,
+    pub(super) data: &'a mut [T],
+}
+
+/// What the six vectors over the constraints of a stage are.
+#[derive(Clone, Copy)]
+pub(super) enum Row {
+    Lower,
+    Upper,
+    LowerLinear,
+    LowerQuadratic,
+    UpperLinear,
+    UpperQuadratic,
+}
+
+impl Place {
+    /// Begin of the gradient in the data of the stage.
+    pub(super) const fn gradient(&self) -> usize {
+        self.matrix() + self.hessian()
+    }
+    /// Begin of the offset of the dynamics.
+    pub(super) const fn offset(&self) -> usize {
+        self.gradient() + self.ld
+    }
+    /// Begin of a vector over constraints.
+    pub(super) const fn row_data(&self, row: Row) -> usize {
+        self.offset() + self.ld_next + row as usize * self.rows
+    }
+    fn shape(&self, field: Field) -> (usize, Shape) {
+        let Self { nx, nu, ng, next, ld, stage, .. } = *self;
+        let (matrix, hessian) = (0, self.matrix());
+        let (begin, rows, columns, row, column) = match field {
+            Field::A => (matrix, next, nx, ld, 1),
+            Field::B => (matrix + nx, next, nu, ld, 1),
+            Field::C => (matrix + next * ld, ng, nx, ld, 1),
+            Field::D => (matrix + next * ld + nx, ng, nu, ld, 1),
+            Field::Q => (hessian, nx, nx, 1, ld),
+            Field::R => (hessian + nx * ld + nx, nu, nu, 1, ld),
+            // u's rows left of the diagonal
+            _ => (hessian + nx, nu, nx, 1, ld),
+        };
+        (begin, Shape { field, stage, rows, columns, row, column })
+    }
+    /// Where the constraints of a kind begin in vectors over constraints, and how many there are.
+    pub(super) const fn kind(&self, field: Field) -> (usize, usize) {
+        match field {
+            Field::StateBounds => (0, self.nx),
+            Field::ControlBounds => (self.nx, self.nu),
+            _ => (self.ld, self.ng),
+        }
+    }
+    /// What a row is.
+    pub(super) const fn name(&self, row: usize) -> (Field, usize) {
+        if row < self.nx {
+            (Field::StateBounds, row)
+        } else if row < self.ld {
+            (Field::ControlBounds, row - self.nx)
+        } else {
+            (Field::GeneralBounds, row - self.ld)
+        }
+    }
+}
+
+macro_rules! matrices {
+    ($($(#[$attribute:meta])* $name:ident $name_mut:ident $field:ident;)*) => {
+        impl<'a, T: Real> Stage<'a, T> { $(
+            $(#[$attribute])*
+            #[must_use]
+            pub fn $name(&self) -> Block<'a, T> {
+                let (begin, shape) = self.place.shape(Field::$field);
+                Block { data: self.data.get(begin..).unwrap_or_default(), shape }
+            }
+        )* }
+        impl<'a, T: Real> StageMut<'a, T> { $(
+            $(#[$attribute])*
+            pub fn $name_mut(&mut self) -> BlockMut<'_, T> {
+                let (begin, shape) = self.place.shape(Field::$field);
+                BlockMut { data: self.data.get_mut(begin..).unwrap_or_default(), shape }
+            }
+        )* }
+    };
+}
+
+matrices! {
+    /// `A`, `∂x₊/∂x`
+    a a_mut A;
+    /// `B`, `∂x₊/∂u`
+    b b_mut B;
+    /// `C`, of the general constraints
+    c c_mut C;
+    /// `D`, of the general constraints
+    d d_mut D;
+    /// `Q`. Its lower triangle is read.
+    q q_mut Q;
+    /// `R`. Its lower triangle is read.
+    r r_mut R;
+    /// `S`, a row for each control
+    s s_mut S;
+}
+
+macro_rules! vectors {
+    ($($(#[$attribute:meta])* $name:ident $name_mut:ident: $place:ident => $begin:expr, $length:expr;)*) => {
+        impl<'a, T: Real> Stage<'a, T> { $(
+            $(#[$attribute])*
+            #[must_use]
+            pub fn $name(&self) -> &'a [T] {
+                let $place = self.place;
+                part(self.data, $begin, $length)
+            }
+        )* }
+        impl<'a, T: Real> StageMut<'a, T> { $(
+            $(#[$attribute])*
+            pub fn $name_mut(&mut self) -> &mut [T] {
+                let $place = self.place;
+                part_mut(self.data, $begin, $length)
+            }
+        )* }
+    };
+}
+
+vectors! {
+    /// `b`, the constant part of `x₊ = A x + B u + b`
+    offset offset_mut: p => p.offset(), p.next;
+    /// `q`
+    gradient_x gradient_x_mut: p => p.gradient(), p.nx;
+    /// `r`
+    gradient_u gradient_u_mut: p => p.gradient() + p.nx, p.nu;
+}
+
+macro_rules! bounds {
+    ($($(#[$attribute:meta])* $name:ident $name_mut:ident $field:ident;)*) => {
+        impl<'a, T: Real> Stage<'a, T> { $(
+            $(#[$attribute])*
+            #[must_use]
+            pub fn $name(&self) -> Bounds<'a, T> {
+                self.bounds(Field::$field)
+            }
+        )* }
+        impl<'a, T: Real> StageMut<'a, T> { $(
+            $(#[$attribute])*
+            pub fn $name_mut(&mut self) -> BoundsMut<'_, T> {
+                self.bounds_mut(Field::$field)
+            }
+        )* }
+    };
+}
+
+bounds! {
+    /// Bounds of the states
+    x_bounds x_bounds_mut StateBounds;
+    /// Bounds of the controls
+    u_bounds u_bounds_mut ControlBounds;
+    /// Bounds of the general constraints
+    g_bounds g_bounds_mut GeneralBounds;
+}
+
+impl<'a, T: Real> Stage<'a, T> {
+    /// The dimensions.
+    #[must_use]
+    pub fn dims(&self) -> StageDims {
+        StageDims::new(self.place.nx, self.place.nu, self.place.ng)
+    }
+    fn bounds(&self, field: Field) -> Bounds<'a, T> {
+        self.some_bounds(self.place.kind(field))
+    }
+    /// Those of everything; what is padding is zero.
+    pub(crate) fn all_bounds(&self) -> Bounds<'a, T> {
+        self.some_bounds((0, self.place.rows))
+    }
+    #[inline(always)]
+    fn some_bounds(&self, (begin, length): (usize, usize)) -> Bounds<'a, T> {
+        let rows = |row| part(self.data, self.place.row_data(row) + begin, length);
+        Bounds {
+            lower: rows(Row::Lower),
+            upper: rows(Row::Upper),
+            lower_linear: rows(Row::LowerLinear),
+            lower_quadratic: rows(Row::LowerQuadratic),
+            upper_linear: rows(Row::UpperLinear),
+            upper_quadratic: rows(Row::UpperQuadratic),
+        }
+    }
+}
+
+impl<T: Real> StageMut<'_, T> {
+    /// The dimensions.
+    #[must_use]
+    pub fn dims(&self) -> StageDims {
+        StageDims::new(self.place.nx, self.place.nu, self.place.ng)
+    }
+    fn bounds_mut(&mut self, field: Field) -> BoundsMut<'_, T> {
+        let (begin, length) = self.place.kind(field);
+        let rows = self.data.get_mut(self.place.row_data(Row::Lower)..).unwrap_or_default();
+        let mut vectors = rows.chunks_exact_mut(self.place.rows.max(1));
+        let mut next = || part_mut(vectors.next().unwrap_or_default(), begin, length);
+        BoundsMut {
+            lower: next(),
+            upper: next(),
+            lower_linear: next(),
+            lower_quadratic: next(),
+            upper_linear: next(),
+            upper_quadratic: next(),
+        }
+    }
+}
+
+/// The arrays of a stage as they lie in memory: matrices column after column, over `v = (x, u)`.
+pub(crate) struct Arrays<'a, T> {
+    /// `nx + nu`
+    pub n: usize,
+    /// The distance of columns.
+    pub ld: usize,
+    /// States of the next stage.
+    pub next: usize,
+    /// Where general constraints begin in vectors over constraints, and their length.
+    pub rows: usize,
+    /// `[A B; C D]ᵀ`: a column for each next state, then one for each general constraint.
+    pub matrix: &'a mut [T],
+    /// `[Q Sᵀ; S R]`, of which the lower triangle counts.
+    pub hessian: &'a mut [T],
+    /// `(q, r)`
+    pub gradient: &'a mut [T],
+    /// The constant part of the dynamics.
+    pub offset: &'a mut [T],
+    /// Six vectors over the constraints.
+    pub limits: &'a mut [T],
+}
+
+/// Those of them that a point is judged by.
+pub(crate) struct ArraysRef<'a, T> {
+    pub n: usize,
+    pub ld: usize,
+    pub next: usize,
+    pub matrix: &'a [T],
+    pub hessian: &'a [T],
+    pub gradient: &'a [T],
+    pub offset: &'a [T],
+}
+
+impl<'a, T: Real> Stage<'a, T> {
+    /// The arrays.
+    pub(crate) fn arrays(&self) -> ArraysRef<'a, T> {
+        let (p, data) = (self.place, self.data);
+        ArraysRef {
+            n: p.n,
+            ld: p.ld,
+            next: p.next,
+            matrix: part(data, 0, p.matrix()),
+            hessian: part(data, p.matrix(), p.hessian()),
+            gradient: part(data, p.gradient(), p.ld),
+            offset: part(data, p.offset(), p.ld_next),
+        }
+    }
+}
+
+impl<T: Real> StageMut<'_, T> {
+    /// The arrays.
+    pub(crate) fn arrays(&mut self) -> Arrays<'_, T> {
+        let p = self.place;
+        let mut rest = &mut *self.data;
+        Arrays {
+            n: p.n,
+            ld: p.ld,
+            next: p.next,
+            rows: p.rows,
+            matrix: take_mut(&mut rest, p.matrix()),
+            hessian: take_mut(&mut rest, p.hessian()),
+            gradient: take_mut(&mut rest, p.ld),
+            offset: take_mut(&mut rest, p.ld_next),
+            limits: rest,
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! What a point violates.
+
+use super::error::{Field, QpError, Side};
+use super::layout::{Place, Places, part};
+use super::problem::QpView;
+use super::stage::Row;
+use crate::scalar::Real;
+
+/// A bound, and by how much a point violates it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Violation {
+    pub field: Field,
+    pub stage: usize,
+    pub index: usize,
+    pub side: Side,
+    pub violation: f64,
+}
+
+impl From<Violation> for QpError {
+    fn from(Violation { field, stage, index, side, violation }: Violation) -> Self {
+        Self::Infeasible { field, stage, index, side, violation }
+    }
+}
+
+/// The hard bound that a point `v` violates most, and the sum of all such violations. Bounds are
+/// hard whose linear penalties are infinite: those of lower and upper bounds of states, controls
+/// and general constraints, stage by stage, as `penalties` has them.
+pub(crate) fn worst<T: Real>(
+    qp: QpView<'_, T>,
+    v: &[T],
+    mut penalties: impl FnMut(&Place, usize) -> [T; 2],
+) -> (Option<Violation>, f64) {
+    let (mut worst, mut sum): (Option<Violation>, f64) = (None, 0.0);
+    for place in Places::<T>::new(qp.dims) {
+        let data = part(qp.data, place.data, place.data_len());
+        let v = part(v, place.v, place.ld);
+        for row in (0..place.n).chain(place.ld..place.ld + place.ng) {
+            let value = if row < place.n {
+                v.get(row).map_or(0.0, |v| v.to_f64())
+            } else {
+                let column = part(data, (place.next + row - place.ld) * place.ld, place.n);
+                column.iter().zip(v).map(|(c, v)| c.to_f64() * v.to_f64()).sum()
+            };
+            let bound = |of| data.get(place.row_data(of) + row).map_or(0.0, |b| b.to_f64());
+            let excess = [bound(Row::Lower) - value, value - bound(Row::Upper)];
+            let sides = [Side::Lower, Side::Upper].into_iter().zip(excess);
+            for ((side, violation), penalty) in sides.zip(penalties(&place, row)) {
+                if penalty.is_finite() || violation <= 0.0 {
+                    continue;
+                }
+                sum += violation;
+                if violation > worst.map_or(0.0, |worst| worst.violation) {
+                    let (field, index) = place.name(row);
+                    worst = Some(Violation { field, stage: place.stage, index, side, violation });
+                }
+            }
+        }
+    }
+    (worst, sum)
+}
+
+/// The linear penalties of a row.
+pub(crate) fn linear_penalties<T: Real>(qp: QpView<'_, T>, place: &Place, row: usize) -> [T; 2] {
+    let data = part(qp.data, place.data, place.data_len());
+    [Row::LowerLinear, Row::UpperLinear]
+        .map(|of| data.get(place.row_data(of) + row).copied().unwrap_or(T::ZERO))
+}
