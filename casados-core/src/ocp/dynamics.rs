@@ -1,6 +1,7 @@
 //! What happens between two nodes of a horizon.
 
 use super::error::OcpError;
+use super::pattern::Origin;
 use crate::model::Dae;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
@@ -189,6 +190,9 @@ pub trait Dynamics<T: Real> {
     const NAMES: Names;
     /// Whether [`Step::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
+    /// What the ends of intervals follow from.
+    #[doc(hidden)]
+    const ORIGIN: Origin = Origin::Unknown;
 
     /// Whether weights of integral costs make sense.
     ///

@@ -68,6 +68,7 @@ mod linearise;
 mod log;
 mod map;
 mod messages;
+mod pattern;
 mod point;
 mod problem;
 mod real_time;
@@ -96,6 +97,8 @@ pub use least_squares::LeastSquaresCost;
 pub use linearise::{Curvature, Exact, GaussNewton};
 pub use log::{Iteration, Log, Outcome, Status, Times};
 pub use map::Map;
+#[cfg(feature = "casadi")]
+pub(crate) use pattern::{Entry, Origin};
 pub use problem::{Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use real_time::HeapRealTime;
