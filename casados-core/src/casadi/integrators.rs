@@ -100,7 +100,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         for output in 0..nz {
             value.join(nx + output, &end, 2 * nx + output);
         }
-        dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian, nw);
+        dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian);
         Q::depend(&stages, nx + nz, &mut value, &mut hessian);
         let outputs = [0..nx, nx..nx + nz, nx + nz..ny];
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
