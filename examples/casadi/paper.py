@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Runs the experiments of the paper again, each tool up to five times by turns, and writes docs/paper.md.
 
-To be run by a Python that has casadi, matplotlib and numpy. acados takes part if `ACADOS_SOURCE_DIR` is set. A whole run takes a quarter of an hour, and
-the libraries before it as long.
+To be run by a Python that has casadi, matplotlib and numpy. acados takes part if
+`ACADOS_SOURCE_DIR` is set. A whole run takes a quarter of an hour, and the libraries before it as
+long.
 """
 
 import argparse
@@ -68,6 +69,7 @@ def main():
         results = results if given.more else {"orbit": {}, "intervals": {}, "chains": {}, "builds": {}}
         results |= {"machine": page.machine(), "date": f"{datetime.date.today():%B %Y}"}
         results["builds"] |= builds
+        results["added"] = given.more
         if "awe" in builds:
             results["orbit"] = orbit.solve(rounds, seconds)
             results["intervals"] = orbit.intervals(rounds, seconds)
@@ -77,6 +79,9 @@ def main():
                     slow = ["CasADi CVODES", "CasADi IDAS"] if given.quick else []
                     results["chains"][f"{m} {setting}"] = chain.run(m, setting, rounds, seconds, slow)
                     last.write_text(json.dumps(results, indent=1))
+        there = [m for m in masses if f"chain_{m}_s2n1" in builds]
+        if there:
+            results["calls"] = chain.calls(max(there), "s2n1")
         last.write_text(json.dumps(results, indent=1))
     page.write(results, target)
     print(f"written: {target}")

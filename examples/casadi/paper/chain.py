@@ -1,5 +1,6 @@
 """Figures 1 and 2: the chain of masses, by all integrators and solvers."""
 
+import ctypes
 import json
 import os
 import subprocess
@@ -123,6 +124,17 @@ def acados(problem, stages, steps):
         raise RuntimeError(answer["error"])
     keys = {"objective": "objective", "iterations": "iterations", "total": "seconds", "functions": "linear"}
     return {key: answer[name] for key, name in keys.items()} | {"complete": True}
+
+
+def calls(masses, setting, count=5000):
+    """The shortest times in nanoseconds of calls of Rust, exported ones, and ones that are known."""
+    overhead, times = ctypes.CDLL(library(f"chain_{masses}_{setting}")).overhead, {}
+    for mode, name in enumerate(["values", "Jacobian", "Hessian"]):
+        to = (ctypes.c_double * 3)()
+        if overhead(ctypes.c_int(mode), ctypes.c_uint(count), ctypes.byref(to)):
+            raise RuntimeError(f"{name}: a call failed")
+        times[f"{masses} masses, {setting}: {name}"] = list(to)
+    return times
 
 
 def runners(masses, setting):

@@ -55,6 +55,10 @@ pub fn measure<const NX: usize>(
     // As many as the widest output has.
     let mut results = vec![vec![0.0; (NX + 3) * (NX + 3)]; outputs];
     let mut places: Vec<*mut f64> = results.iter_mut().map(|result| result.as_mut_ptr()).collect();
+    // Of second derivatives those by the multipliers, which are the Jacobian, are not wanted.
+    if let Mode::Hessian = mode {
+        places.iter_mut().skip(4).step_by(5).for_each(|place| *place = null_mut());
+    }
     // SAFETY: it takes no arguments.
     let memory = unsafe { chain_checkout() };
     let mut shortest = [f64::INFINITY; 3];

@@ -115,8 +115,8 @@ fn solve(solver: i32) -> Result<Report, Box<dyn Error>> {
     Ok(Report::new(&outcome, begin.elapsed().as_secs_f64()))
 }
 
-/// Nanoseconds of a call for values (0), Jacobian (1) or Hessian (2): of Rust, exported, and exported
-/// at known inputs; the status is zero if all calls succeeded.
+/// Nanoseconds of a call for values (0), Jacobian (1) or Hessian (2): of Rust, exported, and
+/// exported at known inputs; the status is zero if all calls succeeded.
 ///
 /// # Safety
 /// The pointer is to three numbers, which nobody else has.
