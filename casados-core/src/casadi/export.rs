@@ -34,6 +34,11 @@ macro_rules! __casadi_export {
             $crate::__casadi_functions!(LIBRARY, $name);
         };
     };
+    ($($other:tt)*) => {
+        ::core::compile_error!(
+            "write `name = Integrator<…>, interval = seconds`, then if they are wanted `quadrature = F` and fields of `Settings`"
+        );
+    };
 }
 
 /// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all intervals
@@ -59,6 +64,11 @@ macro_rules! __casadi_export_horizon {
             });
             $crate::__casadi_functions!(LIBRARY, $name);
         };
+    };
+    ($($other:tt)*) => {
+        ::core::compile_error!(
+            "write `name = Batch<…>, interval = seconds, intervals = number`, then if they are wanted fields of `Settings`"
+        );
     };
 }
 

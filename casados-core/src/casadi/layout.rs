@@ -46,7 +46,9 @@ struct Slack {
 #[derive(Default)]
 pub struct Entries {
     pub sparsity: Sparsity,
-    terms: Vec<(usize, Slot)>,
+    /// Numbers of the matrices of the stages: entry, and place there.
+    stages: Vec<Vec<(u32, u32)>>,
+    constants: Vec<(u32, f64)>,
 }
 
 /// A number that is added to an entry: where it is in the matrix of a stage, or its value.
@@ -63,15 +65,22 @@ impl Entries {
         let mut entries: Vec<(usize, usize)> =
             slots.iter().map(|&([row, column], _)| (row, column)).collect();
         entries.dedup();
-        let mut entry = 0;
-        let terms = slots.into_iter().map(|([row, column], slot)| {
+        let (mut stages, mut constants, mut entry) = (Vec::<Vec<_>>::new(), Vec::new(), 0);
+        for ([row, column], slot) in slots {
             while entries.get(entry).is_some_and(|&here| here != (row, column)) {
                 entry += 1;
             }
-            (entry, slot)
-        });
-        let terms = terms.collect();
-        Self { sparsity: Sparsity::from_entries(rows, columns, entries), terms }
+            match slot {
+                Slot::Entry { stage, index } => {
+                    if stages.len() <= stage {
+                        stages.resize(stage + 1, Vec::new());
+                    }
+                    stages[stage].push((entry as u32, index as u32));
+                }
+                Slot::Constant(value) => constants.push((entry as u32, value)),
+            }
+        }
+        Self { sparsity: Sparsity::from_entries(rows, columns, entries), stages, constants }
     }
 
     /// The values of the entries, out of the matrices of the stages.
@@ -81,20 +90,17 @@ impl Entries {
         choose: impl Fn((&'a [f64], &'a [f64])) -> &'a [f64],
         to: &mut Vec<f64>,
     ) {
-        let matrices: Vec<&[f64]> = qp
-            .stages()
-            .map(|stage| {
-                let arrays = stage.arrays();
-                choose((arrays.matrix, arrays.hessian))
-            })
-            .collect();
         to.clear();
         to.resize(self.sparsity.entries().len(), 0.0);
-        for &(entry, slot) in &self.terms {
-            to[entry] += match slot {
-                Slot::Entry { stage, index } => matrices[stage][index],
-                Slot::Constant(value) => value,
-            };
+        for (stage, terms) in qp.stages().zip(&self.stages) {
+            let arrays = stage.arrays();
+            let matrix = choose((arrays.matrix, arrays.hessian));
+            for &(entry, place) in terms {
+                to[entry as usize] += matrix[place as usize];
+            }
+        }
+        for &(entry, value) in &self.constants {
+            to[entry as usize] += value;
         }
     }
 }

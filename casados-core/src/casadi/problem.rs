@@ -30,6 +30,8 @@ pub struct Problems {
     signatures: Vec<Signature>,
     /// Where the entries of the transposed Jacobian are among those of the Jacobian.
     transposed: Vec<usize>,
+    /// Where those of the upper triangle are among those of the Hessian.
+    upper: Vec<usize>,
     /// What was wrong with the problem when it was made first.
     wrong: Option<String>,
     integrations: AtomicU64,
@@ -80,7 +82,9 @@ impl Problems {
         };
         let (transposed_pattern, transposed) = layout.jacobian.sparsity.transposed();
         let signatures = signatures(&layout, transposed_pattern);
-        Self { make, layout, signatures, transposed, wrong, integrations: AtomicU64::new(0) }
+        let entries = layout.hessian.sparsity.entries().iter().enumerate();
+        let upper = entries.filter(|(_, (row, column))| row <= column).map(|(entry, _)| entry).collect();
+        Self { make, layout, signatures, transposed, upper, wrong, integrations: AtomicU64::new(0) }
     }
 
     fn count(&self) {
@@ -140,7 +144,9 @@ impl Problems {
         for value in hessian.iter_mut() {
             *value *= factor;
         }
-        self.linearised(worker);
+        if !worker.known.first {
+            self.linearised(worker);
+        }
         if sigma == 0.0 {
             self.count();
             let Worker { program, v, ends, hessian, .. } = worker;
@@ -255,10 +261,8 @@ impl Problems {
             }
             b"jac_adj_x_x" => to.copy_from_slice(&worker.hessian),
             b"triu_hess_gamma_x_x" => {
-                let entries = self.layout.hessian.sparsity.entries().iter().zip(&worker.hessian);
-                let upper = entries.filter(|((row, column), _)| row <= column);
-                for (to, (_, value)) in to.iter_mut().zip(upper) {
-                    *to = *value;
+                for (to, &entry) in to.iter_mut().zip(&self.upper) {
+                    *to = worker.hessian[entry];
                 }
             }
             b"grad_gamma_x" | b"adj_x" => {

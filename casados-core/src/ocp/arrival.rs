@@ -44,14 +44,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         crate::qp::assign(arrival.get_mut(nx..).unwrap_or_default(), weight);
         Ok(self)
     }
-
-    /// Whether there is such a cost.
-    #[cfg(feature = "casadi")]
-    pub(crate) fn has_arrival_cost(&mut self) -> bool {
-        let intervals = self.intervals();
-        let arrival = split::<P, T>(self.data.as_mut(), intervals).arrival;
-        arrival.iter().skip(P::Shape::NX).any(|&weight| weight != T::ZERO)
-    }
 }
 
 /// The cost at a point.

@@ -289,31 +289,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(objective)
     }
 
-    /// After [`Ocp::linearise`]: the objective without penalties, and `g` of every stage in
-    /// `values`.
-    ///
-    /// # Errors
-    /// [`OcpError::NonFiniteFunction`]
-    #[cfg(feature = "casadi")]
-    pub(crate) fn constraints(&mut self, values: &mut [T]) -> Result<T, OcpError> {
-        let intervals = self.intervals();
-        let data = split::<P, T>(self.data.as_mut(), intervals);
-        let Problem { path, terminal, running, .. } = self.problem.parts();
-        let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
-        for (k, at) in self.iterate.stages().enumerate() {
-            let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
-            let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            read::<P::Shape, T>(&mut point, [at.x, z, at.u, node.p], node.time);
-            let values = values.get_mut(k * P::Path::ROWS..).unwrap_or_default();
-            if k < intervals {
-                path.value(&point, part_mut(values, 0, P::Path::ROWS), k)?;
-            } else {
-                terminal.value(&point, part_mut(values, 0, P::Terminal::ROWS), k)?;
-            }
-        }
-        Ok(self.objective)
-    }
-
     /// How many numbers `φ` of every interval and `g` of every stage are.
     pub(crate) fn ends(&self) -> usize {
         ends::<P, T>(self.qp.dims())

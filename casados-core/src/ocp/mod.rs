@@ -71,6 +71,8 @@ mod messages;
 mod pattern;
 mod point;
 mod problem;
+#[cfg(feature = "casadi")]
+mod program;
 mod real_time;
 #[cfg(feature = "alloc")]
 mod sensitivities;
