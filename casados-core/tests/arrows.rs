@@ -32,7 +32,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("adaptive", "error shape tableau memory options scalar function model linalg result quadrature erk irk"),
     ("batch", "error shape statistics tableau memory options scalar model linalg result finite irk"),
     ("testing", "error shape memory scalar model result erk irk"),
-    ("ocp", "error shape memory scalar function model qp linalg result quadrature irk batch"),
+    ("ocp", "error shape structure memory scalar function model qp linalg result quadrature irk batch"),
     (
         "casadi",
         "error shape structure tableau memory options function model qp result quadrature adaptive batch ocp",

@@ -2,7 +2,7 @@
 
 use super::cache::{Answer, equal};
 use super::function::{Call, Port, Signature};
-use super::signature::{self, Entry, Output, Source};
+use super::signature::{self, Output, Source};
 use crate::model::Dae;
 use crate::result::{Adjoint, Forward, Hessian};
 use crate::shape::{Matrix, Shape};
@@ -35,6 +35,8 @@ pub struct Wanted {
     pub jacobian: bool,
     pub gradient: bool,
     pub hessian: bool,
+    /// Whether algebraic states are among values or Jacobian.
+    pub algebraic: bool,
 }
 
 impl Wanted {
@@ -50,6 +52,10 @@ impl Wanted {
             jacobian: wants(Source::Jacobian),
             gradient: wants(Source::Gradient),
             hessian: wants(Source::Hessian),
+            algebraic: outputs
+                .iter()
+                .enumerate()
+                .any(|(index, output)| output.algebraic && !output.entries.is_empty() && call.wants(index)),
         }
     }
 
@@ -63,6 +69,7 @@ impl Wanted {
         let same = || answer.lambda.get().is_some_and(|known| equal(known, lambda));
         (!self.value || answer.value.get().is_some())
             && (!self.jacobian || answer.jacobian.get().is_some())
+            && (!self.algebraic || answer.algebraic)
             && (!self.gradient || answer.gradient.get().is_some() && same())
             && (!self.hessian || answer.hessian.get().is_some() && same())
     }
@@ -70,7 +77,7 @@ impl Wanted {
 
 /// The outputs that are wanted.
 pub fn write<T>(answer: &Answer<T>, outputs: &[Output], call: &mut dyn Call) {
-    for (index, Output { source, entries }) in outputs.iter().enumerate() {
+    for (index, Output { source, runs, .. }) in outputs.iter().enumerate() {
         let Some(to) = call.output(index) else { continue };
         let part = match source {
             Source::Value => &answer.value,
@@ -80,8 +87,14 @@ pub fn write<T>(answer: &Answer<T>, outputs: &[Output], call: &mut dyn Call) {
             Source::Zero => continue,
         };
         if let Some(from) = part.get() {
-            for (to, &Entry(entry)) in to.iter_mut().zip(entries) {
-                *to = from.get(entry).copied().unwrap_or(f64::NAN);
+            let mut rest = to;
+            for run in runs {
+                let (to, behind) = rest.split_at_mut(run.len().min(rest.len()));
+                rest = behind;
+                match from.get(run.clone()) {
+                    Some(from) => to.copy_from_slice(from),
+                    None => to.fill(f64::NAN),
+                }
             }
         }
     }
@@ -105,7 +118,14 @@ pub fn gradient_of<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
 
 /// Blocks of `count` rows side by side as the rows from `first` on of a matrix with `rows` rows.
 pub fn rows(blocks: [&[f64]; 3], count: usize, first: usize, rows: usize, to: &mut [f64]) {
-    if count > 0 {
+    if count > 0 && count == rows {
+        let mut rest = to;
+        for block in blocks {
+            let (to, behind) = rest.split_at_mut(block.len());
+            to.copy_from_slice(block);
+            rest = behind;
+        }
+    } else if count > 0 {
         let columns = blocks.into_iter().flat_map(|block| block.chunks_exact(count));
         for (column, to) in columns.zip(to.chunks_exact_mut(rows)) {
             to[first..first + count].copy_from_slice(column);
@@ -132,10 +152,13 @@ pub fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
     ];
     for (block, [row, column], rows) in blocks {
         for (j, values) in block.chunks_exact(rows.max(1)).enumerate() {
-            for (i, value) in values.iter().enumerate() {
-                let (i, j) = (row + i, column + j);
-                to[i + nw * j] = *value;
-                to[j + nw * i] = *value;
+            let j = column + j;
+            to[row + nw * j..row + nw * j + rows].copy_from_slice(values);
+            // Blocks on the diagonal have both triangles.
+            if row != column {
+                for (i, value) in values.iter().enumerate() {
+                    to[j + nw * (row + i)] = *value;
+                }
             }
         }
     }

@@ -41,10 +41,9 @@ impl<V> Part<V> {
 }
 
 impl Part {
-    /// A place for this number of values, which are zero.
+    /// A place for this number of values, which are all to be written.
     pub fn set(&mut self, len: usize) -> &mut [f64] {
         let values = self.open();
-        values.clear();
         values.resize(len, 0.0);
         values
     }
@@ -65,6 +64,8 @@ pub struct Answer<T> {
     pub hessian: Part,
     /// The stages.
     pub tape: Part<T>,
+    /// Whether values and Jacobian, as far as they are there, have algebraic states.
+    pub algebraic: bool,
 }
 
 impl<T> Answer<T> {
@@ -76,10 +77,16 @@ impl<T> Answer<T> {
             part.clear();
         }
         self.tape.clear();
+        self.algebraic = false;
     }
 
     /// Takes what another one knows about the same inputs.
     fn take(&mut self, other: &mut Self) {
+        let parts = [(self.value.valid, other.value.valid), (self.jacobian.valid, other.jacobian.valid)];
+        if parts.iter().any(|&(_, new)| new) {
+            let stays = parts.iter().any(|&(old, new)| old && !new);
+            self.algebraic = other.algebraic && (self.algebraic || !stays);
+        }
         self.value.take(&mut other.value);
         self.jacobian.take(&mut other.jacobian);
         if other.lambda.valid {

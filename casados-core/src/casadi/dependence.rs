@@ -85,14 +85,9 @@ pub fn variables(dimensions: Dimensions, jacobian: Pattern, depth: Option<usize>
 
 /// Which entries of the Hessian of any `λᵀy` over `w` may differ from zero, where `second` are
 /// those of second derivatives by the variables.
-pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation, directions: usize) {
+pub fn curvature(variables: &Relation, second: Pattern, hessian: &mut Relation) {
     for (one, other) in second.iter() {
-        for a in (0..directions).filter(|&a| variables.has(one, a)) {
-            for b in (0..directions).filter(|&b| variables.has(other, b)) {
-                hessian.set(a, b);
-                hessian.set(b, a);
-            }
-        }
+        hessian.join_products(variables, one, other);
     }
 }
 

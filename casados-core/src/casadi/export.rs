@@ -34,6 +34,11 @@ macro_rules! __casadi_export {
             $crate::__casadi_functions!(LIBRARY, $name);
         };
     };
+    ($($other:tt)*) => {
+        ::core::compile_error!(
+            "write `name = Integrator<…>, interval = seconds`, then if they are wanted `quadrature = F` and fields of `Settings`"
+        );
+    };
 }
 
 /// Exports a batch to CasADi: the functions of [`export!`](crate::casadi::export) for all intervals
@@ -60,37 +65,50 @@ macro_rules! __casadi_export_horizon {
             $crate::__casadi_functions!(LIBRARY, $name);
         };
     };
+    ($($other:tt)*) => {
+        ::core::compile_error!(
+            "write `name = Batch<…>, interval = seconds, intervals = number`, then if they are wanted fields of `Settings`"
+        );
+    };
 }
 
 /// Exports a problem of optimal control to CasADi: `casadi.nlpsol("s", "ipopt", "./lib….so")`
 /// solves it, with all of its derivatives computed in the library; see [`casadi`](crate::casadi).
 ///
+/// That is the problem called `nlp`. Others of the same library have names of their own: they are
+/// functions `name`, `name_bounds`, `name_trajectory`, …, to be put together with others.
+///
 /// ```text
 /// fn swing() -> Result<impl Program, Box<dyn Error>> { … }
 /// casados::casadi::export_problem! { swing }
+/// casados::casadi::export_problem! { second = swing_of_another_kind }
 /// ```
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __casadi_export_problem {
     ($make:path) => {
+        $crate::__casadi_export_problem!(nlp = $make);
+    };
+    ($name:ident = $make:path) => {
         const _: () = {
             static LIBRARY: $crate::casadi::Library<$crate::casadi::Problems> =
                 $crate::casadi::Library::new(|| {
                     $crate::casadi::Problems::new(|| Ok(::std::boxed::Box::new($make()?)))
                 });
-            $crate::__casadi_function!(LIBRARY, 0, "", nlp);
-            $crate::__casadi_function!(LIBRARY, 1, "", nlp_f);
-            $crate::__casadi_function!(LIBRARY, 2, "", nlp_g);
-            $crate::__casadi_function!(LIBRARY, 3, "", nlp_grad_f);
-            $crate::__casadi_function!(LIBRARY, 4, "", nlp_jac_g);
-            $crate::__casadi_function!(LIBRARY, 5, "", nlp_hess_l);
-            $crate::__casadi_function!(LIBRARY, 6, "", nlp_grad);
-            $crate::__casadi_function!(LIBRARY, 7, "", nlp_bounds);
-            $crate::__casadi_function!(LIBRARY, 8, "jac_", nlp);
-            $crate::__casadi_function!(LIBRARY, 9, "adj1_", nlp);
-            $crate::__casadi_function!(LIBRARY, 10, "jac_adj1_", nlp);
+            $crate::__casadi_function!(LIBRARY, 0, "", $name, "");
+            $crate::__casadi_function!(LIBRARY, 1, "", $name, "_f");
+            $crate::__casadi_function!(LIBRARY, 2, "", $name, "_g");
+            $crate::__casadi_function!(LIBRARY, 3, "", $name, "_grad_f");
+            $crate::__casadi_function!(LIBRARY, 4, "", $name, "_jac_g");
+            $crate::__casadi_function!(LIBRARY, 5, "", $name, "_hess_l");
+            $crate::__casadi_function!(LIBRARY, 6, "", $name, "_grad");
+            $crate::__casadi_function!(LIBRARY, 7, "", $name, "_bounds");
+            $crate::__casadi_function!(LIBRARY, 8, "jac_", $name, "");
+            $crate::__casadi_function!(LIBRARY, 9, "adj1_", $name, "");
+            $crate::__casadi_function!(LIBRARY, 10, "jac_adj1_", $name, "");
+            $crate::__casadi_function!(LIBRARY, 11, "", $name, "_trajectory");
             /// How many intervals were integrated, for tests.
-            #[unsafe(export_name = "nlp_integrations")]
+            #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
             extern "C" fn integrations() -> ::core::ffi::c_longlong {
                 $crate::casadi::ffi::integrations(&LIBRARY)
             }
@@ -103,10 +121,10 @@ macro_rules! __casadi_export_problem {
 #[macro_export]
 macro_rules! __casadi_functions {
     ($library:ident, $name:ident) => {
-        $crate::__casadi_function!($library, 0, "", $name);
-        $crate::__casadi_function!($library, 1, "jac_", $name);
-        $crate::__casadi_function!($library, 2, "adj1_", $name);
-        $crate::__casadi_function!($library, 3, "jac_adj1_", $name);
+        $crate::__casadi_function!($library, 0, "", $name, "");
+        $crate::__casadi_function!($library, 1, "jac_", $name, "");
+        $crate::__casadi_function!($library, 2, "adj1_", $name, "");
+        $crate::__casadi_function!($library, 3, "jac_adj1_", $name, "");
         /// How many intervals were integrated, for tests.
         #[unsafe(export_name = concat!(stringify!($name), "_integrations"))]
         extern "C" fn integrations() -> ::core::ffi::c_longlong {
@@ -119,11 +137,11 @@ macro_rules! __casadi_functions {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __casadi_function {
-    ($library:ident, $function:literal, $prefix:literal, $name:ident) => {
+    ($library:ident, $function:literal, $prefix:literal, $name:ident, $suffix:literal) => {
         const _: () = {
             use ::core::ffi::{c_char, c_int, c_longlong};
             use $crate::casadi::ffi;
-            #[unsafe(export_name = concat!($prefix, stringify!($name)))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix))]
             unsafe extern "C" fn evaluate(
                 arguments: *const *const f64,
                 results: *mut *mut f64,
@@ -134,31 +152,31 @@ macro_rules! __casadi_function {
                 // SAFETY: the caller's promise is that of `ffi::evaluate`.
                 unsafe { ffi::evaluate(&$library, $function, arguments, results, memory) }
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_n_in"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_n_in"))]
             extern "C" fn n_in() -> c_longlong {
                 ffi::count(&$library, $function, ffi::Side::Input)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_n_out"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_n_out"))]
             extern "C" fn n_out() -> c_longlong {
                 ffi::count(&$library, $function, ffi::Side::Output)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_name_in"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_name_in"))]
             extern "C" fn name_in(index: c_longlong) -> *const c_char {
                 ffi::name(&$library, $function, ffi::Side::Input, index)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_name_out"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_name_out"))]
             extern "C" fn name_out(index: c_longlong) -> *const c_char {
                 ffi::name(&$library, $function, ffi::Side::Output, index)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_sparsity_in"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_sparsity_in"))]
             extern "C" fn sparsity_in(index: c_longlong) -> *const c_longlong {
                 ffi::sparsity(&$library, $function, ffi::Side::Input, index)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_sparsity_out"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_sparsity_out"))]
             extern "C" fn sparsity_out(index: c_longlong) -> *const c_longlong {
                 ffi::sparsity(&$library, $function, ffi::Side::Output, index)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_work"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_work"))]
             unsafe extern "C" fn work(
                 arguments: *mut c_longlong,
                 results: *mut c_longlong,
@@ -168,19 +186,19 @@ macro_rules! __casadi_function {
                 // SAFETY: the caller's promise is that of `ffi::work`.
                 unsafe { ffi::work(&$library, $function, [arguments, results, integers, numbers]) }
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_checkout"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_checkout"))]
             extern "C" fn checkout() -> c_int {
                 ffi::check_out(&$library)
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_release"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_release"))]
             extern "C" fn release(memory: c_int) {
                 ffi::release(&$library, memory);
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_incref"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_incref"))]
             extern "C" fn incref() {
                 ffi::refer(&$library);
             }
-            #[unsafe(export_name = concat!($prefix, stringify!($name), "_decref"))]
+            #[unsafe(export_name = concat!($prefix, stringify!($name), $suffix, "_decref"))]
             extern "C" fn decref() {
                 ffi::forget(&$library);
             }

@@ -160,7 +160,8 @@ pub fn forget<C: Client>(library: &Library<C>) {
     let _ = catch_unwind(AssertUnwindSafe(|| library.forget()));
 }
 
-/// How many intervals were integrated since somebody referred to the functions first.
+/// How many intervals were integrated since somebody referred to the functions first; those of no
+/// length too, where algebraic states are found.
 pub fn integrations<C: Client>(library: &Library<C>) -> c_longlong {
     catch_unwind(AssertUnwindSafe(|| {
         library.client().map_or(0, |client| client.integrations() as c_longlong)

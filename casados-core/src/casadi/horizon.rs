@@ -139,7 +139,7 @@ impl<B: Horizon> Horizons<B> {
         for state in 0..nx {
             value.join(state, &variables, nx + state);
         }
-        dependence::curvature(&variables, B::Model::STRUCTURE.hessian, &mut hessian, nw);
+        dependence::curvature(&variables, B::Model::STRUCTURE.hessian, &mut hessian);
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
         let outputs = [0..nx, nx..nx, nx..nx];
         let shape = signature::Shape { count, inputs, outputs, value: &value, hessian: &hessian };

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::function::Function;
 use crate::model::Dae;
 use crate::quadrature::Quadrature;
-use crate::shape::{Matrix, Outputs, Shape};
+use crate::shape::{Matrix, Outputs};
 use alloc::boxed::Box;
 use core::marker::PhantomData;
 
@@ -85,6 +85,6 @@ where
         for (output, variable) in F::STRUCTURE.jacobian.iter() {
             value.join(first + output, variables, variable);
         }
-        dependence::curvature(variables, F::STRUCTURE.hessian, hessian, M::Shape::NW);
+        dependence::curvature(variables, F::STRUCTURE.hessian, hessian);
     }
 }

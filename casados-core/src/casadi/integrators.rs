@@ -100,7 +100,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         for output in 0..nz {
             value.join(nx + output, &end, 2 * nx + output);
         }
-        dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian, nw);
+        dependence::curvature(&stages, I::Model::STRUCTURE.hessian, &mut hessian);
         Q::depend(&stages, nx + nz, &mut value, &mut hessian);
         let outputs = [0..nx, nx..nx + nz, nx + nz..ny];
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
@@ -152,7 +152,8 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let (nu, of_integrals) = rest.split_at(nz);
         let mut seed: VectorX<I::Model, f64> = vector(of_states);
         let adjoint = wanted.gradient || wanted.hessian;
-        if nz > 0 && adjoint {
+        let algebraic = wanted.algebraic || adjoint && nu.iter().any(|&nu| nu != 0.0);
+        if algebraic && adjoint {
             // What the state is multiplied by depends on where it ends.
             let end = integrator.value(&point, None)?.x;
             keep(integrator, &mut answer.tape)?;
@@ -173,7 +174,8 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         if answer.jacobian.get().is_some() {
             rows(Q::jacobian(integrals), Q::COUNT, nx + nz, ny, answer.jacobian.open());
         }
-        if nz > 0 {
+        answer.algebraic = algebraic;
+        if algebraic {
             if !adjoint {
                 let end = Point { x0: vector(&values[..nx]), u: vector(u), h: 0.0 };
                 self.consistent(integrator, end, &[], zeta)?;
@@ -201,6 +203,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         nu: &[f64],
         zeta: &mut Consistent,
     ) -> Result<(), Failure> {
+        self.integrations.fetch_add(1, Ordering::Relaxed);
         integrator.time(self.settings.time + self.settings.interval)?;
         let outcome = integrator.consistent(&at, nu, zeta);
         integrator.time(self.settings.time)?;

@@ -1,131 +1,309 @@
 //! Where the numbers of a problem are in its variables, constraints and matrices.
+//!
+//! Variables of several stages that are one (shared controls, periodic states) are one variable of
+//! the program, at the place of the first. Behind those of all stages come slack variables `e`, one
+//! for each soft side; behind the constraints of all stages the soft bounds of variables:
+//!
+//! ```text
+//! lower ≤ x + e_lower − e_upper ≤ upper        e ≥ 0, at the cost linear · e + ½ quadratic · e²
+//! ```
 
+use super::program::{Limit, Program};
 use super::sparsity::Sparsity;
 use crate::qp::{QpView, StageDims};
+use alloc::vec;
 use alloc::vec::Vec;
 
 /// Where the numbers of a problem are in its variables, constraints and matrices.
+#[derive(Default)]
 pub struct Layout {
     pub dims: Vec<StageDims>,
-    periodic: Vec<usize>,
     pub variables: usize,
     pub constraints: usize,
-    /// In compressed columns, with the stage of each column.
-    pub jacobian: Vec<Slot>,
-    pub hessian: Vec<Slot>,
+    /// The variable that each state and control is, stage after stage.
+    pub columns: Vec<usize>,
+    /// Constraints that are functions: all but soft bounds of variables.
+    pub functions: usize,
+    slacks: Vec<Slack>,
+    /// The variables with soft bounds.
+    soft: Vec<usize>,
+    pub jacobian: Entries,
+    pub hessian: Entries,
+    /// Bounds of variables, and of constraints.
+    pub bounds: [Vec<[f64; 2]>; 2],
 }
 
-/// An entry of a matrix: where it is in the matrix of a stage, or its value.
+/// A slack variable, which gives way to one side of a constraint.
+struct Slack {
+    variable: usize,
+    row: usize,
+    sign: f64,
+    linear: f64,
+    quadratic: f64,
+}
+
+/// A matrix as a sum: what is added to which entry.
+#[derive(Default)]
+pub struct Entries {
+    pub sparsity: Sparsity,
+    /// Numbers of the matrices of the stages: entry, and place there.
+    stages: Vec<Vec<(u32, u32)>>,
+    constants: Vec<(u32, f64)>,
+}
+
+/// A number that is added to an entry: where it is in the matrix of a stage, or its value.
 #[derive(Clone, Copy)]
-pub enum Slot {
+enum Slot {
     Entry { stage: usize, index: usize },
     Constant(f64),
 }
 
-impl Layout {
-    /// The layout of stages of these dimensions, with the patterns of Jacobian and Hessian.
-    pub fn new(dims: Vec<StageDims>, periodic: Vec<usize>) -> (Self, [Sparsity; 2]) {
-        let last = dims.len().saturating_sub(1);
-        let next = |stage: usize| dims.get(stage + 1).map_or(0, |dims| dims.nx);
-        let variables = dims.iter().map(|dims| dims.nx + dims.nu).sum();
-        let rows: usize = dims.iter().enumerate().map(|(stage, dims)| next(stage) + dims.ng).sum();
-        let (mut jacobian, mut hessian) = (Vec::new(), Vec::new());
-        let (mut of_jacobian, mut of_hessian) = (Vec::new(), Vec::new());
-        let (mut column, mut row, mut before) = (0, 0, 0);
-        for (stage, &StageDims { nx, nu, ng, .. }) in dims.iter().enumerate() {
-            let n = nx + nu;
-            let ld = crate::qp::pad::<f64>(n);
-            for j in 0..n {
-                if stage > 0 && j < nx {
-                    of_jacobian.push((before + j, column + j));
-                    jacobian.push(Slot::Constant(-1.0));
-                }
-                for i in 0..next(stage) + ng {
-                    of_jacobian.push((row + i, column + j));
-                    jacobian.push(Slot::Entry { stage, index: i * ld + j });
-                }
-                if (stage == 0 || stage == last)
-                    && let Some(tie) = periodic.iter().position(|&state| state == j)
-                {
-                    of_jacobian.push((rows + tie, column + j));
-                    jacobian.push(Slot::Constant(if stage == 0 { 1.0 } else { -1.0 }));
-                }
-                for i in 0..n {
-                    of_hessian.push((column + i, column + j));
-                    hessian.push(Slot::Entry { stage, index: i.min(j) * ld + i.max(j) });
-                }
+impl Entries {
+    /// The matrix of these numbers, each at a row and a column.
+    fn new(rows: usize, columns: usize, mut slots: Vec<([usize; 2], Slot)>) -> Self {
+        slots.sort_by_key(|&([row, column], _)| (column, row));
+        let mut entries: Vec<(usize, usize)> =
+            slots.iter().map(|&([row, column], _)| (row, column)).collect();
+        entries.dedup();
+        let (mut stages, mut constants, mut entry) = (Vec::<Vec<_>>::new(), Vec::new(), 0);
+        for ([row, column], slot) in slots {
+            while entries.get(entry).is_some_and(|&here| here != (row, column)) {
+                entry += 1;
             }
-            column += n;
-            before = row;
-            row += next(stage) + ng;
+            match slot {
+                Slot::Entry { stage, index } => {
+                    if stages.len() <= stage {
+                        stages.resize(stage + 1, Vec::new());
+                    }
+                    stages[stage].push((entry as u32, index as u32));
+                }
+                Slot::Constant(value) => constants.push((entry as u32, value)),
+            }
         }
-        let constraints = rows + periodic.len();
-        let patterns = [
-            Sparsity::from_entries(constraints, variables, of_jacobian),
-            Sparsity::from_entries(variables, variables, of_hessian),
-        ];
-        (Self { dims, periodic, variables, constraints, jacobian, hessian }, patterns)
+        Self { sparsity: Sparsity::from_entries(rows, columns, entries), stages, constants }
     }
 
-    /// `g` of the ends of intervals and the values of constraints.
-    pub fn constraints(&self, x: &[f64], ends: &[f64], to: &mut [f64]) {
+    /// The values of the entries, out of the matrices of the stages.
+    pub fn write<'a>(
+        &self,
+        qp: &QpView<'a, f64>,
+        choose: impl Fn((&'a [f64], &'a [f64])) -> &'a [f64],
+        to: &mut Vec<f64>,
+    ) {
+        to.clear();
+        to.resize(self.sparsity.entries().len(), 0.0);
+        for (stage, terms) in qp.stages().zip(&self.stages) {
+            let arrays = stage.arrays();
+            let matrix = choose((arrays.matrix, arrays.hessian));
+            for &(entry, place) in terms {
+                to[entry as usize] += matrix[place as usize];
+            }
+        }
+        for &(entry, value) in &self.constants {
+            to[entry as usize] += value;
+        }
+    }
+}
+
+/// What a layout is made of while it grows.
+struct Draft {
+    layout: Layout,
+    jacobian: Vec<([usize; 2], Slot)>,
+    hessian: Vec<([usize; 2], Slot)>,
+}
+
+impl Layout {
+    /// The layout of a program.
+    pub fn new(program: &mut dyn Program) -> Self {
+        let dims = program.dims();
+        let (columns, variables) = columns(&dims, &program.couplings());
+        let of_stages = dims
+            .iter()
+            .enumerate()
+            .map(|(stage, stage_dims)| dims.get(stage + 1).map_or(0, |next| next.nx) + stage_dims.ng);
+        let functions = of_stages.sum();
+        let bounds = [vec![[f64::NEG_INFINITY, f64::INFINITY]; variables], vec![[0.0; 2]; functions]];
+        let layout =
+            Self { dims, variables, constraints: functions, columns, functions, bounds, ..Self::default() };
+        let mut draft = Draft { layout, jacobian: Vec::new(), hessian: Vec::new() };
+        draft.stages(program);
+        draft.bounds(program);
+        let Draft { mut layout, jacobian, hessian } = draft;
+        let (n, m) = (layout.variables, layout.constraints);
+        layout.jacobian = Entries::new(m, n, jacobian);
+        layout.hessian = Entries::new(n, n, hessian);
+        layout
+    }
+
+    /// States and controls of all stages.
+    pub fn gather(&self, x: &[f64], to: &mut Vec<f64>) {
+        to.clear();
+        to.extend(self.columns.iter().map(|&column| x[column]));
+    }
+
+    /// The variables at states and controls of all stages, without slack.
+    pub fn scatter(&self, from: &[f64], to: &mut [f64]) {
+        for (&column, &value) in self.columns.iter().zip(from).rev() {
+            to[column] = value;
+        }
+    }
+
+    /// What slack variables cost.
+    pub fn penalty(&self, x: &[f64]) -> f64 {
+        self.slacks.iter().fold(0.0, |sum, slack| {
+            let e = x[slack.variable];
+            sum + e * (slack.linear + 0.5 * slack.quadratic * e)
+        })
+    }
+
+    /// `g` of the ends of intervals and the values of constraints, at states and controls `v`.
+    pub fn constraints(&self, x: &[f64], v: &[f64], ends: &[f64], to: &mut [f64]) {
         let last = self.dims.len().saturating_sub(1);
         let phi: usize = self.dims.iter().skip(1).map(|dims| dims.nx).sum();
         let (ends, values) = ends.split_at(phi.min(ends.len()));
         let (mut ends, mut values) = (ends.iter(), values.iter());
-        let (mut to, mut begin) = (to.iter_mut(), 0);
+        let (mut rows, mut begin) = (to.iter_mut(), 0);
         for (stage, dims) in self.dims.iter().enumerate() {
             begin += dims.nx + dims.nu;
             if stage < last {
-                for (to, (end, next)) in to.by_ref().zip(ends.by_ref().zip(&x[begin..])).take(dims.nx) {
+                for (to, (end, next)) in rows.by_ref().zip(ends.by_ref().zip(&v[begin..])).take(dims.nx) {
                     *to = end - next;
                 }
             }
-            for (to, value) in to.by_ref().zip(values.by_ref()).take(dims.ng) {
+            for (to, value) in rows.by_ref().zip(values.by_ref()).take(dims.ng) {
                 *to = *value;
             }
         }
-        let end = begin - self.dims.last().map_or(0, |dims| dims.nx + dims.nu);
-        for (to, &state) in to.zip(&self.periodic) {
-            *to = x[state] - x[end + state];
+        for (to, &variable) in rows.zip(&self.soft) {
+            *to = x[variable];
+        }
+        for slack in &self.slacks {
+            to[slack.row] += slack.sign * x[slack.variable];
         }
     }
 
-    /// `∇f`: that of the QP at the point.
-    pub fn gradient(&self, qp: &QpView<'_, f64>, x: &[f64], to: &mut Vec<f64>) {
+    /// `∇f`: that of the QP at the point, and of the penalties.
+    pub fn gradient(&self, qp: &QpView<'_, f64>, x: &[f64], v: &[f64], to: &mut Vec<f64>) {
         to.clear();
+        to.resize(self.variables, 0.0);
         let mut begin = 0;
         for stage in qp.stages() {
             let arrays = stage.arrays();
-            let v = &x[begin..begin + arrays.n];
+            let v = &v[begin..begin + arrays.n];
+            let columns = &self.columns[begin..begin + arrays.n];
             begin += arrays.n;
-            for i in 0..arrays.n {
+            for (i, &column) in columns.iter().enumerate() {
                 let product: f64 =
                     (0..arrays.n).map(|j| arrays.hessian[i.min(j) * arrays.ld + i.max(j)] * v[j]).sum();
-                to.push(arrays.gradient[i] + product);
+                to[column] += arrays.gradient[i] + product;
+            }
+        }
+        for slack in &self.slacks {
+            to[slack.variable] += slack.linear + slack.quadratic * x[slack.variable];
+        }
+    }
+}
+
+impl Draft {
+    /// The entries of the matrices of all stages.
+    fn stages(&mut self, program: &mut dyn Program) {
+        let Layout { dims, columns, .. } = &self.layout;
+        let (mut begin, mut row) = (0, 0);
+        for (stage, &StageDims { nx, nu, ng, .. }) in dims.iter().enumerate() {
+            let next = dims.get(stage + 1).map_or(0, |next| next.nx);
+            let (n, rows) = (nx + nu, next + ng);
+            let ld = crate::qp::pad::<f64>(n);
+            let pattern = program.pattern(stage);
+            for (j, &column) in columns[begin..begin + n].iter().enumerate() {
+                for i in (0..rows).filter(|&i| pattern.jacobian.has(i, j)) {
+                    self.jacobian.push(([row + i, column], Slot::Entry { stage, index: i * ld + j }));
+                }
+                for i in (0..n).filter(|&i| pattern.hessian.has(i, j)) {
+                    let index = i.min(j) * ld + i.max(j);
+                    self.hessian.push(([columns[begin + i], column], Slot::Entry { stage, index }));
+                }
+            }
+            for (i, &column) in columns[begin + n..].iter().take(next).enumerate() {
+                self.jacobian.push(([row + i, column], Slot::Constant(-1.0)));
+            }
+            begin += n;
+            row += rows;
+        }
+    }
+
+    /// Bounds, and slack variables where they are soft.
+    fn bounds(&mut self, program: &dyn Program) {
+        let (mut begin, mut row) = (0, 0);
+        for stage in 0..self.layout.dims.len() {
+            for limits in program.bounds(stage) {
+                self.bound(self.layout.columns[begin], limits);
+                begin += 1;
+            }
+            row += self.layout.dims.get(stage + 1).map_or(0, |next| next.nx);
+            for limits in program.limits(stage) {
+                self.layout.bounds[1][row] = limits.map(|limit| limit.value);
+                self.slack(row, limits);
+                row += 1;
             }
         }
     }
 
-    /// The entries of a matrix, out of the matrices of the stages.
-    pub fn write<'a>(
-        &self,
-        qp: &QpView<'a, f64>,
-        slots: &[Slot],
-        choose: impl Fn((&'a [f64], &'a [f64])) -> &'a [f64],
-        to: &mut Vec<f64>,
-    ) {
-        let matrices: Vec<&[f64]> = qp
-            .stages()
-            .map(|stage| {
-                let arrays = stage.arrays();
-                choose((arrays.matrix, arrays.hessian))
-            })
-            .collect();
-        to.clear();
-        to.extend(slots.iter().map(|slot| match *slot {
-            Slot::Entry { stage, index } => matrices[stage][index],
-            Slot::Constant(value) => value,
-        }));
+    /// Bounds of a variable: a row if a side is soft. Of stages that share it the narrowest hold.
+    fn bound(&mut self, variable: usize, limits: [Limit; 2]) {
+        let none = [f64::NEG_INFINITY, f64::INFINITY];
+        let (mut hard, mut soft) = (none, none);
+        for (side, limit) in limits.iter().enumerate() {
+            if limit.penalty.is_some() { soft[side] = limit.value } else { hard[side] = limit.value }
+        }
+        let [lower, upper] = &mut self.layout.bounds[0][variable];
+        (*lower, *upper) = (lower.max(hard[0]), upper.min(hard[1]));
+        if limits.iter().any(|limit| limit.penalty.is_some()) {
+            let row = self.layout.constraints;
+            self.layout.constraints += 1;
+            self.layout.bounds[1].push(soft);
+            self.layout.soft.push(variable);
+            self.jacobian.push(([row, variable], Slot::Constant(1.0)));
+            self.slack(row, limits);
+        }
     }
+
+    /// A slack variable for each soft side of a row.
+    fn slack(&mut self, row: usize, limits: [Limit; 2]) {
+        for (limit, sign) in limits.into_iter().zip([1.0, -1.0]) {
+            let Some([linear, quadratic]) = limit.penalty else { continue };
+            let variable = self.layout.variables;
+            self.layout.variables += 1;
+            self.layout.bounds[0].push([0.0, f64::INFINITY]);
+            self.layout.slacks.push(Slack { variable, row, sign, linear, quadratic });
+            self.jacobian.push(([row, variable], Slot::Constant(sign)));
+            if quadratic != 0.0 {
+                self.hessian.push(([variable; 2], Slot::Constant(quadratic)));
+            }
+        }
+    }
+}
+
+/// The variable that each state and control is, and how many there are: shared controls are those
+/// of stage 0, periodic states of the last stage those of the first.
+fn columns(dims: &[StageDims], [periodic, shared]: &[Vec<usize>; 2]) -> (Vec<usize>, usize) {
+    let last = dims.len().saturating_sub(1);
+    let first = dims.first().map_or(0, |dims| dims.nx);
+    let (mut columns, mut variables) = (Vec::new(), 0);
+    for (stage, &StageDims { nx, nu, .. }) in dims.iter().enumerate() {
+        for i in 0..nx + nu {
+            let same = match i.checked_sub(nx) {
+                None if stage == last && last > 0 && periodic.contains(&i) => Some(i),
+                Some(control) if stage > 0 && shared.contains(&control) => Some(first + control),
+                _ => None,
+            };
+            match same.and_then(|place| columns.get(place).copied()) {
+                Some(column) => columns.push(column),
+                None => {
+                    columns.push(variables);
+                    variables += 1;
+                }
+            }
+        }
+    }
+    (columns, variables)
 }

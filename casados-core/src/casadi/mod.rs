@@ -48,6 +48,7 @@ mod integrators;
 mod interval;
 mod layout;
 mod library;
+mod pattern;
 mod problem;
 mod program;
 mod signature;

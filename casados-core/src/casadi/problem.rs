@@ -1,8 +1,8 @@
 //! A whole problem of optimal control as the functions that `casadi.nlpsol` asks a library for.
 //!
-//! Jacobian and Hessian have dense blocks for each stage. IPOPT takes the upper triangle of that of
-//! `γ = σ f + μᵀg`. Other solvers ask for other functions: they get those that CasADi makes of
-//! `nlp` and its derivatives, which have the form of those of any external function.
+//! IPOPT takes the upper triangle of the Hessian of `γ = σ f + μᵀg`. Other solvers ask for other
+//! functions: they get those that CasADi makes of `nlp` and its derivatives, which have the form of
+//! those of any external function.
 
 use super::function::{Call, Port, Signature};
 use super::layout::Layout;
@@ -10,10 +10,12 @@ use super::library::{Client, Failure};
 use super::program::Program;
 use super::sparsity::Sparsity;
 use crate::ocp::OcpError;
+use crate::qp::StageDims;
 use alloc::boxed::Box;
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 /// What makes a problem.
@@ -21,12 +23,15 @@ pub type Make = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
 
 /// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`,
 /// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`, `jac_nlp`, `adj1_nlp`,
-/// `jac_adj1_nlp`.
+/// `jac_adj1_nlp`, `nlp_trajectory`.
 pub struct Problems {
     make: Make,
     layout: Layout,
     signatures: Vec<Signature>,
-    patterns: Patterns,
+    /// Where the entries of the transposed Jacobian are among those of the Jacobian.
+    transposed: Vec<usize>,
+    /// Where those of the upper triangle are among those of the Hessian.
+    upper: Vec<usize>,
     /// What was wrong with the problem when it was made first.
     wrong: Option<String>,
     integrations: AtomicU64,
@@ -36,11 +41,15 @@ pub struct Problems {
 pub struct Worker {
     program: Box<dyn Program>,
     x: Vec<f64>,
+    /// States and controls of all stages there.
+    v: Vec<f64>,
     input: Vec<f64>,
     /// `σ`, then `μ`.
     multipliers: Vec<f64>,
     input_multipliers: Vec<f64>,
     known: Known,
+    /// Whether derivatives were asked for at the last point that values were asked for at.
+    follows: bool,
     objective: f64,
     ends: Vec<f64>,
     gradient: Vec<f64>,
@@ -56,14 +65,6 @@ struct Known {
     second: bool,
 }
 
-/// Where the matrices of a problem have entries.
-struct Patterns {
-    jacobian: Sparsity,
-    hessian: Sparsity,
-    /// Where the entries of the transposed Jacobian are among those of the Jacobian.
-    transposed: Vec<usize>,
-}
-
 const NOT_MADE: &str = "the problem could not be made";
 
 impl Problems {
@@ -73,17 +74,17 @@ impl Problems {
         let made = make().map_err(|error| error.to_string());
         let made = made.and_then(|mut program| {
             program.check()?;
-            Ok(program)
+            Ok(Layout::new(program.as_mut()))
         });
-        let (dims, periodic, wrong) = match made {
-            Ok(mut program) => (program.dims(), program.periodic(), None),
-            Err(wrong) => (Vec::new(), Vec::new(), Some(wrong)),
+        let (layout, wrong) = match made {
+            Ok(layout) => (layout, None),
+            Err(wrong) => (Layout::default(), Some(wrong)),
         };
-        let (layout, [jacobian, hessian]) = Layout::new(dims, periodic);
-        let (transposed_pattern, transposed) = jacobian.transposed();
-        let signatures = signatures(&layout, &jacobian, &hessian, transposed_pattern);
-        let patterns = Patterns { jacobian, hessian, transposed };
-        Self { make, layout, signatures, patterns, wrong, integrations: AtomicU64::new(0) }
+        let (transposed_pattern, transposed) = layout.jacobian.sparsity.transposed();
+        let signatures = signatures(&layout, transposed_pattern);
+        let entries = layout.hessian.sparsity.entries().iter().enumerate();
+        let upper = entries.filter(|(_, (row, column))| row <= column).map(|(entry, _)| entry).collect();
+        Self { make, layout, signatures, transposed, upper, wrong, integrations: AtomicU64::new(0) }
     }
 
     fn count(&self) {
@@ -91,25 +92,41 @@ impl Problems {
         self.integrations.fetch_add(intervals, Ordering::Relaxed);
     }
 
+    /// What is asked at a point: values alone, or with the derivatives that are asked for next.
     fn value(&self, worker: &mut Worker) -> Result<(), OcpError> {
-        if !worker.known.value {
-            self.count();
-            worker.objective = worker.program.value(&worker.x, &mut worker.ends)?;
-            worker.known.value = true;
+        if worker.known.value {
+            return Ok(());
         }
+        if worker.follows {
+            self.first(worker)?;
+            // Until somebody wants them.
+            worker.follows = false;
+            return Ok(());
+        }
+        self.count();
+        worker.objective = worker.program.value(&worker.v, &mut worker.ends)?;
+        worker.known.value = true;
         Ok(())
     }
 
     fn first(&self, worker: &mut Worker) -> Result<(), OcpError> {
+        worker.follows = true;
         if !worker.known.first {
             self.count();
-            let Worker { program, x, gradient, jacobian, .. } = worker;
-            let qp = program.first(x)?;
-            self.layout.gradient(&qp, x, gradient);
-            self.layout.write(&qp, &self.layout.jacobian, |stage| stage.0, jacobian);
-            worker.known.first = true;
+            let Worker { program, v, ends, .. } = worker;
+            worker.objective = program.first(v, ends)?;
+            self.linearised(worker);
         }
         Ok(())
+    }
+
+    /// What every linearisation tells.
+    fn linearised(&self, worker: &mut Worker) {
+        let Worker { program, x, v, gradient, jacobian, known, .. } = worker;
+        let qp = program.qp();
+        self.layout.gradient(&qp, x, v, gradient);
+        self.layout.jacobian.write(&qp, |stage| stage.0, jacobian);
+        (known.value, known.first) = (true, true);
     }
 
     /// `σ H(μ/σ)`, and where `σ` is zero what is linear in `μ`: `H(μ) − H(0)`, both with `σ = 1`.
@@ -117,28 +134,29 @@ impl Problems {
         if worker.known.second {
             return Ok(());
         }
-        let Worker { program, x, multipliers, gradient, jacobian, hessian, .. } = worker;
+        let Worker { program, v, ends, multipliers, hessian, .. } = worker;
         let Some((&sigma, mu)) = multipliers.split_first() else { return Ok(()) };
         let factor = if sigma == 0.0 { 1.0 } else { sigma };
-        let scaled: Vec<f64> = mu.iter().map(|mu| mu / factor).collect();
+        let scaled: Vec<f64> = mu.iter().take(self.layout.functions).map(|mu| mu / factor).collect();
         self.count();
-        let qp = program.second(x, &scaled)?;
-        self.layout.gradient(&qp, x, gradient);
-        self.layout.write(&qp, &self.layout.jacobian, |stage| stage.0, jacobian);
-        self.layout.write(&qp, &self.layout.hessian, |stage| stage.1, hessian);
+        worker.objective = program.second(v, &scaled, ends)?;
+        self.layout.hessian.write(&program.qp(), |stage| stage.1, hessian);
         for value in hessian.iter_mut() {
             *value *= factor;
         }
+        if !worker.known.first {
+            self.linearised(worker);
+        }
         if sigma == 0.0 {
             self.count();
-            let qp = program.second(x, &vec![0.0; mu.len()])?;
+            let Worker { program, v, ends, hessian, .. } = worker;
+            program.second(v, &vec![0.0; scaled.len()], ends)?;
             let mut objective = Vec::new();
-            self.layout.write(&qp, &self.layout.hessian, |stage| stage.1, &mut objective);
+            self.layout.hessian.write(&program.qp(), |stage| stage.1, &mut objective);
             for (value, objective) in hessian.iter_mut().zip(&objective) {
                 *value -= objective;
             }
         }
-        worker.known.first = true;
         worker.known.second = true;
         Ok(())
     }
@@ -163,10 +181,12 @@ impl Client for Problems {
         Ok(Worker {
             program,
             x: vec![f64::NAN; n],
+            v: Vec::new(),
             input: vec![0.0; n],
             multipliers: vec![f64::NAN; m + 1],
             input_multipliers: vec![0.0; m + 1],
             known: Known::default(),
+            follows: false,
             objective: 0.0,
             ends: Vec::new(),
             gradient: Vec::new(),
@@ -185,6 +205,7 @@ impl Client for Problems {
         if !super::cache::equal(&worker.x, &worker.input) {
             worker.known = Known::default();
             worker.x.copy_from_slice(&worker.input);
+            self.layout.gather(&worker.x, &mut worker.v);
         }
         let seed = |port: &Port| [c"lam_f", c"adj_f"].contains(&port.name);
         if let Some(input) = signature.inputs.iter().position(seed) {
@@ -229,21 +250,19 @@ impl Problems {
     /// An output; those of other names have no entries.
     fn write(&self, worker: &Worker, port: &Port, to: &mut [f64]) {
         match port.name.to_bytes() {
-            b"f" => to.fill(worker.objective),
-            b"g" => self.layout.constraints(&worker.x, &worker.ends, to),
+            b"f" => to.fill(worker.objective + self.layout.penalty(&worker.x)),
+            b"g" => self.layout.constraints(&worker.x, &worker.v, &worker.ends, to),
             b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => to.copy_from_slice(&worker.gradient),
             b"jac_g_x" => to.copy_from_slice(&worker.jacobian),
             b"jac_adj_x_adj_g" => {
-                for (to, &entry) in to.iter_mut().zip(&self.patterns.transposed) {
+                for (to, &entry) in to.iter_mut().zip(&self.transposed) {
                     *to = worker.jacobian[entry];
                 }
             }
             b"jac_adj_x_x" => to.copy_from_slice(&worker.hessian),
             b"triu_hess_gamma_x_x" => {
-                let entries = self.patterns.hessian.entries().iter().zip(&worker.hessian);
-                let upper = entries.filter(|((row, column), _)| row <= column);
-                for (to, (_, value)) in to.iter_mut().zip(upper) {
-                    *to = *value;
+                for (to, &entry) in to.iter_mut().zip(&self.upper) {
+                    *to = worker.hessian[entry];
                 }
             }
             b"grad_gamma_x" | b"adj_x" => {
@@ -251,30 +270,38 @@ impl Problems {
                 for (to, gradient) in to.iter_mut().zip(&worker.gradient) {
                     *to = sigma * gradient;
                 }
-                for (&(row, column), value) in self.patterns.jacobian.entries().iter().zip(&worker.jacobian) {
+                for (&(row, column), value) in
+                    self.layout.jacobian.sparsity.entries().iter().zip(&worker.jacobian)
+                {
                     to[column] += mu[row] * value;
                 }
             }
+            b"x" => self.trajectory(worker, |dims| 0..dims.nx, to),
+            b"u" => self.trajectory(worker, |dims| dims.nx..dims.nx + dims.nu, to),
             _ => {}
+        }
+    }
+
+    /// States or controls of all stages, one behind the other.
+    fn trajectory(&self, worker: &Worker, choose: impl Fn(&StageDims) -> Range<usize>, to: &mut [f64]) {
+        let (mut rest, mut to) = (&worker.v[..], to.iter_mut());
+        for dims in &self.layout.dims {
+            let (stage, behind) = rest.split_at(dims.nx + dims.nu);
+            rest = behind;
+            for (from, to) in stage[choose(dims)].iter().zip(to.by_ref()) {
+                *to = *from;
+            }
         }
     }
 
     /// Bounds, the iterate as a start, and bounds of the constraints.
     fn bounds(&self, worker: &Worker, call: &mut dyn Call) {
-        let (n, m) = (self.layout.variables, self.layout.constraints);
-        let (lower, upper): (Vec<_>, Vec<_>) = worker.program.bounds().into_iter().unzip();
-        let mut start = vec![0.0; n];
-        worker.program.point(&mut start);
-        // What is to be zero is, but for general constraints.
-        let [mut g_lower, mut g_upper] = [vec![0.0; m], vec![0.0; m]];
-        let mut begin = 0;
-        for (stage, dims) in self.layout.dims.iter().enumerate() {
-            begin += self.layout.dims.get(stage + 1).map_or(0, |next| next.nx);
-            for row in 0..dims.ng {
-                [g_lower[begin], g_upper[begin]] = worker.program.limits(stage, row);
-                begin += 1;
-            }
-        }
+        let mut start = vec![0.0; self.layout.variables];
+        self.layout.scatter(&worker.program.point(), &mut start);
+        let [x, g] = &self.layout.bounds;
+        let side = |bounds: &[[f64; 2]], side: usize| bounds.iter().map(|bounds| bounds[side]).collect();
+        let [lower, upper, g_lower, g_upper]: [Vec<f64>; 4] =
+            [side(x, 0), side(x, 1), side(g, 0), side(g, 1)];
         for (output, from) in [lower, upper, start, g_lower, g_upper].iter().enumerate() {
             if let Some(to) = call.output(output) {
                 to.copy_from_slice(from);
@@ -284,13 +311,14 @@ impl Problems {
 }
 
 /// Inputs and outputs of all functions.
-fn signatures(
-    layout: &Layout,
-    jacobian: &Sparsity,
-    hessian: &Sparsity,
-    transposed: Sparsity,
-) -> Vec<Signature> {
+fn signatures(layout: &Layout, transposed: Sparsity) -> Vec<Signature> {
+    let [jacobian, hessian] = [&layout.jacobian.sparsity, &layout.hessian.sparsity];
     let (n, m) = (layout.variables, layout.constraints);
+    let last = layout.dims.len().saturating_sub(1);
+    let (nx, nu) = layout.dims.first().map_or((0, 0), |first| (first.nx, first.nu));
+    let [states, controls] = [[nx, layout.dims.len()], [nu, last]];
+    let columns =
+        |name, [rows, columns]: [usize; 2]| Port::new(name, Sparsity::new(rows, columns, |_, _| true));
     let port = |name, rows| Port::new(name, Sparsity::vector(rows));
     let zero = |name, rows, columns| Port::new(name, Sparsity::zero(rows, columns));
     let point = vec![port(c"x", n), port(c"p", 0)];
@@ -340,6 +368,10 @@ fn signatures(
                 zero(c"jac_adj_p_adj_f", 0, 1),
                 zero(c"jac_adj_p_adj_g", 0, m),
             ],
+        },
+        Signature {
+            inputs: vec![port(c"x", n)],
+            outputs: vec![columns(c"x", states), columns(c"u", controls)],
         },
     ]
 }

@@ -1,48 +1,84 @@
 //! A problem of optimal control as a nonlinear program: what is asked of it.
 
-use crate::ocp::{ConstraintName, Formulation};
-use crate::ocp::{Convexification, Exact, GaussNewton, HeapOcp, OcpError, SecondOrder};
-use crate::qp::{Field, QpView, Side, Solution, StageDims, marked};
-use alloc::format;
+use super::pattern::{StagePattern, of_stage};
+use crate::ocp::{
+    Convexification, Curvature, Exact, Formulation, GaussNewton, HeapOcp, OcpError, SecondOrder,
+};
+use crate::qp::{Bounds, QpView, Solution, StageDims, marked};
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
 /// A problem of optimal control, whose variables and constraints are
 ///
 /// ```text
-/// x = (x₀, u₀, x₁, u₁, …, x_N)        g = (φ(x₀, u₀) − x₁, g₀, φ(x₁, u₁) − x₂, g₁, …, g_N, x₀ − x_N where periodic)
+/// x = (x₀, u₀, x₁, u₁, …, x_N, e)        g = (φ(x₀, u₀) − x₁, g₀, φ(x₁, u₁) − x₂, g₁, …, g_N, soft bounds)
 /// ```
+///
+/// where shared controls are in `u₀` alone and periodic states in `x₀` alone, and soft sides have
+/// slack variables `e`.
 pub trait Program: Send {
     /// Dimensions of the stages.
     fn dims(&self) -> Vec<StageDims>;
-    /// Which states are periodic.
-    fn periodic(&mut self) -> Vec<usize>;
-    /// Bounds of the variables.
-    fn bounds(&self) -> Vec<(f64, f64)>;
-    /// Bounds of a general constraint.
-    fn limits(&self, stage: usize, row: usize) -> [f64; 2];
-    /// Whether all that was to be said was, and all bounds are hard.
+    /// Which states are periodic, and which controls are shared.
+    fn couplings(&self) -> [Vec<usize>; 2];
+    /// Where the matrices of a stage may differ from zero.
+    fn pattern(&mut self, stage: usize) -> StagePattern;
+    /// Bounds of the states and controls of a stage.
+    fn bounds(&self, stage: usize) -> Vec<[Limit; 2]>;
+    /// Bounds of its constraints.
+    fn limits(&self, stage: usize) -> Vec<[Limit; 2]>;
+    /// Whether all that was to be said was.
     ///
     /// # Errors
     /// What is wrong, as a text.
     fn check(&mut self) -> Result<(), String>;
-    /// The variables of the iterate.
-    fn point(&self, to: &mut [f64]);
+    /// States and controls of the iterate, stage after stage.
+    fn point(&self) -> Vec<f64>;
     /// The objective, and `φ` of every interval and `g` of every stage in `ends`.
     ///
     /// # Errors
     /// Those of functions and integrators.
-    fn value(&mut self, x: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
-    /// The problem linearised at a point.
+    fn value(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
+    /// The same from the problem linearised there, which [`Program::qp`] is then.
     ///
     /// # Errors
     /// Those of functions and integrators.
-    fn first(&mut self, x: &[f64]) -> Result<QpView<'_, f64>, OcpError>;
-    /// The same, with the Hessian of the Lagrangian, where `multipliers` are those of `g`.
+    fn first(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
+    /// The same with the Hessian of the Lagrangian, where `multipliers` are those of `φ` and `g`.
     ///
     /// # Errors
     /// Those of functions and integrators.
-    fn second(&mut self, x: &[f64], multipliers: &[f64]) -> Result<QpView<'_, f64>, OcpError>;
+    fn second(&mut self, v: &[f64], multipliers: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
+    /// The problem linearised.
+    fn qp(&self) -> QpView<'_, f64>;
+}
+
+/// A side of a bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// Infinite if there is none.
+    pub value: f64,
+    /// What leaving it costs, linearly and quadratically; nothing if it is hard.
+    pub penalty: Option<[f64; 2]>,
+}
+
+impl Limit {
+    /// A side with its penalties; an infinite one is hard.
+    fn new(value: f64, linear: f64, quadratic: f64) -> Self {
+        let is_soft = value.is_finite() && linear.is_finite();
+        Self { value, penalty: is_soft.then_some([linear, quadratic]) }
+    }
+}
+
+/// Both sides of all bounds, with these values.
+fn limits<'a>(bounds: &Bounds<'a, f64>, values: impl Iterator<Item = [f64; 2]> + 'a) -> Vec<[Limit; 2]> {
+    let lower = bounds.lower_linear.iter().zip(bounds.lower_quadratic);
+    let upper = bounds.upper_linear.iter().zip(bounds.upper_quadratic);
+    let sides = values.zip(lower.zip(upper));
+    let limits = sides.map(|([lower, upper], ((&l, &q), (&linear, &quadratic)))| {
+        [Limit::new(lower, l, q), Limit::new(upper, linear, quadratic)]
+    });
+    limits.collect()
 }
 
 impl<P: Formulation<f64> + Send> Program for HeapOcp<P, f64>
@@ -50,101 +86,92 @@ where
     P::Dynamics: SecondOrder<f64>,
 {
     fn dims(&self) -> Vec<StageDims> {
-        self.qp().dims().to_vec()
+        HeapOcp::qp(self).dims().to_vec()
     }
 
-    fn periodic(&mut self) -> Vec<usize> {
-        marked(self.qp().periodic()).collect()
+    fn couplings(&self) -> [Vec<usize>; 2] {
+        let qp = HeapOcp::qp(self);
+        [marked(qp.periodic()).collect(), marked(qp.shared()).collect()]
     }
 
-    fn bounds(&self) -> Vec<(f64, f64)> {
-        let stages = self.qp().stages();
-        let bounds = stages.flat_map(|stage| [stage.x_bounds(), stage.u_bounds()]);
-        bounds.flat_map(|bounds| bounds.lower.iter().copied().zip(bounds.upper.iter().copied())).collect()
+    fn pattern(&mut self, stage: usize) -> StagePattern {
+        let rows = HeapOcp::qp(self).dims().get(stage).map_or(0, |dims| dims.ng);
+        let is_last = stage == self.intervals();
+        let mut pattern = of_stage(self.problem(), is_last, rows);
+        if stage == 0 && self.has_arrival_cost() {
+            let nx = self.names().x.len();
+            (0..nx).for_each(|i| (0..nx).for_each(|j| pattern.hessian.set(i, j)));
+        }
+        pattern
     }
 
-    fn limits(&self, stage: usize, row: usize) -> [f64; 2] {
-        HeapOcp::limits(self, stage, row)
+    fn bounds(&self, stage: usize) -> Vec<[Limit; 2]> {
+        let Some(stage) = HeapOcp::qp(self).stages().nth(stage) else { return Vec::new() };
+        let of = |bounds: Bounds<'_, f64>| {
+            let values = bounds.lower.iter().zip(bounds.upper).map(|(&lower, &upper)| [lower, upper]);
+            limits(&bounds, values)
+        };
+        [of(stage.x_bounds()), of(stage.u_bounds())].concat()
+    }
+
+    fn limits(&self, stage: usize) -> Vec<[Limit; 2]> {
+        let Some(view) = HeapOcp::qp(self).stages().nth(stage) else { return Vec::new() };
+        let values = (0..).map(|row| HeapOcp::limits(self, stage, row));
+        limits(&view.g_bounds(), values)
     }
 
     fn check(&mut self) -> Result<(), String> {
-        HeapOcp::check(self).map_err(|error| error.to_string())?;
-        if let Some(control) = marked(self.qp().shared()).next() {
-            let name = self.names().u.get(control).copied().unwrap_or_default();
-            return Err(format!(
-                "the control `{name}` is shared, which the program of CasADi does not say: make it a state of \
-                 derivative zero"
-            ));
-        }
-        match soft(self) {
-            None => Ok(()),
-            Some(bound) => Err(format!(
-                "{bound} is soft, and the program of CasADi has no slack variables: write the penalty as a cost, \
-                 or leave `soften` out"
-            )),
-        }
+        HeapOcp::check(self).map_err(|error| error.to_string())
     }
 
-    fn point(&self, to: &mut [f64]) {
-        let values = self.iterate().stages().flat_map(|stage| stage.x.iter().chain(stage.u));
-        for (to, from) in to.iter_mut().zip(values) {
-            *to = *from;
-        }
+    fn point(&self) -> Vec<f64> {
+        self.iterate().stages().flat_map(|stage| stage.x.iter().chain(stage.u).copied()).collect()
     }
 
-    fn value(&mut self, x: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
+    fn value(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
         ends.clear();
         ends.resize(HeapOcp::ends(self), 0.0);
-        let mut at = Solution::new(self.qp().dims())?;
-        write(&mut at, x, &[]);
+        let mut at = Solution::new(HeapOcp::qp(self).dims())?;
+        write(&mut at, v, &[]);
         self.evaluate(&at, ends)
     }
 
-    fn first(&mut self, x: &[f64]) -> Result<QpView<'_, f64>, OcpError> {
-        write(self.iterate_mut(), x, &[]);
-        self.linearise(GaussNewton { convexification: Convexification::None })?;
-        Ok(self.qp())
+    fn first(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
+        write(self.iterate_mut(), v, &[]);
+        linearise(self, GaussNewton { convexification: Convexification::None }, ends)
     }
 
-    fn second(&mut self, x: &[f64], multipliers: &[f64]) -> Result<QpView<'_, f64>, OcpError> {
-        write(self.iterate_mut(), x, multipliers);
-        self.linearise(Exact { convexification: Convexification::None })?;
-        Ok(self.qp())
+    fn second(&mut self, v: &[f64], multipliers: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
+        write(self.iterate_mut(), v, multipliers);
+        linearise(self, Exact { convexification: Convexification::None }, ends)
+    }
+
+    fn qp(&self) -> QpView<'_, f64> {
+        HeapOcp::qp(self)
     }
 }
 
-/// A bound that is soft, if there is one.
-fn soft<P: Formulation<f64>>(ocp: &HeapOcp<P, f64>) -> Option<ConstraintName> {
-    for (at, stage) in ocp.qp().stages().enumerate() {
-        let fields = [
-            (Field::StateBounds, stage.x_bounds()),
-            (Field::ControlBounds, stage.u_bounds()),
-            (Field::GeneralBounds, stage.g_bounds()),
-        ];
-        for (field, bounds) in fields {
-            let sides = [
-                (Side::Lower, bounds.lower, bounds.lower_linear),
-                (Side::Upper, bounds.upper, bounds.upper_linear),
-            ];
-            for (side, bounds, penalties) in sides {
-                let is_soft = |(bound, penalty): (&f64, &f64)| bound.is_finite() && penalty.is_finite();
-                if let Some(index) = bounds.iter().zip(penalties).position(is_soft) {
-                    return Some(ocp.name(field, at, index, side));
-                }
-            }
-        }
-    }
-    None
+/// Linearises at the iterate: the objective, and `φ` and `g` in `ends`.
+fn linearise<P: Formulation<f64>, C: Curvature<P::Dynamics, f64>>(
+    ocp: &mut HeapOcp<P, f64>,
+    curvature: C,
+    ends: &mut Vec<f64>,
+) -> Result<f64, OcpError> {
+    ends.clear();
+    ocp.linearise_watched(curvature, |_, step| ends.extend(step.x))?;
+    let phi = ends.len();
+    ends.resize(ocp.ends(), 0.0);
+    ocp.constraints(ends.get_mut(phi..).unwrap_or_default())
 }
 
-/// Variables and multipliers of `g` to where the problem reads them.
-fn write(to: &mut Solution<f64, Vec<StageDims>, Vec<f64>>, x: &[f64], multipliers: &[f64]) {
-    let (mut x, mut multipliers) = (x.iter(), multipliers.iter());
+/// States, controls and multipliers to where the problem reads them.
+fn write(to: &mut Solution<f64, Vec<StageDims>, Vec<f64>>, v: &[f64], multipliers: &[f64]) {
+    let (mut v, mut multipliers) = (v.iter(), multipliers.iter());
     let stages = to.dims().len();
     for stage in 0..stages {
         let Some(stage) = to.stage_mut(stage) else { return };
         for to in stage.x.iter_mut().chain(stage.u) {
-            *to = x.next().copied().unwrap_or(0.0);
+            *to = v.next().copied().unwrap_or(0.0);
         }
         for to in stage.dynamics.iter_mut().chain(stage.g_upper) {
             *to = multipliers.next().copied().unwrap_or(0.0);

@@ -37,8 +37,27 @@ pub struct Output {
     pub source: Source,
     /// The place of each non-zero there.
     pub entries: Vec<Entry>,
+    /// The places as ranges without gaps, in their order.
+    pub runs: Vec<Range<usize>>,
+    /// Whether these are of algebraic states.
+    pub algebraic: bool,
 }
 
+impl Output {
+    fn new(source: Source, entries: Vec<Entry>, algebraic: bool) -> Self {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for &Entry(place) in &entries {
+            match runs.last_mut() {
+                Some(run) if run.end == place => run.end += 1,
+                _ => runs.push(place..place + 1),
+            }
+        }
+        Self { source, entries, runs, algebraic }
+    }
+}
+
+/// Which of the outputs are algebraic states.
+const ALGEBRAIC: usize = 1;
 const INPUTS: [&CStr; 3] = [c"x0", c"u", c"p"];
 const OUTPUTS: [&CStr; 3] = [c"xf", c"zf", c"qf"];
 const NOMINAL: [&CStr; 3] = [c"out_xf", c"out_zf", c"out_qf"];
@@ -116,8 +135,8 @@ impl Shape<'_> {
         let of_adjoint = [of_inputs.clone(), nominal.clone(), seeds].concat();
         let of_second = [of_adjoint.clone(), self.ports(&NOMINAL_GRADIENTS, inputs, true)].concat();
         let [value, gradient] = [
-            self.vectors(Source::Value, outputs, self.rows()),
-            self.vectors(Source::Gradient, inputs, self.directions()),
+            self.vectors(Source::Value, outputs, self.rows(), |index| kinds[index] == ALGEBRAIC),
+            self.vectors(Source::Gradient, inputs, self.directions(), |_| false),
         ];
         let [first, second] = [self.first(), self.second()];
         let whole =
@@ -136,12 +155,22 @@ impl Shape<'_> {
         names.iter().zip(ranges).map(|(name, range)| Port::new(name, sparsity(range.len()))).collect()
     }
 
-    fn vectors(&self, source: Source, ranges: &[Range<usize>], length: usize) -> Vec<Output> {
+    fn vectors(
+        &self,
+        source: Source,
+        ranges: &[Range<usize>],
+        length: usize,
+        is_algebraic: impl Fn(usize) -> bool,
+    ) -> Vec<Output> {
         let intervals = |range: &Range<usize>| {
             let of = |k: usize| range.clone().map(move |index| Entry(k * length + index));
             (0..self.count).flat_map(of).collect()
         };
-        ranges.iter().map(|range| Output { source, entries: intervals(range) }).collect()
+        let outputs = ranges
+            .iter()
+            .enumerate()
+            .map(|(index, range)| Output::new(source, intervals(range), is_algebraic(index)));
+        outputs.collect()
     }
 
     /// The blocks of `∂y/∂w`.
@@ -151,7 +180,9 @@ impl Shape<'_> {
         for (kind, output) in self.present() {
             for (name, input) in JACOBIANS[kind].iter().zip(&self.inputs) {
                 let sparsity = self.value.block(output.clone(), input.clone());
-                let place = Place { first: output.start + rows * input.start, row: 1, column: rows };
+                let algebraic = kind == ALGEBRAIC;
+                let place =
+                    Place { first: output.start + rows * input.start, row: 1, column: rows, algebraic };
                 self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
             }
         }
@@ -165,19 +196,21 @@ impl Shape<'_> {
         for (gradient, row) in self.inputs.iter().enumerate() {
             for (name, column) in HESSIANS[gradient].iter().zip(&self.inputs) {
                 let sparsity = self.hessian.block(row.clone(), column.clone());
-                let place =
-                    Place { first: row.start + directions * column.start, row: 1, column: directions };
+                let first = row.start + directions * column.start;
+                let place = Place { first, row: 1, column: directions, algebraic: false };
                 self.push(&mut blocks, name, &sparsity, Source::Hessian, place);
             }
             for (kind, output) in self.present() {
                 let name = BY_NOMINAL[gradient][kind];
                 let sparsity = Sparsity::zero(row.len(), output.len());
-                self.push(&mut blocks, name, &sparsity, Source::Zero, Place { first: 0, row: 0, column: 0 });
+                let place = Place { first: 0, row: 0, column: 0, algebraic: false };
+                self.push(&mut blocks, name, &sparsity, Source::Zero, place);
             }
             for (kind, output) in self.present() {
                 let name = BY_SEEDS[gradient][kind];
                 let sparsity = self.value.transposed_block(output.clone(), row.clone());
-                let place = Place { first: output.start + rows * row.start, row: rows, column: 1 };
+                let algebraic = kind == ALGEBRAIC;
+                let place = Place { first: output.start + rows * row.start, row: rows, column: 1, algebraic };
                 self.push(&mut blocks, name, &sparsity, Source::Jacobian, place);
             }
         }
@@ -204,14 +237,16 @@ impl Shape<'_> {
         };
         let entries = (0..self.count).flat_map(of).collect();
         blocks.0.push(Port::new(name, sparsity.diagonal(self.count)));
-        blocks.1.push(Output { source, entries });
+        blocks.1.push(Output::new(source, entries, place.algebraic));
     }
 }
 
-/// Where the first element of a block is, and the distances of rows and of columns.
+/// Where the first element of a block is, the distances of rows and columns, and whether they are
+/// of algebraic states.
 #[derive(Clone, Copy)]
 struct Place {
     first: usize,
     row: usize,
     column: usize,
+    algebraic: bool,
 }

@@ -7,7 +7,7 @@ use core::ops::Range;
 /// Structural non-zeros of a matrix in compressed columns, as CasADi reads them: numbers of rows
 /// and columns, where each column begins and the last one ends, rows; or both numbers and a one if
 /// nothing is zero.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sparsity {
     compressed: Vec<i64>,
     /// `(row, column)`, column by column.
@@ -101,6 +101,29 @@ impl Relation {
     /// Nothing but zeros.
     pub fn zero(rows: usize, columns: usize) -> Self {
         Self { columns, related: vec![false; rows * columns] }
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.related.len().checked_div(self.columns).unwrap_or(0)
+    }
+
+    /// Nothing in a row is zero.
+    pub fn fill(&mut self, row: usize) {
+        if let Some(related) = self.related.get_mut(row * self.columns..(row + 1) * self.columns) {
+            related.fill(true);
+        }
+    }
+
+    /// The products of what is in two rows of `other`, in both orders.
+    pub fn join_products(&mut self, other: &Self, one: usize, two: usize) {
+        let columns = self.columns;
+        for a in (0..columns).filter(|&a| other.has(one, a)) {
+            for b in (0..columns).filter(|&b| other.has(two, b)) {
+                self.set(a, b);
+                self.set(b, a);
+            }
+        }
     }
 
     /// A row.

@@ -86,7 +86,7 @@ fn equations_are_matched_with_unknowns() {
     assert_eq!(variables.row(1), [true, false, true]);
     assert_eq!(variables.row(4), [false, true, false]);
     let mut hessian = Relation::zero(3, 3);
-    dependence::curvature(&variables, Pattern { rows: &[5], columns: &[4] }, &mut hessian, 3);
+    dependence::curvature(&variables, Pattern { rows: &[5], columns: &[4] }, &mut hessian);
     assert_eq!(hessian.block(0..3, 0..3).entries(), [(2, 1), (1, 2)]);
 }
 

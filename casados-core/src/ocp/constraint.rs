@@ -2,6 +2,7 @@
 
 use super::check::Labels;
 use super::error::{OcpError, Part};
+use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
@@ -22,6 +23,13 @@ pub trait Constraints<S: Shape, T: Real> {
     /// [`OcpError::NotThere`]
     #[doc(hidden)]
     fn check(&self, there: There) -> Result<(), OcpError>;
+    /// Shows where the Jacobian and the Hessian over `(x, u, z)` may have entries; false if that is
+    /// not known.
+    #[doc(hidden)]
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        let _ = visit;
+        Self::ROWS == 0
+    }
     /// The bounds that hold where nothing else is said: lower ones, upper ones, linear and
     /// quadratic penalties.
     #[doc(hidden)]
@@ -90,6 +98,14 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
     fn check(&self, there: There) -> Result<(), OcpError> {
         self.0.check(there)?;
         self.1.check(there)
+    }
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        use super::pattern::Entry;
+        let behind = &mut |entry| match entry {
+            Entry::Slope(row, variable) => visit(Entry::Slope(A::ROWS + row, variable)),
+            Entry::Curvature(..) => visit(entry),
+        };
+        self.1.pattern(behind) && self.0.pattern(visit)
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
         let [(l, lower), (u, upper), (i, linear), (q, quadratic)] =
@@ -192,6 +208,11 @@ impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
             labels.check_penalty(index, linear, quadratic)?;
         }
         there.check::<F>()
+    }
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        pattern::slopes::<F>(visit);
+        pattern::curvature::<F>(visit);
+        true
     }
     fn bounds(&self, limits: [&mut [T]; 4]) {
         let given = [&self.lower, &self.upper, &self.linear, &self.quadratic];

@@ -1,6 +1,7 @@
 //! Costs at the nodes.
 
 use super::error::OcpError;
+use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, finite, is_algebraic, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
@@ -38,6 +39,13 @@ pub trait Cost<S: Shape, T: Real> {
     #[doc(hidden)]
     fn name(reference: usize) -> (&'static str, usize) {
         ("", reference)
+    }
+
+    /// Shows where the exact Hessian over `(x, u, z)` may have entries; false if that is not known.
+    #[doc(hidden)]
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        let _ = visit;
+        false
     }
 
     /// The value at a point.
@@ -92,6 +100,9 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     fn check(&self, _: There) -> Result<(), OcpError> {
         Ok(())
     }
+    fn pattern(&self, _: Entries<'_>) -> bool {
+        true
+    }
     fn value(&mut self, _: &S::ArrayV<T>, _: &[T], _: usize) -> Result<T, OcpError> {
         Ok(T::ZERO)
     }
@@ -121,6 +132,9 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     fn check_weights(&self) -> Result<(), OcpError> {
         self.0.check_weights()?;
         self.1.check_weights()
+    }
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        self.0.pattern(visit) && self.1.pattern(visit)
     }
     fn name(reference: usize) -> (&'static str, usize) {
         match reference.checked_sub(A::REFERENCES) {
@@ -188,6 +202,11 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
 
     fn check(&self, there: There) -> Result<(), OcpError> {
         there.check::<F>()
+    }
+
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        pattern::curvature::<F>(visit);
+        true
     }
 
     fn value(&mut self, v: &ArrayV<F, T>, _: &[T], stage: usize) -> Result<T, OcpError> {

@@ -2,6 +2,7 @@
 
 use super::error::OcpError;
 use super::names::Names;
+use super::pattern::Origin;
 use crate::model::Dae;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
@@ -177,6 +178,9 @@ pub trait Dynamics<T: Real> {
     const NAMES: Names;
     /// Whether [`Step::z`] says what the algebraic states are at nodes.
     const ALGEBRAIC: bool = false;
+    /// What the ends of intervals follow from.
+    #[doc(hidden)]
+    const ORIGIN: Origin = Origin::Unknown;
 
     /// Whether weights of integral costs make sense.
     ///

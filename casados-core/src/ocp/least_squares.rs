@@ -2,6 +2,7 @@
 
 use super::cost::{At, Cost};
 use super::error::OcpError;
+use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
 use super::weights;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
@@ -108,6 +109,12 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
             0 => Ok(()),
             _ => weights::check::<F, T>(&self.weights, self.coupled != 0),
         }
+    }
+
+    fn pattern(&self, visit: Entries<'_>) -> bool {
+        pattern::squares::<F>(self.coupled != 0, visit);
+        pattern::curvature::<F>(visit);
+        true
     }
 
     fn name(reference: usize) -> (&'static str, usize) {

@@ -85,7 +85,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// [`Ocp::linearise`], and shows every interval to `watch`.
-    pub(super) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
+    pub(crate) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
         mut watch: impl FnMut(usize, &Step<'_, T>),

@@ -3,6 +3,7 @@
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
 use super::names::Names;
+use super::pattern::Origin;
 use super::point::{parameter, position, read};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
@@ -117,6 +118,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
         let structure = &F::STRUCTURE;
         Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
     };
+    const ORIGIN: Origin = Origin::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         for (k, interval) in nodes.iter().enumerate() {

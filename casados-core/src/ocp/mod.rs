@@ -70,8 +70,11 @@ mod log;
 mod map;
 mod messages;
 mod names;
+mod pattern;
 mod point;
 mod problem;
+#[cfg(feature = "casadi")]
+mod program;
 mod real_time;
 #[cfg(feature = "alloc")]
 mod sensitivities;
@@ -99,6 +102,8 @@ pub use linearise::{Curvature, Exact, GaussNewton};
 pub use log::{Iteration, Log, Outcome, Status, Times};
 pub use map::Map;
 pub use names::Names;
+#[cfg(feature = "casadi")]
+pub(crate) use pattern::{Entry, Origin};
 pub use problem::{Formulation, Problem};
 #[cfg(feature = "alloc")]
 pub use real_time::HeapRealTime;

@@ -3,7 +3,8 @@
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::names::Names;
-use super::single::names;
+use super::pattern::Origin;
+use super::single::{names, origin};
 use crate::batch::{BatchError, Integrator, Intervals};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Forward, Hessian, Nominal};
@@ -111,6 +112,7 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
     type Shape = M::Shape;
     const NAMES: Names = names::<M>();
     const ALGEBRAIC: bool = true;
+    const ORIGIN: Origin = origin::<M>();
 
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, false)?;

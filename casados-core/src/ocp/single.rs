@@ -4,6 +4,7 @@
 use super::dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
 use super::names::Names;
+use super::pattern::Origin;
 use crate::error::Error;
 use crate::function::Function;
 use crate::memory::{Memory, WithForward, WithHessian};
@@ -17,6 +18,11 @@ use crate::{erk, irk};
 pub(super) const fn names<M: Dae>() -> Names {
     let structure = &M::STRUCTURE;
     Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
+}
+
+/// The equations of a model.
+pub(super) const fn origin<M: Dae>() -> Origin {
+    Origin::Equations(M::STRUCTURE.jacobian, M::STRUCTURE.hessian)
 }
 
 /// An integrator with an integral cost: `∫ l dt` of a [`Quadrature`] with one output, or half the
@@ -113,6 +119,7 @@ macro_rules! single {
             type Shape = M::Shape;
             const NAMES: Names = names::<M>();
             const ALGEBRAIC: bool = true;
+            const ORIGIN: Origin = origin::<M>();
 
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 for (k, interval) in nodes.iter().enumerate() {

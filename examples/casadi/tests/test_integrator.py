@@ -160,6 +160,54 @@ class Algebraic(unittest.TestCase):
         np.testing.assert_allclose(gradient(w)[:3], expected, rtol=1e-13, atol=1e-13)
 
 
+def spring_of_casadi(plugin, **options):
+    x, u, z, p = casadi.SX.sym("x", 3), casadi.SX.sym("u"), casadi.SX.sym("z"), casadi.SX.sym("p", 2)
+    ode = casadi.vertcat(x[1], u - z, -p[1] * u * u)
+    alg = z + 0.1 * z**3 - p[0] * x[0]
+    quad = casadi.vertcat(0.5 * x[0] ** 2 + 0.1 * u**2, z * x[1])
+    dae = {"x": x, "z": z, "u": u, "p": p, "ode": ode, "alg": alg, "quad": quad}
+    return casadi.integrator("I", plugin, dae, 0, 0.3, options)
+
+
+class OutputsOfCasadi(unittest.TestCase):
+    """Integrals and algebraic states by integrators of CasADi."""
+
+    AT = Algebraic.AT
+
+    def test_integrals_of_the_same_method(self):
+        """Values, Jacobian and Hessian of the same discrete map, Radau IIA with three stages and two
+        steps: 1e-14 of Newton's method times condition numbers of some hundreds."""
+        theirs = spring_of_casadi(
+            "collocation",
+            number_of_finite_elements=2,
+            interpolation_order=3,
+            collocation_scheme="radau",
+            rootfinder="newton",
+            rootfinder_options={"abstol": 1e-14, "max_iter": 50},
+        )
+        ours = external("spring")
+        x, u, p, l = [casadi.MX.sym(*name) for name in [("x", 3), ("u", 1), ("p", 2), ("l", 5)]]
+        w = casadi.vertcat(x, u, p)
+
+        def derivatives(outputs):
+            y = casadi.vertcat(*outputs)
+            hessian, gradient = casadi.hessian(casadi.dot(l, y), w)
+            f = casadi.Function("f", [x, u, p, l], [y, casadi.jacobian(y, w), gradient, hessian])
+            return [full(v) for v in f(*self.AT, [0.3, -0.4, 0.9, 1.2, -0.7])]
+
+        end = theirs(x0=x, u=u, p=p, z0=0.5)
+        for a, b in zip(derivatives(ours(x, u, p)), derivatives([end["xf"], end["qf"]])):
+            np.testing.assert_allclose(a, b, rtol=1e-11, atol=1e-11)
+
+    def test_algebraic_states(self):
+        """Gauss with two stages and two steps has errors of h⁴ = 5e-4 times derivatives of fifth
+        order over 4320: 1e-6 is more than both steps make."""
+        exact = spring_of_casadi("idas", abstol=1e-12, reltol=1e-12)
+        end = exact(x0=self.AT[0], u=self.AT[1], p=self.AT[2], z0=0.5)
+        for a, b in zip(external("spring_z")(*self.AT), [end["xf"], end["zf"], end["qf"]]):
+            np.testing.assert_allclose(full(a), full(b), atol=1e-6)
+
+
 class ConsistentStates(unittest.TestCase):
     """Algebraic states at the end, a function of the states there."""
 
@@ -169,6 +217,22 @@ class ConsistentStates(unittest.TestCase):
         xf, zf, _ = [full(v).ravel() for v in external("spring_z")(*self.AT)]
         residual = zf[0] + 0.1 * zf[0] ** 3 - self.AT[2][0] * xf[0]
         self.assertLess(abs(residual), 1e-15)
+
+    def test_nobody_solves_for_what_is_not_wanted(self):
+        x, u, p = casadi.MX.sym("x", 3), casadi.MX.sym("u"), casadi.MX.sym("p", 2)
+        ends = external("spring_z")(x, u, p)
+        of_states, of_all = [casadi.Function("f", [x, u, p], outputs) for outputs in [[ends[0]], ends]]
+        jac = casadi.Function("j", [x, u, p], [casadi.jacobian(ends[0], x)])
+        at, counts, last = [self.AT[0] + 0.01, *self.AT[1:]], [], integrations("spring_z")
+        for function in [of_states, jac, of_all, jac]:
+            values = function(*at)
+            counts.append(integrations("spring_z") - last)
+            last = integrations("spring_z")
+        # Stages; their derivatives; algebraic states, with the stages that are known.
+        self.assertEqual(counts, [1, 0, 1, 0])
+        other = external("spring_z")(*[value * (1 + 1e-15) for value in at])
+        for a, b in zip(of_all(*at), other):
+            np.testing.assert_allclose(full(a), full(b), rtol=1e-12, atol=1e-13)
 
     def value(self, w):
         out = external("spring_z")(w[:3], w[3:4], w[4:])
@@ -422,6 +486,47 @@ class Leaks(unittest.TestCase):
         for _ in range(300):
             use()
         self.assertLess(self.resident() - before, 1.5e6)
+
+    @unittest.skipUnless(os.path.exists("/proc/self/statm"), "needs /proc")
+    def test_checkouts_and_releases(self):
+        """One memory serves them all: a thousand that were not given back are ten million bytes."""
+        pointer = ctypes.POINTER(ctypes.c_double)
+        x, to = X0.copy(), np.zeros(4)
+        arg = (pointer * 3)(x.ctypes.data_as(pointer), U.ctypes.data_as(pointer), None)
+        res = (pointer * 1)(to.ctypes.data_as(pointer))
+
+        def use(call):
+            memory = RUST.pendulum_checkout()
+            x[0] = 1e-6 * call
+            self.assertEqual(RUST.pendulum(arg, res, None, None, memory), 0)
+            RUST.pendulum_release(memory)
+            return memory
+
+        first = use(0)
+        # The cache has 512 entries.
+        for call in range(1000):
+            use(call)
+        before = self.resident()
+        self.assertEqual({use(call) for call in range(1000, 5000)}, {first})
+        self.assertLess(self.resident() - before, 1.5e6)
+
+    @unittest.skipUnless(os.path.exists("/proc/self/statm"), "needs /proc")
+    def test_problems_again_and_again(self):
+        """A problem of 25 intervals holds more than a hundred thousand bytes."""
+
+        def use():
+            for name in ["nlp_g", "nlp_jac_g"]:
+                F = external(name)
+                F(np.zeros(F.size_in(0)), column([]))
+            del F
+            gc.collect()
+
+        for _ in range(10):
+            use()
+        before = self.resident()
+        for _ in range(60):
+            use()
+        self.assertLess(self.resident() - before, 3e6)
 
 
 if __name__ == "__main__":

@@ -129,8 +129,22 @@ class Solvers(unittest.TestCase):
         before = integrations("nlp")
         for function, arguments in zip(functions, [(x, p, 1, mu), (x, p), (x, p)]):
             function(*arguments)
-        # The gradient comes with the value of the objective.
-        self.assertEqual(integrations("nlp") - before, 2 * N)
+        # Values and gradient come with the Hessian.
+        self.assertEqual(integrations("nlp") - before, N)
+
+    def test_values_come_with_the_derivatives_that_follow(self):
+        """Where derivatives were asked for at the last point, they are computed with the values."""
+        p = casadi.DM(0, 1)
+        g, jac = external("nlp_g"), external("nlp_jac_g")
+        counts, last = [], integrations("nlp")
+        for seed, functions in [(7, [g, jac]), (8, [g, jac]), (9, [g]), (10, [g])]:
+            values = [full(function(point(seed)[0], p)[0] if function is jac else function(point(seed)[0], p)) for function in functions]
+            for value in values:
+                # However they were computed: sums of other orders differ by rounding.
+                np.testing.assert_allclose(value, values[0], rtol=1e-13, atol=1e-14)
+            counts.append(integrations("nlp") - last)
+            last = integrations("nlp")
+        self.assertEqual(counts, [2 * N, N, N, N])
 
 
 if __name__ == "__main__":

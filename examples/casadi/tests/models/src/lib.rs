@@ -2,6 +2,7 @@
 
 mod problem;
 mod reference;
+mod voyage;
 
 use casados::prelude::*;
 

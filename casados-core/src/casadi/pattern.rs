@@ -1,0 +1,108 @@
+//! Where the matrices of a stage of a problem may differ from zero: what the graphs of model, costs
+//! and constraints know, followed through the interval.
+
+use super::dependence::{self, Dimensions};
+use super::sparsity::Relation;
+use crate::ocp::{Constraints, Cost, Dynamics, Entry, Formulation, Origin, Problem};
+use crate::shape::Shape;
+use crate::structure::Pattern;
+
+/// Where the matrices of a stage may differ from zero, over its states and controls.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StagePattern {
+    /// Of the end of the interval, then of the constraints.
+    pub jacobian: Relation,
+    /// Of the Lagrangian.
+    pub hessian: Relation,
+}
+
+/// What a stage has.
+struct Stage {
+    pattern: StagePattern,
+    /// On which states and controls each of `(x, u, z)` depends.
+    variables: Relation,
+    /// Rows of the end of the interval.
+    next: usize,
+}
+
+impl Stage {
+    /// What a function at the node says about itself; everything if it says nothing.
+    fn add(&mut self, first: usize, tell: impl FnOnce(&mut dyn FnMut(Entry)) -> bool) {
+        let Self { pattern: StagePattern { jacobian, hessian }, variables, .. } = self;
+        let is_known = tell(&mut |entry| match entry {
+            Entry::Slope(row, variable) => {
+                jacobian.join(first + row, variables, variable);
+            }
+            Entry::Curvature(one, other) => hessian.join_products(variables, one, other),
+        });
+        if !is_known {
+            (first..jacobian.rows()).for_each(|row| jacobian.fill(row));
+            (0..hessian.rows()).for_each(|row| hessian.fill(row));
+        }
+    }
+
+    /// The end of the interval.
+    fn integrate(&mut self, origin: Origin, dimensions: Dimensions, controls: usize) {
+        let Dimensions { nx, nz, .. } = dimensions;
+        match origin {
+            Origin::Unknown => {
+                (0..self.next).for_each(|row| self.pattern.jacobian.fill(row));
+                (0..nx + controls).for_each(|row| self.pattern.hessian.fill(row));
+                (0..nz).for_each(|row| self.variables.fill(nx + controls + row));
+            }
+            Origin::Equations(jacobian, hessian) => {
+                let on = dependence::variables(dimensions, jacobian, None);
+                for row in 0..nx {
+                    self.pattern.jacobian.join(row, &on, nx + row);
+                }
+                for row in 0..nz {
+                    self.variables.join(nx + controls + row, &on, 2 * nx + row);
+                }
+                for (one, other) in hessian.iter() {
+                    self.pattern.hessian.join_products(&on, one, other);
+                }
+            }
+            Origin::Map(jacobian, hessian) => self.map(jacobian, hessian, dimensions, controls),
+        }
+    }
+
+    /// The end of the interval as a function of the variables `(ẋ, x, z, u, …)` of a model.
+    fn map(&mut self, jacobian: Pattern, hessian: Pattern, Dimensions { nx, nz, .. }: Dimensions, nu: usize) {
+        let position = |variable: usize| match variable.checked_sub(nx)? {
+            state if state < nx => Some(state),
+            other => other.checked_sub(nz).filter(|&control| (nx..nx + nu).contains(&control)),
+        };
+        for (row, variable) in jacobian.iter() {
+            if let Some(column) = position(variable) {
+                self.pattern.jacobian.set(row, column);
+            }
+        }
+        for (one, other) in hessian.iter() {
+            if let (Some(one), Some(other)) = (position(one), position(other)) {
+                self.pattern.hessian.join_products(&self.variables, one, other);
+            }
+        }
+    }
+}
+
+/// The patterns of a stage: of all but the last, or of the last, with `rows` constraints.
+pub fn of_stage<P: Formulation<f64>>(problem: &mut P, is_last: bool, rows: usize) -> StagePattern {
+    let [nx, nz, nu] = [P::Shape::NX, P::Shape::NZ, P::Shape::NU];
+    let [next, nu, nz] = if is_last { [0; 3] } else { [nx, nu, nz] };
+    let n = nx + nu;
+    let mut variables = Relation::zero(n + nz, n);
+    (0..n).for_each(|variable| variables.set(variable, variable));
+    let pattern = StagePattern { jacobian: Relation::zero(next + rows, n), hessian: Relation::zero(n, n) };
+    let mut stage = Stage { pattern, variables, next };
+    let Problem { stage_cost, terminal_cost, path, terminal, .. } = problem.parts();
+    if is_last {
+        stage.add(next, |visit| terminal.pattern(visit));
+        stage.add(next + rows, |visit| terminal_cost.pattern(visit));
+    } else {
+        let dimensions = Dimensions { nx, nz, nw: P::Shape::NW };
+        stage.integrate(<P::Dynamics as Dynamics<f64>>::ORIGIN, dimensions, nu);
+        stage.add(next, |visit| path.pattern(visit));
+        stage.add(next + rows, |visit| stage_cost.pattern(visit));
+    }
+    stage.pattern
+}

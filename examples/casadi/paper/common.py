@@ -1,0 +1,140 @@
+"""What the experiments share: libraries, problems for IPOPT, and how they are timed."""
+
+import contextlib
+import ctypes
+import json
+import os
+import pathlib
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+
+import casadi as ca
+import numpy as np
+
+HERE = pathlib.Path(__file__).resolve().parent.parent
+ROOT = HERE.parent.parent
+FOLDER = HERE / "target" / "paper"
+sys.path.insert(0, str(ROOT / "benches" / "peers"))
+
+# Minimum degree and no scaling: with MUMPS' own scaling steps of some of the problems are inexact.
+MUMPS = {"mumps_permuting_scaling": 0, "mumps_scaling": 0, "mumps_pivot_order": 0}
+
+
+def data(name):
+    """An object of the tests' references."""
+    with open(ROOT / "tests" / "data" / name) as file:
+        return json.load(file)
+
+
+def build(name, features):
+    """The library of some features, and the CPU seconds that this took."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    spent = lambda: sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
+    begin = spent()
+    command = ["cargo", "build", "--quiet", "--release", "--package", "casados-casadi-paper", "--features", features]
+    subprocess.run(command, cwd=HERE, check=True)
+    target = FOLDER / f"lib{name}.so"
+    shutil.copy(HERE / "target" / "release" / "libpaper.so", target)
+    return spent() - begin
+
+
+def library(name):
+    return str(FOLDER / f"lib{name}.so")
+
+
+class Report(ctypes.Structure):
+    """What a solver of casados did."""
+
+    _fields_ = [(name, ctypes.c_double) for name in ["converged", "objective", "iterations", "total", "functions"]]
+
+
+def own(path, solver, repetitions=20):
+    """Some runs of a solver of casados: CPU seconds of one, and the share of functions in the time
+    that it measures itself."""
+    solve, reports = ctypes.CDLL(path).own, []
+    begin = time.process_time()
+    for _ in range(repetitions):
+        report = Report()
+        if solve(ctypes.c_int(solver), ctypes.byref(report)) or not report.converged:
+            raise RuntimeError("casados' solver failed")
+        reports.append(report)
+    seconds = (time.process_time() - begin) / repetitions
+    share = statistics.median(report.functions / report.total for report in reports)
+    return result(report.objective, report.iterations, seconds, share * seconds)
+
+
+def result(objective, iterations, total, functions, complete=True):
+    return {
+        "objective": objective,
+        "iterations": int(iterations),
+        "total": total,
+        "functions": functions,
+        "complete": complete,
+    }
+
+
+class Ipopt:
+    """A problem in IPOPT with MUMPS."""
+
+    def __init__(self, nlp, arguments, tolerance, limit=None, expand=False, **more):
+        options = {"print_level": 0, "sb": "yes", "tol": tolerance, "max_iter": 100, "max_cpu_time": 60.0}
+        options |= {**MUMPS, **more}
+        if limit:
+            options["max_iter"] = limit
+        settings = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
+        settings |= {"record_time": True, "ipopt": options}
+        if expand:
+            settings["expand"] = True
+        self.limit, self.arguments = limit, arguments
+        self.solver = ca.nlpsol("s", "ipopt", nlp, settings)
+
+    def __call__(self):
+        solution = self.solver(**self.arguments)
+        stats = self.solver.stats()
+        if not stats["success"] and not (self.limit and stats["iter_count"] >= self.limit):
+            raise RuntimeError(stats["return_status"])
+        functions = sum(value for key, value in stats.items() if key.startswith("t_proc_nlp_"))
+        objective = float(solution["f"])
+        return result(objective, stats["iter_count"], stats["t_proc_total"], functions, stats["success"])
+
+
+def whole(path, tolerance, **more):
+    """The problem that a library has."""
+    given = ca.external("nlp_bounds", path)()
+    return Ipopt(path, given, tolerance, **more)
+
+
+@contextlib.contextmanager
+def environment(numbers):
+    """Numbers for the library, which reads them when it makes a problem."""
+    os.environ["CASADOS_PAPER"] = " ".join(repr(float(number)) for number in numbers)
+    yield
+
+
+def race(runners, rounds, seconds):
+    """Runs all of them by turns, each as often as its seconds allow: medians of times.
+
+    What cannot be run is left out, with a message."""
+    results, spent = {name: [] for name in runners}, dict.fromkeys(runners, 0.0)
+    for _ in range(rounds):
+        for name, run in runners.items():
+            if spent[name] > seconds:
+                continue
+            begin = time.perf_counter()
+            try:
+                results[name].append(run())
+            except Exception as error:  # noqa: BLE001: whatever it is, the page is to say so
+                print(f"  {name}: {str(error).strip().splitlines()[-1]}")
+                spent[name] = np.inf
+            spent[name] += time.perf_counter() - begin
+    medians = {}
+    for name, runs in results.items():
+        if runs:
+            middle = {key: statistics.median(run[key] for run in runs) for key in ["total", "functions"]}
+            medians[name] = {**runs[-1], **middle, "runs": len(runs)}
+            print(f"  {name}: {json.dumps(medians[name])}", flush=True)
+    return medians
