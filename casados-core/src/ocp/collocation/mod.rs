@@ -29,7 +29,6 @@ use crate::error::Error;
 use crate::irk::{Arguments, Coefficients, Integrator};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, VectorU, VectorX};
-use crate::options::{Jacobian, Newton, Options, Start};
 use crate::qp::{assign, part};
 use crate::result::Seeds;
 use crate::scalar::Real;
@@ -86,11 +85,9 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     /// # Errors
     /// Those of making an integrator.
     pub fn new(integrator: Irk<M, B, S, T>) -> Result<Self, Error> {
-        let newton = Newton { fixed_iterations: Some(1), jacobian: Jacobian::Full, ..Default::default() };
-        let options = Options { newton, start: Start::Warm, ..*integrator.options() };
         let tableau = *integrator.tableau();
         Ok(Self {
-            newton: Integrator::build(options, tableau)?,
+            newton: Integrator::build(integrator.options().lifted(), tableau)?,
             coefficients: Coefficients::new(tableau, false),
             at: integrator,
             stages: Vec::new(),
