@@ -147,7 +147,8 @@ impl<'a, T: Real> Extended<'a, T> {
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states
-    /// themselves are simulated for them, where they are not known from a line search. Nothing where nothing depends on these.
+    /// themselves are simulated for them, where they are not known from a line search. Nothing
+    /// where nothing depends on these.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
