@@ -3,7 +3,7 @@
 
 use crate::Test;
 use casados::ocp::{
-    Barrier, Constraint, Convexification, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon,
+    Barrier, Constraint, Convexification, Exact, Formulation, GeneralCost, HeapIpm, HeapOcp, Horizon, Ipm,
     IpmOptions, LeastSquaresCost, Map, OcpError, Part, Problem, SecondOrder, Status,
 };
 use casados::prelude::*;
@@ -113,6 +113,83 @@ fn deadlines_leave_the_best_iterate() -> Test {
         least = outcome.residuals.largest();
     }
     Ok(())
+}
+
+/// In memory that is given the run is the same, bit by bit; what is too short is refused.
+#[test]
+fn memory_may_be_given() -> Test {
+    let erk = Erk::<CartPole, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+    let problem = Problem::new(erk).stage_cost(GeneralCost::<Effort>::new());
+    let (numbers, (of_solver, of_indices), dims) = lengths(&problem);
+    let mut memory = vec![0.0; numbers];
+    let mut ocp = problem.on_horizon(Horizon::uniform(10, 0.05), &dims, &mut memory)?;
+    let (mut memory, mut indices) = (vec![0.0; of_solver], vec![0; of_indices]);
+    let short = memory.get_mut(1..).unwrap_or_default();
+    let error = build(&ocp, &dims, short, &mut indices).err();
+    assert!(matches!(error, Some(OcpError::Length { part: Part::Memory, .. })), "{error:?}");
+    let mut ipm = build(&ocp, &dims, &mut memory, &mut indices)?;
+    ocp.fix_initial_state(&[0.0, 0.3, 0.0, 0.0])?.bound("u", .., -20.0, 20.0)?.bound(
+        "x[2]",
+        10..,
+        0.0,
+        0.0,
+    )?;
+    ocp.guess(&[0.0; 4], &[0.0])?;
+    let outcome = ipm.solve(&mut ocp)?;
+    assert!(outcome.is_converged(), "{outcome}");
+
+    let erk = Erk::<CartPole, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+    let problem = Problem::new(erk).stage_cost(GeneralCost::<Effort>::new());
+    let mut other = problem.on(Horizon::uniform(10, 0.05))?;
+    other.fix_initial_state(&[0.0, 0.3, 0.0, 0.0])?.bound("u", .., -20.0, 20.0)?.bound(
+        "x[2]",
+        10..,
+        0.0,
+        0.0,
+    )?;
+    other.guess(&[0.0; 4], &[0.0])?;
+    let expected = HeapIpm::new(&other)?.solve(&mut other)?;
+    assert_eq!((outcome.iterations, outcome.objective), (expected.iterations, expected.objective));
+    for (a, b) in ocp.iterate().stages().zip(other.iterate().stages()) {
+        assert_eq!((a.x, a.u, a.dynamics), (b.x, b.u, b.dynamics));
+    }
+    // One bound more than there is memory for.
+    ocp.bound("x[0]", 5..6, -9.0, f64::INFINITY)?;
+    assert!(matches!(ipm.solve(&mut ocp), Err(OcpError::Qp(_))));
+    Ok(())
+}
+
+type Dims = [casados::qp::StageDims; 11];
+type GivenIpm<'a> = Ipm<f64, &'a [casados::qp::StageDims], &'a mut [f64], &'a mut [u32]>;
+
+/// Numbers of the problem, numbers and indices of the solver: 20 bounds and one equation.
+fn lengths<P: Formulation<f64> + InMemory>(_problem: &P) -> (usize, (usize, usize), Dims) {
+    let dims = P::DIMS;
+    (P::numbers(&dims), GivenIpm::memory::<P>(&dims, 20, 1), dims)
+}
+
+fn build<'a, P: Formulation<f64>, D, M>(
+    _ocp: &casados::ocp::Ocp<P, f64, D, M>,
+    dims: &'a [casados::qp::StageDims],
+    numbers: &'a mut [f64],
+    indices: &'a mut [u32],
+) -> Result<GivenIpm<'a>, OcpError> {
+    GivenIpm::in_memory::<P>(dims, 20, 1, numbers, indices)
+}
+
+/// What a problem says of itself.
+trait InMemory {
+    const DIMS: Dims;
+    fn numbers(dims: &[casados::qp::StageDims]) -> usize;
+}
+impl<D, L, E, G, H> InMemory for Problem<D, L, E, G, H>
+where
+    Self: Formulation<f64>,
+{
+    const DIMS: Dims = Self::dims::<f64, 11>();
+    fn numbers(dims: &[casados::qp::StageDims]) -> usize {
+        Self::memory::<f64>(dims)
+    }
 }
 
 /// Where rounding is in the way of the tolerance, what is acceptable is accepted.

@@ -16,6 +16,7 @@ mod arrival;
 mod bounds;
 mod chain;
 mod closed_form;
+mod collocation;
 mod coupling;
 mod curvature;
 mod degenerate;

@@ -13,7 +13,7 @@
 use super::constraint::Constraints;
 use super::cost::{At, Cost};
 use super::data::{Node, get, inputs, is_algebraic, kept, sizes, split};
-use super::dynamics::{Dynamics, Step};
+use super::dynamics::{Dynamics, Nodes, Step};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 #[cfg(feature = "alloc")]
@@ -130,7 +130,8 @@ impl<'a, T: Real> Extended<'a, T> {
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// The weights `ν` of second derivatives of algebraic states, for [`nodes`]: the states
-    /// themselves are simulated for them. Nothing where nothing depends on these.
+    /// themselves are simulated for them, where they are not known from a line search. Nothing
+    /// where nothing depends on these.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
@@ -144,7 +145,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let Problem { dynamics, stage_cost, path, running, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
-        dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
+        let nodes = Nodes { along: self.along, ..nodes };
+        if !core::mem::take(&mut self.has_algebraic) {
+            dynamics.simulate(&nodes, &mut |k, step| keep::<P::Shape, T>(data.algebraic, k, step))?;
+        }
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, stage) in self.iterate.stages().enumerate().take(intervals) {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);

@@ -40,6 +40,10 @@ pub struct Nodes<'a, T> {
     pub(super) dims: [usize; 4],
     /// Distances of stages in `v`, and in `multipliers`.
     pub(super) ld: [usize; 2],
+    /// The part of the last step after which they are, of a solver that knows
+    /// [stages](Dynamics::LIFTED): these have their memory on the heap.
+    #[cfg_attr(not(feature = "alloc"), allow(dead_code))]
+    pub(super) along: Option<T>,
 }
 
 impl<'a, T: Real> Nodes<'a, T> {
@@ -55,7 +59,7 @@ impl<'a, T: Real> Nodes<'a, T> {
     }
     /// All intervals, in order.
     pub fn iter(&self) -> impl Iterator<Item = Interval<'a, T>> + use<'a, T> {
-        let Self { v, multipliers, weights, p, times, dims: [nx, nu, np, nz], ld: [ld, ld_next] } = *self;
+        let Self { v, multipliers, weights, p, times, dims: [nx, nu, np, nz], ld: [ld, ld_next], .. } = *self;
         let part = crate::qp::part::<T>;
         times.windows(2).enumerate().map(move |(k, times)| {
             let [t, end] = [0, 1].map(|i| times.get(i).copied().unwrap_or(T::ZERO));
@@ -94,6 +98,9 @@ pub struct Step<'a, T> {
     pub hessian_p: [&'a [T]; 2],
     /// The integral cost.
     pub cost: IntegralTerms<'a, T>,
+    /// The sum of what is left of the equations of stages, and the largest; zero where these are
+    /// solved.
+    pub stages: [T; 2],
 }
 
 impl<T: Real> Default for Step<'_, T> {
@@ -108,6 +115,7 @@ impl<T: Real> Default for Step<'_, T> {
             hessian: [&[]; 3],
             hessian_p: [&[]; 2],
             cost: IntegralTerms::default(),
+            stages: [T::ZERO; 2],
         }
     }
 }
@@ -159,6 +167,17 @@ impl<T: Real> Default for IntegralTerms<'_, T> {
     }
 }
 
+/// What happens to stages that are variables.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StageAction<T> {
+    /// They go a part of their step.
+    Go(T),
+    /// They are those of the best iterate.
+    Remember,
+    /// They are what they were at the best iterate.
+    Recall,
+}
+
 /// What takes the results of the intervals, in order.
 pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
 
@@ -181,6 +200,9 @@ pub trait Dynamics<T: Real> {
     /// What the ends of intervals follow from.
     #[doc(hidden)]
     const ORIGIN: Origin = Origin::Unknown;
+    /// Whether stages of intervals are variables, which a solver moves with its iterate: by
+    /// `begin_stages`, `expand_stages` and `move_stages`.
+    const LIFTED: bool = false;
 
     /// Whether weights of integral costs make sense.
     ///
@@ -201,6 +223,26 @@ pub trait Dynamics<T: Real> {
     /// # Errors
     /// [`OcpError::Integration`]
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+
+    /// Stages begin anew, at a guess.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    fn begin_stages(&mut self, _nodes: &Nodes<'_, T>) -> Result<(), OcpError> {
+        Ok(())
+    }
+
+    /// The step of stages that belongs to one of states and controls, as it was linearised at these
+    /// nodes.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    fn expand_stages(&mut self, _nodes: &Nodes<'_, T>, _steps: &Nodes<'_, T>) -> Result<(), OcpError> {
+        Ok(())
+    }
+
+    /// What happens to stages.
+    fn move_stages(&mut self, _action: StageAction<T>) {}
 }
 
 /// Dynamics with second derivatives.
@@ -216,6 +258,16 @@ pub trait SecondOrder<T: Real>: Dynamics<T> {
     /// # Errors
     /// [`OcpError::Integration`]
     fn second_order(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+}
+
+/// Sum and largest of what is left of the equations of stages.
+pub(super) fn add_stages<T: Real>([sum, largest]: [T; 2], [more, other]: [T; 2]) -> [T; 2] {
+    [sum + more, larger(largest, other)]
+}
+
+/// The larger one; what is not a number stays.
+pub(super) fn larger<T: PartialOrd>(a: T, b: T) -> T {
+    if b <= a { a } else { b }
 }
 
 /// A vector of these elements.

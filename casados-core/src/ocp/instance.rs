@@ -46,6 +46,13 @@ pub struct Ocp<P, T, D, M> {
     pub(super) data: M,
     /// Of the last linearisation, without penalties.
     pub(super) objective: T,
+    /// What was left of the equations of stages where intervals were evaluated last: the sum, and
+    /// the largest.
+    pub(super) stages: [T; 2],
+    /// See [`Nodes`].
+    pub(super) along: Option<T>,
+    /// Whether algebraic states of the last evaluation are those of the iterate.
+    pub(super) has_algebraic: bool,
 }
 
 /// A problem with its memory on the heap.
@@ -189,7 +196,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             assign(bounds.upper_linear, bounds.lower_linear);
             assign(bounds.upper_quadratic, bounds.lower_quadratic);
         }
-        Ok(Self { problem, initial: Initial::Unknown, qp, iterate, data, objective: T::ZERO })
+        Ok(Self {
+            problem,
+            initial: Initial::Unknown,
+            qp,
+            iterate,
+            data,
+            objective: T::ZERO,
+            stages: [T::ZERO; 2],
+            along: None,
+            has_algebraic: false,
+        })
     }
 
     /// Finds out whether memory of a run has the dimensions of the problem.
@@ -357,5 +374,6 @@ pub(super) fn nodes<'a, S: Shape, T: Real>(
     times: &'a [T],
 ) -> Nodes<'a, T> {
     let dims = [S::NX, S::NU, S::NP, S::NZ];
-    Nodes { v, multipliers, weights, p, times, dims, ld: [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)] }
+    let ld = [pad::<T>(S::NX + S::NU), pad::<T>(S::NX)];
+    Nodes { v, multipliers, weights, p, times, dims, ld, along: None }
 }

@@ -6,10 +6,10 @@ use super::constraint::Constraints;
 use super::convexify::{Convexification, convexify};
 use super::cost::{At, Cost};
 use super::data::{Node, inputs, split};
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, SecondOrder, Sink, Step};
+use super::dynamics::{Dynamics, IntegralTerms, Nodes, SecondOrder, Sink, Step, add_stages, larger};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
-use super::point::{Terms, read};
+use super::point::{Terms, add_blocks, read};
 use super::problem::{Formulation, Problem};
 use super::transfer::Transfer;
 use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, pad, part, part_mut};
@@ -98,7 +98,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let nx = P::Shape::NX;
         let n = inputs::<P::Shape>();
         let ld = pad::<T>(n);
-        let Self { problem, qp, iterate, data, .. } = self;
+        let Self { problem, qp, iterate, data, along, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
         let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = problem.parts();
         let (v, multipliers) = iterate.vectors();
@@ -110,6 +110,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let mut stages = qp.stages_mut();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
+        let nodes = Nodes { along: *along, ..nodes };
+        let mut of_stages = [T::ZERO; 2];
         // Whether intervals add to costs: all of them do, or none. Then these are cleared where
         // those at nodes are added.
         let mut adding = false;
@@ -120,6 +122,9 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let (columns, point) = ([step.dx, step.du], part(v, k * ld, ld));
             Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
             watch(k, step);
+            if P::Dynamics::LIFTED {
+                of_stages = add_stages(of_stages, step.stages);
+            }
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
             objective = objective + value;
             plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
@@ -226,6 +231,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         arrival::add(data.arrival, qp);
         self.objective = objective + arrival::cost(data.arrival, iterate);
+        self.stages = of_stages;
         Ok(())
     }
 
@@ -249,7 +255,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     #[must_use]
     pub fn residuals(&mut self) -> (Residuals, f64) {
         let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
-        let (residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
+        let (mut residuals, penalties) = super::kkt::residuals(self.qp.view(), &self.iterate, data.scratch);
+        if P::Dynamics::LIFTED {
+            let [_, stages] = self.stages;
+            residuals.dynamics = larger(residuals.dynamics, stages.to_f64());
+        }
         (residuals, self.objective.to_f64() + penalties)
     }
 
@@ -267,8 +277,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (v, multipliers) = at.vectors();
         let mut objective = arrival::cost(data.arrival, at);
         let nodes = nodes::<P::Shape, T>(v, multipliers, &[], data.p, data.times);
+        let (nodes, mut of_stages) = (Nodes { along: self.along, ..nodes }, [T::ZERO; 2]);
         dynamics.simulate(&nodes, &mut |k, step: &Step<'_, T>| {
             objective = objective + step.cost.value;
+            if P::Dynamics::LIFTED {
+                of_stages = add_stages(of_stages, step.stages);
+            }
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             assign(part_mut(ends, k * nx, nx), step.x);
         })?;
@@ -286,6 +300,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 terminal.value(&point, part_mut(values, k * P::Path::ROWS, P::Terminal::ROWS), k)?;
             }
         }
+        self.stages = of_stages;
         Ok(objective)
     }
 
@@ -363,27 +378,4 @@ pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     let [a0, a1, a2, a3] = sums;
     let sum = (a0 + a1) + (a2 + a3);
     rest.iter().zip(more).fold(sum, |sum, (&a, &b)| sum + a * b)
-}
-
-/// Adds blocks `xx`, `xu`, `uu`, column after column, to the lower triangle.
-fn add_blocks<T: Real>(terms: &mut Terms<'_, T>, nx: usize, [xx, xu, uu]: [&[T]; 3]) {
-    if xx.is_empty() && uu.is_empty() {
-        return;
-    }
-    for (j, column) in xx.chunks_exact(nx.max(1)).enumerate() {
-        for (i, &value) in column.iter().enumerate().skip(j) {
-            terms.curve(i, j, value);
-        }
-    }
-    for (u, column) in xu.chunks_exact(nx.max(1)).enumerate() {
-        for (x, &value) in column.iter().enumerate() {
-            terms.curve(nx + u, x, value);
-        }
-    }
-    let nu = xu.len() / nx.max(1);
-    for (j, column) in uu.chunks_exact(nu.max(1)).enumerate() {
-        for (i, &value) in column.iter().enumerate().skip(j) {
-            terms.curve(nx + i, nx + j, value);
-        }
-    }
 }

@@ -1,4 +1,4 @@
-//! Problems of optimal control, discretised by direct multiple shooting.
+//! Problems of optimal control, discretised by direct multiple shooting or direct collocation.
 //!
 //! ```text
 //! min  Σ_k l(x_k, z_k, u_k, p_k, t_k) + e(x_N)        x_{k+1} = φ(x_k, u_k, p_k)        z_k = ζ(x_k, u_k, p_k)
@@ -7,7 +7,7 @@
 //!
 //! | | |
 //! | --- | --- |
-//! | `φ` | [`Dynamics`]: an integrator of single intervals (`Irk`, `Erk`), `Shooting` over a `Batch`, [`Map`] |
+//! | `φ` | [`Dynamics`]: an integrator of single intervals (`Irk`, `Erk`), `Shooting` over a `Batch`, `Collocation`, [`Map`] |
 //! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`GeneralCost`], pairs of costs; integrals with [`Along`] |
 //! | `g` | [`Constraint`], pairs of constraints |
 //!
@@ -37,6 +37,8 @@
 //! from the stages of the last one: these converge with the iterates, to the same solution.
 //!
 //! [`Ipm`] solves the same problems by a nonlinear interior point with exact Hessians.
+//! `Collocation` has stages as variables there: the same discrete solution, from guesses that
+//! nobody could integrate.
 //!
 //! States may be periodic, `x₀ = x_N` (`ocp.periodic("x")?`), and controls the same at all stages
 //! (`ocp.shared("u.duration")?`). Such controls are parameters that are found, and free end times:
@@ -50,6 +52,8 @@ mod algebraic;
 mod arrival;
 mod bounds;
 mod check;
+#[cfg(feature = "alloc")]
+mod collocation;
 mod constraint;
 mod convexify;
 mod cost;
@@ -85,10 +89,12 @@ mod sqp;
 mod transfer;
 mod weights;
 
+#[cfg(feature = "alloc")]
+pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};
 pub use convexify::Convexification;
 pub use cost::{Cost, GeneralCost};
-pub use dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, Step};
+pub use dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step};
 pub use error::{ConstraintName, OcpError, Part, Text};
 pub use horizon::Horizon;
 #[cfg(feature = "alloc")]

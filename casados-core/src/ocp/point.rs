@@ -194,3 +194,26 @@ impl<T: Real> Cross<'_, T> {
         }
     }
 }
+
+/// Adds blocks `xx`, `xu`, `uu`, column after column, to the lower triangle.
+pub(super) fn add_blocks<T: Real>(terms: &mut Terms<'_, T>, nx: usize, [xx, xu, uu]: [&[T]; 3]) {
+    if xx.is_empty() && uu.is_empty() {
+        return;
+    }
+    for (j, column) in xx.chunks_exact(nx.max(1)).enumerate() {
+        for (i, &value) in column.iter().enumerate().skip(j) {
+            terms.curve(i, j, value);
+        }
+    }
+    for (u, column) in xu.chunks_exact(nx.max(1)).enumerate() {
+        for (x, &value) in column.iter().enumerate() {
+            terms.curve(nx + u, x, value);
+        }
+    }
+    let nu = xu.len() / nx.max(1);
+    for (j, column) in uu.chunks_exact(nu.max(1)).enumerate() {
+        for (i, &value) in column.iter().enumerate().skip(j) {
+            terms.curve(nx + i, nx + j, value);
+        }
+    }
+}

@@ -216,7 +216,7 @@ macro_rules! single {
 }
 
 /// What an integrator is told before an interval.
-trait Begin<T> {
+pub(super) trait Begin<T> {
     fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error>;
 }
 

@@ -83,6 +83,12 @@ impl<M: Dae, T: Real, const S: usize, const C: usize> DirectionalMemory<M, T, S,
         Ok(())
     }
 
+    /// The derivatives of the stages of the last step, directions innermost.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn stages(&self) -> &[T] {
+        self.sweep.dy()
+    }
+
     /// # Errors
     /// [`Error::Overflow`]
     pub(crate) fn finish<F: Fallback>(&mut self, work: &Work<M, T, S, F>, step: usize) -> Result<(), Error> {

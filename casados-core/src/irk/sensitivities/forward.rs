@@ -260,4 +260,31 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.run.keep()?;
         Ok(&memory.result)
     }
+
+    /// The derivatives of the stages of every step in one direction, added to what is there.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn add_stage_derivatives(
+        &mut self,
+        arguments: &Arguments<'_, M, T>,
+        seeds: &Seeds<M, T, 1>,
+        to: &mut [crate::model::ArrayK<M, [T; S]>],
+    ) -> Result<(), Error>
+    where
+        W: WithDirectional<1>,
+    {
+        let memory = W::directional(&mut self.directional)?;
+        memory.seed(seeds);
+        let count = self.run.options.steps;
+        self.run.steps(arguments, |parts, n, step, exact| {
+            parts.linearize(n, step, exact)?;
+            memory.step(parts, n, count)?;
+            let to = to.get_mut(n).map_or(&mut [][..], |to| to.as_mut().as_flattened_mut());
+            for (to, &derivative) in to.iter_mut().zip(memory.stages()) {
+                *to = *to + derivative;
+            }
+            Ok(())
+        })?;
+        self.sweep = None;
+        self.run.keep().map(|_| ())
+    }
 }

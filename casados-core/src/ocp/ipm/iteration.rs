@@ -8,7 +8,7 @@ use super::run::State;
 use super::work::Work;
 use super::{Ipm, IpmOptions, elastic};
 use crate::ocp::convexify::Convexification;
-use crate::ocp::dynamics::SecondOrder;
+use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, Measure};
 use crate::ocp::instance::Ocp;
@@ -82,6 +82,7 @@ where
             Ok(direction) => direction,
             Err(error) => return ocp.status_of_error(error).map(Some),
         };
+        self.expand(ocp, state)?;
         row.times.qp = watch.lap();
         if (state.over)() {
             return Ok(Some(Status::OutOfTime));
@@ -106,7 +107,7 @@ where
                 return Ok(Some(Status::NoProgress));
             }
             // Where no step made progress is no place to begin.
-            ocp.iterate.copy_from(best);
+            ocp.recall(best);
             elastic::soften(ocp, state, work.penalties, options.elastic_penalty);
             return Ok(None);
         };
@@ -150,12 +151,19 @@ where
     ) -> Result<Measure, OcpError> {
         let (residuals, objective) = ocp.residuals();
         let plain = ocp.objective.to_f64();
-        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         evaluate(&mut iterate, &mut solution.view_mut());
         update_barrier(state, &iterate, &residuals, &self.options);
-        let here = measure::here(&iterate, plain, state.mu);
+        let mut here = measure::here(&iterate, plain, state.mu);
+        if P::Dynamics::LIFTED {
+            // The QP has the ends of intervals where the next step would lead to.
+            let lengths = state.lengths;
+            let Self { trial, numbers, indices, work, .. } = self;
+            let mut work = Work::new(ocp.qp().dims, ocp.ends(), capacity, work.as_mut());
+            let mut room = Room { lengths: &lengths, numbers, indices, trial, work: &mut work };
+            here = room.measure(ocp, state.mu, 0.0).unwrap_or(here);
+        }
         if !state.has_filter {
             state.small_violation = 1e-4 * here.violation.max(1.0);
             state.filter = Filter::new(MARGIN, 1e4 * here.violation.max(1.0));
@@ -163,11 +171,13 @@ where
         }
         (row.residuals, row.objective) = (residuals, objective);
         (row.elastic, row.barrier) = (state.elastic.is_some(), state.mu);
+        let work = Work::new(ocp.qp().dims, ocp.ends(), capacity, self.work.as_mut());
         let violation = elastic::worst(ocp, state, work.penalties).map_or(0.0, |worst| worst.violation);
         let size = residuals.largest().max(violation);
         if size < state.best_residual || row.iteration == 0 {
             (state.best_residual, state.best_iteration) = (size, *row);
             self.best.copy_from(&ocp.iterate);
+            ocp.problem.parts().dynamics.move_stages(StageAction::Remember);
         }
         let acceptable = size <= self.options.acceptable_tolerance;
         state.acceptable = if acceptable { state.acceptable + 1 } else { 0 };
@@ -270,6 +280,9 @@ where
         iterate.go(part, T::from_f64(dual));
         keep_near_centre(&mut iterate.sides, state.mu);
         iterate.store(&mut view);
+        ocp.problem.parts().dynamics.move_stages(StageAction::Go(part));
+        // The line search ends where it accepts a point; a tiny step has none.
+        ocp.has_algebraic = !direction.tiny;
         Ok(())
     }
 }

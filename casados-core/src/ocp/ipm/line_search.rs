@@ -4,6 +4,7 @@ use super::measure;
 use super::newton::{Lengths, attach, evaluate_values};
 use super::run::State;
 use super::work::Work;
+use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, MARGIN, Measure, POWER_OBJECTIVE, POWER_VIOLATION, objective_decides};
 use crate::ocp::instance::Ocp;
@@ -136,7 +137,9 @@ where
             if there.is_some_and(|there| expected.accepts(filter, alpha, &there)) {
                 return Ok(Found::Step(Accepted { alpha, corrected: false }));
             }
-            let bends = there.is_some_and(|there| there.violation >= expected.here.violation);
+            // Corrections know nothing of stages.
+            let bends =
+                !P::Dynamics::LIFTED && there.is_some_and(|there| there.violation >= expected.here.violation);
             if alpha == longest
                 && bends
                 && let Some(alpha) = self.correct(ocp, filter, expected, tau)?
@@ -153,13 +156,14 @@ where
 
     /// Barrier function and violation after a part of the step; nothing where a function has no
     /// value.
-    fn measure<P: Formulation<T>>(
+    pub fn measure<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         mu: f64,
         alpha: f64,
     ) -> Option<Measure> {
         let part_of_step = T::from_f64(alpha);
+        ocp.along = Some(part_of_step);
         {
             let iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
             self.trial.copy_from(&ocp.iterate);
@@ -178,7 +182,11 @@ where
             }
         }
         let objective = ocp.rows_at(self.trial, self.work.ends, self.work.rows).ok()?;
-        let gaps = ocp.gaps_at(self.trial, self.work.ends);
+        ocp.along = Some(T::ZERO);
+        let mut gaps = ocp.gaps_at(self.trial, self.work.ends);
+        if P::Dynamics::LIFTED {
+            gaps += ocp.stages[0].to_f64();
+        }
         let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices).ok()?;
         let slacks = part(self.work.slacks, 0, self.lengths.counts.pairs());
         let mut violation = gaps + measure::violations(&mut iterate.sides, self.work.rows, slacks);

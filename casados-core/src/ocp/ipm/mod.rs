@@ -12,6 +12,7 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `barrier` | how `μ` shrinks |
 //! | `elastic` | penalties where no step makes progress |
+//! | `stages` | stages that are variables go with the iterate |
 //!
 //! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the
 //! Riccati recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has
@@ -25,10 +26,12 @@ mod heap;
 mod iteration;
 mod line_search;
 mod measure;
+mod memory;
 mod multipliers;
 mod newton;
 mod options;
 mod run;
+mod stages;
 mod start;
 mod work;
 
@@ -55,6 +58,9 @@ use alloc::vec::Vec;
 /// tries. Where no step makes progress, hard bounds of states and constraints get penalties, and
 /// the bound that stays violated most is named. The iterate of the problem is the best one
 /// afterwards, whatever the status.
+///
+/// [`HeapIpm`] allocates its memory; [`Ipm::in_memory`] takes it, and then a run allocates nothing
+/// but its log, with the feature `alloc`.
 ///
 /// A. Wächter, L. T. Biegler, Math. Program. 106 (2006); periodic states by parametric recursion,
 /// inertia by J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977).

@@ -26,11 +26,16 @@ impl Lengths {
 
     /// Of the same problem with every bound soft, equations too.
     pub fn all_soft<T: Real>(&self, qp: QpView<'_, T>) -> Self {
-        let Counts { lower, upper, equations, .. } = self.counts;
-        let (lower, upper) = (lower + equations, upper + equations);
-        let counts = Counts { lower, upper, soft: lower + upper, equations };
+        let counts = all_soft(&self.counts);
         Self { counts, fixed: self.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
     }
+}
+
+/// Every bound soft, equations too.
+pub(super) const fn all_soft(counts: &Counts) -> Counts {
+    let Counts { lower, upper, equations, .. } = *counts;
+    let (lower, upper) = (lower + equations, upper + equations);
+    Counts { lower, upper, soft: lower + upper, equations }
 }
 
 /// How the constraints of a problem are read.

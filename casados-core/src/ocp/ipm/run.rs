@@ -114,6 +114,7 @@ where
     {
         ocp.fits(self.trial.dims())?;
         self.options.check()?;
+        ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
         ocp.linearise(Exact { convexification: Convexification::None })?;
         let (lengths, capacity) = self.prepare(ocp)?;
@@ -164,8 +165,9 @@ where
         let work = Work::new(ocp.qp().dims, ocp.ends(), &capacity, self.work.as_mut());
         ocp.set_penalties(work.penalties, None);
         if outcome.status != Status::Converged && state.best_residual.is_finite() {
-            ocp.iterate.copy_from(&self.best);
+            ocp.recall(&self.best);
         }
+        (ocp.along, ocp.has_algebraic) = (None, false);
         let stuck = matches!(outcome.status, Status::NoProgress | Status::QpFailed(_));
         if stuck && state.best_residual <= self.options.acceptable_tolerance {
             outcome.status = Status::Acceptable;
@@ -183,7 +185,7 @@ where
     ) -> Result<(Lengths, Lengths), OcpError> {
         let lengths = Lengths::of(ocp.qp());
         let capacity = lengths.all_soft(ocp.qp());
-        let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity);
+        let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
         self.work.at_least(length, Field::Numbers)?.fill(T::ZERO);
         self.numbers.at_least(capacity.numbers, Field::Numbers)?.fill(T::ZERO);
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };

@@ -3,6 +3,7 @@
 use super::newton::Lengths;
 use super::start::scratch;
 use crate::ocp::elastic;
+use crate::qp::interior::Counts;
 use crate::qp::{StageDims, end, take_mut};
 use crate::scalar::Real;
 
@@ -31,8 +32,8 @@ pub(super) struct Work<'a, T> {
 
 impl<'a, T: Real> Work<'a, T> {
     /// How many numbers it takes.
-    pub fn length(dims: &[StageDims], ends: usize, capacity: &Lengths) -> usize {
-        let (pairs, end) = (capacity.counts.pairs(), end::<T>(dims));
+    pub const fn length(dims: &[StageDims], ends: usize, counts: &Counts) -> usize {
+        let (pairs, end) = (counts.pairs(), end::<T>(dims));
         ends + 2 * end.row + 4 * pairs + end.dynamics + scratch::<T>(dims) + elastic::memory(dims)
     }
 

@@ -1,0 +1,456 @@
+//! The nonlinear interior point: the orbit of the aircraft and the chain of masses with exact
+//! Hessians, by shooting and by collocation, beside IPOPT with direct collocation (CasADi, where
+//! `CASADOS_PYTHON` or `python3` has it), from known starts and from random ones.
+//!
+//! ```text
+//! cargo run --release --manifest-path benches/Cargo.toml --bin interior_point -- --write docs/benchmarks.md
+//! ```
+//!
+//! Times are CPU time of one thread. What is compared takes turns, round by round, and the medians
+//! of the rounds count; IPOPT runs once in each of the first rounds. `--starts 10` takes fewer
+//! random starts than a hundred, `--only starts` (or `times`) a part.
+
+#[path = "../../../examples/models/awe.rs"]
+mod awe;
+#[path = "../../../examples/models/chain_problem.rs"]
+mod chain_problem;
+#[path = "../../../tests/data/mod.rs"]
+mod data;
+#[path = "../../../examples/awe_orbit/problem.rs"]
+mod problem;
+
+use awe::Awe;
+use casados::ocp::{
+    Collocation, Exact, Formulation, HeapIpm, HeapOcp, HeapSqp, Outcome, SecondOrder, Shooting,
+};
+use casados::prelude::*;
+use casados_benches::models::Chain;
+use casados_benches::peer::Peer;
+use casados_benches::record::{insert, load, numbers};
+use casados_benches::time::pin;
+use cpu_time::ThreadTime;
+use data::Record;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+type Failure = Box<dyn std::error::Error>;
+/// States and controls of all nodes.
+type Guess = [Vec<Vec<f64>>; 2];
+
+const ROUNDS: usize = 9;
+/// IPOPT takes seconds.
+const PEER_ROUNDS: usize = 3;
+
+/// A run: how it ended, and its CPU time in milliseconds.
+#[derive(Clone, Copy)]
+struct Run {
+    outcome: Outcome,
+    milliseconds: f64,
+}
+
+fn timed(call: impl FnOnce() -> Result<Outcome, Failure>) -> Result<Run, Failure> {
+    let start = ThreadTime::now();
+    let outcome = call()?;
+    Ok(Run { outcome, milliseconds: 1e3 * start.elapsed().as_secs_f64() })
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// A problem with its solver, to be run again and again from one guess.
+fn runner<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+    mut ocp: HeapOcp<P>,
+) -> Result<impl FnMut(&Guess) -> Result<Run, Failure>, Failure> {
+    let mut ipm = HeapIpm::new(&ocp)?;
+    Ok(move |guess: &Guess| {
+        problem::begin(&mut ocp, guess)?;
+        timed(|| Ok(ipm.solve(&mut ocp)?))
+    })
+}
+
+/// The same by sequential quadratic programming with exact Hessians.
+fn sequential<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+    mut ocp: HeapOcp<P>,
+) -> Result<impl FnMut(&Guess) -> Result<Run, Failure>, Failure> {
+    let mut sqp = HeapSqp::new(&ocp)?.exact(Exact::default());
+    sqp.options.tolerance = 1e-8;
+    Ok(move |guess: &Guess| {
+        problem::begin(&mut ocp, guess)?;
+        timed(|| Ok(sqp.solve(&mut ocp)?))
+    })
+}
+
+type Runner<'r> = &'r mut dyn FnMut(&Guess) -> Result<Run, Failure>;
+
+/// A row for each method, with what IPOPT takes in the same rounds.
+fn compare(
+    table: &mut String,
+    name: &str,
+    guess: &Guess,
+    methods: &mut [(&str, Runner<'_>)],
+    ipopt: &mut Option<Peer>,
+    request: &Value,
+) -> Result<(), Failure> {
+    let mut runs: Vec<Vec<Run>> = vec![Vec::new(); methods.len()];
+    let (mut theirs, mut answer) = (Vec::new(), None);
+    for round in 0..ROUNDS {
+        for (runs, (_, run)) in runs.iter_mut().zip(methods.iter_mut()) {
+            runs.push(run(guess)?);
+        }
+        if let Some(ipopt) = ipopt.as_mut().filter(|_| round < PEER_ROUNDS) {
+            let mut request = request.clone();
+            (request["x"], request["u"]) = (json!(guess[0]), json!(guess[1]));
+            match ipopt.ask(&request) {
+                Ok(found) => {
+                    theirs.push(1e3 * found["seconds"].as_f64().unwrap_or(f64::NAN));
+                    answer = Some(found);
+                }
+                Err(error) => eprintln!("IPOPT: {error}"),
+            }
+        }
+    }
+    let theirs = median(theirs.into_iter());
+    for (runs, (method, _)) in runs.iter().zip(methods.iter()) {
+        let Some(Run { outcome, .. }) = runs.first() else { continue };
+        let of = |part: fn(&Run) -> f64| median(runs.iter().map(part));
+        let (total, iterations) = (of(|run| run.milliseconds), outcome.iterations.max(1) as f64);
+        let functions = of(|run| 1e3 * (run.outcome.times.linearise + run.outcome.times.search));
+        let end = if outcome.is_converged() { "" } else { " (not solved)" };
+        writeln!(
+            table,
+            "| {name}, {method} | {}{end} | {:.8} | {total:.2} | {:.3} | {:.0} % | {:.1} |",
+            outcome.iterations,
+            outcome.objective,
+            total / iterations,
+            100.0 * functions / of(|run| 1e3 * run.outcome.times.total()),
+            theirs / total,
+        )?;
+    }
+    if let Some(answer) = answer {
+        writeln!(
+            table,
+            "| {name}, IPOPT ({}) | {} | {:.8} | {theirs:.0} | {:.1} | | |",
+            answer["status"].as_str().unwrap_or(""),
+            answer["iterations"],
+            answer["objective"].as_f64().unwrap_or(f64::NAN),
+            theirs / answer["iterations"].as_f64().unwrap_or(f64::NAN),
+        )?;
+    }
+    Ok(())
+}
+
+const OPTIONS: Options = Options {
+    steps: 1,
+    newton: Newton {
+        tolerance: 0.0,
+        max_iterations: 50,
+        jacobian: casados::options::Jacobian::Auto,
+        fixed_iterations: None,
+    },
+    start: Start::Zero,
+    compensated: false,
+};
+
+macro_rules! chain {
+    ($nx:literal, $record:expr, $dynamics:expr) => {
+        chain_problem::problem!($nx, numbers(&$record["xrest"]), numbers(&$record["x0"]), $dynamics)
+    };
+}
+macro_rules! chain_batch {
+    ($nx:literal) => {
+        Shooting::new(Batch::<Chain<$nx>, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?)
+    };
+}
+macro_rules! chain_collocation {
+    ($nx:literal) => {
+        Collocation::new(Irk::<Chain<$nx>, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?)?
+    };
+}
+
+fn rest(record: &Value) -> Guess {
+    [vec![numbers(&record["xrest"]); 41], vec![vec![0.0; 3]; 40]]
+}
+
+fn chain_request(masses: usize, record: &Value) -> Value {
+    json!({ "problem": "chain", "masses": masses, "x_rest": numbers(&record["xrest"]),
+        "x0": numbers(&record["x0"]), "iterations": 200 })
+}
+
+fn times(table: &mut String, orbit: &Record, ipopt: &mut Option<Peer>) -> Result<(), Failure> {
+    let h = orbit.number("T")?;
+    writeln!(
+        table,
+        "| | iterations | objective | ms | ms an iteration | functions | IPOPT's time over this |\n| --- | --- | --- | --- | --- | --- | --- |"
+    )?;
+    let mut shooting = runner(problem::orbit(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?), h)?)?;
+    let mut collocation =
+        runner(problem::orbit(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
+    let request = json!({ "problem": "orbit", "h": h, "iterations": 200 });
+    for name in ["guess_dc", "guess_pow", "guess_init"] {
+        let guess = problem::guess(&orbit.record(name)?)?;
+        let mut methods: [(&str, Runner<'_>); 2] =
+            [("shooting", &mut shooting), ("collocation", &mut collocation)];
+        compare(table, &format!("orbit from `{name}`"), &guess, &mut methods, ipopt, &request)?;
+    }
+    macro_rules! row {
+        ($nx:literal, $masses:literal) => {{
+            let record = load(concat!("tests/data/ocp/chain_", $masses, ".json"))?;
+            let mut shooting = runner(chain!($nx, record, chain_batch!($nx)))?;
+            let mut collocation = runner(chain!($nx, record, chain_collocation!($nx)))?;
+            let mut sqp = sequential(chain!($nx, record, chain_batch!($nx)))?;
+            let mut methods: [(&str, Runner<'_>); 3] =
+                [("shooting", &mut shooting), ("collocation", &mut collocation), ("SQP", &mut sqp)];
+            let name = concat!("chain of ", $masses, " masses");
+            compare(table, name, &rest(&record), &mut methods, ipopt, &chain_request($masses, &record))?;
+        }};
+    }
+    row!(9, 3);
+    row!(21, 5);
+    row!(33, 7);
+    Ok(())
+}
+
+/// A pendulum on a cart, over horizons of any length.
+#[ode]
+fn cart_pole(x: [f64; 4], u: [f64; 1]) -> [f64; 4] {
+    let [_, theta, v, omega] = x;
+    let (s, c) = theta.sin_cos();
+    let d = 1.1 - 0.1 * c * c;
+    [
+        v,
+        omega,
+        (-0.08 * s * omega * omega + 0.981 * c * s + u[0]) / d,
+        (-0.08 * c * s * omega * omega + u[0] * c + 1.1 * 9.81 * s) / (0.8 * d),
+    ]
+}
+#[function]
+fn effort(x: [f64; 4], u: [f64; 1]) -> f64 {
+    1e-2 * (u[0] * u[0] + x[1] * x[1]) + 1e-3 * (x[0] * x[0] + x[2] * x[2] + x[3] * x[3])
+}
+
+/// Milliseconds of an iteration over the number of intervals, and of a recursion with periodic
+/// states and without.
+fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
+    use casados::ocp::{GeneralCost, Horizon, Problem};
+    writeln!(
+        table,
+        "| intervals | iterations | microseconds of an iteration for each interval |\n| --- | --- | --- |"
+    )?;
+    for n in [20, 40, 80, 160, 320, 640] {
+        let batch = Batch::<CartPole, Gauss<2>>::new(Options::default())?;
+        let mut ocp = Problem::new(Shooting::new(batch))
+            .stage_cost(GeneralCost::<Effort>::new())
+            .on(Horizon::uniform(n, 0.05))?;
+        ocp.fix_initial_state(&[0.0, 0.4, 0.0, 0.0])?.bound("u", .., -5.0, 5.0)?;
+        ocp.bound("x[0]", 1.., -0.5, 0.5)?;
+        let guess = [vec![vec![0.0; 4]; n + 1], vec![vec![0.0]; n]];
+        let mut run = runner(ocp)?;
+        let mut runs = Vec::new();
+        for _ in 0..ROUNDS {
+            runs.push(run(&guess)?);
+        }
+        let Some(Run { outcome, .. }) = runs.first() else { continue };
+        let iterations = outcome.iterations.max(1) as f64;
+        let time = median(runs.iter().map(|run| 1e3 * run.milliseconds / iterations / n as f64));
+        writeln!(table, "| {n} | {} | {time:.2} |", outcome.iterations)?;
+    }
+    let h = orbit.number("T")?;
+    let guess = problem::guess(&orbit.record("guess_dc")?)?;
+    let shooting = || Ok::<_, Failure>(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?));
+    let (mut periodic, mut plain) = (problem::orbit(shooting()?, h)?, problem::flight(shooting()?, h)?);
+    plain.fix_initial_state(&guess[0][0])?;
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..ROUNDS {
+        problem::begin(&mut periodic, &guess)?;
+        problem::begin(&mut plain, &guess)?;
+        times[0].extend(directions(&mut periodic)?);
+        times[1].extend(directions(&mut plain)?);
+    }
+    let [periodic, plain] = times.map(|times| median(times.into_iter()));
+    writeln!(
+        table,
+        "\nA search direction with 22 periodic states takes {:.2} times as long as one without: {periodic:.3} and {plain:.3} ms.",
+        periodic / plain
+    )?;
+    Ok(())
+}
+
+/// Milliseconds of search directions that needed one factorisation.
+fn directions<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
+    ocp: &mut HeapOcp<P>,
+) -> Result<Vec<f64>, Failure> {
+    let mut ipm = HeapIpm::new(ocp)?;
+    ipm.options.max_iterations = 12;
+    ipm.solve(ocp)?;
+    let plain = ipm.log().0.iter().filter(|i| i.regularisation == 0.0 && i.step > 0.0);
+    Ok(plain.map(|iteration| 1e3 * iteration.times.qp).collect())
+}
+
+/// Steele, Lea and Flood (2014): numbers between −1 and 1.
+struct SplitMix(u64);
+
+impl SplitMix {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+/// A start beside another one: every state and control of every node by a random part of `size`.
+fn beside([x, u]: &Guess, seed: u64, size: [&[f64]; 2]) -> Guess {
+    let mut random = SplitMix(seed);
+    let mut moved = |rows: &Vec<Vec<f64>>, size: &[f64]| {
+        let row = |row: &Vec<f64>| row.iter().zip(size).map(|(v, s)| v + s * random.next()).collect();
+        rows.iter().map(row).collect()
+    };
+    [moved(x, size[0]), moved(u, size[1])]
+}
+
+/// Half of the range of every state over the nodes.
+fn ranges(rows: &[Vec<f64>]) -> Vec<f64> {
+    let mut ranges =
+        rows.first().map_or(Vec::new(), |row| vec![[f64::INFINITY, f64::NEG_INFINITY]; row.len()]);
+    for row in rows {
+        for (range, &value) in ranges.iter_mut().zip(row) {
+            *range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+    ranges.iter().map(|[low, high]| (high - low) / 2.0).collect()
+}
+
+/// How often a method succeeded.
+#[derive(Default)]
+struct Tally {
+    solved: usize,
+    best: usize,
+    iterations: Vec<f64>,
+}
+
+impl Tally {
+    fn count(&mut self, solved: bool, iterations: f64, objective: f64, best: f64) {
+        if solved {
+            self.solved += 1;
+            self.best += usize::from(objective <= best + 1e-5 * best.abs().max(1.0));
+            self.iterations.push(iterations);
+        }
+    }
+}
+
+fn starts(
+    table: &mut String,
+    name: &str,
+    guesses: &[Guess],
+    methods: &mut [(&str, Runner<'_>)],
+    ipopt: &mut Option<Peer>,
+    request: &Value,
+) -> Result<(), Failure> {
+    let mut found: Vec<Vec<(bool, f64, f64)>> = vec![Vec::new(); methods.len() + 1];
+    for (seed, guess) in guesses.iter().enumerate() {
+        for ((method, run), found) in methods.iter_mut().zip(&mut found) {
+            // An interval that cannot be integrated is a failure of its method.
+            let result = run(guess).map_err(|error| error.to_string());
+            let row = result.as_ref().map_or((false, 0.0, 0.0), |run| {
+                (run.outcome.is_converged(), run.outcome.iterations as f64, run.outcome.objective)
+            });
+            if !row.0 {
+                let why = result.map_or_else(|error| error, |run| run.outcome.to_string());
+                eprintln!("{name}, start {seed}, {method}: {why}");
+            }
+            found.push(row);
+        }
+        if let Some(ipopt) = ipopt {
+            let mut request = request.clone();
+            (request["x"], request["u"]) = (json!(guess[0]), json!(guess[1]));
+            let row = ipopt.ask(&request).map_or((false, 0.0, 0.0), |answer| {
+                let number = |key: &str| answer[key].as_f64().unwrap_or(f64::NAN);
+                (answer["status"] == "solved", number("iterations"), number("objective"))
+            });
+            if !row.0 {
+                eprintln!("{name}, start {seed}, IPOPT: not solved after {} iterations", row.1);
+            }
+            if let Some(theirs) = found.last_mut() {
+                theirs.push(row);
+            }
+        }
+    }
+    let solved = found.iter().flatten().filter(|row| row.0);
+    let best = solved.fold(f64::INFINITY, |best, row| best.min(row.2));
+    let names = methods.iter().map(|(name, _)| *name).chain(["IPOPT"]);
+    for (method, rows) in names.zip(&found).filter(|(_, rows)| !rows.is_empty()) {
+        let mut tally = Tally::default();
+        for &(solved, iterations, objective) in rows {
+            tally.count(solved, iterations, objective, best);
+        }
+        let most = tally.iterations.iter().copied().fold(0.0, f64::max);
+        let middle = median(tally.iterations.iter().copied());
+        writeln!(
+            table,
+            "| {name}, {method} | {} of {} | {} | {middle:.0} | {most:.0} |",
+            tally.solved,
+            rows.len(),
+            tally.best
+        )?;
+    }
+    Ok(())
+}
+
+fn random(table: &mut String, orbit: &Record, ipopt: &mut Option<Peer>, count: usize) -> Result<(), Failure> {
+    let h = orbit.number("T")?;
+    writeln!(
+        table,
+        "| | solved | of these at the best objective | iterations, median | most |\n| --- | --- | --- | --- | --- |"
+    )?;
+    let circle = problem::guess(&orbit.record("guess_init")?)?;
+    let size = ranges(&circle[0]).into_iter().map(|range| 0.2 * range).collect::<Vec<_>>();
+    let guesses: Vec<Guess> =
+        (0..count as u64).map(|seed| beside(&circle, seed, [&size, &[0.1, 0.1, 0.1, 1.0]])).collect();
+    let mut shooting = runner(problem::orbit(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?), h)?)?;
+    let mut collocation =
+        runner(problem::orbit(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
+    let mut methods: [(&str, Runner<'_>); 2] =
+        [("shooting", &mut shooting), ("collocation", &mut collocation)];
+    let request = json!({ "problem": "orbit", "h": h, "iterations": 200 });
+    starts(table, "orbit", &guesses, &mut methods, ipopt, &request)?;
+
+    let record = load("tests/data/ocp/chain_5.json")?;
+    let size: Vec<f64> = (0..21).map(|i| if i < 12 { 0.1 } else { 0.5 }).collect();
+    let guesses: Vec<Guess> =
+        (0..count as u64).map(|seed| beside(&rest(&record), seed, [&size, &[1.0; 3]])).collect();
+    let mut shooting = runner(chain!(21, record, chain_batch!(21)))?;
+    let mut collocation = runner(chain!(21, record, chain_collocation!(21)))?;
+    let mut methods: [(&str, Runner<'_>); 2] =
+        [("shooting", &mut shooting), ("collocation", &mut collocation)];
+    starts(table, "chain of 5 masses", &guesses, &mut methods, ipopt, &chain_request(5, &record))
+}
+
+fn main() -> Result<(), Failure> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let value = |name: &str| arguments.iter().position(|a| a == name).and_then(|i| arguments.get(i + 1));
+    let only = value("--only").map(String::as_str);
+    let count = value("--starts").map_or(Ok(100), |count| count.parse())?;
+    eprintln!("pinned: {}", pin());
+    let mut ipopt = Peer::start("casadi_starts.py", |command| command).ok();
+    let orbit = Record::from(load("tests/data/awe/orbit.json")?);
+    let mut table = String::new();
+    if only != Some("starts") {
+        times(&mut table, &orbit, &mut ipopt)?;
+        table.push('\n');
+        scaling(&mut table, &orbit)?;
+        table.push('\n');
+    }
+    if only != Some("times") {
+        random(&mut table, &orbit, &mut ipopt, count)?;
+    }
+    println!("{table}");
+    match value("--write") {
+        Some(file) => Ok(insert(Path::new(file), "interior point", &table)?),
+        None => Ok(()),
+    }
+}
