@@ -53,8 +53,8 @@ fn measure() -> Result<Vec<f64>, casados::Error> {
     Ok(data)
 }
 
-/// The estimate with a cost of stages and of the last one, from a start on: states and controls, and
-/// the outcome.
+/// The estimate with a cost of stages and of the last one, from a start on: states and controls,
+/// and the outcome.
 macro_rules! estimate {
     ($data:expr, $cost:expr, $start:expr) => {{
         let irk = Irk::<Pendulum, Gauss<2>>::new(Options::default())?;

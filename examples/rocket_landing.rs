@@ -1,6 +1,6 @@
-//! A rocket lands with the least fuel: thrust and glide slope are second-order cones, which clarabel
-//! takes as they are. The same problem with smooth constraints, by the nonlinear interior point, has
-//! the same optimum.
+//! A rocket lands with the least fuel: thrust and glide slope are second-order cones, which
+//! clarabel takes as they are. The same problem with smooth constraints, by the nonlinear interior
+//! point, has the same optimum.
 //!
 //! ```text
 //! cargo run --features clarabel --example rocket_landing

@@ -107,8 +107,8 @@ impl<T: Real, const NY: usize> Convex<T> for PseudoHuber<T, NY> {
     }
 }
 
-/// `φ(y − r)` of the outputs `y(x, z, u, p, t)` of a function, a reference `r`, which every stage has
-/// for itself, and a convex function `φ`: [`Huber`], [`PseudoHuber`], or your own [`Convex`].
+/// `φ(y − r)` of the outputs `y(x, z, u, p, t)` of a function, a reference `r`, which every stage
+/// has for itself, and a convex function `φ`: [`Huber`], [`PseudoHuber`], or your own [`Convex`].
 ///
 /// Its Hessian is `Jᵀ ∇²φ J`, the generalised one of Gauss and Newton, which is positive
 /// semidefinite; the exact one has `Σ_i ∂φ/∂r_i ∇²y_i` too. Of `φ = ½ ‖·‖²` it is

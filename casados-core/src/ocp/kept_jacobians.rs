@@ -59,10 +59,11 @@ adjoints!(erk, Ode, WithForward);
 /// QP with kept [A B], and the gradient  ∇f + ([A B]_exact − [A B]_kept)ᵀ π
 /// ```
 ///
-/// One adjoint of an interval costs about as much as one direction of its Jacobian. Residuals of the
-/// conditions of optimality are exact, whatever Jacobians are kept, and so are solutions; convergence
-/// is linear, at a rate that the distance from the kept point says. Where a step is longer than
-/// [`contraction`](Self::contraction) of the one before, all Jacobians are computed again.
+/// One adjoint of an interval costs about as much as one direction of its Jacobian. Residuals of
+/// the conditions of optimality are exact, whatever Jacobians are kept, and so are solutions;
+/// convergence is linear, at a rate that the distance from the kept point says. Where a step is
+/// longer than [`contraction`](Self::contraction) of the one before, all Jacobians are computed
+/// again.
 ///
 /// It is for [`Sqp::gauss_newton`](super::Sqp::gauss_newton), over integrators of single intervals
 /// without costs at algebraic states, integrals, or derivatives of solutions by parameters.
