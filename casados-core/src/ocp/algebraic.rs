@@ -108,12 +108,20 @@ impl<'a, T: Real> Extended<'a, T> {
         slopes: &mut [T],
     ) {
         let [n, nz] = sizes::<S>();
-        for (p, (direct, dp)) in
-            direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate()
-        {
+        let parameters = || direct.chunks_exact((n + nz).max(1)).zip(dp.chunks_exact(nz.max(1))).enumerate();
+        for (p, (direct, dp)) in parameters() {
             let through = |i: usize| {
                 dp.iter().enumerate().fold(get(direct, i), |sum, (l, &dp)| sum + self.hessian(i, n + l) * dp)
             };
+            for (l, &slope) in dp.iter().enumerate() {
+                to.slope(p, get(self.terms.gradient, n + l) * slope);
+            }
+            for (q, (other, dq)) in parameters() {
+                let products = dq.iter().zip(dp).enumerate();
+                let sum = products
+                    .fold(T::ZERO, |sum, (l, (&dq, &dp))| sum + dq * through(n + l) + get(other, n + l) * dp);
+                to.curve(q, p, sum);
+            }
             for j in 0..n {
                 let rows = dz.chunks_exact(n.max(1)).enumerate();
                 to.add(j, p, rows.fold(through(j), |sum, (i, row)| sum + through(n + i) * get(row, j)));

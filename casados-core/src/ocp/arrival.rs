@@ -27,6 +27,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Errors
     /// [`OcpError::Length`]; [`OcpError::InvalidValue`] of `x̄`;
     /// [`OcpError::InvalidArrivalWeight`].
+    ///
+    /// # Example
+    /// A mean of 0 with the weight 1, and 3 measured with the weight 2: `x + 2 (x − 3) = 0`.
+    /// ```
+    /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn drift(x: f64, u: f64) -> f64 { x + u }
+    /// #[function]
+    /// fn disturbance(_x: f64, u: f64) -> f64 { 1e3 * u }
+    /// #[function]
+    /// fn measured(x: f64, _u: f64) -> f64 { x }
+    ///
+    /// let mut ocp = Problem::new(Map::<Drift, f64>::new())
+    ///     .stage_cost(LeastSquaresCost::<Disturbance>::diagonal(&[1.0]))
+    ///     .terminal_cost(LeastSquaresCost::<Measured>::diagonal(&[2.0]))
+    ///     .on(Horizon::uniform(1, 1.0))?;
+    /// ocp.free_initial_state().guess(&[0.0], &[0.0])?;
+    /// ocp.set_arrival_cost(&[0.0], &[1.0])?.set_terminal_reference(&[3.0])?;
+    /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// assert!((ocp.stage(0)?.x[0] - 2.0).abs() < 1e-4);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_arrival_cost(&mut self, mean: &[T], weight: &[T]) -> Result<&mut Self, OcpError> {
         let nx = P::Shape::NX;
         Labels::states::<P, T>(Part::InitialState, 0).check_vector(mean, nx)?;

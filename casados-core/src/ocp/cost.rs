@@ -2,7 +2,7 @@
 
 use super::error::OcpError;
 use super::pattern::{self, Entries};
-use super::point::{Cross, Terms, There, finite, is_algebraic, position};
+use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
 use crate::shape::{Array, Plain, Shape};
@@ -68,7 +68,8 @@ pub trait Cost<S: Shape, T: Real> {
         terms: &mut Terms<'_, T>,
     ) -> Result<T, OcpError>;
 
-    /// Adds what parameters change of the gradient, times the factor.
+    /// Adds what parameters change of the gradient, and gradient and Hessian with respect to the
+    /// parameters themselves, times the factor.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -242,6 +243,12 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
         cross: &mut Cross<'_, T>,
     ) -> Result<(), OcpError> {
         self.mu = Array::from_fn(|_| T::ONE);
+        F::adjoint::<T>(v, &self.mu, &mut self.gradient);
+        for (variable, &slope) in self.gradient.as_ref().iter().enumerate() {
+            if let Some(p) = parameter::<F::Shape>(variable) {
+                cross.slope(p, at.factor * slope);
+            }
+        }
         cross.curvature::<F>(v, &self.mu, at.factor, &mut self.hessian);
         Ok(())
     }

@@ -15,10 +15,30 @@ use crate::scalar::Real;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Makes states periodic, `x₀ = x_N`: one, or all that a name means (`x` means `x[0]`, `x[1]`,
-    /// …). The initial state is to be free.
+    /// …). The initial state is to be free. None is periodic by default.
     ///
     /// # Errors
     /// [`OcpError::UnknownName`]
+    ///
+    /// # Example
+    /// The state that a constant control holds: `x = ½ x + 1`.
+    /// ```
+    /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn relax(x: f64, u: f64) -> f64 { 0.5 * x + u }
+    /// #[function]
+    /// fn control(_x: f64, u: f64) -> f64 { u - 1.0 }
+    ///
+    /// let mut ocp = Problem::new(Map::<Relax, f64>::new())
+    ///     .stage_cost(LeastSquaresCost::<Control>::diagonal(&[1.0]))
+    ///     .on(Horizon::uniform(5, 1.0))?;
+    /// ocp.free_initial_state().periodic("x")?.guess(&[0.0], &[0.0])?;
+    /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// assert!((ocp.stage(0)?.x[0] - 2.0).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn periodic(&mut self, name: &str) -> Result<&mut Self, OcpError> {
         let known = <P::Dynamics as Dynamics<T>>::NAMES;
         let mut found = false;
@@ -41,6 +61,30 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::UnknownName`]
+    ///
+    /// # Example
+    /// A line through data: where it begins is the first state, its slope a shared control.
+    /// ```
+    /// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn climb(x: f64, u: f64) -> f64 { x + u }
+    /// #[function]
+    /// fn height(x: f64, _u: f64) -> f64 { x }
+    ///
+    /// let mut ocp = Problem::new(Map::<Climb, f64>::new())
+    ///     .stage_cost(LeastSquaresCost::<Height>::diagonal(&[1.0]))
+    ///     .on(Horizon::uniform(4, 1.0))?;
+    /// ocp.free_initial_state().shared("u")?.guess(&[0.0], &[0.0])?;
+    /// for (k, data) in [1.0, 3.0, 5.0, 7.0].into_iter().enumerate() {
+    ///     ocp.set_reference(k..=k, &[data])?;
+    /// }
+    /// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    /// let first = ocp.stage(0)?;
+    /// assert!((first.x[0] - 1.0).abs() < 1e-6 && (first.u[0] - 2.0).abs() < 1e-6);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn shared(&mut self, name: &str) -> Result<&mut Self, OcpError> {
         let known = <P::Dynamics as Dynamics<T>>::NAMES;
         let mut found = false;

@@ -94,8 +94,8 @@ pub struct Step<'a, T> {
     pub dp: &'a [T],
     /// `∇²(πᵀφ + νᵀζ + integral)`: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
-    /// The blocks `xp`, `up` of the same.
-    pub hessian_p: [&'a [T]; 2],
+    /// The blocks `xp`, `up`, `pp` of the same.
+    pub hessian_p: [&'a [T]; 3],
     /// The integral cost.
     pub cost: IntegralTerms<'a, T>,
     /// The sum of what is left of the equations of stages, and the largest; zero where these are
@@ -113,7 +113,7 @@ impl<T: Real> Default for Step<'_, T> {
             du: &[],
             dp: &[],
             hessian: [&[]; 3],
-            hessian_p: [&[]; 2],
+            hessian_p: [&[]; 3],
             cost: IntegralTerms::default(),
             stages: [T::ZERO; 2],
         }
@@ -141,7 +141,7 @@ impl<'a, M: Dae, T: Real> From<&'a Forward<M, T>> for Step<'a, T> {
 impl<'a, M: Dae, T: Real> From<&'a Hessian<M, T>> for Step<'a, T> {
     fn from(result: &'a Hessian<M, T>) -> Self {
         let hessian = [result.h_xx.as_slice(), result.h_xu.as_slice(), result.h_uu.as_slice()];
-        let hessian_p = [result.h_xp.as_slice(), result.h_up.as_slice()];
+        let hessian_p = [result.h_xp.as_slice(), result.h_up.as_slice(), result.h_pp.as_slice()];
         Self { hessian, hessian_p, ..Self::from(&result.first.forward) }
     }
 }
@@ -155,15 +155,17 @@ pub struct IntegralTerms<'a, T> {
     pub x: &'a [T],
     /// Its gradient with respect to `u`.
     pub u: &'a [T],
+    /// Its gradient with respect to `p`.
+    pub p: &'a [T],
     /// The matrix of Gauss and Newton: blocks `xx`, `xu`, `uu`.
     pub hessian: [&'a [T]; 3],
-    /// Its blocks `xp`, `up`.
-    pub hessian_p: [&'a [T]; 2],
+    /// Its blocks `xp`, `up`, `pp`.
+    pub hessian_p: [&'a [T]; 3],
 }
 
 impl<T: Real> Default for IntegralTerms<'_, T> {
     fn default() -> Self {
-        Self { value: T::ZERO, x: &[], u: &[], hessian: [&[]; 3], hessian_p: [&[]; 2] }
+        Self { value: T::ZERO, x: &[], u: &[], p: &[], hessian: [&[]; 3], hessian_p: [&[]; 3] }
     }
 }
 

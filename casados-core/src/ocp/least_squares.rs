@@ -159,11 +159,16 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
         self.square(reference, at.stage)?;
         let Self { weights, mu, jacobian, hessian, .. } = self;
         let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
-        for (&a, (k, variable)) in entries() {
-            let Some(i) = position::<F::Shape>(variable) else { continue };
-            for (&b, (l, variable)) in entries() {
-                let Some(p) = parameter::<F::Shape>(variable) else { continue };
-                cross.add(i, p, at.factor * weights[(k, l)] * a * b);
+        for (&b, (l, variable)) in entries() {
+            let Some(p) = parameter::<F::Shape>(variable) else { continue };
+            cross.slope(p, at.factor * mu[l] * b);
+            for (&a, (k, variable)) in entries() {
+                let product = at.factor * weights[(k, l)] * a * b;
+                if let Some(i) = position::<F::Shape>(variable) {
+                    cross.add(i, p, product);
+                } else if let Some(q) = parameter::<F::Shape>(variable) {
+                    cross.curve(q, p, product);
+                }
             }
         }
         if at.exact {

@@ -28,6 +28,7 @@ pub struct Map<F: Function, T: Plain> {
     h_uu: <F::Shape as Shape>::MatrixUU<T>,
     h_xp: <F::Shape as Shape>::MatrixXP<T>,
     h_up: <F::Shape as Shape>::MatrixUP<T>,
+    h_pp: <F::Shape as Shape>::MatrixPP<T>,
 }
 
 impl<F: Function, T: Real> Map<F, T> {
@@ -68,12 +69,15 @@ impl<F: Function, T: Real> Map<F, T> {
                     }
                 }
             }
-            let (mut hessian, mut hessian_p) = ([&[][..]; 3], [&[][..]; 2]);
+            let (mut hessian, mut hessian_p) = ([&[][..]; 3], [&[][..]; 3]);
             if second {
                 crate::qp::assign(self.mu.as_mut(), interval.multipliers);
                 F::hessian::<T>(&self.v, &self.mu, &mut self.hessian);
                 for (entry, &value) in self.hessian.as_ref().iter().enumerate() {
                     let Some((row, column)) = F::STRUCTURE.hessian.get(entry) else { continue };
+                    if let (Some(p), Some(q)) = (parameter::<F::Shape>(row), parameter::<F::Shape>(column)) {
+                        (self.h_pp[(p, q)], self.h_pp[(q, p)]) = (value, value);
+                    }
                     let here = |variable| position::<F::Shape>(variable).filter(|&i| i < nx + nu);
                     let Some(column) = here(column) else { continue };
                     if let Some(p) = parameter::<F::Shape>(row) {
@@ -96,7 +100,7 @@ impl<F: Function, T: Real> Map<F, T> {
                     }
                 }
                 hessian = [self.h_xx.as_slice(), self.h_xu.as_slice(), self.h_uu.as_slice()];
-                hessian_p = [self.h_xp.as_slice(), self.h_up.as_slice()];
+                hessian_p = [self.h_xp.as_slice(), self.h_up.as_slice(), self.h_pp.as_slice()];
             }
             let (x, dx, du, dp) =
                 (self.x.as_slice(), self.dx.as_slice(), self.du.as_slice(), self.dp.as_slice());

@@ -8,7 +8,7 @@
 //! | | |
 //! | --- | --- |
 //! | `φ` | [`Dynamics`]: an integrator of single intervals (`Irk`, `Erk`), `Shooting` over a `Batch`, `Collocation`, [`Map`] |
-//! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`GeneralCost`], pairs of costs; integrals with [`Along`] |
+//! | `l`, `e` | [`LeastSquaresCost`] `½ ‖y − r‖²_W`, [`ConvexCost`] `φ(y − r)`, [`GeneralCost`], pairs of costs; integrals with [`Along`] |
 //! | `g` | [`Constraint`], pairs of constraints |
 //!
 //! All of these are `#[function]`s of the arguments of the model: derivatives are exact and not
@@ -26,7 +26,9 @@
 //! where a QP is infeasible (elastic mode), and an [`Outcome`] that says how it ended, at which
 //! constraint if there is one to blame. [`RealTime`] takes one step in each sample, in two phases.
 //! `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback
-//! gains.
+//! gains; `SolutionFactors` has adjoint ones, and gradient and Hessian of the optimal value.
+//!
+//! `KeptJacobians` wraps an integrator, keeps its Jacobians, and asks for adjoints in their place.
 //!
 //! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its
 //! stages to there (`z0` of its results), with their exact first derivatives; those of second
@@ -55,6 +57,7 @@ mod check;
 #[cfg(feature = "alloc")]
 mod collocation;
 mod constraint;
+mod convex;
 mod convexify;
 mod cost;
 mod coupling;
@@ -66,6 +69,8 @@ mod filter;
 mod horizon;
 mod instance;
 mod ipm;
+#[cfg(feature = "alloc")]
+mod kept_jacobians;
 mod kkt;
 mod labels;
 mod least_squares;
@@ -92,6 +97,7 @@ mod weights;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};
+pub use convex::{Convex, ConvexCost, Huber, PseudoHuber};
 pub use convexify::Convexification;
 pub use cost::{Cost, GeneralCost};
 pub use dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step};
@@ -103,6 +109,8 @@ pub use instance::Ocp;
 #[cfg(feature = "alloc")]
 pub use ipm::HeapIpm;
 pub use ipm::{Barrier, Ipm, IpmOptions};
+#[cfg(feature = "alloc")]
+pub use kept_jacobians::{Adjoints, KeptJacobians};
 pub use least_squares::LeastSquaresCost;
 pub use linearise::{Curvature, Exact, GaussNewton};
 pub use log::{Iteration, Log, Outcome, Status, Times};
@@ -115,7 +123,7 @@ pub use problem::{Formulation, Problem};
 pub use real_time::HeapRealTime;
 pub use real_time::{Feedback, Prepared, RealTime};
 #[cfg(feature = "alloc")]
-pub use sensitivities::Sensitivities;
+pub use sensitivities::{Sensitivities, SolutionAdjoint, SolutionFactors, ValueHessian};
 #[cfg(feature = "alloc")]
 pub use shooting::Shooting;
 pub use single::{Along, IntegralCost};

@@ -153,18 +153,34 @@ fn each_entry<F: Function, T: Real>(
     }
 }
 
-/// Derivatives of a gradient over `(x, u)`, or `(x, u, z)`, with respect to parameters, a column
-/// for each, to be added to.
+/// Derivatives with respect to parameters, to be added to.
 pub struct Cross<'a, T> {
+    /// Of a gradient over `(x, u)`, or `(x, u, z)`: a column for each parameter.
     pub(super) columns: &'a mut [T],
     /// The distance of columns.
     pub(super) ld: usize,
+    /// The gradient with respect to the parameters themselves.
+    pub(super) slopes: &'a mut [T],
+    /// The Hessian with respect to these, both triangles.
+    pub(super) square: &'a mut [T],
 }
 
 impl<T: Real> Cross<'_, T> {
     /// Adds to the derivative of element `row` by parameter `p`.
     pub(super) fn add(&mut self, row: usize, p: usize, value: T) {
         if let Some(element) = self.columns.get_mut(p * self.ld + row) {
+            *element = *element + value;
+        }
+    }
+    /// Adds to the gradient with respect to parameters.
+    pub(super) fn slope(&mut self, p: usize, value: T) {
+        if let Some(element) = self.slopes.get_mut(p) {
+            *element = *element + value;
+        }
+    }
+    /// Adds to the Hessian with respect to parameters, at this place alone.
+    pub(super) fn curve(&mut self, p: usize, q: usize, value: T) {
+        if let Some(element) = self.square.get_mut(q * self.slopes.len() + p) {
             *element = *element + value;
         }
     }
@@ -179,14 +195,23 @@ impl<T: Real> Cross<'_, T> {
     ) {
         each_entry::<F, T>(v, mu, hessian, |row, column, value| {
             // Parameters come after states and controls: they are rows of the lower triangle.
-            if let (Some(p), Some(position)) = (parameter::<F::Shape>(row), position::<F::Shape>(column)) {
+            let Some(p) = parameter::<F::Shape>(row) else { return };
+            if let Some(position) = position::<F::Shape>(column) {
                 self.add(position, p, factor * value);
+            } else if let Some(q) = parameter::<F::Shape>(column) {
+                self.curve(p, q, factor * value);
+                if p != q {
+                    self.curve(q, p, factor * value);
+                }
             }
         });
     }
-    /// Adds matrices `xp` and `up`, column after column.
+    /// Adds matrices `xp`, `up` and `pp`, column after column.
     #[cfg(feature = "alloc")]
-    pub(super) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up]: [&[T]; 2]) {
+    pub(super) fn add_blocks(&mut self, [nx, nu]: [usize; 2], [xp, up, pp]: [&[T]; 3]) {
+        for (to, &value) in self.square.iter_mut().zip(pp) {
+            *to = *to + value;
+        }
         for (first, rows, block) in [(0, nx, xp), (nx, nu, up)] {
             for (p, column) in block.chunks_exact(rows.max(1)).enumerate() {
                 column.iter().enumerate().for_each(|(i, &value)| self.add(first + i, p, value));

@@ -73,8 +73,9 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for Leas
             value: self.value,
             x: self.grad_x0.as_slice(),
             u: self.grad_u.as_slice(),
+            p: self.grad_p.as_slice(),
             hessian: [self.h_xx.as_slice(), self.h_xu.as_slice(), self.h_uu.as_slice()],
-            hessian_p: [self.h_xp.as_slice(), self.h_up.as_slice()],
+            hessian_p: [self.h_xp.as_slice(), self.h_up.as_slice(), self.h_pp.as_slice()],
         }
     }
 }
@@ -90,12 +91,13 @@ impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T:
             value: self.q.as_slice().first().copied().unwrap_or(T::ZERO),
             x: self.dq_dx0.as_slice(),
             u: self.dq_du.as_slice(),
+            p: self.dq_dp.as_slice(),
             ..IntegralTerms::default()
         }
     }
 }
 
-fn at<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
+pub(super) fn at<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
     result.map_err(|error| OcpError::Integration { interval, error })
 }
 
@@ -206,7 +208,7 @@ macro_rules! single {
                     let result = integrator.hessian_along(&x, &u, interval.h, &lambda, $(interval.$nu,)? along);
                     let result = at(k, result)?;
                     // The Hessian is that of both together: what the integral would add is in it.
-                    let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 2], ..integral.terms() };
+                    let cost = IntegralTerms { hessian: [&[]; 3], hessian_p: [&[]; 3], ..integral.terms() };
                     sink(k, &Step { cost, ..result.into() });
                 }
                 Ok(())

@@ -1,9 +1,18 @@
 //! How the barrier parameter changes.
 
 use crate::qp::Residuals;
+use crate::qp::interior::Sides;
 use crate::scalar::{Real, Scalar};
 
 /// What the barrier parameter follows.
+///
+/// ```
+/// use casados::ocp::{Barrier, IpmOptions};
+///
+/// let mut options = IpmOptions::new::<f64>();
+/// assert_eq!(options.barrier, Barrier::Monotone);
+/// options.barrier = Barrier::Adaptive;
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Barrier {
     /// It shrinks where the barrier problem is solved well enough: Wächter and Biegler (2006), with
@@ -93,6 +102,14 @@ pub(super) fn error(residuals: &Residuals, farthest: f64) -> f64 {
 pub(super) fn farthest<T: Real>(slacks: &[T], multipliers: &[T], mu: f64) -> f64 {
     let products = slacks.iter().zip(multipliers);
     products.fold(0.0, |m, (&s, &l)| larger(m, (s.to_f64() * l.to_f64() - mu).abs()))
+}
+
+/// What is left of the sides, and of `s λ = μ`, in the barrier problem itself: there soft bounds
+/// are violated a little everywhere.
+pub(super) fn residuals<T: Real>(sides: &Sides<'_, T>, mu: f64) -> (f64, f64) {
+    let all = sides.residual.iter().chain(&*sides.equation_residual);
+    let largest = all.fold(0.0, |m, residual| larger(m, residual.abs().to_f64()));
+    (largest, farthest(sides.slack, sides.multiplier, mu))
 }
 
 /// The larger one; NaN stays.

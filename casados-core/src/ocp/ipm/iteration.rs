@@ -113,7 +113,7 @@ where
         };
         (row.step, row.corrected) = (accepted.alpha, accepted.corrected);
         self.accept(ocp, capacity, state, &direction, accepted)?;
-        let ends = direction.tiny && state.mu <= self.options.tolerance;
+        let ends = direction.tiny && state.mu <= self.options.tolerance.max(self.options.final_mu);
         Ok(ends.then_some(Status::NoProgress))
     }
 
@@ -149,11 +149,15 @@ where
         state: &mut State<'_>,
         row: &mut Iteration,
     ) -> Result<Measure, OcpError> {
-        let (residuals, objective) = ocp.residuals();
+        let (mut residuals, objective) = ocp.residuals();
         let plain = ocp.objective.to_f64();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         evaluate(&mut iterate, &mut solution.view_mut());
+        if self.options.final_mu > 0.0 {
+            (residuals.inequalities, residuals.complementarity) =
+                barrier::residuals(&iterate.sides, self.options.final_mu);
+        }
         update_barrier(state, &iterate, &residuals, &self.options);
         let mut here = measure::here(&iterate, plain, state.mu);
         if P::Dynamics::LIFTED {
@@ -297,7 +301,7 @@ fn update_barrier<T: Real>(
     let Sides { slack, multiplier, .. } = &iterate.sides;
     let error = |mu| barrier::error(residuals, barrier::farthest(slack, multiplier, mu));
     let before = state.mu;
-    let tolerance = options.tolerance;
+    let tolerance = options.tolerance.max(10.0 * options.final_mu);
     state.mu = match options.barrier {
         Barrier::Monotone => barrier::shrink(before, error, tolerance),
         Barrier::Adaptive => state.progress.next(before, error, [slack, multiplier], tolerance),

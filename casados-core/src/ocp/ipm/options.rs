@@ -21,6 +21,9 @@ pub struct IpmOptions {
     pub max_iterations: usize,
     /// The first barrier parameter `μ`. Default 0.1.
     pub start_mu: f64,
+    /// The last one: what is solved is the barrier problem with this `μ`, whose solutions are
+    /// smooth functions of the data. Default 0, the problem itself.
+    pub final_mu: f64,
     /// What it follows. Default [`Barrier::Monotone`].
     pub barrier: Barrier,
     /// Bounds are left by this at the start, relative to their size and to the room between them;
@@ -49,6 +52,7 @@ impl IpmOptions {
             acceptable_iterations: 15,
             max_iterations: 200,
             start_mu: 0.1,
+            final_mu: 0.0,
             barrier: Barrier::Monotone,
             bound_push: 1e-2,
             warm_start: false,
@@ -70,6 +74,11 @@ impl IpmOptions {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(OcpError::InvalidOption { name, value, allowed: "positive and finite" });
             }
+        }
+        let last = self.final_mu;
+        if !(last >= 0.0 && last <= self.start_mu) {
+            let allowed = "from 0 to `start_mu`";
+            return Err(OcpError::InvalidOption { name: "final_mu", value: last, allowed });
         }
         // Two bounds push from both sides.
         for (name, value) in [("bound_push", self.bound_push), ("warm_push", self.warm_push)] {

@@ -73,10 +73,33 @@ where
     }
 
     /// As [`Ipm::solve`], until the time is over: `over` is asked after each evaluation of the
-    /// problem, factorisation and trial of the line search. A clock, or a counter of cycles.
+    /// problem, factorisation and trial of the line search. A clock, or a counter of cycles. Then
+    /// the status is [`Status::OutOfTime`], and the iterate the best one until then.
     ///
     /// # Errors
     /// As [`Ipm::solve`].
+    ///
+    /// # Example
+    /// ```
+    /// use casados::ocp::{HeapIpm, Horizon, LeastSquaresCost, Map, Problem, Status};
+    /// use casados::prelude::*;
+    /// use std::time::{Duration, Instant};
+    ///
+    /// #[function]
+    /// fn push(x: f64, u: f64) -> f64 { x + u }
+    /// #[function]
+    /// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+    ///
+    /// let mut ocp = Problem::new(Map::<Push, f64>::new())
+    ///     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+    ///     .on(Horizon::uniform(10, 0.1))?;
+    /// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+    /// let deadline = Instant::now() + Duration::from_secs(60);
+    /// let mut ipm = HeapIpm::new(&ocp)?;
+    /// assert!(ipm.solve_until(&mut ocp, &mut || Instant::now() > deadline)?.is_converged());
+    /// assert_eq!(ipm.solve_until(&mut ocp, &mut || true)?.status, Status::OutOfTime);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn solve_until<P: Formulation<T>>(
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,

@@ -1,39 +1,43 @@
-//! How a solution changes with its initial state and with parameters.
+//! How a solution, and its value, change with the initial state and with parameters.
+//!
+//! | | |
+//! | --- | --- |
+//! | `factors` | the conditions of optimality, factorised: adjoints, derivatives of the value |
+//! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
+//! | `parameters` | what parameters change of the conditions |
 
 mod active;
+mod factors;
 mod parameters;
 mod recursion;
 
+pub use factors::{SolutionAdjoint, SolutionFactors, ValueHessian};
+
 use super::data::get;
-use super::error::{OcpError, Part};
-use super::instance::{Initial, Ocp};
-use super::linearise::Curvature;
+use super::error::OcpError;
+use super::instance::Ocp;
+use super::linearise::{Curvature, dot};
 use super::problem::Formulation;
-use crate::qp::StageDims;
+use crate::linalg::axpy;
+use crate::qp::{StageDims, assign, part, part_mut};
 use crate::scalar::Real;
-use crate::shape::Shape;
 use alloc::vec::Vec;
 
 /// `dx_k/dx₀`, `du_k/dx₀`, `dx_k/dp` and `du_k/dp` of a solution, and the gains of the feedback
 /// `u_k + K_k (x − x_k)`.
 ///
 /// Derivatives with respect to `p` are those where the parameters of all stages change together.
+/// Where few functions of the solution are of interest, adjoints by [`SolutionFactors`] are
+/// cheaper.
 #[derive(Clone, Debug)]
 pub struct Sensitivities<T> {
-    nx: usize,
-    nu: usize,
-    np: usize,
-    /// `K`, `dx/dx₀`, `du/dx₀`: matrices column after column, one stage after the other.
-    gains: Vec<T>,
+    factors: SolutionFactors<T>,
+    /// `dx/dx₀`, `du/dx₀`: matrices column after column, one stage after the other.
     x: Vec<T>,
     u: Vec<T>,
-    /// `dx/dp`, and `du/dp`; before that what the controls do where the states stay.
+    /// `dx/dp`, and `du/dp`
     x_p: Vec<T>,
     u_p: Vec<T>,
-    problem: parameters::Parameters<T>,
-    /// `P` of the next stage, `P [A B]`, `M`, its factors, and for the parameters the gradients of
-    /// stage and next stage.
-    work: Vec<T>,
 }
 
 impl<T: Real> Sensitivities<T> {
@@ -42,45 +46,88 @@ impl<T: Real> Sensitivities<T> {
     /// # Errors
     /// [`OcpError::OutOfMemory`]
     pub fn new<P: Formulation<T>>(ocp: &super::HeapOcp<P, T>) -> Result<Self, OcpError> {
-        let (nx, nu, np, n) = (P::Shape::NX, P::Shape::NU, P::Shape::NP, ocp.intervals());
+        let factors = SolutionFactors::new(ocp)?;
+        let ([nx, nu, np], n) = (factors.dims, factors.intervals);
         Ok(Self {
-            nx,
-            nu,
-            np,
-            gains: zeros(n * nu * nx)?,
+            factors,
             x: zeros((n + 1) * nx * nx)?,
             u: zeros(n * nu * nx)?,
             x_p: zeros((n + 1) * nx * np)?,
             u_p: zeros(n * nu * np)?,
-            problem: parameters::Parameters::new::<P>(n)?,
-            work: zeros(recursion::Work::<T>::length(nx, nu, np))?,
         })
+    }
+
+    /// The factors, for adjoints and the value of the same solution, and their smoothing.
+    pub fn factors(&mut self) -> &mut SolutionFactors<T> {
+        &mut self.factors
     }
 
     /// `K_k`, `NU × NX`, column after column; empty where there is none.
     #[must_use]
     pub fn gain(&self, stage: usize) -> &[T] {
-        block(&self.gains, stage, self.nu * self.nx)
+        self.factors.gain(stage)
     }
     /// `dx_k/dx₀`, `NX × NX`, column after column.
     #[must_use]
     pub fn dx(&self, stage: usize) -> &[T] {
-        block(&self.x, stage, self.nx * self.nx)
+        let [nx, _, _] = self.factors.dims;
+        block(&self.x, stage, nx * nx)
     }
     /// `du_k/dx₀`, `NU × NX`, column after column.
     #[must_use]
     pub fn du(&self, stage: usize) -> &[T] {
-        block(&self.u, stage, self.nu * self.nx)
+        let [nx, nu, _] = self.factors.dims;
+        block(&self.u, stage, nu * nx)
     }
     /// `dx_k/dp`, `NX × NP`, column after column.
     #[must_use]
     pub fn dx_dp(&self, stage: usize) -> &[T] {
-        block(&self.x_p, stage, self.nx * self.np)
+        let [nx, _, np] = self.factors.dims;
+        block(&self.x_p, stage, nx * np)
     }
     /// `du_k/dp`, `NU × NP`, column after column.
     #[must_use]
     pub fn du_dp(&self, stage: usize) -> &[T] {
-        block(&self.u_p, stage, self.nu * self.np)
+        let [_, nu, np] = self.factors.dims;
+        block(&self.u_p, stage, nu * np)
+    }
+
+    /// `dx_{k+1} = A dx_k + B du_k`, `du_k = K dx_k`.
+    fn by_initial_state(&mut self) {
+        let Self { factors, x, u, .. } = self;
+        let ([nx, nu, _], n) = (factors.dims, factors.intervals);
+        let size = nx + nu;
+        x.fill(T::ZERO);
+        u.fill(T::ZERO);
+        (0..nx).for_each(|i| set(x, i * nx + i, T::ONE));
+        for k in 0..n {
+            let (before, after) = x.split_at_mut_checked((k + 1) * nx * nx).unwrap_or_default();
+            for direction in 0..nx {
+                let du = part_mut(u, (k * nx + direction) * nu, nu);
+                let dx = part(before, (k * nx + direction) * nx, nx);
+                for (gain, &dx) in factors.gain(k).chunks_exact(nu.max(1)).zip(dx) {
+                    axpy(dx, gain, du);
+                }
+                let rows = part(&factors.dynamics, k * nx * size, nx * size).chunks_exact(size.max(1));
+                for (next, row) in part_mut(after, direction * nx, nx).iter_mut().zip(rows) {
+                    *next = dot(part(row, 0, nx), dx) + dot(part(row, nx, nu), du);
+                }
+            }
+        }
+    }
+
+    fn by_parameters(&mut self) {
+        let Self { factors, x_p, u_p, .. } = self;
+        let ([nx, nu, np], n) = (factors.dims, factors.intervals);
+        let mut column = core::mem::take(&mut factors.column);
+        for p in 0..np {
+            recursion::solve_parameter(factors, p, &mut column);
+            for k in 0..=n {
+                assign(part_mut(x_p, (k * np + p) * nx, nx), column.state(k));
+                assign(part_mut(u_p, (k * np + p) * nu, nu), column.control(k));
+            }
+        }
+        factors.column = column;
     }
 }
 
@@ -101,28 +148,23 @@ fn zeros<T: Real>(length: usize) -> Result<Vec<T>, OcpError> {
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// How the solution changes with its initial state and with parameters, where the bounds that
-    /// are active stay so: the iterate must be a solution, with a fixed initial state.
+    /// are active stay so: [`Ocp::factorise`], and one solution for each of both.
     ///
     /// With [`Exact`](super::Exact) Hessians that are not made convex these are derivatives of the
     /// solution; with those of Gauss and Newton, which leave second derivatives of dynamics,
     /// constraints and least squares out of what parameters change, too, they are approximations of
-    /// the same quality. One Riccati recursion: [`OcpError::Qp`] if the reduced Hessian is not
-    /// positive definite.
+    /// the same quality.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is not fixed;
-    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::Coupled`].
+    /// Those of [`Ocp::factorise`].
     pub fn differentiate<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
         result: &mut Sensitivities<T>,
     ) -> Result<(), OcpError> {
-        self.check_memory(result)?;
-        let problem = &mut result.problem;
-        self.linearise_watched(curvature, |k, step| problem.take(k, step))?;
-        self.differentiate_functions(C::EXACT, problem)?;
-        recursion::backward(self.qp.view(), &self.iterate, result)?;
-        recursion::forward(self.qp.view(), result);
+        self.factorise(curvature, &mut result.factors)?;
+        result.by_initial_state();
+        result.by_parameters();
         Ok(())
     }
 
@@ -132,26 +174,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::Missing`] if the initial state is not fixed; [`OcpError::Length`] if the memory
-    /// is of another problem; [`OcpError::Qp`] if the reduced Hessian is not positive definite.
+    /// is of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian is not
+    /// positive definite.
     pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
-        self.check_memory(result)?;
-        recursion::backward(self.qp.view(), &self.iterate, result)?;
+        self.check_factors(&result.factors)?;
+        result.factors.fill(self.qp.view(), &self.iterate, false)?;
         let Sensitivities { x, u, x_p, u_p, .. } = result;
         for derivatives in [x, u, x_p, u_p] {
             derivatives.fill(T::ZERO);
-        }
-        Ok(())
-    }
-
-    fn check_memory(&self, result: &Sensitivities<T>) -> Result<(), OcpError> {
-        self.is_uncoupled()?;
-        if self.initial != Initial::Fixed {
-            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
-        }
-        let (nx, n) = (P::Shape::NX, self.intervals());
-        let (expected, found) = ((n + 1) * nx * nx, result.x.len());
-        if expected != found || [result.nu, result.np] != [P::Shape::NU, P::Shape::NP] {
-            return Err(OcpError::Length { part: Part::Memory, stage: 0, expected, found });
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! What parameters change of the conditions of optimality.
 
 use super::zeros;
+use crate::linalg::axpy;
 use crate::ocp::algebraic::{self, Extended};
 use crate::ocp::constraint::Constraints;
 use crate::ocp::cost::{At, Cost};
@@ -8,9 +9,10 @@ use crate::ocp::data::{Node, inputs, split};
 use crate::ocp::dynamics::Step;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
+use crate::ocp::linearise::dot;
 use crate::ocp::point::{Cross, read};
 use crate::ocp::problem::{Formulation, Problem};
-use crate::qp::{StageDims, assign, part, part_mut};
+use crate::qp::{SolutionStage, StageDims, assign, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use alloc::vec::Vec;
@@ -29,6 +31,9 @@ pub(super) struct Parameters<T> {
     gradients: Vec<T>,
     /// `∂g/∂p`, row after row.
     slopes: Vec<T>,
+    /// `∂L/∂p`, which is that of the optimal value, and `∂²L/∂p²`: sums over all stages.
+    pub(super) slopes_of_value: Vec<T>,
+    pub(super) square: Vec<T>,
     /// `∂z/∂p`, column after column.
     algebraic: Vec<T>,
     /// `∂²L/∂(x, u, z)∂p` of a stage, where `z` stays.
@@ -47,6 +52,8 @@ impl<T: Real> Parameters<T> {
             ends: zeros(n * nx * np)?,
             gradients: zeros((n + 1) * (nx + nu) * np)?,
             slopes: zeros((n * P::Path::ROWS + P::Terminal::ROWS) * np)?,
+            slopes_of_value: zeros(np)?,
+            square: zeros(np * np)?,
             algebraic: zeros(n * P::Shape::NZ * np)?,
             extended: zeros((nx + nu + P::Shape::NZ) * np)?,
             mu: zeros(P::Path::ROWS.max(P::Terminal::ROWS))?,
@@ -64,10 +71,40 @@ impl<T: Real> Parameters<T> {
         let [nx, nu, np] = self.dims;
         part(&self.gradients, k * (nx + nu) * np, (nx + nu) * np)
     }
-    /// `∂g/∂p` of a constraint of a stage.
-    pub(super) fn slope(&self, k: usize, row: usize) -> &[T] {
-        let [_, _, np] = self.dims;
-        part(&self.slopes, (k * self.rows + row) * np, np)
+    /// Adds what a constraint with the gradient `c` over `(x, u)` does as a spring.
+    pub(super) fn constrain(&mut self, [k, row]: [usize; 2], stiff: T, c: &[T]) {
+        let [nx, nu, np] = self.dims;
+        let size = nx + nu;
+        let slopes = part(&self.slopes, (k * self.rows + row) * np, np);
+        for (p, &slope) in slopes.iter().enumerate() {
+            axpy(stiff * slope, c, part_mut(&mut self.gradients, (k * np + p) * size, c.len()));
+            axpy(stiff * slope, slopes, part_mut(&mut self.square, p * np, np));
+        }
+    }
+
+    /// Before the first interval.
+    pub(super) fn begin(&mut self) {
+        self.slopes_of_value.fill(T::ZERO);
+        self.square.fill(T::ZERO);
+        self.slopes.fill(T::ZERO);
+    }
+
+    /// `πᵀ ∂φ/∂p + μᵀ ∂g/∂p` of all stages.
+    fn weigh<'a>(&mut self, stages: impl Iterator<Item = SolutionStage<'a, T>>)
+    where
+        T: 'a,
+    {
+        let [nx, _, np] = self.dims;
+        for (k, at) in stages.enumerate() {
+            let columns = part(&self.ends, k * nx * np, nx * np).chunks_exact(nx.max(1));
+            for (column, of_value) in columns.zip(&mut self.slopes_of_value) {
+                *of_value = *of_value + dot(column, at.dynamics);
+            }
+            for (row, (&upper, &lower)) in at.g_upper.iter().zip(at.g_lower).enumerate() {
+                let slopes = part(&self.slopes, (k * self.rows + row) * np, np);
+                axpy(upper - lower, slopes, &mut self.slopes_of_value);
+            }
+        }
     }
 
     /// What an interval adds.
@@ -78,9 +115,11 @@ impl<T: Real> Parameters<T> {
         assign(part_mut(&mut self.ends, k * nx * np, nx * np), step.dp);
         let columns = part_mut(&mut self.gradients, k * size * np, size * np);
         columns.fill(T::ZERO);
-        let mut cross = Cross { columns, ld: size };
+        let (slopes, square) = (&mut *self.slopes_of_value, &mut *self.square);
+        let mut cross = Cross { columns, ld: size, slopes, square };
         cross.add_blocks([nx, nu], step.hessian_p);
         cross.add_blocks([nx, nu], step.cost.hessian_p);
+        step.cost.p.iter().enumerate().for_each(|(p, &slope)| cross.slope(p, slope));
     }
 }
 
@@ -98,7 +137,18 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         }
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = self.problem.parts();
-        let Parameters { gradients, slopes, algebraic: dz_dp, extended, mu, values, rows, .. } = result;
+        let Parameters {
+            gradients,
+            slopes,
+            algebraic: dz_dp,
+            extended,
+            mu,
+            values,
+            rows,
+            slopes_of_value: of_value,
+            square,
+            ..
+        } = &mut *result;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, at) in self.iterate.stages().enumerate() {
             let node = Node::new::<P>(k, intervals, *running, [data.times, data.p, data.references]);
@@ -108,7 +158,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if k == intervals {
                 columns.fill(T::ZERO);
             }
-            let mut cross = Cross { columns, ld: size };
+            let mut cross = Cross { columns, ld: size, slopes: of_value, square };
             for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
                 *mu = upper - lower;
             }
@@ -126,7 +176,8 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 continue;
             }
             extended.fill(T::ZERO);
-            let mut direct = Cross { columns: extended, ld: size + z.len() };
+            let Cross { slopes: of_value, square, .. } = &mut cross;
+            let mut direct = Cross { columns: extended, ld: size + z.len(), slopes: of_value, square };
             stage_cost.cross(&point, node.reference, place, &mut direct)?;
             path.cross(&point, mu, slopes, &mut direct);
             let Extended { mut terms, columns } = Extended::new::<P::Shape>(data.extended);
@@ -138,6 +189,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let dp = part(dz_dp, k * z.len() * np, z.len() * np);
             Extended { terms, columns }.fold_parameters::<P::Shape>([dz, dp], extended, &mut cross, slopes);
         }
+        result.weigh(self.iterate.stages());
         Ok(())
     }
 }

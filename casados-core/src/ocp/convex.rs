@@ -1,0 +1,308 @@
+//! Convex functions of residuals as costs at the nodes.
+
+use super::cost::{At, Cost};
+use super::error::OcpError;
+use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
+use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Outputs, Plain};
+use bytemuck::Zeroable;
+
+/// A convex function `φ(r)` of a residual with `NY` elements.
+pub trait Convex<T> {
+    /// `φ(r)`, its gradient, `NY`, and its Hessian, `NY × NY` with both triangles, which is
+    /// symmetric and positive semidefinite. Both are zero before the call.
+    fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T;
+
+    /// What is wrong with its constants: which, their value, and what they have to be.
+    ///
+    /// # Errors
+    /// These three.
+    fn check(&self) -> Result<(), (usize, f64, &'static str)> {
+        Ok(())
+    }
+}
+
+/// Huber's function of every residual, with a weight of its own: `½ w r²` where `|r| ≤ δ`, and
+/// `w δ (|r| − ½ δ)` where it is larger: outliers have a bounded force.
+///
+/// P. J. Huber, "Robust estimation of a location parameter", Ann. Math. Statist. 35 (1964).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Huber<T, const NY: usize> {
+    /// `w`, from zero on.
+    pub weights: [T; NY],
+    /// `δ`, positive, in the unit of its residual.
+    pub delta: [T; NY],
+}
+
+/// The smooth sister of [`Huber`], with second derivatives everywhere:
+/// `w δ² (√(1 + (r/δ)²) − 1)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PseudoHuber<T, const NY: usize> {
+    /// `w`, from zero on.
+    pub weights: [T; NY],
+    /// `δ`, positive, in the unit of its residual.
+    pub delta: [T; NY],
+}
+
+/// `Σ w_i f(r_i, δ_i)` of a function with its first and second derivative.
+fn separate<T: Real, const NY: usize>(
+    [weights, delta]: [&[T; NY]; 2],
+    r: &[T],
+    [gradient, hessian]: [&mut [T]; 2],
+    f: impl Fn(T, T) -> [T; 3],
+) -> T {
+    let mut sum = T::ZERO;
+    let places = gradient.iter_mut().zip(hessian.iter_mut().step_by(NY + 1));
+    for ((&r, (&weight, &delta)), (slope, curvature)) in r.iter().zip(weights.iter().zip(delta)).zip(places) {
+        let [value, first, second] = f(r, delta);
+        sum = sum + weight * value;
+        (*slope, *curvature) = (weight * first, weight * second);
+    }
+    sum
+}
+
+/// Whether weights and `δ` make sense.
+fn check<T: Real>(weights: &[T], delta: &[T]) -> Result<(), (usize, f64, &'static str)> {
+    for (i, (weight, delta)) in weights.iter().zip(delta).enumerate() {
+        let (weight, delta) = (weight.to_f64(), delta.to_f64());
+        if !(weight >= 0.0 && weight.is_finite()) {
+            return Err((i, weight, "finite and not negative"));
+        }
+        if !(delta > 0.0 && delta.is_finite()) {
+            return Err((i, delta, "finite and positive: it is the `delta` of Huber's function"));
+        }
+    }
+    Ok(())
+}
+
+impl<T: Real, const NY: usize> Convex<T> for Huber<T, NY> {
+    fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T {
+        let half = T::from_f64(0.5);
+        separate([&self.weights, &self.delta], r, [gradient, hessian], |r, delta| {
+            if r.abs() <= delta {
+                [half * r * r, r, T::ONE]
+            } else {
+                let force = if r < T::ZERO { -delta } else { delta };
+                [delta * (r.abs() - half * delta), force, T::ZERO]
+            }
+        })
+    }
+    fn check(&self) -> Result<(), (usize, f64, &'static str)> {
+        check(&self.weights, &self.delta)
+    }
+}
+
+impl<T: Real, const NY: usize> Convex<T> for PseudoHuber<T, NY> {
+    fn evaluate(&self, r: &[T], gradient: &mut [T], hessian: &mut [T]) -> T {
+        separate([&self.weights, &self.delta], r, [gradient, hessian], |r, delta| {
+            let part = r / delta;
+            let root = (T::ONE + part * part).sqrt();
+            // `√(1 + a²) − 1` without cancellation.
+            [r * r / (T::ONE + root), r / root, T::ONE / (root * root * root)]
+        })
+    }
+    fn check(&self) -> Result<(), (usize, f64, &'static str)> {
+        check(&self.weights, &self.delta)
+    }
+}
+
+/// `φ(y − r)` of the outputs `y(x, z, u, p, t)` of a function, a reference `r`, which every stage
+/// has for itself, and a convex function `φ`: [`Huber`], [`PseudoHuber`], or your own [`Convex`].
+///
+/// Its Hessian is `Jᵀ ∇²φ J`, the generalised one of Gauss and Newton, which is positive
+/// semidefinite; the exact one has `Σ_i ∂φ/∂r_i ∇²y_i` too. Of `φ = ½ ‖·‖²` it is
+/// [`LeastSquaresCost`](super::LeastSquaresCost). References are zero where none are set.
+///
+/// N. N. Schraudolph, "Fast curvature matrix-vector products for second-order gradient descent",
+/// Neural Comput. 14 (2002); F. Messerer, K. Baumgärtner, M. Diehl, "Survey of sequential convex
+/// programming and generalized Gauss-Newton methods", ESAIM: Proc. Surv. 71 (2021).
+///
+/// # Example
+/// Of the data 0, 0.2, 0.4 and 10 the last one pulls with `δ = 1` alone: `3 x = 0.6 + 1`.
+/// ```
+/// use casados::ocp::{ConvexCost, HeapSqp, Horizon, Huber, Map, Problem};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn stays(x: f64, _u: f64) -> f64 { x }
+/// #[function]
+/// fn state(x: f64, _u: f64) -> f64 { x }
+/// #[function]
+/// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+///
+/// let stage = Huber { weights: [1.0, 1.0], delta: [1.0, 1.0] };
+/// let last = Huber { weights: [1.0], delta: [1.0] };
+/// let mut ocp = Problem::new(Map::<Stays, f64>::new())
+///     .stage_cost(ConvexCost::<Both, _>::new(stage))
+///     .terminal_cost(ConvexCost::<State, _>::new(last))
+///     .on(Horizon::uniform(3, 1.0))?;
+/// ocp.free_initial_state().guess(&[0.0], &[0.0])?;
+/// for (k, data) in [0.0, 0.2, 0.4].into_iter().enumerate() {
+///     ocp.set_reference(k..=k, &[data, 0.0])?;
+/// }
+/// ocp.set_terminal_reference(&[10.0])?;
+/// let outcome = HeapSqp::new(&ocp)?.gauss_newton().solve(&mut ocp)?;
+/// assert!(outcome.is_converged());
+/// assert!((ocp.stage(0)?.x[0] - 1.6 / 3.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct ConvexCost<F: Function, C, T: Plain = f64> {
+    /// `φ`, whose constants may be changed.
+    pub outer: C,
+    y: ArrayY<F, T>,
+    /// `∂φ/∂r`, and `∂²φ/∂r²`.
+    mu: ArrayY<F, T>,
+    phi: MatrixYY<F, T>,
+    jacobian: F::Jacobian<T>,
+    hessian: F::Hessian<T>,
+}
+
+impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
+    /// The cost of a convex function. Constants that make no sense are refused by `Problem::on` and
+    /// by every linearisation: [`OcpError::InvalidWeight`].
+    #[must_use]
+    pub fn new(outer: C) -> Self {
+        let mut cost = Self {
+            outer,
+            y: Zeroable::zeroed(),
+            mu: Zeroable::zeroed(),
+            phi: Zeroable::zeroed(),
+            jacobian: Zeroable::zeroed(),
+            hessian: Zeroable::zeroed(),
+        };
+        F::jacobian_constants::<T>(&mut cost.jacobian);
+        cost
+    }
+
+    /// `φ` and its derivatives at the outputs.
+    fn evaluate(&mut self, reference: &[T], stage: usize) -> Result<T, OcpError> {
+        let Self { outer, y, mu, phi, .. } = self;
+        for (y, &r) in y.as_mut().iter_mut().zip(reference) {
+            *y = *y - r;
+        }
+        mu.as_mut().fill(T::ZERO);
+        phi.as_mut_slice().fill(T::ZERO);
+        let value = outer.evaluate(y.as_ref(), mu.as_mut(), phi.as_mut_slice());
+        let derivatives = mu.as_ref().iter().chain(phi.as_slice());
+        let value = derivatives.fold(value, |value, &d| if d.is_finite() { value } else { d });
+        let value = finite::<F, T>(y, value, stage)?;
+        for k in 0..F::Outputs::NY {
+            let curvature = phi[(k, k)];
+            if curvature < T::ZERO {
+                let (outputs, allowed) = ([k, k], "not negative: the outer function is to be convex");
+                let (function, value) = (F::STRUCTURE.name, curvature.to_f64());
+                return Err(OcpError::InvalidWeight { function, outputs, value, allowed });
+            }
+        }
+        Ok(value)
+    }
+
+    /// The entries of an output, each with its variable.
+    fn row(jacobian: &F::Jacobian<T>, output: usize) -> impl Iterator<Item = (usize, T)> + Clone {
+        let begin = |output: usize| F::STRUCTURE.begins.get(output).map_or(0, |&begin| begin as usize);
+        let places = F::STRUCTURE.by_row.get(begin(output)..begin(output + 1)).unwrap_or_default();
+        places.iter().filter_map(move |&entry| {
+            let (_, variable) = F::STRUCTURE.jacobian.get(entry as usize)?;
+            Some((variable, *jacobian.as_ref().get(entry as usize)?))
+        })
+    }
+}
+
+impl<F: Function, C: Convex<T>, T: Real> Cost<F::Shape, T> for ConvexCost<F, C, T> {
+    const REFERENCES: usize = F::Outputs::NY;
+    const CONVEX: bool = true;
+    const ALGEBRAIC: bool = is_algebraic::<F>();
+
+    fn check(&self, there: There) -> Result<(), OcpError> {
+        Cost::<F::Shape, T>::check_weights(self)?;
+        there.check::<F>()
+    }
+
+    fn check_weights(&self) -> Result<(), OcpError> {
+        self.outer.check().map_err(|(output, value, allowed)| {
+            let outputs = [output, output];
+            OcpError::InvalidWeight { function: F::STRUCTURE.name, outputs, value, allowed }
+        })
+    }
+
+    fn name(reference: usize) -> (&'static str, usize) {
+        (F::STRUCTURE.name, reference)
+    }
+
+    fn value(&mut self, v: &ArrayV<F, T>, reference: &[T], stage: usize) -> Result<T, OcpError> {
+        F::value::<T>(v, &mut self.y);
+        self.evaluate(reference, stage)
+    }
+
+    fn add(
+        &mut self,
+        v: &ArrayV<F, T>,
+        reference: &[T],
+        at: At<'_, T>,
+        terms: &mut Terms<'_, T>,
+    ) -> Result<T, OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        let value = self.evaluate(reference, at.stage)?;
+        let Self { mu, phi, jacobian, hessian, .. } = self;
+        let rows = |output| {
+            let entries = Self::row(jacobian, output);
+            entries.filter_map(|(variable, value)| Some((position::<F::Shape>(variable)?, value)))
+        };
+        // From a point `v` on the gradient is `Jᵀ (φ′ − φ″ J v)`.
+        let moved: ArrayY<F, T> = Array::from_fn(|l| {
+            rows(l).fold(T::ZERO, |sum, (i, a)| sum + a * at.from.get(i).copied().unwrap_or(T::ZERO))
+        });
+        for k in 0..F::Outputs::NY {
+            let mut slope = mu[k];
+            for (l, &moved) in moved.as_ref().iter().enumerate() {
+                let weight = phi[(k, l)];
+                if weight == T::ZERO {
+                    continue;
+                }
+                slope = slope - weight * moved;
+                for (i, a) in rows(k) {
+                    for (j, b) in rows(l).filter(|&(j, _)| i >= j) {
+                        terms.curve(i, j, at.factor * weight * a * b);
+                    }
+                }
+            }
+            for (i, a) in rows(k) {
+                terms.slope(i, at.factor * slope * a);
+            }
+        }
+        if at.exact {
+            terms.curvature::<F>(v, mu, at.factor, hessian);
+        }
+        Ok(at.factor * value)
+    }
+
+    fn cross(
+        &mut self,
+        v: &ArrayV<F, T>,
+        reference: &[T],
+        at: At<'_, T>,
+        cross: &mut Cross<'_, T>,
+    ) -> Result<(), OcpError> {
+        F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
+        self.evaluate(reference, at.stage)?;
+        let Self { mu, phi, jacobian, hessian, .. } = self;
+        let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
+        for (&b, (l, variable)) in entries() {
+            let Some(p) = parameter::<F::Shape>(variable) else { continue };
+            cross.slope(p, at.factor * mu[l] * b);
+            for (&a, (k, variable)) in entries() {
+                let product = at.factor * phi[(k, l)] * a * b;
+                if let Some(i) = position::<F::Shape>(variable) {
+                    cross.add(i, p, product);
+                } else if let Some(q) = parameter::<F::Shape>(variable) {
+                    cross.curve(q, p, product);
+                }
+            }
+        }
+        if at.exact {
+            cross.curvature::<F>(v, mu, at.factor, hessian);
+        }
+        Ok(())
+    }
+}

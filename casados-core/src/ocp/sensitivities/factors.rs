@@ -1,0 +1,321 @@
+//! The conditions of optimality at a solution, factorised once for any number of derivatives.
+
+use super::active::Springs;
+use super::parameters::Parameters;
+use super::recursion::{self, Column};
+use super::{block, zeros};
+use crate::ocp::HeapOcp;
+use crate::ocp::error::{OcpError, Part};
+use crate::ocp::instance::{Initial, Ocp};
+use crate::ocp::linearise::Curvature;
+use crate::ocp::problem::Formulation;
+use crate::qp::{QpView, Solution, StageDims, assign, part, part_mut};
+use crate::scalar::Real;
+use crate::shape::Shape;
+use alloc::vec::Vec;
+
+/// The conditions of optimality at a solution, factorised: adjoint derivatives of the solution, and
+/// derivatives of the optimal value, by the initial state and by parameters.
+///
+/// ```text
+/// adjoint(λ)              λᵀ dw/dx₀,  λᵀ dw/dp            w = (x₀, u₀, …, x_N) of the solution
+/// value_gradient_x0, _p   ∂V/∂x₀,  ∂V/∂p                   V(x₀, p) = min f
+/// value_hessian           ∂²V/∂x₀²,  ∂²V/∂x₀∂p,  ∂²V/∂p²
+/// ```
+///
+/// `p` are the parameters of all stages, which change together. [`Ocp::factorise`] fills it by one
+/// linearisation and one Riccati recursion, `O(N (NX + NU)³)`. An adjoint costs
+/// `O(N (NX + NU) (NX + NU + NP))`, however many parameters there are; the Hessian of the value one
+/// such solve for each parameter. The gradient of the value is that of the Lagrangian (envelope
+/// theorem), and costs nothing more.
+///
+/// Where bounds are active the derivatives are those along which the active set stays. At a bound
+/// that is active without a force solutions have two derivatives, one for each side. Then the bound
+/// counts as active if its multiplier is larger than its slack, and [`weakly_active`] says how many
+/// bounds are in question. [`smoothing`] gives derivatives that are continuous there.
+///
+/// [`weakly_active`]: SolutionFactors::weakly_active
+/// [`smoothing`]: SolutionFactors::smoothing
+///
+/// # Example
+/// The distance of a mass is a parameter: what does it change of the cost?
+/// ```
+/// use casados::ocp::{Exact, HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SolutionFactors};
+/// use casados::prelude::*;
+/// use casados::qp::HeapSolution;
+///
+/// #[function]
+/// fn push(x: [f64; 1], u: [f64; 1], _p: [f64; 1]) -> f64 { x[0] + u[0] }
+/// #[function]
+/// fn away(x: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 2] { [x[0] - p[0], u[0]] }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(LeastSquaresCost::<Away>::diagonal(&[1.0, 1.0]))
+///     .on(Horizon::uniform(2, 1.0))?;
+/// ocp.fix_initial_state(&[0.0])?.set_parameters(.., &[1.0])?.guess(&[0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+///
+/// let mut factors = SolutionFactors::new(&ocp)?;
+/// ocp.factorise(Exact::default(), &mut factors)?;
+/// // V(x₀, p) = ½ (x₀ − p)² + ¼ (x₀ − p)², with u₀ = (p − x₀) / 2.
+/// assert!((factors.value_gradient_x0()[0] + 1.5).abs() < 1e-9);
+/// assert!((factors.value_hessian().pp[0] - 1.5).abs() < 1e-6);
+/// let mut seed = HeapSolution::new(ocp.qp().dims())?;
+/// seed.stage_mut(0).ok_or("a stage")?.u[0] = 1.0;
+/// let adjoint = factors.adjoint(&seed)?;
+/// assert!((adjoint.x0[0] + 0.5).abs() < 1e-6 && (adjoint.p[0] - 0.5).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct SolutionFactors<T> {
+    /// The barrier parameter `μ` that the iterate solves, as that of [`Ipm`](crate::ocp::Ipm) with
+    /// [`IpmOptions::final_mu`](crate::ocp::IpmOptions::final_mu): bounds are springs `μ/s²`, and
+    /// derivatives those of the barrier problem, which are smooth. Zero, the default: solutions of
+    /// the problem itself, with active sets.
+    pub smoothing: T,
+    /// `NX`, `NU`, `NP`
+    pub(super) dims: [usize; 3],
+    pub(super) intervals: usize,
+    /// `K`, and Cholesky's factors of `M_uu`, of every interval.
+    pub(super) gains: Vec<T>,
+    pub(super) controls: Vec<T>,
+    /// `P` of every stage.
+    pub(super) costs_to_go: Vec<T>,
+    /// The rows of `[A B]` of every interval.
+    pub(super) dynamics: Vec<T>,
+    pub(super) problem: Parameters<T>,
+    pub(super) column: Column<T>,
+    /// `∂V/∂x₀`, and the Hessian of the value as far as parameters are concerned.
+    gradient: Vec<T>,
+    cross: Vec<T>,
+    square: Vec<T>,
+    adjoint: Vec<T>,
+    weak: usize,
+    pub(super) work: Vec<T>,
+}
+
+/// `λᵀ dw/dx₀` and `λᵀ dw/dp`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolutionAdjoint<'a, T> {
+    /// By the initial state, `NX`.
+    pub x0: &'a [T],
+    /// By the parameters, `NP`.
+    pub p: &'a [T],
+}
+
+/// The Hessian of the optimal value; matrices column after column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValueHessian<'a, T> {
+    /// `∂²V/∂x₀²`, `NX × NX`.
+    pub xx: &'a [T],
+    /// `∂²V/∂x₀∂p`, `NX × NP`.
+    pub xp: &'a [T],
+    /// `∂²V/∂p²`, `NP × NP`.
+    pub pp: &'a [T],
+}
+
+impl<T: Real> SolutionFactors<T> {
+    /// Memory for a problem.
+    ///
+    /// # Errors
+    /// [`OcpError::OutOfMemory`]
+    pub fn new<P: Formulation<T>>(ocp: &HeapOcp<P, T>) -> Result<Self, OcpError> {
+        let dims @ [nx, nu, np] = [P::Shape::NX, P::Shape::NU, P::Shape::NP];
+        let n = ocp.intervals();
+        Ok(Self {
+            smoothing: T::ZERO,
+            dims,
+            intervals: n,
+            gains: zeros(n * nu * nx)?,
+            controls: zeros(n * nu * nu)?,
+            costs_to_go: zeros((n + 1) * nx * nx)?,
+            dynamics: zeros(n * nx * (nx + nu))?,
+            problem: Parameters::new::<P>(n)?,
+            column: Column::new(dims, n)?,
+            gradient: zeros(nx)?,
+            cross: zeros(nx * np)?,
+            square: zeros(np * np)?,
+            adjoint: zeros(np)?,
+            weak: 0,
+            work: zeros(recursion::work(nx, nu))?,
+        })
+    }
+
+    /// `K_k` of the feedback `u_k + K_k (x − x_k)`, `NU × NX`, column after column; empty where
+    /// there is none.
+    #[must_use]
+    pub fn gain(&self, stage: usize) -> &[T] {
+        let [nx, nu, _] = self.dims;
+        block(&self.gains, stage, nu * nx)
+    }
+
+    /// How many bounds have neither a slack nor a multiplier above `ε^¼` (1e-4 in double
+    /// precision): there, solutions have a derivative to either side. Zero where solutions are
+    /// smoothed.
+    #[must_use]
+    pub fn weakly_active(&self) -> usize {
+        self.weak
+    }
+
+    /// `∂V/∂x₀`, `NX`.
+    #[must_use]
+    pub fn value_gradient_x0(&self) -> &[T] {
+        &self.gradient
+    }
+
+    /// `∂V/∂p`, `NP`.
+    #[must_use]
+    pub fn value_gradient_p(&self) -> &[T] {
+        &self.problem.slopes_of_value
+    }
+
+    /// The Hessian of the optimal value.
+    pub fn value_hessian(&mut self) -> ValueHessian<'_, T> {
+        let [nx, _, np] = self.dims;
+        for p in 0..np {
+            let mut column = core::mem::take(&mut self.column);
+            recursion::solve_parameter(self, p, &mut column);
+            assign(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
+            for q in 0..np {
+                let value = super::get(&self.problem.square, p * np + q) + self.change(q, &column);
+                super::set(&mut self.square, p * np + q, value);
+            }
+            self.column = column;
+        }
+        ValueHessian { xx: part(&self.costs_to_go, 0, nx * nx), xp: &self.cross, pp: &self.square }
+    }
+
+    /// `λᵀ dw/dx₀` and `λᵀ dw/dp`, where states and controls of `seed` are `λ`; its multipliers are
+    /// not looked at.
+    ///
+    /// # Errors
+    /// [`OcpError::Length`] if the seed has other dimensions; [`OcpError::InvalidValue`] if it is
+    /// not finite.
+    pub fn adjoint<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        seed: &Solution<T, D, M>,
+    ) -> Result<SolutionAdjoint<'_, T>, OcpError> {
+        self.check_seed(seed)?;
+        let mut column = core::mem::take(&mut self.column);
+        recursion::solve_seed(self, seed, &mut column);
+        for p in 0..self.dims[2] {
+            let value = self.change(p, &column);
+            super::set(&mut self.adjoint, p, value);
+        }
+        self.column = column;
+        Ok(SolutionAdjoint { x0: self.column.multipliers(0), p: &self.adjoint })
+    }
+
+    /// The product of a solution of the conditions of optimality with what a parameter changes of
+    /// these.
+    fn change(&self, p: usize, column: &Column<T>) -> T {
+        let [nx, nu, _] = self.dims;
+        let mut sum = T::ZERO;
+        for k in 0..=self.intervals {
+            let gradient = part(self.problem.gradient(k), p * (nx + nu), nx + nu);
+            let (of_x, of_u) = gradient.split_at_checked(nx).unwrap_or_default();
+            let end = part(self.problem.end(k), p * nx, nx);
+            let pairs = of_x.iter().zip(column.state(k)).chain(of_u.iter().zip(column.control(k)));
+            let pairs = pairs.chain(end.iter().zip(column.multipliers(k + 1)));
+            sum = pairs.fold(sum, |sum, (&a, &b)| sum + a * b);
+        }
+        sum
+    }
+
+    fn check_seed<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &self,
+        seed: &Solution<T, D, M>,
+    ) -> Result<(), OcpError> {
+        let [nx, nu, _] = self.dims;
+        let (expected, found) = (self.intervals + 1, seed.dims().len());
+        if expected != found {
+            return Err(OcpError::Length { part: Part::Dimensions, stage: 0, expected, found });
+        }
+        for (stage, at) in seed.stages().enumerate() {
+            let controls = if stage < self.intervals { nu } else { 0 };
+            for (part, values, expected) in [(Part::States, at.x, nx), (Part::Controls, at.u, controls)] {
+                if values.len() != expected {
+                    return Err(OcpError::Length { part, stage, expected, found: values.len() });
+                }
+                if let Some((index, value)) = crate::irk::not_finite(values) {
+                    return Err(OcpError::InvalidValue { part, stage, name: "seed", index, value });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The recursion, for the QP at the iterate.
+    ///
+    /// # Errors
+    /// [`OcpError::Qp`]
+    pub(super) fn fill<D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
+        &mut self,
+        qp: QpView<'_, T>,
+        iterate: &Solution<T, D, M>,
+        parameters: bool,
+    ) -> Result<(), OcpError> {
+        let mut largest = T::ZERO;
+        for stage in qp.stages() {
+            for &value in stage.arrays().hessian {
+                largest = value.abs().max(largest);
+            }
+        }
+        let mut springs = Springs::new(largest, self.smoothing);
+        recursion::factorise(self, qp, iterate, &mut springs, parameters)?;
+        self.weak = springs.weak;
+        recursion::gradient(qp, iterate, &mut self.gradient);
+        Ok(())
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Factorises the conditions of optimality at the iterate, for derivatives of the solution and
+    /// of its value: the iterate must be a solution, with a fixed initial state.
+    ///
+    /// With [`Exact`](crate::ocp::Exact) Hessians that are not made convex these are derivatives of
+    /// the solution; with those of Gauss and Newton approximations, but for the gradient of the
+    /// value, which has no Hessian in it.
+    ///
+    /// # Errors
+    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is not fixed;
+    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::Coupled`] where there
+    /// are periodic states or shared controls; [`OcpError::InvalidOption`] of the smoothing;
+    /// [`OcpError::Qp`] if the reduced Hessian is not positive definite.
+    pub fn factorise<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        factors: &mut SolutionFactors<T>,
+    ) -> Result<(), OcpError> {
+        self.check_factors(factors)?;
+        let problem = &mut factors.problem;
+        problem.begin();
+        self.linearise_watched(curvature, |k, step| problem.take(k, step))?;
+        self.differentiate_functions(C::EXACT, problem)?;
+        factors.fill(self.qp.view(), &self.iterate, true)
+    }
+
+    pub(super) fn check_factors(&self, factors: &SolutionFactors<T>) -> Result<(), OcpError> {
+        self.is_uncoupled()?;
+        if self.initial != Initial::Fixed {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        let value = factors.smoothing.to_f64();
+        if !(value >= 0.0 && value.is_finite()) {
+            return Err(OcpError::InvalidOption {
+                name: "smoothing",
+                value,
+                allowed: "from 0 on and finite",
+            });
+        }
+        let (part, stage) = (Part::Memory, 0);
+        let given = [P::Shape::NX, P::Shape::NU, P::Shape::NP, self.intervals()];
+        let [nx, nu, np] = factors.dims;
+        for (expected, found) in given.into_iter().zip([nx, nu, np, factors.intervals]) {
+            if expected != found {
+                return Err(OcpError::Length { part, stage, expected, found });
+            }
+        }
+        Ok(())
+    }
+}
