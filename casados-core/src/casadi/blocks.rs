@@ -35,8 +35,8 @@ pub struct Wanted {
     pub jacobian: bool,
     pub gradient: bool,
     pub hessian: bool,
-    /// Whether algebraic states are among values or Jacobian.
-    pub algebraic: bool,
+    /// Whether algebraic states are among values, and in the Jacobian.
+    pub algebraic: [bool; 2],
 }
 
 impl Wanted {
@@ -52,10 +52,12 @@ impl Wanted {
             jacobian: wants(Source::Jacobian),
             gradient: wants(Source::Gradient),
             hessian: wants(Source::Hessian),
-            algebraic: outputs
-                .iter()
-                .enumerate()
-                .any(|(index, output)| output.algebraic && !output.entries.is_empty() && call.wants(index)),
+            algebraic: [Source::Value, Source::Jacobian].map(|source| {
+                outputs.iter().enumerate().any(|(index, output)| {
+                    let is_one = output.algebraic && output.source == source && !output.entries.is_empty();
+                    is_one && call.wants(index)
+                })
+            }),
         }
     }
 
@@ -69,7 +71,7 @@ impl Wanted {
         let same = || answer.lambda.get().is_some_and(|known| equal(known, lambda));
         (!self.value || answer.value.get().is_some())
             && (!self.jacobian || answer.jacobian.get().is_some())
-            && (!self.algebraic || answer.algebraic)
+            && self.algebraic.iter().zip(&answer.algebraic).all(|(wanted, known)| !wanted || *known)
             && (!self.gradient || answer.gradient.get().is_some() && same())
             && (!self.hessian || answer.hessian.get().is_some() && same())
     }

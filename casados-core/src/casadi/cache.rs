@@ -64,8 +64,8 @@ pub struct Answer<T> {
     pub hessian: Part,
     /// The stages.
     pub tape: Part<T>,
-    /// Whether values and Jacobian, as far as they are there, have algebraic states.
-    pub algebraic: bool,
+    /// Whether values and Jacobian have algebraic states.
+    pub algebraic: [bool; 2],
 }
 
 impl<T> Answer<T> {
@@ -77,15 +77,15 @@ impl<T> Answer<T> {
             part.clear();
         }
         self.tape.clear();
-        self.algebraic = false;
+        self.algebraic = [false; 2];
     }
 
     /// Takes what another one knows about the same inputs.
     fn take(&mut self, other: &mut Self) {
-        let parts = [(self.value.valid, other.value.valid), (self.jacobian.valid, other.jacobian.valid)];
-        if parts.iter().any(|&(_, new)| new) {
-            let stays = parts.iter().any(|&(old, new)| old && !new);
-            self.algebraic = other.algebraic && (self.algebraic || !stays);
+        for (part, is_new) in [other.value.valid, other.jacobian.valid].into_iter().enumerate() {
+            if is_new {
+                self.algebraic[part] = other.algebraic[part];
+            }
         }
         self.value.take(&mut other.value);
         self.jacobian.take(&mut other.jacobian);

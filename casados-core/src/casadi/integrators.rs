@@ -152,7 +152,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let (nu, of_integrals) = rest.split_at(nz);
         let mut seed: VectorX<I::Model, f64> = vector(of_states);
         let adjoint = wanted.gradient || wanted.hessian;
-        let algebraic = wanted.algebraic || adjoint && nu.iter().any(|&nu| nu != 0.0);
+        let algebraic = wanted.algebraic.contains(&true) || adjoint && nu.iter().any(|&nu| nu != 0.0);
         if algebraic && adjoint {
             // What the state is multiplied by depends on where it ends.
             let end = integrator.value(&point, None)?.x;
@@ -174,7 +174,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         if answer.jacobian.get().is_some() {
             rows(Q::jacobian(integrals), Q::COUNT, nx + nz, ny, answer.jacobian.open());
         }
-        answer.algebraic = algebraic;
+        answer.algebraic = [algebraic; 2];
         if algebraic {
             if !adjoint {
                 let end = Point { x0: vector(&values[..nx]), u: vector(u), h: 0.0 };

@@ -305,8 +305,8 @@ pub trait Widest<T> {
     fn call<E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>>(self) -> Self::Output;
 }
 
-/// A computation on slices that is compiled with this crate, once for each number type and not again
-/// in each program: [`Real::compiled`] runs it. [`compiled`] makes one.
+/// A computation on slices that is compiled with this crate, once for each number type and not in
+/// each program again: [`Real::compiled`] runs it, and the macro `compiled!` makes one.
 #[doc(hidden)]
 pub trait Compiled {
     /// The computation.
