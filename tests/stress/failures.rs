@@ -254,6 +254,22 @@ fn t29_discontinuity() {
     check!(DormandPrince8);
 }
 
+/// Wherever the jump lies in a step: the step over it is as accurate as the tolerance asks, four
+/// times what its estimate allows, and the rest of the run twice.
+#[test]
+fn jumps_anywhere() {
+    for rtol in [1e-4, 1e-6, 1e-8, 1e-10] {
+        for k in 0..100 {
+            let options = AdaptiveOptions { rtol, atol: rtol, max_steps: 2000, ..Default::default() };
+            let mut adaptive = Adaptive::<Switched, Radau>::new(options).expect("valid");
+            let x0 = 1.0 + 0.001 * f64::from(k);
+            let exact = (2.0 + (x0 - 2.0) * f64::exp(-5.0)) * f64::exp(-3.0);
+            let x = adaptive.solve(&vector![x0], &vector![0.0], 8.0).expect("a solution").x[0];
+            assert!((x - exact).abs() <= 6.0 * rtol, "{rtol:e} {x0}: {:e}", x - exact);
+        }
+    }
+}
+
 /// The polynomial of the last step of Van der Pol's oscillator satisfies its equations at the
 /// stages: `D x = h f(x)`, with the derivatives `D` of the Lagrange polynomials of the start and
 /// the stages, to rounding of the terms.

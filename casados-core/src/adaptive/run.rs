@@ -38,6 +38,10 @@ const SINGULAR: usize = 5;
 
 /// After so many iterations in a row that did not converge the planned elimination may be to blame.
 const TROUBLES: usize = 3;
+/// Refusals by so many tolerances count twice and accepted steps take one away: where so much is
+/// left, as after refusals of two steps one after the other, the solution is not smooth.
+const MUCH: f64 = 8.0;
+const NOT_SMOOTH: usize = 3;
 
 /// Memory of a run.
 #[derive(Zeroable)]
@@ -160,7 +164,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         let mut convergence = Convergence::default();
         let mut controller = Predictive::default();
         let mut refusal = Refusal::Error;
-        let mut tried = 0;
+        let (mut tried, mut refused) = (0, 0usize);
         let mut pivoted = false;
         loop {
             let mut changed = false;
@@ -307,6 +311,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     continue;
                 }
             };
+            // Where steps are refused again and again the solution is not smooth: the method is of no
+            // higher order there than its estimate.
+            let error =
+                if refused >= NOT_SMOOTH { error * (self.base.finer / LENIENT).max(1.0) } else { error };
             let order = stages.count() as f64 + 1.0;
             let most = 2.0 * convergence.most as f64;
             let effort = (1.0 + most) / (convergence.iterations as f64 + most);
@@ -317,6 +325,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             if error >= 1.0 {
                 self.statistics.rejected += 1;
                 refusal = Refusal::Error;
+                refused = if error < MUCH { refused } else { (refused + 2).min(2 * NOT_SMOOTH) };
                 h = h * T::from_f64(if accepted_h.is_none() { 0.1 } else { factor });
                 (rejected, last) = (true, false);
                 need = if current { Need::Factors } else { Need::Jacobian };
@@ -325,7 +334,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
 
             // The step is accepted.
             self.statistics.steps += 1;
-            (troubles, pivoted) = (0, false);
+            (troubles, pivoted, refused) = (0, false, refused.saturating_sub(1));
             stages.accept();
             if let Some(sensitivities) = &mut self.sensitivities {
                 sensitivities.accept();
