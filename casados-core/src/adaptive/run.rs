@@ -311,10 +311,10 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     continue;
                 }
             };
-            // Where steps are refused again and again the solution is not smooth: the method is of no
-            // higher order there than its estimate.
-            let error =
-                if refused >= NOT_SMOOTH { error * (self.base.finer / LENIENT).max(1.0) } else { error };
+            // Where steps are refused again and again the solution is not smooth, and the method of no
+            // higher order than its estimate.
+            let rough = if refused >= NOT_SMOOTH { self.base.finer / LENIENT } else { 1.0 };
+            let error = error * rough.max(1.0);
             let order = stages.count() as f64 + 1.0;
             let most = 2.0 * convergence.most as f64;
             let effort = (1.0 + most) / (convergence.iterations as f64 + most);
