@@ -311,8 +311,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                     continue;
                 }
             };
-            // Where steps are refused again and again the solution is not smooth, and the method of no
-            // higher order than its estimate.
+            // Where steps are refused again and again the solution is not smooth: methods have no
+            // higher order than their estimates there.
             let rough = if refused >= NOT_SMOOTH { self.base.finer / LENIENT } else { 1.0 };
             let error = error * rough.max(1.0);
             let order = stages.count() as f64 + 1.0;
