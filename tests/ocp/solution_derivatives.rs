@@ -4,7 +4,7 @@
 use crate::Test;
 use casados::ocp::{
     Along, Constraint, Convexification, Exact, Formulation, GaussNewton, GeneralCost, HeapIpm, HeapOcp,
-    HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SecondOrder, SolutionFactors,
+    HeapSqp, Horizon, LeastSquaresCost, Map, Problem, SecondOrder, Shooting, SolutionFactors,
 };
 use casados::prelude::*;
 use casados::qp::HeapSolution;
@@ -224,6 +224,10 @@ pub fn work(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> f64 {
 pub fn speed(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> f64 {
     p[1] * p[1] * x[1] + 0.1 * p[0] * u[0] * x[0]
 }
+#[function]
+pub fn jump(x: [f64; 2], u: [f64; 1], p: [f64; 2]) -> [f64; 2] {
+    [x[0] + 0.15 * x[1], x[1] + 0.15 * (u[0] * x[0].cos() - p[0] * p[1] * x[0].sin())]
+}
 pub const N: usize = 10;
 pub const AT: [f64; 4] = [-0.8, 0.1, 1.3, 0.8];
 
@@ -233,7 +237,10 @@ const STEP: f64 = 5e-4;
 pub const TOLERANCE: f64 = 1e-5;
 
 macro_rules! bounded {
-    ($dynamics:expr, $at:expr) => {{
+    ($dynamics:expr, $at:expr) => {
+        bounded!($dynamics, $at, x[0] <= -0.25, from 7)
+    };
+    ($dynamics:expr, $at:expr, x[0] <= $most:expr, from $stage:expr) => {{
         let mut ocp = Problem::new($dynamics)
             .running_cost((
                 LeastSquaresCost::<Tracking>::diagonal(&[6.0, 3.0, 12.0]),
@@ -244,11 +251,37 @@ macro_rules! bounded {
             .on(Horizon::uniform(N, 0.15))?;
         let (x0, p) = $at.split_at(2);
         ocp.fix_initial_state(x0)?.bound("u", .., -2.0, 0.37)?.guess(x0, &[0.0])?.set_parameters(.., p)?;
-        ocp.bound("x[0]", 7.., f64::NEG_INFINITY, -0.25)?.soften("x[0]", 7.., 0.1, 2.0)?;
+        ocp.bound("x[0]", $stage.., f64::NEG_INFINITY, $most)?.soften("x[0]", $stage.., 0.1, 2.0)?;
         ocp
     }};
 }
 pub(crate) use bounded;
+
+/// Dynamics of an integrator, of a batch and of a map, with active bounds of controls and a soft
+/// bound of the last state that is violated by more than the differences move it: where it is just
+/// reached, second derivatives jump.
+#[test]
+fn values_and_adjoints_are_differences_of_solutions() -> Test {
+    macro_rules! check {
+        ($dynamics:expr) => {{
+            let mut ocp = bounded!($dynamics, AT, x[0] <= -0.05, from N);
+            assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+            let stages = || ocp.iterate().stages();
+            assert!((1..N).contains(&stages().filter(|stage| stage.u_upper.iter().any(|&m| m > 1e-3)).count()));
+            assert!(stages().next_back().is_some_and(|last| last.x[0] > 0.01 && last.x_upper[0] > 0.11));
+            check_by_differences(
+                &AT,
+                By::Sqp,
+                |at| solved(bounded!($dynamics, at, x[0] <= -0.05, from N), By::Sqp),
+                TOLERANCE,
+            )?;
+        }};
+    }
+    check!(Irk::<Pendulum, Gauss<2>>::new(Options::default())?);
+    check!(Shooting::new(Batch::<Pendulum, Gauss<2>>::new(Options::default())?));
+    check!(Map::<Jump, f64>::new());
+    Ok(())
+}
 
 /// Integral costs with parameters: squares, and a general one.
 #[test]
