@@ -2,7 +2,7 @@
 
 use super::cost::{At, Cost};
 use super::error::OcpError;
-use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
+use super::point::{Cross, Terms, There, finite, is_algebraic, position};
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::scalar::Real;
 use crate::shape::{Array, Matrix, Outputs, Plain};
@@ -287,19 +287,7 @@ impl<F: Function, C: Convex<T>, T: Real> Cost<F::Shape, T> for ConvexCost<F, C, 
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         self.evaluate(reference, at.stage)?;
         let Self { mu, phi, jacobian, hessian, .. } = self;
-        let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
-        for (&b, (l, variable)) in entries() {
-            let Some(p) = parameter::<F::Shape>(variable) else { continue };
-            cross.slope(p, at.factor * mu[l] * b);
-            for (&a, (k, variable)) in entries() {
-                let product = at.factor * phi[(k, l)] * a * b;
-                if let Some(i) = position::<F::Shape>(variable) {
-                    cross.add(i, p, product);
-                } else if let Some(q) = parameter::<F::Shape>(variable) {
-                    cross.curve(q, p, product);
-                }
-            }
-        }
+        cross.gauss_newton::<F>(jacobian, mu, phi, at.factor);
         if at.exact {
             cross.curvature::<F>(v, mu, at.factor, hessian);
         }

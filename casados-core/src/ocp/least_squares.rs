@@ -3,7 +3,7 @@
 use super::cost::{At, Cost};
 use super::error::OcpError;
 use super::pattern::{self, Entries};
-use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
+use super::point::{Cross, Terms, There, finite, is_algebraic, position};
 use super::weights;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
@@ -158,19 +158,7 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
         F::value_jacobian::<T>(v, &mut self.y, &mut self.jacobian);
         self.square(reference, at.stage)?;
         let Self { weights, mu, jacobian, hessian, .. } = self;
-        let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
-        for (&b, (l, variable)) in entries() {
-            let Some(p) = parameter::<F::Shape>(variable) else { continue };
-            cross.slope(p, at.factor * mu[l] * b);
-            for (&a, (k, variable)) in entries() {
-                let product = at.factor * weights[(k, l)] * a * b;
-                if let Some(i) = position::<F::Shape>(variable) {
-                    cross.add(i, p, product);
-                } else if let Some(q) = parameter::<F::Shape>(variable) {
-                    cross.curve(q, p, product);
-                }
-            }
-        }
+        cross.gauss_newton::<F>(jacobian, mu, weights, at.factor);
         if at.exact {
             cross.curvature::<F>(v, mu, at.factor, hessian);
         }

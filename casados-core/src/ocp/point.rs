@@ -1,7 +1,7 @@
 //! Functions at a node: what they are evaluated at, and where their derivatives go.
 
 use super::error::OcpError;
-use crate::function::{ArrayV, ArrayY, Function, FunctionStructure};
+use crate::function::{ArrayV, ArrayY, Function, FunctionStructure, MatrixYY};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -205,6 +205,29 @@ impl<T: Real> Cross<'_, T> {
                 }
             }
         });
+    }
+    /// Adds what parameters change of the gradient of `factor φ(y)` by first derivatives of the
+    /// outputs of a function: `∇φ` is `mu`, its matrix `∇²φ` is `outer`.
+    pub(super) fn gauss_newton<F: Function>(
+        &mut self,
+        jacobian: &F::Jacobian<T>,
+        mu: &ArrayY<F, T>,
+        outer: &MatrixYY<F, T>,
+        factor: T,
+    ) {
+        let entries = || jacobian.as_ref().iter().zip(F::STRUCTURE.jacobian.iter());
+        for (&b, (l, variable)) in entries() {
+            let Some(p) = parameter::<F::Shape>(variable) else { continue };
+            self.slope(p, factor * mu[l] * b);
+            for (&a, (k, variable)) in entries() {
+                let product = factor * outer[(k, l)] * a * b;
+                if let Some(i) = position::<F::Shape>(variable) {
+                    self.add(i, p, product);
+                } else if let Some(q) = parameter::<F::Shape>(variable) {
+                    self.curve(q, p, product);
+                }
+            }
+        }
     }
     /// Adds matrices `xp`, `up` and `pp`, column after column.
     #[cfg(feature = "alloc")]
