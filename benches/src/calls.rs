@@ -6,7 +6,7 @@ use casados::model::{VectorU, VectorX};
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, Hessian, Nominal};
 use casados::shape::{Matrix, Shape};
-use casados::{Batch, BatchError, Error, Intervals, Statistics, batch};
+use casados::{Batch, BatchError, Error, Integrator, Intervals, Statistics, batch};
 use std::hint::black_box;
 
 /// An integrator with its inputs in place.
@@ -133,75 +133,6 @@ pub fn open(case: &Case, options: Options) -> Result<Box<dyn Calls>, String> {
     }
 }
 
-/// The calls that implicit and explicit integrators have in common.
-trait Integrator<M: Dae> {
-    fn solve(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Nominal<M>, Error>;
-    fn forward(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Forward<M>, Error>;
-    fn adjoint(
-        &mut self,
-        x0: &VectorX<M, f64>,
-        u: &VectorU<M, f64>,
-        h: f64,
-        lambda: &VectorX<M, f64>,
-    ) -> Result<&Adjoint<M>, Error>;
-    fn hessian(
-        &mut self,
-        x0: &VectorX<M, f64>,
-        u: &VectorU<M, f64>,
-        h: f64,
-        lambda: &VectorX<M, f64>,
-    ) -> Result<&Hessian<M>, Error>;
-    fn statistics(&self) -> Statistics;
-}
-
-macro_rules! integrator {
-    ($module:ident, $model:ident) => {
-        impl<M: $model, B, const S: usize> Integrator<M>
-            for casados::$module::Integrator<M, B, S, f64, Heap>
-        {
-            fn solve(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-            ) -> Result<&Nominal<M>, Error> {
-                self.solve(x0, u, h)
-            }
-            fn forward(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-            ) -> Result<&Forward<M>, Error> {
-                self.forward(x0, u, h)
-            }
-            fn adjoint(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-                lambda: &VectorX<M, f64>,
-            ) -> Result<&Adjoint<M>, Error> {
-                self.adjoint(x0, u, h, lambda)
-            }
-            fn hessian(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-                lambda: &VectorX<M, f64>,
-            ) -> Result<&Hessian<M>, Error> {
-                self.hessian(x0, u, h, lambda)
-            }
-            fn statistics(&self) -> Statistics {
-                self.statistics().to_owned()
-            }
-        }
-    };
-}
-integrator!(irk, Dae);
-integrator!(erk, Ode);
-
 struct Typed<M: Dae, I> {
     integrator: I,
     inputs: Vec<(VectorX<M, f64>, VectorU<M, f64>)>,
@@ -241,7 +172,7 @@ fn rows<V: Matrix<f64>>(matrix: &V, row: usize) -> impl Iterator<Item = f64> {
     (0..V::COLUMNS).map(move |j| matrix[(row, j)])
 }
 
-impl<M: Dae, I: Integrator<M>> Typed<M, I> {
+impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Typed<M, I> {
     fn new(case: &Case, integrator: I) -> Self {
         let inputs = case.inputs.iter().map(|(x0, u)| (vector(x0), vector(u))).collect();
         Self { integrator, inputs, lambda: vector(&case.lambda), h: case.t, results: Results::NONE }
@@ -353,7 +284,7 @@ fn of_hessian<M: Dae>(result: &Hessian<M>, values: &mut Values) {
     values.hessian = triangle(result);
 }
 
-impl<M: Dae, I: Integrator<M>> Calls for Typed<M, I> {
+impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Calls for Typed<M, I> {
     fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error> {
         let (x0, u) = black_box(&self.inputs[input]);
         let lambda = black_box(&self.lambda);

@@ -32,7 +32,6 @@ pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};
 pub use forward::Forward;
-pub use integrator::Integrator;
 pub use points::{Points, Random};
 pub use report::{Deviation, Report, Row};
 pub use sensitivities::{Exact, check_exact, check_sensitivities};

@@ -8,10 +8,12 @@
 
 use super::bounded::Bounded;
 use super::differences;
-use super::integrator::{Answer, Integrator, Interval};
+use super::integrator::{Answer, Interval};
 use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::memory::Heap;
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::shape::Shape;
 use core::any::type_name;
@@ -39,7 +41,7 @@ const DEVIATIONS: f64 = 32.0;
 /// meant.
 ///
 /// Errors are those of the integrator at the given inputs.
-pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
+pub fn check_sensitivities<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     integrator: &mut I,
     x0: &VectorX<M, f64>,
     u: &VectorU<M, f64>,
@@ -157,7 +159,7 @@ pub struct Exact {
 /// `coarse` takes fewer steps than `fine`: the difference between the two is the estimate of the
 /// discretisation error of `fine`, of which it is a multiple when the order is reached. Together
 /// with the sampled rounding error it is the tolerance of the comparison.
-pub fn check_exact<M: Dae, I: Integrator<M>>(
+pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     coarse: &mut I,
     fine: &mut I,
     x0: &VectorX<M, f64>,
@@ -305,7 +307,7 @@ impl Direction {
 
 /// The largest deviation of each entry over samples.
 fn noise<M: Dae>(
-    integrator: &mut impl Integrator<M>,
+    integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
     interval: &Interval,
     lambda: &[f64],
     center: &Answer,
