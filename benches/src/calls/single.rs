@@ -5,78 +5,8 @@ use super::results::{Results, of_adjoint, of_forward, of_hessian, of_nominal, pl
 use crate::case::{Case, Mode, Values};
 use casados::model::{VectorU, VectorX};
 use casados::prelude::*;
-use casados::result::{Adjoint, Forward, Hessian, Nominal};
-use casados::{Error, Statistics};
+use casados::{Error, Integrator, Statistics};
 use std::hint::black_box;
-
-/// The calls that implicit and explicit integrators have in common.
-pub trait Integrator<M: Dae> {
-    fn solve(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Nominal<M>, Error>;
-    fn forward(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Forward<M>, Error>;
-    fn adjoint(
-        &mut self,
-        x0: &VectorX<M, f64>,
-        u: &VectorU<M, f64>,
-        h: f64,
-        lambda: &VectorX<M, f64>,
-    ) -> Result<&Adjoint<M>, Error>;
-    fn hessian(
-        &mut self,
-        x0: &VectorX<M, f64>,
-        u: &VectorU<M, f64>,
-        h: f64,
-        lambda: &VectorX<M, f64>,
-    ) -> Result<&Hessian<M>, Error>;
-    fn statistics(&self) -> Statistics;
-}
-
-macro_rules! integrator {
-    ($module:ident, $model:ident) => {
-        impl<M: $model, B, const S: usize> Integrator<M>
-            for casados::$module::Integrator<M, B, S, f64, Heap>
-        {
-            fn solve(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-            ) -> Result<&Nominal<M>, Error> {
-                self.solve(x0, u, h)
-            }
-            fn forward(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-            ) -> Result<&Forward<M>, Error> {
-                self.forward(x0, u, h)
-            }
-            fn adjoint(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-                lambda: &VectorX<M, f64>,
-            ) -> Result<&Adjoint<M>, Error> {
-                self.adjoint(x0, u, h, lambda)
-            }
-            fn hessian(
-                &mut self,
-                x0: &VectorX<M, f64>,
-                u: &VectorU<M, f64>,
-                h: f64,
-                lambda: &VectorX<M, f64>,
-            ) -> Result<&Hessian<M>, Error> {
-                self.hessian(x0, u, h, lambda)
-            }
-            fn statistics(&self) -> Statistics {
-                self.statistics().to_owned()
-            }
-        }
-    };
-}
-integrator!(irk, Dae);
-integrator!(erk, Ode);
 
 /// An integrator with its inputs and results.
 pub(super) struct Typed<M: Dae, I> {
@@ -87,14 +17,14 @@ pub(super) struct Typed<M: Dae, I> {
     results: Results<M>,
 }
 
-impl<M: Dae, I: Integrator<M>> Typed<M, I> {
+impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Typed<M, I> {
     pub(super) fn new(case: &Case, integrator: I) -> Self {
         let inputs = case.inputs.iter().map(|(x0, u)| (vector(x0), vector(u))).collect();
         Self { integrator, inputs, lambda: vector(&case.lambda), h: case.t, results: Results::NONE }
     }
 }
 
-impl<M: Dae, I: Integrator<M>> Calls for Typed<M, I> {
+impl<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>> Calls for Typed<M, I> {
     fn call(&mut self, mode: Mode, input: usize) -> Result<(), Error> {
         let (x0, u) = black_box(&self.inputs[input]);
         let lambda = black_box(&self.lambda);

@@ -1,11 +1,13 @@
 //! An integrator against an exact solution.
 
-use super::integrator::{Integrator, Interval};
+use super::integrator::Interval;
 use super::names::{direction_name, second_name, state_name};
 use super::noise::{DEVIATIONS, largest, noise};
 use super::report::{Entry, Report};
 use super::sensitivities::warn;
 use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::memory::Heap;
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::shape::Shape;
 use core::any::type_name;
@@ -31,7 +33,7 @@ pub struct Exact {
 /// `coarse` takes fewer steps than `fine`: the difference between the two is the estimate of the
 /// discretisation error of `fine`, of which it is a multiple when the order is reached. Together
 /// with the sampled rounding error it is the tolerance of the comparison.
-pub fn check_exact<M: Dae, I: Integrator<M>>(
+pub fn check_exact<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     coarse: &mut I,
     fine: &mut I,
     x0: &VectorX<M, f64>,

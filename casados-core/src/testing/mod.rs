@@ -36,7 +36,6 @@ pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};
 pub use exact::{Exact, check_exact};
 pub use forward::Forward;
-pub use integrator::Integrator;
 pub use points::{Points, Random};
 pub use report::{Deviation, Report, Row};
 pub use sensitivities::check_sensitivities;

@@ -6,10 +6,12 @@
 //! condition times epsilon of that very entry.
 
 use super::bounded::Bounded;
-use super::integrator::{Answer, Integrator, Interval};
+use super::integrator::{Answer, Interval};
 use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::memory::Heap;
 use crate::model::Dae;
 use std::string::String;
 use std::vec::Vec;
@@ -24,7 +26,7 @@ pub(super) const DEVIATIONS: f64 = 32.0;
 
 /// The largest deviation of each entry over samples.
 pub(super) fn noise<M: Dae>(
-    integrator: &mut impl Integrator<M>,
+    integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
     interval: &Interval,
     lambda: &[f64],
     center: &Answer,

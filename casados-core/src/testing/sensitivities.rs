@@ -2,12 +2,14 @@
 
 use super::bounded::Bounded;
 use super::differences;
-use super::integrator::{Answer, Integrator, Interval};
+use super::integrator::{Answer, Interval};
 use super::names::{derivative_name, direction_name, second_name, state_name};
 use super::noise::{DEVIATIONS, against_differences, agree, attach, largest, noise};
 use super::points::Random;
 use super::report::{Entry, Report};
 use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::memory::Heap;
 use crate::model::{Dae, VectorP, VectorU, VectorX};
 use crate::shape::Shape;
 use core::any::type_name;
@@ -27,7 +29,7 @@ use std::vec::Vec;
 /// meant.
 ///
 /// Errors are those of the integrator at the given inputs.
-pub fn check_sensitivities<M: Dae, I: Integrator<M>>(
+pub fn check_sensitivities<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     integrator: &mut I,
     x0: &VectorX<M, f64>,
     u: &VectorU<M, f64>,
@@ -106,7 +108,7 @@ impl Calls<'_> {
     fn repeat<M: Dae>(
         &self,
         report: &mut Report,
-        integrator: &mut impl Integrator<M>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
         interval: &Interval,
         lambda: &[f64],
     ) -> Result<(), Error> {
@@ -137,7 +139,7 @@ impl Calls<'_> {
     fn against_differences<M: Dae>(
         &self,
         report: &mut Report,
-        integrator: &mut impl Integrator<M>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
         interval: &Interval,
         (lambda, noise): (&[f64], &Answer),
     ) {
