@@ -37,6 +37,7 @@ pub mod adaptive;
 pub mod batch;
 #[cfg(feature = "casadi")]
 pub mod casadi;
+pub mod constrained;
 #[cfg(feature = "num-dual")]
 pub mod dual;
 pub mod erk;
@@ -67,6 +68,7 @@ pub use adaptive::{
 };
 #[cfg(feature = "alloc")]
 pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
+pub use constrained::{Consistent, Constrained, Inconsistent};
 pub use erk::Erk;
 pub use error::Error;
 pub use function::{Function, GraphFunction};

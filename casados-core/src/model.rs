@@ -9,7 +9,7 @@ use crate::shape::{Array, Plain, Shape};
 #[doc(no_inline)]
 pub use crate::structure::{
     Assembly, Cost, Dependent, Elimination, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
-    Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
 };
 use bytemuck::Zeroable;
 

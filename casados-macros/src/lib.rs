@@ -30,6 +30,10 @@ const STACK: usize = 1 << 29;
 /// Where the equations have several roots, that decides for one; where they have no value or a
 /// singular matrix at `z = 0`, as those with `z.ln()` or `z * z - x[0]`, there is no solution
 /// without it.
+///
+/// `#[dae(index_reduction)]` differentiates constraints in time until the model has index 1, and
+/// makes its invariants a function; `#[dae(index_reduction(baumgarte = [2.0, 1.0]))]` lets what
+/// constraints are off by decay.
 #[proc_macro_attribute]
 pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Dae, attribute.into(), item.into()).into()

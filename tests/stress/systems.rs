@@ -179,6 +179,7 @@ macro_rules! system {
                     lone: &[],
                     operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
                     elimination: Elimination::NONE,
+                    reduction: None,
                 };
                 fn residual<S: casados::Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
                     $crate::systems::residual::<Self, S>(v, f);

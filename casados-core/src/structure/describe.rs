@@ -31,6 +31,9 @@ impl Display for Structure {
         names(f, "parameters p", self.p)?;
         writeln!(f)?;
         self.equations(f)?;
+        if let Some(reduction) = self.reduction {
+            writeln!(f, "{reduction}")?;
+        }
         self.sparsity(f)?;
         writeln!(f)?;
         self.elimination(f)?;
@@ -294,7 +297,7 @@ impl Write for Length {
     }
 }
 
-fn title(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
+pub(super) fn title(f: &mut Formatter<'_>, title: &str) -> fmt::Result {
     write!(f, "{title:INDENT$}")
 }
 

@@ -5,10 +5,12 @@ mod cost;
 mod curvature;
 mod describe;
 mod elimination;
+mod reduction;
 
 pub use cost::Cost;
 pub use curvature::{Lone, MOST_ROWS, NO_COLUMN, Term, begins, by_column, by_row, columns, symmetric};
 pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, Supernode, Update};
+pub use reduction::Reduction;
 
 /// What is known about a model before it runs.
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +98,9 @@ pub struct Structure {
     /// How the Newton matrix is eliminated.
     /// Read by `linalg`.
     pub elimination: Elimination,
+    /// What was differentiated, where the macro reduced the index.
+    /// Read by [`Dae::describe`](crate::Dae::describe).
+    pub reduction: Option<&'static Reduction>,
 }
 
 /// Positions of structural non-zeros, in the order of their values.

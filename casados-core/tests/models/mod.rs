@@ -93,6 +93,7 @@ impl Dae for Nonlinear {
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
+        reduction: None,
     };
 
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
@@ -192,6 +193,7 @@ impl Dae for Linear {
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
+        reduction: None,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
         let v = &v.map(|cell| S::load(&cell));
@@ -263,6 +265,7 @@ impl Dae for Fragile {
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
+        reduction: None,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
         let v = &v.map(|cell| S::load(&cell));
@@ -331,6 +334,7 @@ impl Dae for Algebraic {
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
+        reduction: None,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
         let v = &v.map(|cell| S::load(&cell));
@@ -439,6 +443,7 @@ impl Dae for Rod {
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
+        reduction: None,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
         let v = &v.map(|cell| S::load(&cell));

@@ -118,6 +118,7 @@ impl Dae for Pendulum {
         lone: &[],
         operations: NONE,
         elimination: Elimination::NONE,
+        reduction: None,
     };
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
         let v = &v.map(|cell| S::load(&cell));

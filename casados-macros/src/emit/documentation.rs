@@ -51,7 +51,8 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
 }
 
 /// The user's text, then what is known about the function.
-pub fn of_function(functions: &[FunctionAnalysis]) -> TokenStream {
+pub fn of_function<'a>(functions: impl Iterator<Item = &'a FunctionAnalysis>) -> TokenStream {
+    let functions: Vec<_> = functions.collect();
     let Some(first) = functions.first() else {
         return TokenStream::new();
     };

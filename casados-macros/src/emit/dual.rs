@@ -239,6 +239,7 @@ fn structure(model: &Model, sizes: &Sizes) -> TokenStream {
                             hessian: 0,
                         },
                         elimination: #krate::model::Elimination::NONE,
+                        reduction: ::core::option::Option::None,
                     }
     }
 }

@@ -27,12 +27,22 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
         return Ok(item);
     };
     let original = original(&item).map(|(name, _)| name).unwrap_or_else(|| first.model.name.clone());
-    let implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
-
+    let mut implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
     let documentation = documentation::of_type(&original, models);
     let Model { name, visibility, instance, krate, .. } = &first.model;
+    let invariants = models.iter().filter_map(model::invariants);
+    let mut types = vec![Type { name, visibility, documentation, instance }];
+    let invariants: Vec<&FunctionAnalysis> = invariants.collect();
+    if let Some(first) = invariants.first() {
+        implementations.extend(model::constrained(models));
+        for function in &invariants {
+            implementations.extend(function::write(function)?);
+        }
+        let documentation = documentation::of_function(invariants.iter().copied());
+        types.push(Type { name: &first.model.name, visibility, documentation, instance });
+    }
     let item = with_elementary_functions(item, krate);
-    assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+    assemble(item, place, &types, implementations)
 }
 
 /// The same for functions, whose types implement `Function`.
@@ -45,10 +55,10 @@ pub fn expand_functions(
         return Ok(item);
     };
     let implementations = functions.iter().map(function::write).collect::<syn::Result<TokenStream>>()?;
-    let documentation = documentation::of_function(functions);
+    let documentation = documentation::of_function(functions.iter());
     let Model { name, visibility, instance, krate, .. } = &first.model;
     let item = with_elementary_functions(item, krate);
-    assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+    assemble(item, place, &[Type { name, visibility, documentation, instance }], implementations)
 }
 
 /// The same for dual models.
@@ -59,7 +69,7 @@ pub fn expand_dual(source: language::dual::Source) -> syn::Result<TokenStream> {
     };
     let documentation = models.first().map(dual::documentation).unwrap_or_default();
     let implementations = models.iter().map(dual::write).collect();
-    assemble(item, place, Type { name, visibility, documentation, instance }, implementations)
+    assemble(item, place, &[Type { name, visibility, documentation, instance }], implementations)
 }
 
 /// The item with `sin`, `exp` and the like in scope, which `f64` has only where there is `std`.
@@ -79,42 +89,52 @@ struct Type<'a> {
     instance: &'a [Instance],
 }
 
-/// The item, the type and its implementations, where they belong.
+/// The item, the types and their implementations, where they belong.
 fn assemble(
     item: TokenStream,
     place: Place,
-    ty: Type,
+    types: &[Type],
     implementations: TokenStream,
 ) -> syn::Result<TokenStream> {
-    let Type { name, visibility, documentation, instance } = ty;
-    let generics = generics(instance.iter().map(|instance| (&instance.name, &instance.ty)));
-    let declaration = quote! {
-        #documentation
-        #[derive(Clone, Copy, Debug)]
+    let declaration = |ty: &Type, visibility: &TokenStream| {
+        let Type { name, documentation, instance, .. } = ty;
+        let generics = generics(instance.iter().map(|instance| (&instance.name, &instance.ty)));
+        quote! {
+            #documentation
+            #[derive(Clone, Copy, Debug)]
+            #visibility struct #name #generics;
+        }
     };
     match place {
         // A model may be all that its function is for.
-        Place::Beside => Ok(quote! {
-            #[allow(dead_code)]
-            #item
-            #declaration
-            #visibility struct #name #generics;
-            #implementations
-        }),
+        Place::Beside => {
+            let declarations = types.iter().map(|ty| declaration(ty, &ty.visibility.to_token_stream()));
+            Ok(quote! {
+                #[allow(dead_code)]
+                #item
+                #(#declarations)*
+                #implementations
+            })
+        }
         Place::Inside => {
             let syn::ItemMod { ident, .. } = syn::parse2(item.clone())?;
+            let declarations = types.iter().map(|ty| declaration(ty, &quote!(pub)));
             let inside = quote! {
-                #declaration
-                pub struct #name #generics;
+                #(#declarations)*
                 #implementations
             };
             let module = language::tokens::with(item, &TokenStream::new(), &inside);
+            let exports = types.iter().map(|Type { name, visibility, .. }| {
+                quote! {
+                    #[doc(inline)]
+                    #[allow(unused_imports)]
+                    #visibility use #ident::#name;
+                }
+            });
             Ok(quote! {
                 #[allow(dead_code)]
                 #module
-                #[doc(inline)]
-                #[allow(unused_imports)]
-                #visibility use #ident::#name;
+                #(#exports)*
             })
         }
     }

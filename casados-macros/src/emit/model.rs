@@ -3,7 +3,7 @@
 use super::code::{self, MODEL, dimensions, ty};
 use super::{domain, structure};
 use crate::language::{Model, Variables};
-use crate::structure::{Analysis, Derivatives};
+use crate::structure::{Analysis, Derivatives, FunctionAnalysis};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
@@ -119,4 +119,24 @@ fn ode(analysis: &Analysis) -> Option<TokenStream> {
             }
         }
     })
+}
+
+/// The function of the invariants of a model whose index was reduced.
+pub fn invariants(analysis: &Analysis) -> Option<&FunctionAnalysis> {
+    analysis.reduction.as_ref().map(|reduction| &reduction.invariants)
+}
+
+/// What connects models with the functions of their invariants.
+pub fn constrained(models: &[Analysis]) -> TokenStream {
+    let constrained = |analysis: &Analysis| {
+        let (model, function) = (ty(&analysis.model), ty(&invariants(analysis)?.model));
+        let krate = &analysis.model.krate;
+        Some(quote! {
+            #[automatically_derived]
+            impl #krate::Constrained for #model {
+                type Invariants = #function;
+            }
+        })
+    };
+    models.iter().filter_map(constrained).collect()
 }

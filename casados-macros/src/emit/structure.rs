@@ -3,7 +3,7 @@
 use super::elimination;
 use crate::graph::Node;
 use crate::language::Variables;
-use crate::structure::{Analysis, Derivatives, Facts, FunctionAnalysis, Operations};
+use crate::structure::{Analysis, Derivatives, Facts, FunctionAnalysis, Operations, Reduction};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
@@ -29,6 +29,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
         [&facts.trivial, &facts.quadratures, &facts.directions, &facts.curved].map(|list| numbers(list));
     let [count, terms] = [curved.len(), analysis.symmetric].map(Literal::usize_unsuffixed);
     let elimination = elimination::write(krate, &analysis.elimination.tables);
+    let reduction = reduction(krate, analysis.reduction.as_ref());
     quote! {{
         const JACOBIAN: #krate::model::Pattern = #jacobian;
         const HESSIAN: #krate::model::Pattern = #hessian;
@@ -59,8 +60,28 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             lone: &[#(#lone),*],
             operations: #operations,
             elimination: #elimination,
+            reduction: #reduction,
         }
     }}
+}
+
+/// What was differentiated.
+fn reduction(krate: &syn::Path, reduction: Option<&Reduction>) -> TokenStream {
+    let Some(Reduction { differentiated, rates, singular, .. }) = reduction else {
+        return quote!(::core::option::Option::None);
+    };
+    let differentiated = differentiated.iter().map(|&(equation, times)| {
+        let [equation, times] = [equation, times].map(Literal::u32_unsuffixed);
+        quote!((#equation, #times))
+    });
+    let singular = singular.map(Literal::u32_unsuffixed);
+    quote! {
+        ::core::option::Option::Some(&#krate::model::Reduction {
+            differentiated: &[#(#differentiated),*],
+            rates: &[#(#rates),*],
+            singular: [#(#singular),*],
+        })
+    }
 }
 
 /// The value of `Function::STRUCTURE`.

@@ -20,6 +20,7 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         instance: Vec::new(),
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
         samplings: Vec::new(),
+        reduction: None,
         graph,
         spans: vec![Span::call_site(); residual.len()],
         residual,

@@ -21,6 +21,8 @@ mod reverse;
 mod rules;
 mod simplify;
 mod sparsity;
+mod substitute;
+mod tangent;
 #[cfg(test)]
 mod tests;
 
@@ -29,6 +31,7 @@ pub use hessian::hessian;
 pub use jacobian::jacobian;
 pub use reverse::gradient;
 pub use sparsity::Degree;
+pub use tangent::tangent;
 
 use std::collections::HashMap;
 

@@ -15,7 +15,6 @@ pub enum Degree {
 
 impl Graph {
     /// For each node the indices of the variables that it depends on, ascending.
-    #[cfg(test)]
     pub fn dependencies(&self, nodes: &[Node]) -> Vec<Vec<u32>> {
         let reachable = self.reachable(nodes);
         let variable = |node: &Node| match self.op(*node) {

@@ -4,9 +4,11 @@
 //! - `(M, N) = [(1, 2), (3, 4)]`: of several together;
 //! - `name = Ident`: another name for the model's type;
 //! - `crate = path`: where casados is found;
-//! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives.
+//! - `nominal(x = [0.0, 3.0])`, `range(x = -1.0..=1.0)`: where the model lives;
+//! - `index_reduction`, `index_reduction(baumgarte = [2.0, 1.0])`: equations may be differentiated.
 
 use super::mistakes::Mistakes;
+use super::reduction::Reduction;
 use super::sampling::{self, Kind, Sampling, Setting};
 use super::{Instance, Variables};
 use proc_macro2::{Ident, Span, TokenStream};
@@ -16,7 +18,8 @@ use syn::{Error, Expr, GenericParam, Generics, Lit, Result, Token};
 
 /// What an attribute can say.
 const POSSIBLE: &str = "the attribute takes values of const parameters (`N = [1, 2]`, `N = 1..=4`, \
-    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `nominal(x = ..)` and `range(x = ..)`";
+    `(M, N) = [(1, 2), (3, 4)]`), `name = Type`, `crate = path`, `nominal(x = ..)`, `range(x = ..)` and \
+    `index_reduction`";
 
 /// More models than this in one attribute are taken for a mistake.
 const MAX_INSTANCES: usize = 1000;
@@ -27,6 +30,8 @@ pub struct Arguments {
     pub krate: syn::Path,
     /// Another name for the model's type.
     pub name: Option<Ident>,
+    /// How the index is reduced, if that is asked for.
+    pub reduction: Option<Reduction>,
     /// Groups of const parameters with the values that they take together.
     values: Vec<Values>,
     /// Nominal values and ranges.
@@ -45,6 +50,7 @@ impl Arguments {
         let mut arguments = Self {
             krate: syn::parse_quote!(::casados),
             name: None,
+            reduction: None,
             values: Vec::new(),
             settings: Vec::new(),
         };
@@ -62,6 +68,12 @@ impl Arguments {
                 Entry::Name(span, name) => {
                     if arguments.name.replace(name).is_some() {
                         mistakes.note(Error::new(span, "`name` is given twice"));
+                    }
+                }
+                Entry::Reduction(reduction) => {
+                    let span = reduction.span;
+                    if arguments.reduction.replace(reduction).is_some() {
+                        mistakes.note(Error::new(span, "`index_reduction` is given twice"));
                     }
                 }
                 Entry::Values(values) => {
@@ -185,6 +197,7 @@ enum Entry {
     Name(Span, Ident),
     Values(Values),
     Settings(Vec<Setting>),
+    Reduction(Reduction),
 }
 
 impl Parse for Entry {
@@ -209,6 +222,11 @@ impl Parse for Entry {
             let content;
             syn::parenthesized!(content in input);
             return Ok(Self::Settings(Setting::list(kind, &content)?));
+        }
+        if let [name] = &names[..]
+            && name == "index_reduction"
+        {
+            return Ok(Self::Reduction(Reduction::read(name.span(), input)?));
         }
         if names.is_empty() {
             return Err(Error::new(span, POSSIBLE));

@@ -27,6 +27,7 @@ mod operator;
 mod path;
 mod pattern;
 mod place;
+mod reduction;
 mod sampling;
 mod select;
 pub mod signature;
@@ -42,6 +43,7 @@ use crate::graph::{Graph, Node};
 use attribute::Arguments;
 use model::Template;
 use proc_macro2::{Span, TokenStream};
+pub use reduction::{Rates, Reduction};
 pub use sampling::Sampling;
 
 /// Which attribute.
@@ -98,6 +100,8 @@ pub struct Model {
     pub variables: Variables,
     /// What the attribute says about the values of the variables `(ẋ, x, z, u, p, t)`.
     pub samplings: Vec<Sampling>,
+    /// How its index is reduced, if the attribute asks for that.
+    pub reduction: Option<Reduction>,
     /// The expressions.
     pub graph: Graph,
     /// `f`, one node per equation.
@@ -188,10 +192,19 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
     if template.form == Form::Function {
         arguments.without_settings("a function")?;
     }
+    if template.form != Form::Dae
+        && let Some(reduction) = &arguments.reduction
+    {
+        return Err(syn::Error::new(
+            reduction.span,
+            "only the equations of a `#[dae]` have an index to reduce",
+        ));
+    }
     let instances = arguments.instances(&template.function.sig.generics)?;
     let model = |instance| {
         let mut model = template.model(instance)?;
         model.samplings = arguments.samplings(&model.variables)?;
+        model.reduction.clone_from(&arguments.reduction);
         Ok(model)
     };
     instances.into_iter().map(model).collect()

@@ -74,6 +74,7 @@ impl Template<'_> {
             instance,
             variables,
             samplings: Vec::new(),
+            reduction: None,
             graph: evaluator.graph,
             residual,
             spans,

@@ -203,7 +203,7 @@ fn interval(kind: Kind, value: &Expr) -> Result<(f64, f64)> {
 }
 
 /// A literal, with a sign or without.
-fn number(value: &Expr) -> Result<f64> {
+pub(super) fn number(value: &Expr) -> Result<f64> {
     let literal = match value {
         Expr::Lit(literal) => match &literal.lit {
             Lit::Float(number) => Some(number.base10_parse::<f64>()?),

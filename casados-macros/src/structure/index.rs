@@ -3,13 +3,21 @@
 use crate::graph::Entry;
 use crate::language::Model;
 
+/// What is said of equations and unknowns that do not match.
+pub struct Words<'a> {
+    /// The name of an unknown.
+    pub name: &'a dyn Fn(usize) -> String,
+    /// What an equation without unknowns does not contain.
+    pub nothing: &'a str,
+    /// What that means, and the way out.
+    pub conclusion: &'a str,
+}
+
 /// An error if no matching of equations to unknowns exists in the pattern of `(f_ẋ, f_z)`: then
-/// `∂f/∂(ẋ, z)` is singular whatever the values, and the model is not of index 1. Names what is
-/// over- and underdetermined (the Dulmage-Mendelsohn decomposition).
+/// `∂f/∂(ẋ, z)` is singular whatever the values, and the model is not of index 1.
 pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<()> {
     let nx = ends[0];
-    let count = model.residual.len();
-    let mut rows = vec![Vec::new(); count];
+    let mut rows = vec![Vec::new(); model.residual.len()];
     for &(row, variable, _) in jacobian {
         if variable < nx {
             rows[row as usize].push(variable as usize);
@@ -17,7 +25,27 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
             rows[row as usize].push((variable - ends[1] + nx) as usize);
         }
     }
-    let matching = match_rows(&rows, count);
+    let name = |unknown: usize| match model.variables.x.get(unknown) {
+        Some(name) => derivative(name),
+        None => format!("`{}`", model.variables.z[unknown - nx as usize]),
+    };
+    let way_out = match model.reduction {
+        None => ", or let the macro do so with `#[dae(index_reduction)]`",
+        Some(_) => "",
+    };
+    let conclusion = format!(
+        "the model is not of index 1; differentiate these equations with respect to time until the derivatives or \
+         algebraic states appear in them{way_out}, or remove what is not determined"
+    );
+    let nothing = "neither a derivative nor an algebraic state";
+    matching(model, &rows, &Words { name: &name, nothing, conclusion: &conclusion })
+}
+
+/// An error if no matching of equations to unknowns exists in the pattern `rows`. Names what is
+/// over- and underdetermined (the Dulmage-Mendelsohn decomposition).
+pub fn matching(model: &Model, rows: &[Vec<usize>], words: &Words) -> syn::Result<()> {
+    let count = rows.len();
+    let matching = match_rows(rows, count);
     if matching.iter().all(Option::is_some) {
         return Ok(());
     }
@@ -29,20 +57,17 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
     // From each unmatched unknown: too few equations for these unknowns.
     let of_row = inverse(&matching, count);
     let parts = [
-        components(&rows, &matching, &unmatched(&of_row)),
+        components(rows, &matching, &unmatched(&of_row)),
         components(&columns, &of_row, &unmatched(&matching)),
     ];
-    let name = |&unknown: &usize| match model.variables.x.get(unknown) {
-        Some(name) => derivative(name),
-        None => format!("`{}`", model.variables.z[unknown - nx as usize]),
-    };
+    let name = |&unknown: &usize| (words.name)(unknown);
     let number = |equation: &usize| equation.to_string();
     let mut sentences = Vec::new();
     for (equations, unknowns) in &parts[0] {
         let subject = phrase("equation", "equations", equations, number);
         let s = if equations.len() == 1 { "s" } else { "" };
         sentences.push(if unknowns.is_empty() {
-            format!("{subject} contain{s} neither a derivative nor an algebraic state")
+            format!("{subject} contain{s} {}", words.nothing)
         } else {
             format!("{subject} determine{s} only {}", list(unknowns, name))
         });
@@ -56,12 +81,7 @@ pub fn check(model: &Model, jacobian: &[Entry], ends: [u32; 5]) -> syn::Result<(
         };
         sentences.push(format!("{} {verb} determined {object}", list(unknowns, name)));
     }
-    let message = format!(
-        "{}: the model is not of index 1; differentiate these equations with respect to time until the \
-         derivatives or algebraic states appear in them, or remove what is not determined (equations are \
-         counted from 0)",
-        sentences.join("; ")
-    );
+    let message = format!("{}: {} (equations are counted from 0)", sentences.join("; "), words.conclusion);
     // At every equation concerned; several that come from the same tokens are one.
     let concerned = |part: usize| parts[part].iter().flat_map(move |(a, b)| if part == 0 { a } else { b });
     let mut seen = Vec::new();

@@ -5,6 +5,7 @@ mod elimination;
 mod facts;
 mod index;
 mod kinematic;
+mod reduction;
 mod samples;
 mod supernodes;
 pub mod tables;
@@ -67,6 +68,20 @@ pub struct Analysis {
     pub explicit: Option<Vec<(u32, f64)>>,
     /// How the Newton matrix is eliminated.
     pub elimination: Elimination,
+    /// What was differentiated, if the index was reduced.
+    pub reduction: Option<Reduction>,
+}
+
+/// A model whose index was reduced.
+pub struct Reduction {
+    /// Equations that were differentiated, and how often.
+    pub differentiated: Vec<(u32, u32)>,
+    /// The rates of Baumgarte's stabilisation.
+    pub rates: Vec<f64>,
+    /// How many sample points have a singular matrix `∂f/∂(ẋ, z)`, and how many there are.
+    pub singular: [u32; 2],
+    /// The function of the invariants.
+    pub invariants: FunctionAnalysis,
 }
 
 /// The order in which the Newton matrix is eliminated.
@@ -90,9 +105,21 @@ pub struct Operations {
     pub hessian: u32,
 }
 
-/// Derives everything, or says why the model is no index-1 DAE.
+/// Reduces the index where that is asked for, and derives everything.
 pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     check_length(&model)?;
+    let reduced = reduction::reduce(&mut model)?;
+    let mut analysis = analyse_index_one(model)?;
+    if let Some(reduction::Reduced { differentiated, rates, invariants }) = reduced {
+        let singular = reduction::rank::check(&analysis)?;
+        let invariants = analyse_function(invariants);
+        analysis.reduction = Some(Reduction { differentiated, rates, singular, invariants });
+    }
+    Ok(analysis)
+}
+
+/// Derives everything, or says why the model is no index-1 DAE.
+fn analyse_index_one(mut model: Model) -> syn::Result<Analysis> {
     let ends = ends(&model.variables);
     let derivatives = differentiate(&mut model, ends);
     let Derivatives { jacobian, blocks, constant, hessian, linear, .. } = &derivatives;
@@ -104,7 +131,7 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     let curved = hessian.iter().filter(|entry| facts.curved.contains(&entry.0));
     let symmetric = curved.map(|entry| if entry.0 == entry.1 { 1 } else { 2 }).sum();
     let elimination = elimination(&model, jacobian, *blocks, &facts.trivial);
-    Ok(Analysis { model, derivatives, facts, nonlinear, symmetric, explicit, elimination })
+    Ok(Analysis { model, derivatives, facts, nonlinear, symmetric, explicit, elimination, reduction: None })
 }
 
 /// Derives everything about a function.
@@ -177,10 +204,9 @@ fn newton_matrix(
 
 /// Plans the elimination of the Newton matrix.
 fn elimination(model: &Model, jacobian: &[Entry], blocks: [usize; 6], trivial: &[u32]) -> Elimination {
-    let Variables { x, z, u, p } = &model.variables;
+    let nx = model.variables.x.len();
     let (kinematic, positions) = newton_matrix(model, jacobian, blocks, trivial);
-    let mut samplings = model.samplings.clone();
-    samplings.resize(2 * x.len() + z.len() + u.len() + p.len() + 1, Sampling::default());
+    let samplings = samplings(model);
     let entries = samples::sample(&model.graph, jacobian, &positions, &samplings, model.opaque.len());
     let plan = elimination::plan(model.residual.len(), &entries);
     let updated: HashSet<u32> = plan.updates.iter().copied().collect();
@@ -193,8 +219,16 @@ fn elimination(model: &Model, jacobian: &[Entry], blocks: [usize; 6], trivial: &
         original(block).is_some_and(|position| samples::is_identity(&model.graph, jacobian, position))
     };
     let identity: Vec<bool> = plan.ranges.iter().map(is_identity).collect();
-    let tables = tables::of(&plan, &positions, &identity, &kinematic, [model.residual.len(), x.len()]);
+    let tables = tables::of(&plan, &positions, &identity, &kinematic, [model.residual.len(), nx]);
     Elimination { plan, tables }
+}
+
+/// What is known about the values of each of the variables `(ẋ, x, z, u, p, t)`.
+fn samplings(model: &Model) -> Vec<Sampling> {
+    let Variables { x, z, u, p } = &model.variables;
+    let mut samplings = model.samplings.clone();
+    samplings.resize(2 * x.len() + z.len() + u.len() + p.len() + 1, Sampling::default());
+    samplings
 }
 
 /// As many equations as unknowns.

@@ -48,6 +48,23 @@ pub fn pattern(jacobian: &[(u32, u32, Node)], blocks: [usize; 6], nx: u32) -> Ve
     positions.into_values().collect()
 }
 
+/// Values of nodes at sample points at which all of them are finite.
+pub fn values(graph: &Graph, nodes: &[Node], samplings: &[Sampling], opaque: usize) -> Vec<Vec<f64>> {
+    let mut random = Random::default();
+    let points = Points { graph, nodes, samplings, constants: constants(&mut random, opaque) };
+    let mut found = Vec::new();
+    for draw in 0..DRAWS {
+        if found.len() == POINTS {
+            break;
+        }
+        let values = points.at(&mut random, draw);
+        if values.iter().all(|value| value.is_finite()) {
+            found.push(values);
+        }
+    }
+    found
+}
+
 /// The non-zeros with their values `Σ c f (hμ)^order` at sample points and sample values of `hμ`.
 pub fn sample(
     graph: &Graph,
@@ -57,8 +74,8 @@ pub fn sample(
     opaque: usize,
 ) -> Vec<Entry> {
     let nodes: Vec<Node> = jacobian.iter().map(|entry| entry.2).collect();
-    let mut random = Random(0x9e37_79b9_7f4a_7c15);
-    let constants: Vec<f64> = (0..opaque).map(|_| random.between(0.5, 2.0)).collect();
+    let mut random = Random::default();
+    let points = Points { graph, nodes: &nodes, samplings, constants: constants(&mut random, opaque) };
     let mut entries: Vec<Entry> = positions
         .iter()
         .map(|position| Entry {
@@ -73,31 +90,52 @@ pub fn sample(
         if found == POINTS {
             break;
         }
-        let point: Vec<f64> =
-            samplings.iter().map(|sampling| coordinate(&mut random, draw, *sampling)).collect();
-        let values = graph.evaluate(&nodes, Point { variables: &point, opaque: &constants, seeds: &[] });
+        let values = points.at(&mut random, draw);
         let mut used = positions.iter().flat_map(|position| &position.terms);
-        if used.all(|term| values[term.entry as usize].is_finite()) {
-            found += 1;
-            for _ in 0..2 {
-                // Eigenvalues of A lie in the right half-plane; the step size may be anything.
-                let size = 10f64.powf(random.between(-4.0, 0.0));
-                let angle = random.between(-1.4, 1.4);
-                let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
-                for (entry, position) in entries.iter_mut().zip(positions) {
-                    let mut value = Complex::default();
-                    for term in &position.terms {
-                        let c = term.by.map_or(1.0, |by| -values[by as usize]);
-                        let mut product = Complex { re: c * values[term.entry as usize], im: 0.0 };
-                        (0..term.order).for_each(|_| product = product.times(hmu));
-                        value = Complex { re: value.re + product.re, im: value.im + product.im };
-                    }
-                    entry.values.push(value);
+        if !used.all(|term| values[term.entry as usize].is_finite()) {
+            continue;
+        }
+        found += 1;
+        for _ in 0..2 {
+            // Eigenvalues of A lie in the right half-plane; the step size may be anything.
+            let size = 10f64.powf(random.between(-4.0, 0.0));
+            let angle = random.between(-1.4, 1.4);
+            let hmu = Complex { re: size * angle.cos(), im: size * angle.sin() };
+            for (entry, position) in entries.iter_mut().zip(positions) {
+                let mut value = Complex::default();
+                for term in &position.terms {
+                    let c = term.by.map_or(1.0, |by| -values[by as usize]);
+                    let mut product = Complex { re: c * values[term.entry as usize], im: 0.0 };
+                    (0..term.order).for_each(|_| product = product.times(hmu));
+                    value = Complex { re: value.re + product.re, im: value.im + product.im };
                 }
+                entry.values.push(value);
             }
         }
     }
     entries
+}
+
+/// Values for constants from outside.
+fn constants(random: &mut Random, opaque: usize) -> Vec<f64> {
+    (0..opaque).map(|_| random.between(0.5, 2.0)).collect()
+}
+
+/// What sample points are drawn for.
+struct Points<'a> {
+    graph: &'a Graph,
+    nodes: &'a [Node],
+    samplings: &'a [Sampling],
+    constants: Vec<f64>,
+}
+
+impl Points<'_> {
+    /// The values at a point.
+    fn at(&self, random: &mut Random, draw: usize) -> Vec<f64> {
+        let point: Vec<f64> =
+            self.samplings.iter().map(|sampling| coordinate(random, draw, *sampling)).collect();
+        self.graph.evaluate(self.nodes, Point { variables: &point, opaque: &self.constants, seeds: &[] })
+    }
 }
 
 /// The block is the identity, whatever the step size and the point.
@@ -134,6 +172,12 @@ fn anywhere(random: &mut Random, draw: usize) -> f64 {
 
 /// A linear congruential generator: the same points in every build.
 struct Random(u64);
+
+impl Default for Random {
+    fn default() -> Self {
+        Self(0x9e37_79b9_7f4a_7c15)
+    }
+}
 
 impl Random {
     fn between(&mut self, low: f64, high: f64) -> f64 {

@@ -76,6 +76,7 @@ impl<const FAULT: u8> Dae for Example<FAULT> {
         lone: &[],
         operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
         elimination: Elimination::NONE,
+        reduction: None,
     };
 
     fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {

@@ -238,6 +238,7 @@ mod logistic {
             lone: &[],
             operations: Operations { residual: 0, residual_jacobian: 0, adjoint: 0, hessian: 0 },
             elimination: Elimination::NONE,
+            reduction: None,
         };
 
         fn residual<S: Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {

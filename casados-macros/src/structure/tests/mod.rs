@@ -2,6 +2,7 @@
 
 mod index;
 mod kinematic;
+mod reduction;
 
 use super::{Analysis, Facts, analyse};
 use crate::graph::{Binary, Graph, Node, Op, Unary};
@@ -21,6 +22,7 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         instance: Vec::new(),
         variables: Variables { x: names("x", nx), z: names("z", nz), u: names("u", nu), p: names("p", np) },
         samplings: Vec::new(),
+        reduction: None,
         spans: vec![Span::call_site(); residual.len()],
         graph,
         residual,

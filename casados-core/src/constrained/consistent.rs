@@ -1,0 +1,242 @@
+//! The states nearest to given ones that satisfy the invariants of a model.
+//!
+//! ```text
+//! min ½ |x − x̂|²    with  y(x, p, t) = 0,  x_j = x̂_j of those that are held
+//! ```
+//!
+//! by Gauss and Newton: with `G = ∂y/∂x` in the columns that are free, `x ← x̂ + G⁺ (G (x − x̂) − y)`.
+//! `G = L Q` by Gram and Schmidt, twice, shows which invariant depends on those before it.
+
+use super::{Constrained, Inconsistent};
+use crate::error::Argument;
+use crate::finite::not_finite;
+use crate::function::{ArrayV, ArrayY, Function, MatrixYX, MatrixYY};
+use crate::model::{ArrayX, Dae, VectorP, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Outputs, Shape};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// Iterations after which the values are given up.
+const ITERATIONS: usize = 200;
+
+/// States that satisfy the invariants of a model, nearest to given ones.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::Consistent;
+/// use nalgebra::vector;
+///
+/// /// A pendulum on a circle of radius one.
+/// #[dae(index_reduction)]
+/// fn pendulum(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+///     let circle = x[0] * x[0] + x[1] * x[1] - 1.0;
+///     [xdot[0] - x[2], xdot[1] - x[3], xdot[2] + z * x[0], xdot[3] + z * x[1] + 9.81, circle]
+/// }
+///
+/// let guess = vector![0.7, -0.5, 0.2, 0.1];
+/// let x = Consistent::<Pendulum>::new().hold("x[0]")?.solve(&guess, &vector![], 0.0)?;
+/// assert_eq!(x[0], 0.7);
+/// assert!((x[1] + 0.51f64.sqrt()).abs() < 1e-15);
+/// # Ok::<(), casados::Inconsistent>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Consistent<M: Constrained> {
+    held: ArrayX<M, bool>,
+    model: PhantomData<M>,
+}
+
+impl<M: Constrained> Default for Consistent<M> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The function of the invariants of a model.
+type Invariants<M> = <M as Constrained>::Invariants;
+
+/// What an iteration works with.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct Work<M: Constrained, T: Real> {
+    v: ArrayV<Invariants<M>, T>,
+    y: ArrayY<Invariants<M>, T>,
+    jacobian: <Invariants<M> as Function>::Jacobian<T>,
+    /// `G`, and then `Q`.
+    rows: MatrixYX<Invariants<M>, T>,
+    /// `L`
+    lower: MatrixYY<Invariants<M>, T>,
+    step: ArrayX<M, T>,
+}
+
+impl<M: Constrained> Consistent<M> {
+    /// All states are free.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { held: ArrayX::<M, bool>::from_fn(|_| false), model: PhantomData }
+    }
+
+    /// Holds a state at the value that is given: `x[0]`, or all of an array or a struct, `x`.
+    ///
+    /// # Errors
+    /// [`Inconsistent::NoSuchState`]
+    pub fn hold(mut self, name: &'static str) -> Result<Self, Inconsistent> {
+        let mut found = false;
+        for (held, state) in self.held.as_mut().iter_mut().zip(M::STRUCTURE.x) {
+            let rest = state.strip_prefix(name);
+            if rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.'])) {
+                (*held, found) = (true, true);
+            }
+        }
+        if found { Ok(self) } else { Err(Inconsistent::NoSuchState { name }) }
+    }
+
+    /// The states nearest to `x`, in the sum of squares.
+    ///
+    /// # Errors
+    /// [`Inconsistent`]; of a `x` far from the constraints also where there are such states.
+    pub fn solve<T: Real>(
+        &self,
+        x: &VectorX<M, T>,
+        p: &VectorP<M, T>,
+        t: T,
+    ) -> Result<VectorX<M, T>, Inconsistent> {
+        for (argument, values) in
+            [(Argument::X0, x.as_slice()), (Argument::P, p.as_slice()), (Argument::T, &[t])]
+        {
+            if let Some((index, value)) = not_finite(values) {
+                return Err(Inconsistent::NonFiniteInput { argument, index, value });
+            }
+        }
+        let mut work = Work::<M, T>::new(p, t);
+        let (mut found, mut last) = (*x, f64::INFINITY);
+        let epsilon = T::EPSILON;
+        for _ in 0..ITERATIONS {
+            work.linearise(&self.held, &found)?;
+            work.factorise()?;
+            let moved = work.advance(x, &mut found);
+            // Once it is at rounding, it does not shrink any more.
+            if moved <= 4.0 * epsilon || (moved < 1e3 * epsilon && moved > 0.5 * last) {
+                return Ok(found);
+            }
+            last = moved;
+        }
+        work.linearise(&self.held, &found)?;
+        let (output, residual) = work.largest();
+        let (equation, derivative) = origin::<M>(output);
+        Err(Inconsistent::NotConverged { equation, derivative, residual })
+    }
+}
+
+/// The equation that an invariant comes from, and which derivative of it that is.
+fn origin<M: Dae>(output: usize) -> (u32, u32) {
+    M::STRUCTURE.reduction.and_then(|reduction| reduction.invariant(output)).unwrap_or((output as u32, 0))
+}
+
+impl<M: Constrained, T: Real> Work<M, T> {
+    fn new(p: &VectorP<M, T>, t: T) -> Self {
+        let mut work = Self::zeroed();
+        let v = work.v.as_mut();
+        let (start, end) = (M::Shape::NV - 1 - M::Shape::NP, M::Shape::NV - 1);
+        v[start..end].copy_from_slice(p.as_slice());
+        v[end] = t;
+        <Invariants<M> as Function>::jacobian_constants::<T>(&mut work.jacobian);
+        work
+    }
+
+    /// Evaluates the invariants and `G`.
+    fn linearise(&mut self, held: &ArrayX<M, bool>, x: &VectorX<M, T>) -> Result<(), Inconsistent> {
+        let nx = M::Shape::NX;
+        self.v.as_mut()[nx..2 * nx].copy_from_slice(x.as_slice());
+        <Invariants<M> as Function>::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
+        self.rows.as_mut_slice().fill(T::ZERO);
+        let pattern = &<Invariants<M> as Function>::STRUCTURE.jacobian;
+        let mut bad = not_finite(self.y.as_ref());
+        for ((output, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
+            if !value.is_finite() {
+                bad = bad.or(Some((output, value.to_f64())));
+            }
+            let state = variable.wrapping_sub(nx);
+            if held.as_ref().get(state) == Some(&false) {
+                self.rows[(output, state)] = value;
+            }
+        }
+        let Some((output, value)) = bad else { return Ok(()) };
+        let (equation, derivative) = origin::<M>(output);
+        Err(Inconsistent::NonFinite { equation, derivative, value })
+    }
+
+    /// `G = L Q`
+    fn factorise(&mut self) -> Result<(), Inconsistent> {
+        let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
+        self.lower.as_mut_slice().fill(T::ZERO);
+        for i in 0..ny {
+            let norm = |rows: &MatrixYX<Invariants<M>, T>| {
+                (0..nx).fold(T::ZERO, |sum, state| sum + rows[(i, state)] * rows[(i, state)]).sqrt()
+            };
+            let whole = norm(&self.rows);
+            for _ in 0..2 {
+                for j in 0..i {
+                    let product = (0..nx)
+                        .fold(T::ZERO, |sum, state| sum + self.rows[(i, state)] * self.rows[(j, state)]);
+                    self.lower[(i, j)] = self.lower[(i, j)] + product;
+                    for state in 0..nx {
+                        self.rows[(i, state)] = self.rows[(i, state)] - product * self.rows[(j, state)];
+                    }
+                }
+            }
+            let rest = norm(&self.rows);
+            // What remains of equal rows is rounding; squares of it say whether anything does.
+            let independent = rest.to_f64() * rest.to_f64() > T::EPSILON * whole.to_f64() * whole.to_f64();
+            if !independent {
+                let (equation, derivative) = origin::<M>(i);
+                let residual = self.y[i].to_f64();
+                return Err(Inconsistent::Dependent { equation, derivative, residual });
+            }
+            self.lower[(i, i)] = rest;
+            for state in 0..nx {
+                self.rows[(i, state)] = self.rows[(i, state)] / rest;
+            }
+        }
+        Ok(())
+    }
+
+    /// The next iterate, and by how much it moved, relative to the size of the states.
+    fn advance(&mut self, given: &VectorX<M, T>, found: &mut VectorX<M, T>) -> f64 {
+        let (ny, nx) = (<Invariants<M> as Function>::Outputs::NY, M::Shape::NX);
+        let (given, found) = (given.as_slice(), found.as_mut_slice());
+        self.step.as_mut().fill(T::ZERO);
+        // `y` becomes `L⁻¹ y`; the part of `x − x̂` in the rows of `Q` is taken away by it.
+        for i in 0..ny {
+            let mut value = self.y[i];
+            for j in 0..i {
+                value = value - self.lower[(i, j)] * self.y[j];
+            }
+            self.y[i] = value / self.lower[(i, i)];
+            let along = (0..nx)
+                .fold(T::ZERO, |sum, state| sum + self.rows[(i, state)] * (found[state] - given[state]));
+            for state in 0..nx {
+                self.step[state] = self.step[state] + self.rows[(i, state)] * (along - self.y[i]);
+            }
+        }
+        let (mut moved, mut size) = (0.0f64, 0.0f64);
+        for state in 0..nx {
+            let next = given[state] + self.step[state];
+            moved = moved.max((next - found[state]).to_f64().abs());
+            size = size.max(next.to_f64().abs());
+            found[state] = next;
+        }
+        if size > 0.0 { moved / size } else { moved }
+    }
+
+    /// The invariant that is violated most.
+    fn largest(&self) -> (usize, f64) {
+        let mut largest = (0, 0.0f64);
+        for (output, value) in self.y.as_ref().iter().enumerate() {
+            if value.to_f64().abs() > largest.1.abs() {
+                largest = (output, value.to_f64());
+            }
+        }
+        largest
+    }
+}

@@ -1,0 +1,95 @@
+//! Why there are no consistent values.
+
+use crate::error::Argument;
+use core::fmt;
+
+/// Why [`Consistent`](super::Consistent) found no values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Inconsistent {
+    /// No state has this name.
+    NoSuchState {
+        /// The name.
+        name: &'static str,
+    },
+    /// An argument has an element that is infinite or NaN.
+    NonFiniteInput {
+        /// The argument.
+        argument: Argument,
+        /// The element.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// An invariant or its derivatives are infinite or NaN.
+    NonFinite {
+        /// The equation that the invariant comes from.
+        equation: u32,
+        /// Which derivative of it the invariant is.
+        derivative: u32,
+        /// The value.
+        value: f64,
+    },
+    /// The derivatives of an invariant by the states that are free depend on those of the
+    /// invariants before it.
+    Dependent {
+        /// The equation that the invariant comes from.
+        equation: u32,
+        /// Which derivative of it the invariant is.
+        derivative: u32,
+        /// By how much it is violated there.
+        residual: f64,
+    },
+    /// The iteration does not settle.
+    NotConverged {
+        /// The equation of the invariant that is violated most.
+        equation: u32,
+        /// Which derivative of it the invariant is.
+        derivative: u32,
+        /// By how much.
+        residual: f64,
+    },
+}
+
+/// An invariant by the equation it comes from.
+struct Invariant(u32, u32);
+
+impl fmt::Display for Invariant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.1 {
+            0 => write!(f, "the constraint of equation {}", self.0),
+            1 => write!(f, "the derivative of the constraint of equation {}", self.0),
+            order => write!(f, "derivative {order} of the constraint of equation {}", self.0),
+        }
+    }
+}
+
+impl fmt::Display for Inconsistent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::NoSuchState { name } => {
+                write!(f, "no state is called `{name}`: `describe()` of the model lists the names")
+            }
+            Self::NonFiniteInput { argument, index, value } => {
+                write!(f, "element {index} of {argument} is {value}")
+            }
+            Self::NonFinite { equation, derivative, value } => {
+                write!(f, "{} is {value}: start elsewhere", Invariant(equation, derivative))
+            }
+            Self::Dependent { equation, derivative, residual } => write!(
+                f,
+                "{} is violated by {residual:e}, and the states that are free cannot change it independently of the \
+                 constraints before it: hold fewer states, or start elsewhere",
+                Invariant(equation, derivative)
+            ),
+            Self::NotConverged { equation, derivative, residual } => write!(
+                f,
+                "no states were found that satisfy the constraints: {} is violated by {residual:e}; start nearer to \
+                 them, or hold other states",
+                Invariant(equation, derivative)
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Inconsistent {}

@@ -1,0 +1,72 @@
+//! What `#[dae(index_reduction)]` did.
+
+use super::describe::title;
+use core::fmt::{self, Display, Formatter};
+
+/// Equations that were differentiated in time until the model had index 1.
+///
+/// Equation `i` stood for the constraint `g(x, p, t) = 0`. Differentiated `c` times it determines
+/// derivatives or algebraic states; `g` and its derivatives below `c` are invariants: the outputs
+/// of [`Constrained::Invariants`](crate::Constrained::Invariants), in the order of `differentiated`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reduction {
+    /// The equations, and how often each was differentiated.
+    pub differentiated: &'static [(u32, u32)],
+    /// The rates `r_m` of Baumgarte's stabilisation, in 1 over the unit of time: the equations are
+    /// `Π_m (d/dt + r_m) g = 0`. None without stabilisation.
+    pub rates: &'static [f64],
+    /// At how many sample points the matrix `∂f/∂(ẋ, z)` is singular, and how many there are.
+    pub singular: [u32; 2],
+}
+
+impl Reduction {
+    /// The number of invariants.
+    #[must_use]
+    pub fn invariants(&self) -> usize {
+        self.differentiated.iter().map(|&(_, times)| times as usize).sum()
+    }
+
+    /// The equation that an invariant comes from, and which derivative of it that is.
+    #[must_use]
+    pub fn invariant(&self, mut output: usize) -> Option<(u32, u32)> {
+        for &(equation, times) in self.differentiated {
+            if output < times as usize {
+                return Some((equation, output as u32));
+            }
+            output -= times as usize;
+        }
+        None
+    }
+}
+
+impl Display for Reduction {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        title(f, "index reduction")?;
+        for (place, &(equation, times)) in self.differentiated.iter().enumerate() {
+            let comma = if place == 0 { "equation" } else { ", equation" };
+            match times {
+                1 => write!(f, "{comma} {equation} differentiated once")?,
+                2 => write!(f, "{comma} {equation} differentiated twice")?,
+                _ => write!(f, "{comma} {equation} differentiated {times} times")?,
+            }
+        }
+        writeln!(f)?;
+        title(f, "  invariants")?;
+        writeln!(f, "{}: what was differentiated, and its lower derivatives", self.invariants())?;
+        title(f, "  stabilised")?;
+        match self.rates {
+            [] => writeln!(f, "no: errors of a constraint grow with time")?,
+            rates => {
+                write!(f, "errors decay with the rates")?;
+                rates.iter().try_for_each(|rate| write!(f, " {rate}"))?;
+                writeln!(f, " (Baumgarte)")?;
+            }
+        }
+        let [singular, points] = self.singular;
+        if singular > 0 {
+            title(f, "  singular")?;
+            writeln!(f, "at {singular} of {points} sample points, where the constraints lose rank")?;
+        }
+        Ok(())
+    }
+}

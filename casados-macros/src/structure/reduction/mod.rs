@@ -1,0 +1,164 @@
+//! Index reduction: constraints are differentiated in time until the model has index 1.
+//!
+//! [`signature`] says how often each equation is differentiated. Equations that give a derivative
+//! explicitly, as `q̇ = v`, are [`rules`]: their derivatives are not needed, since `d/dt` of what
+//! depends on `q` has `v` in the place of `q̇`. What is left are constraints `g(x, p, t) = 0`. The
+//! highest derivative of each takes its place ([`constraints`]), all states stay, and the lower ones
+//! are the invariants. [`rank`] holds the result against sample points.
+//!
+//! With rates `r_m` of Baumgarte's stabilisation the place of a constraint is taken by
+//! `Π_m (d/dt + r_m) g` (J. Baumgarte, Stabilization of constraints and integrals of motion in
+//! dynamical systems, 1972).
+
+mod constraints;
+pub mod rank;
+mod rules;
+mod signature;
+
+use crate::graph::Node;
+use crate::language::{Model, Rates, Variables};
+use crate::structure::index::{self, Words};
+use constraints::Constraint;
+use quote::format_ident;
+
+/// What became of a model whose index was reduced.
+pub struct Reduced {
+    /// Equations that were differentiated, and how often.
+    pub differentiated: Vec<(u32, u32)>,
+    /// The rates of Baumgarte's stabilisation, for as many derivatives as there are.
+    pub rates: Vec<f64>,
+    /// Constraints and their lower derivatives, equation by equation, as a function of the model's
+    /// variables.
+    pub invariants: Model,
+}
+
+/// Reduces the index if that is asked for and there is something to differentiate.
+pub fn reduce(model: &mut Model) -> syn::Result<Option<Reduced>> {
+    let Some(reduction) = model.reduction.clone() else { return Ok(None) };
+    let rows = signature(model);
+    let Some(offsets) = signature::offsets(&rows) else { return Err(undetermined(model, &rows)) };
+    if offsets.equations.iter().all(|&times| times == 0) {
+        return Ok(None);
+    }
+    let rules = rules::find(model, &rows, &offsets)?;
+    let mut constraints = Vec::new();
+    for (equation, &times) in offsets.equations.iter().enumerate() {
+        if times > 0 && !rules.equations.contains(&equation) {
+            constraints.push(constraints::differentiate(model, &rules.rates, equation, times)?);
+        }
+    }
+    let most = constraints.iter().map(Constraint::times).max().unwrap_or(0);
+    let rates = match reduction.rates {
+        Rates::None => Vec::new(),
+        Rates::All(rate) => vec![rate; most],
+        Rates::Each(rates) if rates.len() == most => rates,
+        Rates::Each(rates) => {
+            let message = format!(
+                "a constraint is differentiated {}, but there {} of decay: one for each derivative, or one for all",
+                times(most),
+                if rates.len() == 1 { "is 1 rate".into() } else { format!("are {} rates", rates.len()) },
+            );
+            return Err(syn::Error::new(reduction.span, message));
+        }
+    };
+    for constraint in &constraints {
+        model.residual[constraint.equation] = constraint.stabilised(&mut model.graph, &rates);
+    }
+    let differentiated = constraints
+        .iter()
+        .map(|constraint| (constraint.equation as u32, constraint.times() as u32))
+        .collect();
+    Ok(Some(Reduced { differentiated, rates, invariants: invariants(model, &constraints) }))
+}
+
+/// `once`, `twice`, `3 times`
+pub fn times(count: usize) -> String {
+    match count {
+        1 => "once".into(),
+        2 => "twice".into(),
+        _ => format!("{count} times"),
+    }
+}
+
+/// The signature matrix: unknowns are `(x, z)`.
+fn signature(model: &Model) -> Vec<signature::Row> {
+    let (nx, nz) = (model.variables.x.len() as u32, model.variables.z.len() as u32);
+    let row = |variables: Vec<u32>| {
+        let mut row = Vec::new();
+        for unknown in 0..nx + nz {
+            let order = match unknown {
+                state if state < nx && variables.binary_search(&state).is_ok() => Some(1),
+                _ => variables.binary_search(&(nx + unknown)).ok().map(|_| 0),
+            };
+            row.extend(order.map(|order| (unknown as usize, order)));
+        }
+        row
+    };
+    model.graph.dependencies(&model.residual).into_iter().map(row).collect()
+}
+
+/// Equations that leave unknowns open, however often they are differentiated.
+fn undetermined(model: &Model, rows: &[signature::Row]) -> syn::Error {
+    let nx = model.variables.x.len();
+    let pattern: Vec<Vec<usize>> = rows.iter().map(|row| row.iter().map(|entry| entry.0).collect()).collect();
+    let words = Words {
+        name: &|unknown| match model.variables.x.get(unknown) {
+            Some(name) => format!("`{name}`"),
+            None => format!("`{}`", model.variables.z[unknown - nx]),
+        },
+        nothing: "no state",
+        conclusion: "no derivatives of these equations determine all states; remove equations that repeat each other, \
+                     and add those that are missing",
+    };
+    let other = || syn::Error::new(model.name.span(), words.conclusion);
+    index::matching(model, &pattern, &words).err().unwrap_or_else(other)
+}
+
+/// The name of a variable `(ẋ, x, z, u, p, t)`.
+fn variable(names: &Variables, index: u32) -> String {
+    let Variables { x, z, u, p } = names;
+    let mut index = index as usize;
+    if let Some(name) = x.get(index) {
+        return format!("the derivative of `{name}`");
+    }
+    index -= x.len();
+    for block in [x, z, u, p] {
+        if let Some(name) = block.get(index) {
+            return format!("`{name}`");
+        }
+        index -= block.len();
+    }
+    "`t`".into()
+}
+
+/// The function of the invariants.
+fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
+    let mut spans = Vec::new();
+    let mut outputs: Vec<Node> = Vec::new();
+    for constraint in constraints {
+        for level in &constraint.levels[..constraint.times()] {
+            outputs.push(*level);
+            spans.extend(model.spans.get(constraint.equation));
+        }
+    }
+    let name = &model.name;
+    let text = format!(
+        " Constraints of [`{name}`] and their derivatives, as its equations have them: invariants, zero on every \
+         solution."
+    );
+    Model {
+        name: format_ident!("{name}Invariants"),
+        visibility: model.visibility.clone(),
+        documentation: vec![syn::parse_quote!(#[doc = #text])],
+        instance: model.instance.clone(),
+        variables: model.variables.clone(),
+        samplings: Vec::new(),
+        reduction: None,
+        graph: model.graph.clone(),
+        residual: outputs,
+        spans,
+        opaque: model.opaque.clone(),
+        uses: model.uses.clone(),
+        krate: model.krate.clone(),
+    }
+}

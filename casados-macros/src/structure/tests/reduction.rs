@@ -1,0 +1,170 @@
+//! Models whose index is reduced: what is refused and why, and the aircraft on its tether against
+//! the form that was reduced by hand.
+
+use super::super::{Analysis, analyse};
+use crate::graph::Point;
+use crate::language::{self, Form};
+
+/// A model, or why there is none.
+fn read(attribute: &str, item: &str) -> Result<Analysis, String> {
+    let tokens = |text: &str| text.parse::<proc_macro2::TokenStream>().expect("these are tokens");
+    let source =
+        language::read(Form::Dae, tokens(attribute), tokens(item)).map_err(|error| error.to_string())?;
+    let model = source.models.into_iter().next().expect("there is a model");
+    analyse(model).map_err(|error| error.to_string())
+}
+
+fn reduced(item: &str) -> Result<Analysis, String> {
+    read("index_reduction", item)
+}
+
+fn refusal(item: &str) -> String {
+    reduced(item).err().expect("the model is refused")
+}
+
+#[test]
+fn what_has_index_one_stays() {
+    let analysis = reduced("fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - z, z + x] }");
+    assert!(analysis.is_ok_and(|analysis| analysis.reduction.is_none()));
+}
+
+#[test]
+fn without_the_argument_the_error_names_it() {
+    let item = "fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - z, x - 1.0] }";
+    let error = read("", item).err().expect("it has index two");
+    assert!(error.contains("or let the macro do so with `#[dae(index_reduction)]`"), "{error}");
+    let analysis = reduced(item).expect("its index can be reduced");
+    assert_eq!(analysis.reduction.map(|reduction| reduction.differentiated), Some(vec![(1, 1)]));
+}
+
+#[test]
+fn a_control_that_would_jump() {
+    let error = refusal("fn f(xdot: f64, x: f64, u: f64, z: f64) -> [f64; 2] { [xdot - z, x - u] }");
+    assert!(
+        error.starts_with("equation 1 has to be differentiated and contains `u`")
+            && error.contains("make it a state, with its rate as the control"),
+        "{error}"
+    );
+    // In the highest derivative it may be.
+    let velocity = reduced(
+        "fn f(xdot: [f64; 2], x: [f64; 2], u: f64, z: f64) -> [f64; 3] {
+            [xdot[0] - x[1] - u, xdot[1] - z, x[0] * x[0] + x[1] - 1.0]
+        }",
+    );
+    assert!(velocity.is_ok());
+}
+
+#[test]
+fn constraints_that_repeat_each_other() {
+    // Different texts of the same constraint: no structure shows that.
+    let error = refusal(
+        "fn f(xdot: [f64; 4], x: [f64; 4], z: [f64; 2]) -> [f64; 6] {
+            [xdot[0] - x[2], xdot[1] - x[3], xdot[2] + z[0] * x[0] + z[1] * x[0], xdot[3] + z[0] * x[1] + z[1] * x[1],
+             x[0] * x[0] + x[1] * x[1] - 1.0, (x[0] + x[1]) * (x[0] + x[1]) - 2.0 * x[0] * x[1] - 1.0]
+        }",
+    );
+    assert!(
+        error.contains("equations 4, 5 are dependent at every sample point, and leave `z[0]`, `z[1]` open"),
+        "{error}"
+    );
+}
+
+#[test]
+fn equations_that_determine_nothing() {
+    let error = refusal("fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - x, x - 1.0] }");
+    assert!(error.contains("`z` is determined by no equation"), "{error}");
+    assert!(error.contains("no derivatives of these equations determine all states"), "{error}");
+}
+
+#[test]
+fn derivatives_that_are_not_explicit() {
+    // `q̇` from an equation that is not linear in it.
+    let error = refusal(
+        "fn f(xdot: [f64; 2], x: [f64; 2], z: f64) -> [f64; 3] {
+            [xdot[0] + xdot[0] * xdot[0] * xdot[0] - x[1], xdot[1] - z, x[0] - 1.0]
+        }",
+    );
+    assert!(
+        error.contains("the derivative of `x[0]` would have to be differentiated once")
+            && error.contains("no equation gives it explicitly"),
+        "{error}"
+    );
+}
+
+#[test]
+fn rates_have_to_fit() {
+    let item = "fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - z, x - 1.0] }";
+    let refused = |attribute: &str| read(attribute, item).err().expect("the rates are refused");
+    assert!(refused("index_reduction(baumgarte = [1.0, 2.0])").contains("once, but there are 2 rates"));
+    assert!(refused("index_reduction(baumgarte = 0.0)").contains("does not let errors decay"));
+    assert!(refused("index_reduction(baumgarte = [])").contains("`baumgarte = 2.0` for one rate"));
+    assert!(refused("index_reduction(other = 1.0)").contains("`index_reduction` takes"));
+    assert!(refused("index_reduction, index_reduction").contains("given twice"));
+    let analysis = read("index_reduction(baumgarte = 2)", item).expect("one rate for all");
+    assert_eq!(analysis.reduction.map(|reduction| reduction.rates), Some(vec![2.0]));
+}
+
+/// Two constraints `sin a = sin b`, `cos a + cos b = c`: at `a = b = 0` their rows vanish, elsewhere
+/// they do not.
+#[test]
+fn rank_that_is_lost_at_some_points() {
+    let item = "fn f(xdot: [f64; 4], x: [f64; 4], z: [f64; 2], p: f64) -> [f64; 6] {
+        let (sa, ca, sb, cb) = (x[0].sin(), x[0].cos(), x[1].sin(), x[1].cos());
+        [xdot[0] - x[2], xdot[1] - x[3], xdot[2] + z[0] * ca - z[1] * sa, xdot[3] - z[0] * cb - z[1] * sb,
+         sa - sb, ca + cb - p]
+    }";
+    let singular = |attribute: &str| {
+        let reduction = read(attribute, item).expect("it is regular elsewhere").reduction;
+        reduction.expect("it is reduced").singular
+    };
+    let [anywhere, points] = singular("index_reduction");
+    assert!(anywhere < points && points >= 12);
+    assert_eq!(singular("index_reduction, nominal(x = 0.0)")[0], singular("index_reduction")[0].max(1));
+}
+
+/// The aircraft with its tether as the constraint `c = 0`: after the reduction its equations are
+/// those of the form by hand, in value and in work.
+#[test]
+fn the_aircraft_from_its_constraint() {
+    let text = include_str!("../../../../examples/models/awe.rs");
+    let begin = text.find("pub mod awe {").expect("the model is a module");
+    let end = text.find("\nimpl From").expect("conversions follow it");
+    let by_hand = &text[begin..end];
+    let constraint =
+        "tether: (ddc + 2.0 * TETHER_DAMPING * dc + TETHER_DAMPING * TETHER_DAMPING * c) / CONSTRAINT";
+    assert!(by_hand.contains(constraint));
+    let lagrange = by_hand.replace(constraint, "tether: c / CONSTRAINT");
+    let reduced = read("index_reduction(baumgarte = 0.1)", &lagrange).expect("its index can be reduced");
+    let by_hand = read("", by_hand).expect("it has index one");
+    let reduction = reduced.reduction.as_ref().expect("it was reduced");
+    assert_eq!(reduction.differentiated, [(22, 2)]);
+
+    let entries = |analysis: &Analysis| -> Vec<(u32, u32)> {
+        analysis.derivatives.jacobian.iter().map(|entry| (entry.0, entry.1)).collect()
+    };
+    assert_eq!(entries(&reduced), entries(&by_hand));
+    let values = |analysis: &Analysis, point: &[f64]| {
+        let jacobian = analysis.derivatives.jacobian.iter().map(|entry| entry.2);
+        let nodes: Vec<_> = analysis.model.residual.iter().copied().chain(jacobian).collect();
+        analysis.model.graph.evaluate(&nodes, Point { variables: point, opaque: &[], seeds: &[] })
+    };
+    for draw in 0..20 {
+        let wave = |index: usize| (1.7 * (draw * 52 + index) as f64).sin();
+        let mut point: Vec<f64> = (0..52).map(wave).collect();
+        // A position of some hundred metres and a velocity of some ten metres a second.
+        (23..26).for_each(|index| point[index] = 200.0 + 100.0 * point[index]);
+        (26..29).for_each(|index| point[index] *= 30.0);
+        for (a, b) in values(&reduced, &point).into_iter().zip(values(&by_hand, &point)) {
+            // The terms of the constraint are up to 3e5 over a scale of 1.1e6, those of its
+            // derivatives less; a handful of roundings.
+            assert!((a - b).abs() <= 16.0 * f64::EPSILON * (1.0 + a.abs()), "{a} {b}");
+        }
+    }
+    let work = |analysis: &Analysis| {
+        let operations = analysis.derivatives.operations;
+        [operations.residual, operations.residual_jacobian, operations.adjoint, operations.hessian]
+    };
+    for (reduced, by_hand) in work(&reduced).into_iter().zip(work(&by_hand)) {
+        assert!(f64::from(reduced) <= 1.05 * f64::from(by_hand), "{reduced} operations, {by_hand} by hand");
+    }
+}

@@ -1,0 +1,7 @@
+//! Models with constraints, whose index the macro reduces.
+
+mod car_axis;
+mod circuit;
+mod consistent;
+mod mechanisms;
+mod pendulum;
