@@ -3,5 +3,6 @@
 mod car_axis;
 mod circuit;
 mod consistent;
+mod double_pendulum;
 mod mechanisms;
 mod pendulum;

@@ -168,3 +168,54 @@ fn the_aircraft_from_its_constraint() {
         assert!(f64::from(reduced) <= 1.05 * f64::from(by_hand), "{reduced} operations, {by_hand} by hand");
     }
 }
+
+/// Andrews' squeezer with its six loops as constraints: where the derivatives of the velocities are
+/// the accelerations, its equations are those that were differentiated by hand.
+#[test]
+fn the_squeezer_from_its_constraints() {
+    let text = include_str!("../../../../examples/models/ivp/mechanics.rs");
+    let begin = text.find("pub fn squeezer").expect("the model is a function");
+    let by_hand = &text[begin..];
+    let mut lagrange = by_hand.to_string();
+    let loops = [
+        ("moved_x - SS * cg * ag + SS * sg * vg * vg,", "RR * cb - D * cbt - SS * sg - XB,"),
+        ("moved_y - SS * sg * ag - SS * cg * vg * vg,", "RR * sb - D * sbt + SS * cg - YB,"),
+        (
+            "moved_x - E * cpd * (ap + ad) + E * spd * vpd * vpd + ZT * sd * ad + ZT * cd * vd * vd,",
+            "RR * cb - D * cbt - E * spd - ZT * cd + 0.06934,",
+        ),
+        (
+            "moved_y - E * spd * (ap + ad) - E * cpd * vpd * vpd - ZT * cd * ad + ZT * sd * vd * vd,",
+            "RR * sb - D * sbt + E * cpd - ZT * sd + 0.00227,",
+        ),
+        (
+            "moved_x + ZF * soe * (ao + ae) + ZF * coe * voe * voe - U * ce * ae + U * se * ve * ve,",
+            "RR * cb - D * cbt - ZF * coe - U * se + 0.06934,",
+        ),
+        (
+            "moved_y - ZF * coe * (ao + ae) + ZF * soe * voe * voe - U * se * ae - U * ce * ve * ve,",
+            "RR * sb - D * sbt - ZF * soe + U * ce + 0.00227,",
+        ),
+    ];
+    for (differentiated, constraint) in loops {
+        assert!(lagrange.contains(differentiated));
+        lagrange = lagrange.replace(differentiated, constraint);
+    }
+    let reduced = reduced(&lagrange).expect("its index can be reduced");
+    let by_hand = read("", by_hand).expect("it has index one");
+    let reduction = reduced.reduction.as_ref().expect("it was reduced");
+    assert_eq!(reduction.differentiated, [(21, 2), (22, 2), (23, 2), (24, 2), (25, 2), (26, 2)]);
+    let values = |analysis: &Analysis, point: &[f64]| {
+        let point = Point { variables: point, opaque: &[], seeds: &[] };
+        analysis.model.graph.evaluate(&analysis.model.residual, point)
+    };
+    for draw in 0..20 {
+        // (ẋ, x, z, t), where the derivatives of the rates are the accelerations.
+        let mut point: Vec<f64> = (0..42).map(|index| (1.7 * (draw * 42 + index) as f64).sin()).collect();
+        (0..7).for_each(|body| point[7 + body] = point[28 + body]);
+        for (row, (a, b)) in values(&reduced, &point).into_iter().zip(values(&by_hand, &point)).enumerate() {
+            // Lengths are below 0.1, angles, rates and accelerations below two.
+            assert!((a - b).abs() <= 16.0 * f64::EPSILON * (0.1 + a.abs()), "{row}: {a} {b}");
+        }
+    }
+}
