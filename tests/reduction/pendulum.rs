@@ -34,8 +34,8 @@ fn after(x0: Vector4<f64>, time: f64) -> (Vector4<f64>, f64) {
     (end.x, end.dx_dx0.abs().column_sum().amax())
 }
 
-/// `4 √(l/g) K(sin(θ/2)) = 2π √(l/g) / agm(1, cos(θ/2))`, from horizontal and from the bottom, where
-/// one coordinate of the constraint's derivative vanishes.
+/// `4 √(l/g) K(sin(θ/2)) = 2π √(l/g) / agm(1, cos(θ/2))`, from horizontal and from the bottom,
+/// where one coordinate of the constraint's derivative vanishes.
 #[test]
 fn swings_have_the_period_of_the_elliptic_integral() {
     for angle in [PI / 2.0, 0.3, 2.5] {

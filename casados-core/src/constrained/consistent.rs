@@ -4,8 +4,8 @@
 //! min ½ |x − x̂|²    with  y(x, p, t) = 0,  x_j = x̂_j of those that are held
 //! ```
 //!
-//! by Gauss and Newton: with `G = ∂y/∂x` in the columns that are free, `x ← x̂ + G⁺ (G (x − x̂) − y)`.
-//! `G = L Q` by Gram and Schmidt, twice, shows which invariant depends on those before it.
+//! by Gauss and Newton: with `G = ∂y/∂x` in the columns that are free,
+//! `x ← x̂ + G⁺ (G (x − x̂) − y)`. `G = L Q` by Gram and Schmidt, twice, shows which invariant depends on those before it.
 
 use super::{Constrained, Inconsistent};
 use crate::error::Argument;

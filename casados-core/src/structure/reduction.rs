@@ -7,7 +7,8 @@ use core::fmt::{self, Display, Formatter};
 ///
 /// Equation `i` stood for the constraint `g(x, p, t) = 0`. Differentiated `c` times it determines
 /// derivatives or algebraic states; `g` and its derivatives below `c` are invariants: the outputs
-/// of [`Constrained::Invariants`](crate::Constrained::Invariants), in the order of `differentiated`.
+/// of [`Constrained::Invariants`](crate::Constrained::Invariants), in the order of
+/// `differentiated`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reduction {
     /// The equations, and how often each was differentiated.

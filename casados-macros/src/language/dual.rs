@@ -88,6 +88,10 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
     }
     require_feature(&function, cfg!(feature = "num-dual"))?;
     let arguments = Arguments::read(attribute)?;
+    if let Some(reduction) = &arguments.reduction {
+        let message = "a dual model has no graph that could be differentiated in time: write it with `f64`";
+        return Err(Error::new(reduction.span, message));
+    }
     let mut consts = function.sig.generics.clone();
     consts.params =
         consts.params.into_iter().filter(|parameter| !matches!(parameter, GenericParam::Type(_))).collect();

@@ -1,5 +1,5 @@
-//! `index_reduction` in the brackets of `#[dae(...)]`: that equations may be differentiated in time,
-//! and how what they say is held.
+//! `index_reduction` in the brackets of `#[dae(...)]`: that equations may be differentiated in
+//! time, and how what they say is held.
 //!
 //! - `index_reduction`: the constraints' highest derivatives take their place;
 //! - `index_reduction(baumgarte = 2.0)`, `index_reduction(baumgarte = [2.0, 1.0])`: what the

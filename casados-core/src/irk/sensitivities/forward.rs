@@ -53,7 +53,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.keep_forward().map(|_| ())
     }
 
-    /// As [`Integrator::forward`], with an integrand, and with derivatives refined where digits were lost.
+    /// As [`Integrator::forward`], with an integrand, and with derivatives refined where digits
+    /// were lost.
     #[cfg(feature = "alloc")]
     pub(crate) fn forward_refined(
         &mut self,

@@ -3,8 +3,8 @@
 //! [`signature`] says how often each equation is differentiated. Equations that give a derivative
 //! explicitly, as `q̇ = v`, are [`rules`]: their derivatives are not needed, since `d/dt` of what
 //! depends on `q` has `v` in the place of `q̇`. What is left are constraints `g(x, p, t) = 0`. The
-//! highest derivative of each takes its place ([`constraints`]), all states stay, and the lower ones
-//! are the invariants. [`rank`] holds the result against sample points.
+//! highest derivative of each takes its place ([`constraints`]), all states stay, and the lower
+//! ones are the invariants. [`rank`] holds the result against sample points.
 //!
 //! With rates `r_m` of Baumgarte's stabilisation the place of a constraint is taken by
 //! `Π_m (d/dt + r_m) g` (J. Baumgarte, Stabilization of constraints and integrals of motion in

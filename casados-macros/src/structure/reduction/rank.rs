@@ -72,10 +72,10 @@ fn null_vector(mut a: Vec<Vec<f64>>, wanted: bool) -> Option<Vec<f64>> {
     let mut rank = count;
     for step in 0..count {
         let mut best = (0.0, step, step);
-        for row in step..count {
-            for column in step..count {
-                if a[row][column].abs() > best.0 {
-                    best = (a[row][column].abs(), row, column);
+        for (row, values) in a.iter().enumerate().skip(step) {
+            for (column, value) in values.iter().enumerate().skip(step) {
+                if value.abs() > best.0 {
+                    best = (value.abs(), row, column);
                 }
             }
         }

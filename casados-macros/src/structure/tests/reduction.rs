@@ -104,8 +104,8 @@ fn rates_have_to_fit() {
     assert_eq!(analysis.reduction.map(|reduction| reduction.rates), Some(vec![2.0]));
 }
 
-/// Two constraints `sin a = sin b`, `cos a + cos b = c`: at `a = b = 0` their rows vanish, elsewhere
-/// they do not.
+/// Two constraints `sin a = sin b`, `cos a + cos b = c`: at `a = b = 0` their rows vanish,
+/// elsewhere they do not.
 #[test]
 fn rank_that_is_lost_at_some_points() {
     let item = "fn f(xdot: [f64; 4], x: [f64; 4], z: [f64; 2], p: f64) -> [f64; 6] {
