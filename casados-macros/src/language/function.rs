@@ -130,8 +130,8 @@ impl Evaluator {
         Ok(())
     }
 
-    /// The value of one argument, as the function has it; `scope` is that of its generic parameters,
-    /// if there are any.
+    /// The value of one argument, as the function has it; `scope` is that of its generic
+    /// parameters, if there are any.
     fn argument(
         &mut self,
         input: &syn::FnArg,
