@@ -1,5 +1,5 @@
-//! `(1 / 2) as f64`, which is zero: a warning where two integer literals are divided, a remainder is
-//! lost, and a real number is made of what is left.
+//! `(1 / 2) as f64`, which is zero: a warning where two integer literals are divided, a remainder
+//! is lost, and a real number is made of what is left.
 
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::quote;
