@@ -21,8 +21,9 @@ const STACK: usize = 1 << 29;
 /// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
 ///
 /// What a model may contain is in `docs/language.md`. In `f64` the residual has the bits of the
-/// function, but structural zeros are zeros: `0.0 * y` is dropped, whatever `y` is when it runs.
-/// Conditions of the compiler (`#[cfg]`) are refused inside of a model.
+/// function, but structural zeros are zeros: `0.0 * y`, `0.0 / y` and `y - y` are dropped, whatever
+/// `y` is when it runs, NaN too. Conditions of the compiler (`#[cfg]`) are refused inside of a
+/// model.
 ///
 /// `#[dae(nominal(x = [900.0, 2e6], z = 0.1), range(z = 1e-3..=10.0))]` says where it lives.
 /// Algebraic states start Newton's method at their nominal values where a call gives no others
@@ -40,6 +41,9 @@ pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
 }
 
 /// An explicit model `ẋ = g(x, u, p, t)`.
+///
+/// What holds for [`macro@dae`] holds here: what a model may contain is in `docs/language.md`,
+/// structural zeros are zeros, and conditions of the compiler are refused.
 #[proc_macro_attribute]
 pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Ode, attribute.into(), item.into()).into()
@@ -47,6 +51,9 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
 
 /// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event, a cost, a
 /// constraint.
+///
+/// It is written in the language of [`macro@dae`]: structural zeros are zeros, and conditions of
+/// the compiler are refused.
 #[proc_macro_attribute]
 pub fn function(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Function, attribute.into(), item.into()).into()
@@ -82,20 +89,27 @@ fn expand_within(
         Err(error) => return emit::with_errors(attribute, item, &error),
     }
     let expansion = language::read(form, attribute.clone(), item.clone()).and_then(|source| {
-        if form == language::Form::Function {
-            let functions: Vec<_> = source.models.into_iter().map(structure::analyse_function).collect();
-            return emit::expand_functions(source.item, source.place, &functions);
-        }
-        let mut models = Vec::new();
-        let mut mistakes = language::mistakes::Mistakes::default();
-        for model in source.models {
-            match structure::analyse(model) {
-                Ok(model) => models.push(model),
-                Err(error) => mistakes.note(error),
-            }
-        }
-        mistakes.none()?;
-        emit::expand(source.item, source.place, &models)
+        let warnings = source.warnings.clone();
+        let mut expansion = expand_source(form, source)?;
+        expansion.extend(warnings);
+        Ok(expansion)
     });
     expansion.unwrap_or_else(|error| emit::with_errors(attribute, item, &error))
+}
+
+fn expand_source(form: language::Form, source: language::Source) -> syn::Result<proc_macro2::TokenStream> {
+    if form == language::Form::Function {
+        let functions: Vec<_> = source.models.into_iter().map(structure::analyse_function).collect();
+        return emit::expand_functions(source.item, source.place, &functions);
+    }
+    let mut models = Vec::new();
+    let mut mistakes = language::mistakes::Mistakes::default();
+    for model in source.models {
+        match structure::analyse(model) {
+            Ok(model) => models.push(model),
+            Err(error) => mistakes.note(error),
+        }
+    }
+    mistakes.none()?;
+    emit::expand(source.item, source.place, &models)
 }

@@ -1,7 +1,7 @@
 //! Elementary functions and constants.
 
 use crate::{emitted, part, point, same_bits};
-use casados::{Dae, dae};
+use casados::{Dae, dae, ode};
 
 #[dae]
 fn unary(xdot: [f64; 27], x: [f64; 27]) -> [f64; 27] {
@@ -105,4 +105,24 @@ fn fused_multiplication() {
         assert!((plain - found).abs() <= 3.0 * 8.0 * f64::EPSILON / 2.0, "{plain} {found}");
     }
     assert_eq!(Fused::STRUCTURE.u, ["u[0]", "u[1]"]);
+}
+
+/// Terms that are zero whatever else is a number.
+#[ode]
+fn structural_zeros(x: [f64; 2]) -> [f64; 2] {
+    [0.0 * x[0].ln() + x[1], 1e-300 * x[0].ln() + (x[1].ln() - x[1].ln()) + 0.0 / x[1].ln()]
+}
+
+/// They are left out, NaN or not; what has any other factor keeps its NaN.
+#[test]
+fn structural_zeros_are_zeros() {
+    let x = [-0.3, -0.7];
+    let [first, second] = structural_zeros(x);
+    assert!(first.is_nan() && second.is_nan());
+    // v = (ẋ, x, t)
+    let found = crate::emitted::<StructuralZeros>(&[0.0, 0.0, x[0], x[1], 0.0]);
+    assert_eq!(found[0], 0.7);
+    assert!(found[1].is_nan());
+    // Of ẋ₀ and x₁, of ẋ₁ and x₀.
+    assert_eq!(StructuralZeros::STRUCTURE.jacobian.rows.len(), 4);
 }

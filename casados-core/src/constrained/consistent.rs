@@ -5,8 +5,8 @@
 //! ```
 //!
 //! by Gauss and Newton: with `G = ∂y/∂x` in the columns that are free,
-//! `x ← x̂ + G⁺ (G (x − x̂) − y)`. `G = L Q` by Gram and Schmidt, twice, shows which invariant depends
-//! on those before it.
+//! `x ← x̂ + G⁺ (G (x − x̂) − y)`. `G = L Q` by Gram and Schmidt, twice, shows which invariant
+//! depends on those before it.
 
 use super::{Constrained, Inconsistent};
 use crate::error::Argument;

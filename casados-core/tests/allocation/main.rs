@@ -4,6 +4,7 @@
 #[path = "../models/mod.rs"]
 mod models;
 
+mod adaptive;
 mod irk;
 mod qp;
 

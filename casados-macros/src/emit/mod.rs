@@ -14,6 +14,7 @@ mod schedule;
 mod structure;
 #[cfg(test)]
 mod tests;
+mod text;
 mod together;
 
 use crate::language::{self, Instance, Model, Place};

@@ -3,10 +3,11 @@
 use super::chunk::{self, Chunk, Plan};
 use super::divisor;
 use super::schedule::{self, Step, Values};
+use super::text::{binary, number, unary};
 use super::together::{self, Function};
 use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
 use crate::language::Variables;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
 /// The most statements of one function. The pieces of a longer routine are not inlined: a compiler
@@ -38,19 +39,34 @@ impl Routine<'_> {
         for (name, node) in (0..).zip(steps.iter().copied().flat_map(chunk::computed)) {
             names[node.0 as usize] = name;
         }
-        let writer = Writer { routine: self, graph, variables, opaque, outputs: &outputs, names: &names };
+        let mut uses = vec![0u32; graph.len()];
+        for node in steps.iter().flat_map(|&step| chunk::read(graph, &outputs, step)) {
+            uses[node.at()] += 1;
+        }
+        let writer = Writer {
+            routine: self,
+            graph,
+            variables,
+            opaque,
+            outputs: &outputs,
+            names: &names,
+            uses: &uses,
+            in_place: HashMap::new(),
+        };
 
         let mut text = String::new();
         let count = if operations == 1 { "operation" } else { "operations" };
         let _ = writeln!(text, "/// {} {operations} {count}.", self.documentation);
         writer.driver(&mut text, &plan);
         for (number, piece) in plan.chunks.iter().enumerate() {
-            writer.piece(&mut text, number, &steps, piece, plan.slots);
+            let in_place = writer.read_in_place(&steps[piece.steps.clone()], piece);
+            Writer { in_place, ..writer.clone() }.piece(&mut text, number, &steps, piece, plan.slots);
         }
         text
     }
 }
 
+#[derive(Clone)]
 struct Writer<'a> {
     routine: &'a Routine<'a>,
     graph: &'a Graph,
@@ -59,6 +75,10 @@ struct Writer<'a> {
     outputs: &'a [Node],
     /// Number of the local variable of each node.
     names: &'a [u32],
+    /// How often each node is read.
+    uses: &'a [u32],
+    /// Values of earlier pieces that this one reads once, out of their slots.
+    in_place: HashMap<Node, usize>,
 }
 
 impl Writer<'_> {
@@ -111,11 +131,38 @@ impl Writer<'_> {
         let steps = &steps[piece.steps.clone()];
 
         self.loads(text, steps, piece);
-        for &step in steps {
+        let mut steps = steps.iter().copied().peekable();
+        while let Some(step) = steps.next() {
+            // A value that is stored and nothing else needs no name.
+            if let Step::Compute(node) = step
+                && let Some(Step::Store(output)) =
+                    steps.next_if(|next| self.uses[node.at()] == 1 && self.stores(*next, node))
+            {
+                self.store(text, output, &self.expression(node));
+                continue;
+            }
             self.step(text, step);
             self.spills(text, step, piece);
         }
         text.push_str("}\n}\n");
+    }
+
+    /// Whether a statement stores a node.
+    fn stores(&self, step: Step, node: Node) -> bool {
+        matches!(step, Step::Store(output) if self.outputs[output] == node)
+    }
+
+    /// Values of earlier pieces that are read once, in slots that the piece does not write to.
+    fn read_in_place(&self, steps: &[Step], piece: &Chunk) -> HashMap<Node, usize> {
+        let mut uses: HashMap<Node, usize> = HashMap::new();
+        for node in steps.iter().flat_map(|&step| chunk::read(self.graph, self.outputs, step)) {
+            *uses.entry(node).or_default() += 1;
+        }
+        let written: BTreeSet<usize> = piece.spills.values().copied().collect();
+        let once = |&(node, slot): &(Node, usize)| {
+            uses.get(&node) == Some(&1) && !written.contains(&slot) && !self.is_condition(node)
+        };
+        piece.loads.iter().copied().filter(once).collect()
     }
 
     /// What a piece reads: variables, seeds, and values of the pieces before it.
@@ -135,7 +182,7 @@ impl Writer<'_> {
         for row in seeds {
             let _ = writeln!(text, "let mu_{row} = S::load(&mu[{row}]);");
         }
-        for &(node, slot) in &piece.loads {
+        for &(node, slot) in piece.loads.iter().filter(|(node, _)| !self.in_place.contains_key(node)) {
             let name = self.names[node.0 as usize];
             if self.is_condition(node) {
                 let _ = writeln!(text, "let v{name} = S::eq(w[{slot}], S::from_f64(1.0));");
@@ -162,11 +209,13 @@ impl Writer<'_> {
                 );
             }
             Step::Together(values) => self.together(text, values),
-            Step::Store(output) => {
-                let (array, index, node) = &self.routine.stores[output];
-                let _ = writeln!(text, "S::store({}, &mut {array}[{index}]);", self.atom(*node));
-            }
+            Step::Store(output) => self.store(text, output, &self.atom(self.outputs[output])),
         }
+    }
+
+    fn store(&self, text: &mut String, output: usize, value: &str) {
+        let (array, index, _) = &self.routine.stores[output];
+        let _ = writeln!(text, "S::store({value}, &mut {array}[{index}]);");
     }
 
     /// The same function of several arguments.
@@ -227,6 +276,9 @@ impl Writer<'_> {
 
     /// A node where it is used: a local variable or a constant.
     fn atom(&self, node: Node) -> String {
+        if let Some(slot) = self.in_place.get(&node) {
+            return format!("w[{slot}]");
+        }
         match self.graph.op(node) {
             Op::Constant(bits) => format!("S::from_f64({})", number(f64::from_bits(bits))),
             Op::Opaque(index) => format!("S::from_f64(c[{index}])"),
@@ -280,86 +332,5 @@ impl Writer<'_> {
             Op::Not(a) => format!("S::not({})", atom(a)),
             Op::Constant(_) | Op::Variable(_) | Op::Opaque(_) | Op::Seed(_) => atom(node),
         }
-    }
-}
-
-/// A number such that reading it gives the same bits.
-pub fn number(value: f64) -> String {
-    if value.is_finite() {
-        format!("{value:?}")
-    } else if value.is_nan() {
-        format!("f64::from_bits({:#x})", value.to_bits())
-    } else if value > 0.0 {
-        String::from("f64::INFINITY")
-    } else {
-        String::from("f64::NEG_INFINITY")
-    }
-}
-
-fn binary(function: Binary) -> &'static str {
-    match function {
-        Binary::Add => "+",
-        Binary::Sub => "-",
-        Binary::Mul => "*",
-        Binary::Div => "/",
-        Binary::Powf => "powf",
-        Binary::Atan2 => "atan2",
-        Binary::Hypot => "hypot",
-    }
-}
-
-fn unary(function: Unary) -> &'static str {
-    match function {
-        Unary::Neg => "neg",
-        Unary::Sqrt => "sqrt",
-        Unary::Cbrt => "cbrt",
-        Unary::Exp => "exp",
-        Unary::Exp2 => "exp2",
-        Unary::ExpM1 => "exp_m1",
-        Unary::Ln => "ln",
-        Unary::Ln1p => "ln_1p",
-        Unary::Log2 => "log2",
-        Unary::Log10 => "log10",
-        Unary::Sin => "sin",
-        Unary::Cos => "cos",
-        Unary::Tan => "tan",
-        Unary::Asin => "asin",
-        Unary::Acos => "acos",
-        Unary::Atan => "atan",
-        Unary::Sinh => "sinh",
-        Unary::Cosh => "cosh",
-        Unary::Tanh => "tanh",
-        Unary::Asinh => "asinh",
-        Unary::Acosh => "acosh",
-        Unary::Atanh => "atanh",
-        Unary::Abs => "abs",
-        Unary::Signum => "signum",
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_keep_their_bits() {
-        let list =
-            [0.0, -0.0, 0.1, -1.0 / 3.0, 1e300, 5e-324, f64::MIN_POSITIVE, f64::MAX, 1e22, 123456789.0];
-        for value in list {
-            let text = number(value);
-            let expression: syn::Expr = syn::parse_str(&text).unwrap();
-            let (sign, literal) = match &expression {
-                syn::Expr::Unary(unary) => (-1.0, &*unary.expr),
-                other => (1.0, other),
-            };
-            let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Float(literal), .. }) = literal else {
-                panic!("`{text}` is no number of floating point");
-            };
-            let read: f64 = sign * literal.base10_parse::<f64>().unwrap();
-            assert_eq!(read.to_bits(), value.to_bits(), "{text}");
-        }
-        assert_eq!(number(f64::INFINITY), "f64::INFINITY");
-        assert_eq!(number(f64::NEG_INFINITY), "f64::NEG_INFINITY");
-        assert_eq!(number(f64::from_bits(0x7ff8_0000_0000_0001)), "f64::from_bits(0x7ff8000000000001)");
     }
 }

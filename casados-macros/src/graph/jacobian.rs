@@ -26,6 +26,7 @@ pub fn best(
         let Some((entries, products)) = derive(&mut copy, order, budget) else { continue };
         // No order is worth many times the work of another.
         budget = budget.min(products.saturating_mul(2).saturating_add(1000));
+        let entries = copy.with_signs_inside(entries, beside);
         let needed: Vec<Node> = beside.iter().copied().chain(entries.iter().map(|entry| entry.2)).collect();
         let operations = copy.operations(&needed);
         if best.as_ref().is_none_or(|best| operations < best.0) {

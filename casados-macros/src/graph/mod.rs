@@ -19,6 +19,7 @@ mod jacobian;
 mod print;
 mod reverse;
 mod rules;
+mod signs;
 mod simplify;
 mod sparsity;
 mod substitute;

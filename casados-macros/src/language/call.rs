@@ -163,6 +163,9 @@ impl Evaluator {
             }
         }
         let full = builtin.path.join("::");
+        if let Some(instead) = builtin.path.iter().rev().nth(1).and_then(|ty| instead_of(ty)) {
+            return Err(unsupported(at, format!("`{full}` ({instead})")).into());
+        }
         Err(error(
             at,
             format!(
@@ -273,4 +276,20 @@ fn argument_hint(builtin: &Builtin, expected: &Type) -> Type {
         (Some(name), Type::Option(inner)) if name == "Some" => (**inner).clone(),
         _ => Type::Unknown,
     }
+}
+
+/// What to write instead of a type of nalgebra that a graph model does not have.
+fn instead_of(ty: &str) -> Option<&'static str> {
+    Some(match ty {
+        "Quaternion" | "UnitQuaternion" | "UnitDualQuaternion" | "DualQuaternion" => {
+            "four numbers of the state and their products in a helper function are the same"
+        }
+        "Rotation2" | "Rotation3" | "Isometry2" | "Isometry3" | "Similarity2" | "Similarity3"
+        | "UnitComplex" => "a matrix of fixed size is the same",
+        "Complex" => "two numbers are the same",
+        "DVector" | "DMatrix" | "RowDVector" => {
+            "vectors and matrices have a fixed size: `SVector`, `SMatrix`"
+        }
+        _ => return None,
+    })
 }

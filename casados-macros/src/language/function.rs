@@ -48,30 +48,7 @@ impl Evaluator {
         if generic && let syn::ReturnType::Type(_, ty) = &item.sig.output {
             self.unify(ty, expected, &scope);
         }
-        // Arguments.
-        let mut values = Vec::with_capacity(arguments.len());
-        let mut given = match arguments {
-            Arguments::Values(values) => (values.into_iter().map(Some).collect::<Vec<_>>(), None),
-            Arguments::Written(receiver, expressions) => {
-                let mut values: Vec<_> = receiver.into_iter().map(Some).collect();
-                let skip = values.len();
-                values.resize_with(skip + expressions.len(), || None);
-                (values, Some((skip, expressions)))
-            }
-        };
-        for (index, input) in item.sig.inputs.iter().enumerate() {
-            let hint = match input {
-                syn::FnArg::Typed(input) => self.resolve(&input.ty, &scope)?,
-                syn::FnArg::Receiver(_) => Type::Unknown,
-            };
-            let value = match (given.0[index].take(), given.1) {
-                (Some(value), _) => value,
-                (None, Some((skip, expressions))) => self.expression(&expressions[index - skip], &hint)?,
-                (None, None) => Value::Uninitialised,
-            };
-            let scope = generic.then_some(&scope);
-            values.push(self.argument(input, value, &hint, (name, index), scope, at)?);
-        }
+        let values = self.arguments_of(item, arguments, &scope, generic, at)?;
         self.check_known(generics, &scope, name, at)?;
         if let (Some((implementation, _)), Some(around)) = (&function.owner, &block_scope) {
             self.check_known(&implementation.generics, around, name, at)?;
@@ -112,6 +89,42 @@ impl Evaluator {
         Ok(self.coerce(value, &returns, at)?)
     }
 
+    /// Values of the arguments of a call; where the function is generic, they tell its parameters.
+    fn arguments_of(
+        &mut self,
+        item: &syn::ItemFn,
+        arguments: Arguments,
+        scope: &Rc<Scope>,
+        generic: bool,
+        at: At,
+    ) -> Evaluated<Vec<Value>> {
+        let name = &item.sig.ident;
+        let mut values = Vec::with_capacity(arguments.len());
+        let mut given = match arguments {
+            Arguments::Values(values) => (values.into_iter().map(Some).collect::<Vec<_>>(), None),
+            Arguments::Written(receiver, expressions) => {
+                let mut values: Vec<_> = receiver.into_iter().map(Some).collect();
+                let skip = values.len();
+                values.resize_with(skip + expressions.len(), || None);
+                (values, Some((skip, expressions)))
+            }
+        };
+        for (index, input) in item.sig.inputs.iter().enumerate() {
+            let hint = match input {
+                syn::FnArg::Typed(input) => self.resolve(&input.ty, scope)?,
+                syn::FnArg::Receiver(_) => Type::Unknown,
+            };
+            let value = match (given.0[index].take(), given.1) {
+                (Some(value), _) => value,
+                (None, Some((skip, expressions))) => self.expression(&expressions[index - skip], &hint)?,
+                (None, None) => Value::Uninitialised,
+            };
+            let scope = generic.then_some(scope);
+            values.push(self.argument(input, value, &hint, (name, index), scope, at)?);
+        }
+        Ok(values)
+    }
+
     /// A graph of a function that calls itself would have no end.
     fn refuse_recursion(&self, item: &Rc<syn::ItemFn>, name: &syn::Ident, at: At) -> Evaluated<()> {
         let mut frame = self.calls.clone();
@@ -130,8 +143,8 @@ impl Evaluator {
         Ok(())
     }
 
-    /// The value of one argument, as the function has it; `scope` is that of its generic parameters,
-    /// if there are any.
+    /// The value of one argument, as the function has it; `scope` is that of its generic
+    /// parameters, if there are any.
     fn argument(
         &mut self,
         input: &syn::FnArg,

@@ -9,6 +9,7 @@ mod branch;
 mod call;
 mod closure;
 mod coercion;
+mod division;
 pub mod dual;
 mod environment;
 mod evaluator;
@@ -84,6 +85,8 @@ pub struct Source {
     pub place: Place,
     /// One model; several where the attribute lists values of const generics.
     pub models: Vec<Model>,
+    /// Items at which the compiler warns of what is right, but hardly meant.
+    pub warnings: TokenStream,
 }
 
 /// A model as a graph.
@@ -149,6 +152,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
     let written = item.clone();
     let mut parsed = syn::parse2(tokens::without_tests(item))?;
     hygiene::separate(&mut parsed);
+    let warnings = division::warnings(&parsed);
     match parsed {
         syn::Item::Fn(function) => {
             let template = Template {
@@ -161,7 +165,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
                 krate: arguments.krate.clone(),
             };
             let models = models(&arguments, &template)?;
-            Ok(Source { item: written, place: Place::Beside, models })
+            Ok(Source { item: written, place: Place::Beside, models, warnings })
         }
         syn::Item::Mod(mut module) => {
             let index = module::model_function(form, &mut module)?;
@@ -179,7 +183,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
                 krate: arguments.krate.clone(),
             };
             let models = models(&arguments, &template)?;
-            Ok(Source { item: tokens::without_marks(written), place: Place::Inside, models })
+            Ok(Source { item: tokens::without_marks(written), place: Place::Inside, models, warnings })
         }
         other => Err(syn::Error::new_spanned(
             other,

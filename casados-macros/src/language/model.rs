@@ -7,6 +7,7 @@ use super::flatten;
 use super::mistakes::Mistakes;
 use super::place::Place;
 use super::signature::{self, Argument, Role};
+use super::types::Type;
 use super::value::{Function, Generic, Integer, IntegerType, Value};
 use super::{Form, Instance, Model, Variables};
 use crate::graph::{Binary, Node};
@@ -91,35 +92,27 @@ impl Template<'_> {
         evaluator: &mut Evaluator,
         scope: &Rc<Scope>,
     ) -> Result<(Variables, Vec<Value>)> {
-        let mut types = Vec::new();
-        let mut names = Vec::new();
-        let mut mistakes = Mistakes::default();
-        for argument in arguments {
-            let ty = match evaluator.resolve(&argument.ty, scope) {
-                Ok(ty) => ty,
-                Err(error) => {
-                    mistakes.note(error);
-                    continue;
-                }
-            };
-            // A dry run: names first, since the position of a variable depends on all dimensions.
-            let mut list = Vec::new();
-            let instance = evaluator.instantiate(
-                &ty,
+        let (types, names) = types_and_names(arguments, evaluator, scope)?;
+        let variables = self.named(arguments, &names)?;
+        let mut values = Vec::new();
+        for (argument, ty) in arguments.iter().zip(&types) {
+            let mut next = offset(&variables, argument.role);
+            values.push(evaluator.instantiate(
+                ty,
                 argument.role.name().to_owned(),
-                &mut |evaluator, name| {
-                    list.push(name);
-                    Ok(evaluator.graph.variable(0))
+                &mut |evaluator, _| {
+                    let node = evaluator.graph.variable(next);
+                    next += 1;
+                    Ok(node)
                 },
                 &argument.ty,
-            );
-            if let Err(error) = instance {
-                mistakes.note(error);
-            }
-            types.push(ty);
-            names.push(list);
+            )?);
         }
-        mistakes.none()?;
+        Ok((variables, values))
+    }
+
+    /// The variables by their names in each argument.
+    fn named(&self, arguments: &[Argument], names: &[Vec<String>]) -> Result<Variables> {
         let names_of = |role: Role| {
             let position = arguments.iter().position(|argument| argument.role == role);
             position.map_or_else(Vec::new, |position| names[position].clone())
@@ -130,7 +123,7 @@ impl Template<'_> {
             u: names_of(Role::U),
             p: names_of(Role::P),
         };
-        for (argument, list) in arguments.iter().zip(&names) {
+        for (argument, list) in arguments.iter().zip(names) {
             let after = |names: &[String], prefix: &str| -> Vec<String> {
                 names.iter().map(|name| name[prefix.len()..].to_owned()).collect()
             };
@@ -160,21 +153,7 @@ impl Template<'_> {
                 "a model has at least one differential state: an argument `x`",
             ));
         }
-        let mut values = Vec::new();
-        for (argument, ty) in arguments.iter().zip(&types) {
-            let mut next = offset(&variables, argument.role);
-            values.push(evaluator.instantiate(
-                ty,
-                argument.role.name().to_owned(),
-                &mut |evaluator, _| {
-                    let node = evaluator.graph.variable(next);
-                    next += 1;
-                    Ok(node)
-                },
-                &argument.ty,
-            )?);
-        }
-        Ok((variables, values))
+        Ok(variables)
     }
 
     fn check_length(&self, residual: &[Node], variables: &Variables) -> Result<()> {
@@ -205,6 +184,44 @@ impl Template<'_> {
             syn::ReturnType::Default => Err(Error::new(self.function.sig.ident.span(), message)),
         }
     }
+}
+
+/// Types of arguments and names of their numbers: a dry run, since the position of a variable
+/// depends on all dimensions.
+fn types_and_names(
+    arguments: &[Argument],
+    evaluator: &mut Evaluator,
+    scope: &Rc<Scope>,
+) -> Result<(Vec<Type>, Vec<Vec<String>>)> {
+    let mut types = Vec::new();
+    let mut names = Vec::new();
+    let mut mistakes = Mistakes::default();
+    for argument in arguments {
+        let ty = match evaluator.resolve(&argument.ty, scope) {
+            Ok(ty) => ty,
+            Err(error) => {
+                mistakes.note(error);
+                continue;
+            }
+        };
+        let mut list = Vec::new();
+        let instance = evaluator.instantiate(
+            &ty,
+            argument.role.name().to_owned(),
+            &mut |evaluator, name| {
+                list.push(name);
+                Ok(evaluator.graph.variable(0))
+            },
+            &argument.ty,
+        );
+        if let Err(error) = instance {
+            mistakes.note(error);
+        }
+        types.push(ty);
+        names.push(list);
+    }
+    mistakes.none()?;
+    Ok((types, names))
 }
 
 /// So many numbers, in words.

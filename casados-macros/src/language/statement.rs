@@ -1,12 +1,12 @@
 //! Blocks, `let`, loops, and the macros that are understood.
 
-use super::evaluator::{Evaluated, Evaluator, Flow, Target, error, unsupported};
+use super::evaluator::{At, Evaluated, Evaluator, Flow, Target, error, unsupported};
 use super::methods::{Receiver, iterator};
 use super::pattern::{Subject, Truth};
 use super::types::Type;
 use super::value::Value;
 use quote::ToTokens;
-use syn::parse::Parser;
+use syn::parse::{ParseStream, Parser};
 use syn::punctuated::Punctuated;
 use syn::{Expr, Stmt, Token};
 
@@ -212,11 +212,7 @@ impl Evaluator {
                     return Err(error(call, "there is nothing to assert").into());
                 };
                 let value = self.expression(condition, &Type::Bool)?;
-                match self.truth(&value, condition)? {
-                    Truth::Known(true) => Ok(Value::unit()),
-                    Truth::Known(false) => Err(error(condition, failed(&arguments, 1)).into()),
-                    Truth::When(_) => Err(runtime_assertion(call).into()),
-                }
+                self.asserted(call, &value, condition, || failed(&arguments, 1))
             }
             "assert_eq" | "debug_assert_eq" | "assert_ne" | "debug_assert_ne" => {
                 let arguments = list.parse2(tokens)?;
@@ -231,14 +227,10 @@ impl Evaluator {
                     super::arithmetic::Comparison::Ne
                 };
                 let value = self.compare(comparison, &x, &y, call)?;
-                match self.truth(&value, call)? {
-                    Truth::Known(true) => Ok(Value::unit()),
-                    Truth::Known(false) => Err(error(call, failed(&arguments, 2)).into()),
-                    Truth::When(_) => Err(runtime_assertion(call).into()),
-                }
+                self.asserted(call, &value, call, || failed(&arguments, 2))
             }
             "matches" => {
-                let parts = |input: syn::parse::ParseStream| {
+                let parts = |input: ParseStream| {
                     let subject: Expr = input.parse()?;
                     input.parse::<Token![,]>()?;
                     let pattern: proc_macro2::TokenStream = input.parse()?;
@@ -261,41 +253,60 @@ impl Evaluator {
                 }
                 Ok(Value::matrix(elements.len(), 1, elements))
             }
-            "matrix" => {
-                let rows = |input: syn::parse::ParseStream| {
-                    let mut rows = vec![Vec::new()];
-                    while !input.is_empty() {
-                        let element: Expr = input.parse()?;
-                        if let Some(row) = rows.last_mut() {
-                            row.push(element);
-                        }
-                        if input.peek(Token![;]) {
-                            input.parse::<Token![;]>()?;
-                            if !input.is_empty() {
-                                rows.push(Vec::new());
-                            }
-                        } else if !input.is_empty() {
-                            input.parse::<Token![,]>()?;
-                        }
-                    }
-                    Ok(rows)
-                };
-                let rows: Vec<Vec<Expr>> = rows.parse2(tokens)?;
-                let columns = rows.first().map_or(0, Vec::len);
-                if rows.iter().any(|row| row.len() != columns) {
-                    return Err(error(call, "the rows of this matrix differ in length").into());
-                }
-                let mut elements = vec![Value::Uninitialised; rows.len() * columns];
-                for (r, row) in rows.iter().enumerate() {
-                    for (c, element) in row.iter().enumerate() {
-                        elements[r + c * rows.len()] = self.expression(element, &Type::Real)?;
-                    }
-                }
-                Ok(Value::matrix(rows.len(), columns, elements))
-            }
+            "matrix" => self.matrix_of_rows(call, &rows_of_matrix.parse2(tokens)?),
             _ => Err(unsupported(call, format!("the macro `{name}!`")).into()),
         }
     }
+
+    /// An assertion of what has to be known; `at` is where it is false.
+    fn asserted(
+        &mut self,
+        call: &syn::Macro,
+        value: &Value,
+        at: At,
+        message: impl FnOnce() -> String,
+    ) -> Evaluated {
+        match self.truth(value, at)? {
+            Truth::Known(true) => Ok(Value::unit()),
+            Truth::Known(false) => Err(error(at, message()).into()),
+            Truth::When(_) => Err(runtime_assertion(call).into()),
+        }
+    }
+
+    /// `matrix!`, row by row.
+    fn matrix_of_rows(&mut self, call: &syn::Macro, rows: &[Vec<Expr>]) -> Evaluated {
+        let columns = rows.first().map_or(0, Vec::len);
+        if rows.iter().any(|row| row.len() != columns) {
+            return Err(error(call, "the rows of this matrix differ in length").into());
+        }
+        let mut elements = vec![Value::Uninitialised; rows.len() * columns];
+        for (r, row) in rows.iter().enumerate() {
+            for (c, element) in row.iter().enumerate() {
+                elements[r + c * rows.len()] = self.expression(element, &Type::Real)?;
+            }
+        }
+        Ok(Value::matrix(rows.len(), columns, elements))
+    }
+}
+
+/// Elements between commas, rows between semicolons.
+fn rows_of_matrix(input: ParseStream) -> syn::Result<Vec<Vec<Expr>>> {
+    let mut rows = vec![Vec::new()];
+    while !input.is_empty() {
+        let element: Expr = input.parse()?;
+        if let Some(row) = rows.last_mut() {
+            row.push(element);
+        }
+        if input.peek(Token![;]) {
+            input.parse::<Token![;]>()?;
+            if !input.is_empty() {
+                rows.push(Vec::new());
+            }
+        } else if !input.is_empty() {
+            input.parse::<Token![,]>()?;
+        }
+    }
+    Ok(rows)
 }
 
 /// What the end of a block tells about a variable: `let mut r = zeros(); ...; r` has the type of

@@ -161,20 +161,30 @@ impl Evaluator {
                 _ => {}
             }
         }
-        let name = renamed.unwrap_or(name);
-        Ok(match name.as_str() {
+        self.resolve_known(path, last, &renamed.unwrap_or(name), &scope)
+    }
+
+    /// The type of a name that is not the user's own: of the language, or of nalgebra.
+    fn resolve_known(
+        &mut self,
+        path: &syn::Path,
+        last: &syn::PathSegment,
+        name: &str,
+        scope: &Rc<Scope>,
+    ) -> Result<Type> {
+        Ok(match name {
             "f64" => Type::Real,
-            "f32" => return Err(error(&path, "models are computed in `f64`: write `f64` instead of `f32`")),
+            "f32" => return Err(error(path, "models are computed in `f64`: write `f64` instead of `f32`")),
             "bool" => Type::Bool,
             "Option" => {
-                let arguments = self.generic_arguments(&last.arguments, &scope)?;
+                let arguments = self.generic_arguments(&last.arguments, scope)?;
                 match arguments.into_iter().next() {
                     Some(Generic::Type(inner)) => Type::Option(Rc::new(inner)),
                     _ => Type::Option(Rc::new(Type::Unknown)),
                 }
             }
             "SVector" | "SMatrix" | "RowSVector" | "Matrix" | "OMatrix" => {
-                let arguments = self.generic_arguments(&last.arguments, &scope)?;
+                let arguments = self.generic_arguments(&last.arguments, scope)?;
                 let lengths: Vec<_> = arguments
                     .iter()
                     .skip(1)
@@ -184,7 +194,7 @@ impl Evaluator {
                     })
                     .collect();
                 let length = |index: usize| lengths.get(index).copied().flatten();
-                match name.as_str() {
+                match name {
                     "SVector" => Type::Matrix(length(0), Some(1)),
                     "RowSVector" => Type::Matrix(Some(1), length(0)),
                     "SMatrix" => Type::Matrix(length(0), length(1)),
@@ -197,9 +207,9 @@ impl Evaluator {
                         last,
                         "a model has no `u128`, whose values exceed `i128`: write `f64` or `i128`",
                     ));
-                } else if let Some(ty) = IntegerType::named(&name) {
+                } else if let Some(ty) = IntegerType::named(name) {
                     Type::Integer(ty)
-                } else if let Some((rows, columns)) = matrix_alias(&name) {
+                } else if let Some((rows, columns)) = matrix_alias(name) {
                     Type::Matrix(Some(rows), Some(columns))
                 } else {
                     Type::Unknown

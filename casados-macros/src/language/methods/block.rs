@@ -102,25 +102,7 @@ pub(super) fn change(
             (0..rows.min(columns)).for_each(|i| new.elements[i + i * rows] = value.clone());
         }
         "set_column" | "set_row" => {
-            call.expect(2)?;
-            let index = evaluator.usize(&call.arguments[0], at)?;
-            let source = argument(evaluator, call, 1)?;
-            let by_column = call.name == "set_column";
-            let (limit, length) = if by_column { (columns, rows) } else { (rows, columns) };
-            if index >= limit || source.elements.len() != length {
-                return Err(error(
-                    at,
-                    format!(
-                        "`{}` of {index} with {} elements does not fit a matrix of {rows} rows and {columns} columns",
-                        call.name,
-                        source.elements.len()
-                    ),
-                ));
-            }
-            for (i, element) in source.elements.iter().enumerate() {
-                let position = if by_column { i + index * rows } else { index + i * rows };
-                new.elements[position] = element.clone();
-            }
+            set_line(evaluator, &mut new, call)?;
         }
         "set_diagonal" => {
             let source = argument(evaluator, call, 0)?;
@@ -154,6 +136,31 @@ pub(super) fn change(
     }
     option::update(evaluator, receiver, Value::Matrix(Rc::new(new)), call)?;
     Ok(Some(Value::unit()))
+}
+
+/// A column or a row of a matrix.
+fn set_line(evaluator: &mut Evaluator, new: &mut Matrix, call: &Call) -> Result<()> {
+    let (at, rows, columns) = (call.at, new.rows, new.columns);
+    call.expect(2)?;
+    let index = evaluator.usize(&call.arguments[0], at)?;
+    let source = argument(evaluator, call, 1)?;
+    let by_column = call.name == "set_column";
+    let (limit, length) = if by_column { (columns, rows) } else { (rows, columns) };
+    if index >= limit || source.elements.len() != length {
+        return Err(error(
+            at,
+            format!(
+                "`{}` of {index} with {} elements does not fit a matrix of {rows} rows and {columns} columns",
+                call.name,
+                source.elements.len()
+            ),
+        ));
+    }
+    for (i, element) in source.elements.iter().enumerate() {
+        let position = if by_column { i + index * rows } else { index + i * rows };
+        new.elements[position] = element.clone();
+    }
+    Ok(())
 }
 
 pub(super) fn column(matrix: &Matrix, column: usize) -> Matrix {

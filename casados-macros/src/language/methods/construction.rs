@@ -49,15 +49,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         Type::Matrix(rows, columns) => (own_rows.or(*rows), own_columns.or(*columns)),
         _ => (own_rows, own_columns),
     };
-    let size = || match (rows, columns) {
-        (Some(rows), Some(columns)) => Ok((rows, columns)),
-        _ => Err(error(
-            at,
-            format!(
-                "the size of this matrix is not known here: write `SMatrix::<f64, 2, 3>::{name}(..)` or name its type in a `let`"
-            ),
-        )),
-    };
+    let size = || known_size(name, (rows, columns), at);
     let constant = |evaluator: &mut Evaluator, value: f64| Value::Real(evaluator.graph.constant(value));
     Ok(Some(match name {
         "zeros" | "zero" => {
@@ -101,19 +93,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         | "from_vec"
         | "from_row_iterator"
         | "from_column_iterator"
-        | "from_iterator" => {
-            let elements = elements_of(evaluator, call, rows.zip(columns))?;
-            let (rows, columns) = match (rows, columns) {
-                (None, Some(1)) => (elements.len(), 1),
-                _ => size()?,
-            };
-            fits(elements.len(), rows, columns, at)?;
-            if name.starts_with("from_row") {
-                from_fn(rows, columns, |r, c| Ok(elements[r * columns + c].clone()))?
-            } else {
-                Value::matrix(rows, columns, elements)
-            }
-        }
+        | "from_iterator" => from_list(evaluator, name, call, (rows, columns))?,
         "from" => match evaluator.load(call.only()?.clone(), at)? {
             Value::Array(elements) => from_arrays(evaluator, &elements, rows, columns, at)?,
             other => other,
@@ -135,6 +115,39 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         }
         _ => return Ok(None),
     }))
+}
+
+/// The size of a matrix that has to be known.
+fn known_size(name: &str, size: (Option<usize>, Option<usize>), at: At) -> Result<(usize, usize)> {
+    match size {
+        (Some(rows), Some(columns)) => Ok((rows, columns)),
+        _ => Err(error(
+            at,
+            format!(
+                "the size of this matrix is not known here: write `SMatrix::<f64, 2, 3>::{name}(..)` or name its type in a `let`"
+            ),
+        )),
+    }
+}
+
+/// A matrix of a list of its elements.
+fn from_list(
+    evaluator: &mut Evaluator,
+    name: &str,
+    call: &Call,
+    (rows, columns): (Option<usize>, Option<usize>),
+) -> Result<Value> {
+    let elements = elements_of(evaluator, call, rows.zip(columns))?;
+    let (rows, columns) = match (rows, columns) {
+        (None, Some(1)) => (elements.len(), 1),
+        size => known_size(name, size, call.at)?,
+    };
+    fits(elements.len(), rows, columns, call.at)?;
+    if name.starts_with("from_row") {
+        from_fn(rows, columns, |r, c| Ok(elements[r * columns + c].clone()))
+    } else {
+        Ok(Value::matrix(rows, columns, elements))
+    }
 }
 
 fn reals(evaluator: &mut Evaluator, values: &[Value], at: At) -> Result<Vec<Value>> {

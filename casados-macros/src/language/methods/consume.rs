@@ -12,45 +12,7 @@ use syn::Result;
 pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Option<Value>> {
     let at = call.at;
     let value = match call.name {
-        "fold" => {
-            call.expect(2)?;
-            let mut accumulated = call.arguments[0].clone();
-            while let Some(value) = iter.next(evaluator, at)? {
-                accumulated = evaluator.call(&call.arguments[1], vec![accumulated, value], at)?;
-            }
-            accumulated
-        }
-        "rfold" => {
-            call.expect(2)?;
-            let mut accumulated = call.arguments[0].clone();
-            while let Some(value) = iter.next_back(evaluator, at)? {
-                accumulated = evaluator.call(&call.arguments[1], vec![accumulated, value], at)?;
-            }
-            accumulated
-        }
-        "reduce" => {
-            let closure = call.only()?;
-            let Some(mut accumulated) = iter.next(evaluator, at)? else {
-                return Ok(Some(Value::Option(None)));
-            };
-            while let Some(value) = iter.next(evaluator, at)? {
-                accumulated = evaluator.call(closure, vec![accumulated, value], at)?;
-            }
-            Value::some(accumulated)
-        }
-        // Sums begin with the first element: to add it to zero changes no bits but the sign of a
-        // zero.
-        "sum" | "product" => {
-            let operator = if call.name == "sum" { Operator::Add } else { Operator::Mul };
-            let Some(first) = iter.next(evaluator, at)? else {
-                return empty(evaluator, call).map(Some);
-            };
-            let mut accumulated = evaluator.load(first, at)?;
-            while let Some(value) = iter.next(evaluator, at)? {
-                accumulated = evaluator.binary(operator, &accumulated, &value, at)?;
-            }
-            accumulated
-        }
+        "fold" | "rfold" | "reduce" | "sum" | "product" => fold(evaluator, iter, call)?,
         "for_each" => {
             let closure = call.only()?;
             while let Some(value) = iter.next(evaluator, at)? {
@@ -104,6 +66,52 @@ pub fn consume(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result
         _ => return Ok(None),
     };
     Ok(Some(value))
+}
+
+/// One value out of all.
+fn fold(evaluator: &mut Evaluator, mut iter: Iter, call: &Call) -> Result<Value> {
+    let at = call.at;
+    Ok(match call.name {
+        "fold" => {
+            call.expect(2)?;
+            let mut accumulated = call.arguments[0].clone();
+            while let Some(value) = iter.next(evaluator, at)? {
+                accumulated = evaluator.call(&call.arguments[1], vec![accumulated, value], at)?;
+            }
+            accumulated
+        }
+        "rfold" => {
+            call.expect(2)?;
+            let mut accumulated = call.arguments[0].clone();
+            while let Some(value) = iter.next_back(evaluator, at)? {
+                accumulated = evaluator.call(&call.arguments[1], vec![accumulated, value], at)?;
+            }
+            accumulated
+        }
+        "reduce" => {
+            let closure = call.only()?;
+            let Some(mut accumulated) = iter.next(evaluator, at)? else {
+                return Ok(Value::Option(None));
+            };
+            while let Some(value) = iter.next(evaluator, at)? {
+                accumulated = evaluator.call(closure, vec![accumulated, value], at)?;
+            }
+            Value::some(accumulated)
+        }
+        // Sums begin with the first element: to add it to zero changes no bits but the sign of a
+        // zero.
+        _ => {
+            let operator = if call.name == "sum" { Operator::Add } else { Operator::Mul };
+            let Some(first) = iter.next(evaluator, at)? else {
+                return empty(evaluator, call);
+            };
+            let mut accumulated = evaluator.load(first, at)?;
+            while let Some(value) = iter.next(evaluator, at)? {
+                accumulated = evaluator.binary(operator, &accumulated, &value, at)?;
+            }
+            accumulated
+        }
+    })
 }
 
 /// The sum or product of nothing.

@@ -30,6 +30,14 @@ fn refusals() {
     refused("x[x[0] as usize]", "has no derivative");
     refused("unknown(x[0])", "does not see the function `unknown`");
     refused("crate::params::mass(x[0])", "does not see the function `crate::params::mass`");
+    refused("nalgebra::Quaternion::new(x[0], x[1], x[2], x[3]).norm()", "four numbers of the state");
+    refused("use nalgebra::DVector; DVector::zeros(3).norm() + x[0]", "`SVector`, `SMatrix`");
+    refused("x[0] * 1_u128 as f64", "a model has no `u128`");
+    refused(
+        "let n: u128 = 340282366920938463463374607431768211455; x[0] * n as f64",
+        "a model has no `u128`",
+    );
+    refused("x[0] * 340282366920938463463374607431768211455 as f64", "does not fit into an `i128`");
     refused("x[N]", "needed as an integer");
     refused("let mut s = 0.0; for i in 0..crate::N { s += x[i]; } s", "needed as an integer");
     refused("assert!(x[0] > 0.0); x[0]", "not known at compile time");

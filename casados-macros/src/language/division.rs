@@ -1,0 +1,91 @@
+//! `(1 / 2) as f64`, which is zero: a warning where two integer literals are divided, a remainder
+//! is lost, and a real number is made of what is left.
+
+use proc_macro2::{Ident, Literal, Span, TokenStream};
+use quote::quote;
+use syn::Expr;
+use syn::visit::{self, Visit};
+
+/// Items that make the compiler warn at each such division: on stable toolchains a macro has no
+/// other voice than the use of something deprecated.
+pub fn warnings(item: &syn::Item) -> TokenStream {
+    let mut divisions = Divisions(Vec::new());
+    divisions.visit_item(item);
+    divisions.0.into_iter().map(warning).collect()
+}
+
+/// A division: its operator and its parts.
+type Division = (Span, i128, i128);
+
+fn warning((operator, a, b): Division) -> TokenStream {
+    let quotient = a / b;
+    let note =
+        format!("`{a} / {b}` is a division of integers, whose value is {quotient}: write `{a}.0 / {b}.0`");
+    let (name, note) = (Ident::new("integer_division", operator), Literal::string(&note));
+    quote! {
+        const _: () = {
+            #[deprecated(note = #note)]
+            #[allow(non_upper_case_globals)]
+            const integer_division: () = ();
+            #name
+        };
+    }
+}
+
+struct Divisions(Vec<Division>);
+
+impl<'ast> Visit<'ast> for Divisions {
+    fn visit_expr_cast(&mut self, cast: &'ast syn::ExprCast) {
+        if let syn::Type::Path(ty) = &*cast.ty
+            && ty.path.is_ident("f64")
+            && let Expr::Binary(binary) = within(&cast.expr)
+            && let syn::BinOp::Div(operator) = &binary.op
+            && let (Some(a), Some(b)) = (integer(&binary.left), integer(&binary.right))
+            && a.checked_rem(b).is_some_and(|rest| rest != 0)
+        {
+            self.0.push((operator.spans[0], a, b));
+        }
+        visit::visit_expr_cast(self, cast);
+    }
+}
+
+/// An expression without the brackets around it.
+fn within(expression: &Expr) -> &Expr {
+    match expression {
+        Expr::Paren(inner) => within(&inner.expr),
+        Expr::Group(inner) => within(&inner.expr),
+        other => other,
+    }
+}
+
+/// The value of an integer literal.
+fn integer(expression: &Expr) -> Option<i128> {
+    match within(expression) {
+        Expr::Lit(syn::ExprLit { lit: syn::Lit::Int(literal), .. }) if !literal.suffix().starts_with('f') => {
+            literal.base10_parse().ok()
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn divisions_that_lose_a_remainder_are_found() {
+        let of = |body: &str| {
+            let item = syn::parse_str(&format!("fn m(x: f64) -> f64 {{ {body} }}")).unwrap();
+            warnings(&item).to_string()
+        };
+        assert!(of("(1 / 2) as f64 * x").contains("whose value is 0: write `1.0 / 2.0`"));
+        assert_eq!(of("x + { let a = ((7_u8) / 2) as f64; a }").matches("deprecated").count(), 1);
+        for fine in
+            ["(4 / 2) as f64", "1.0 / 2.0", "(1 / 2) as usize", "(1f64 / 2f64) as f64", "(1 / 0) as f64"]
+        {
+            assert_eq!(of(fine), "", "{fine}");
+        }
+        // What is meant may be said in two statements, and an index is meant.
+        assert_eq!(of("let half = 7 / 2; half as f64 + (0..3).map(|i| (i / 2) as f64).sum::<f64>()"), "");
+    }
+}
