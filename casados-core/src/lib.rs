@@ -43,6 +43,7 @@ pub mod erk;
 pub mod error;
 mod finite;
 pub mod function;
+pub mod integrator;
 pub mod irk;
 mod linalg;
 pub mod memory;
@@ -69,6 +70,7 @@ pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
 pub use erk::Erk;
 pub use error::Error;
 pub use function::{Function, GraphFunction};
+pub use integrator::Integrator;
 pub use irk::Irk;
 #[cfg(feature = "alloc")]
 pub use memory::Heap;

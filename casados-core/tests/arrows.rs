@@ -24,18 +24,28 @@ const ARROWS: &[(&str, &str)] = &[
     ("result", "shape model"),
     ("finite", "error scalar linalg"),
     ("quadrature", "error shape scalar function model linalg result finite"),
-    ("erk", "error shape statistics tableau memory options scalar model linalg result quadrature"),
+    ("integrator", "error statistics memory scalar model result quadrature"),
+    ("erk", "error shape statistics tableau memory options scalar model linalg result quadrature integrator"),
     (
         "irk",
-        "error shape statistics structure tableau memory options scalar model linalg result finite quadrature",
+        "error shape statistics structure tableau memory options scalar model linalg result finite quadrature \
+         integrator",
     ),
-    ("adaptive", "error shape tableau memory options scalar function model linalg result quadrature erk irk"),
+    (
+        "adaptive",
+        "error shape statistics tableau memory options scalar function model linalg result quadrature integrator \
+         erk irk",
+    ),
     ("batch", "error shape statistics tableau memory options scalar model linalg result finite irk"),
-    ("testing", "error shape memory scalar model result erk irk"),
-    ("ocp", "error shape structure memory scalar function model qp linalg result quadrature irk batch"),
+    ("testing", "error shape memory scalar model result integrator"),
+    (
+        "ocp",
+        "error shape structure memory scalar function model qp linalg result quadrature integrator irk batch",
+    ),
     (
         "casadi",
-        "error shape structure tableau memory options function model qp result quadrature adaptive batch ocp",
+        "error shape structure tableau memory options function model qp result quadrature integrator adaptive batch \
+         ocp",
     ),
 ];
 

@@ -8,8 +8,8 @@
 //! largest entry, so that no test passes by being unable to tell.
 
 use casados::options::Start;
-use casados::testing::{Exact, Integrator, Report, check_exact};
-use casados::{Dae, DormandPrince8, Erk, Gauss, Irk, Options, RadauIIA, dae, ode};
+use casados::testing::{Exact, Report, check_exact};
+use casados::{Dae, DormandPrince8, Erk, Gauss, Heap, Integrator, Irk, Options, RadauIIA, dae, ode};
 use nalgebra::SVector;
 use serde_json::Value;
 
@@ -170,7 +170,7 @@ fn run<M, I, const NX: usize, const NU: usize, const NP: usize>(
             VectorU<f64> = SVector<f64, NU>,
             VectorP<f64> = SVector<f64, NP>,
         >,
-    I: Integrator<M>,
+    I: Integrator<Model = M, Number = f64, Memory = Heap>,
 {
     let (x0, rest) = problem.point.split_at(NX);
     let (u, p) = rest.split_at(NU);

@@ -3,10 +3,9 @@
 use crate::models::oscillators::VanDerPol;
 use casados::error::Quantity;
 use casados::options::{Newton, Start};
-use casados::testing::Integrator;
 use casados::{
-    Adaptive, AdaptiveOptions, Dae, DormandPrince5, DormandPrince8, Erk, Error, Gauss, Irk, Options, Radau,
-    RadauIIA, Rk4, Shape, dae, ode,
+    Adaptive, AdaptiveOptions, Dae, DormandPrince5, DormandPrince8, Erk, Error, Gauss, Heap, Integrator, Irk,
+    Options, Radau, RadauIIA, Rk4, Shape, dae, ode,
 };
 use nalgebra::{SVector, vector};
 
@@ -136,7 +135,7 @@ fn t22_index_two() {
 }
 
 /// An integrator that fails, and then gives the bits of a fresh one.
-fn fails<M: Dae, I: Integrator<M>>(
+fn fails<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     make: impl Fn() -> I,
     x0: f64,
     [h, good]: [f64; 2],

@@ -4,8 +4,7 @@
 
 use super::everything::Everything;
 use super::interval::{check, options};
-use casados::testing::Integrator;
-use casados::{Erk, Gauss, Irk, RadauIIA, Rk4, ode};
+use casados::{Erk, Gauss, Heap, Integrator, Irk, RadauIIA, Rk4, ode};
 use nalgebra::SVector;
 
 #[test]
@@ -60,7 +59,7 @@ fn invariants(x: &SVector<f64, 3>) -> [f64; 2] {
 /// The largest relative drift of the invariants over many steps.
 fn drift<I>(mut integrator: I, intervals: usize) -> f64
 where
-    I: Integrator<RigidBody>,
+    I: Integrator<Model = RigidBody, Number = f64, Memory = Heap>,
 {
     let mut x = SVector::from([0.9, 0.4, -1.1]);
     let start = invariants(&x);

@@ -1,7 +1,6 @@
 //! A planet around a sun, and how much a method changes what the planet keeps.
 
-use casados::ode;
-use casados::testing::Integrator;
+use casados::{Heap, Integrator, ode};
 use nalgebra::{SVector, vector};
 
 /// `q̈ = −q/|q|³`
@@ -34,7 +33,7 @@ fn energy(x: &SVector<f64, 4>) -> f64 {
 /// The largest relative changes of angular momentum and energy, looked at after each of so many
 /// intervals.
 pub fn changes(
-    integrator: &mut impl Integrator<Kepler>,
+    integrator: &mut impl Integrator<Model = Kepler, Number = f64, Memory = Heap>,
     mut x: SVector<f64, 4>,
     intervals: usize,
     h: f64,

@@ -6,9 +6,10 @@ use super::integrator::Integrator;
 use super::piecewise::{Piecewise, PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian};
 use super::sealed::Engine;
 use crate::error::Error;
+use crate::integrator::With;
 use crate::model::{Dae, VectorU, VectorX};
-use crate::quadrature::{Integrand, With};
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::quadrature::Integrand;
+use crate::result::Nominal;
 use crate::scalar::Real;
 
 impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
@@ -22,52 +23,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         integrand: &'b mut Q,
     ) -> With<'a, 'b, Self, Q> {
         With { integrator: self, integrand }
-    }
-}
-
-impl<'a, M: Dae, B: Engine<M, T>, T: Real, Q: Integrand<M, T>> With<'a, '_, Integrator<M, B, T>, Q> {
-    /// See [`Integrator::solve`]; the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
-        self.integrator.solve_along(x0, u, h, Some(self.integrand))
-    }
-
-    /// See [`Integrator::forward`]; the integral and its derivatives.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error> {
-        self.integrator.forward_along(x0, u, h, Some(self.integrand))
-    }
-
-    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn adjoint(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&'a Adjoint<M, T>, Error> {
-        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
-    }
-
-    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn hessian(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&'a Hessian<M, T>, Error> {
-        self.integrator.hessian_along(x0, u, h, lambda, Some(self.integrand))
     }
 }
 

@@ -12,6 +12,7 @@ use super::sealed::{Engine, Kind};
 use super::tape::Entry;
 use crate::erk::Integrator as Erk;
 use crate::error::{Error, Refusal};
+use crate::integrator::Integrator as _;
 use crate::memory::Heap;
 use crate::model::{ArrayK, ArrayW, ArrayX, Dae, Ode, VectorX};
 use crate::options::Options;

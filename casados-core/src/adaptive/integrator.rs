@@ -1,5 +1,6 @@
 //! The adaptive integrator as its users see it.
 
+mod calls;
 mod derivatives;
 mod settings;
 
@@ -12,9 +13,9 @@ use super::statistics::AdaptiveStatistics;
 use super::tape::Tape;
 use super::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
+use crate::integrator::{self, Integrator as _};
 use crate::irk::check;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
-use crate::quadrature::{Along, reborrow};
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -221,21 +222,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
             None => return Err(Error::NoResult),
         }
         Ok(dense)
-    }
-
-    /// As [`Integrator::solve`], with an integrand: the steps are taken again, to rounding.
-    pub(crate) fn solve_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Nominal<M, T>, Error> {
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, ..) = self.parts(span)?;
-        frozen.solve::<B>(state, x0, along)?;
-        self.last = Some(span);
-        Ok(&self.base.result)
     }
 
     /// Following calls take the steps of the last successful one, whatever they are given, and

@@ -6,6 +6,7 @@
 
 use super::consistent::At;
 use crate::error::Error;
+use crate::integrator::Integrator as _;
 use crate::irk::Integrator;
 use crate::memory::Heap;
 use crate::model::{ArrayW, ArrayX, Dae, VectorX};

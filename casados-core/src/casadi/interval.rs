@@ -3,6 +3,7 @@
 use crate::adaptive::{self, AdaptiveOptions};
 use crate::batch::vector;
 use crate::error::Error;
+use crate::integrator::Integrator as _;
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;

@@ -3,10 +3,10 @@
 use super::integrator::Integrator;
 use super::step::Point;
 use crate::error::{Error, Place};
-use crate::memory::{Memory, WithForward, WithHessian};
-use crate::model::{ArrayW, ArrayX, Ode, VectorU, VectorX};
-use crate::quadrature::{Along, Integrand, With};
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::integrator::With;
+use crate::memory::Memory;
+use crate::model::{ArrayW, ArrayX, Ode};
+use crate::quadrature::{Along, Integrand};
 use crate::scalar::Real;
 use crate::shape::Shape;
 
@@ -50,59 +50,5 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         integrand: &'b mut Q,
     ) -> With<'a, 'b, Self, Q> {
         With { integrator: self, integrand }
-    }
-}
-
-impl<'a, M: Ode, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
-    With<'a, '_, Integrator<M, B, S, T, W>, Q>
-{
-    /// See [`Integrator::solve`]; the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
-    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
-        self.integrator.solve_along(x0, u, h, Some(self.integrand))
-    }
-
-    /// See [`Integrator::forward`]; the integral and its derivatives.
-    ///
-    /// # Errors
-    /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
-    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error>
-    where
-        W: WithForward,
-    {
-        self.integrator.forward_along(x0, u, h, Some(self.integrand))
-    }
-
-    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
-    pub fn adjoint(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&'a Adjoint<M, T>, Error> {
-        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
-    }
-
-    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator::solve`]; [`Error::NonFiniteFunction`].
-    pub fn hessian(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&'a Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
-        self.integrator.hessian_along(x0, u, h, lambda, Some(self.integrand))
     }
 }

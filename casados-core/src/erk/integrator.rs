@@ -5,12 +5,12 @@ use super::adjoint::Sweep;
 use super::hessian::Curvature;
 use super::step::{Base, Counts, Grid, Record, Scheme};
 use crate::error::{Argument, Error};
+use crate::integrator::Integrator as _;
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;
 use crate::memory::{Fallback, Inline, Memory};
 use crate::model::{ArrayK, ArrayW, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
-use crate::quadrature::{Along, begin, finish};
 use crate::result::{Adjoint, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -199,26 +199,6 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// the first call of a mode [`Error::OutOfMemory`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
         self.solve_along(x0, u, h, None)
-    }
-
-    /// As [`Integrator::solve`], with an integrand.
-    pub(crate) fn solve_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Nominal<M, T>, Error> {
-        let grid = self.begin(x0, u, h)?;
-        begin(&mut along);
-        let base = W::nominal(&mut self.base)?;
-        let run = base.run(&self.scheme, grid, &mut along);
-        self.counts = base.point.counts;
-        run?;
-        finish(&mut along)?;
-        let Base { x, result, .. } = base;
-        result.x.as_mut_slice().copy_from_slice(x.as_ref());
-        Ok(result)
     }
 
     /// Checks the input, and goes to the start of the interval.

@@ -10,6 +10,7 @@
 
 mod adjoint;
 mod along;
+mod calls;
 mod forward;
 mod hessian;
 mod integrator;

@@ -1,12 +1,12 @@
 //! Derivatives of a call, as users see them: each answers one question, with nothing else computed.
 
 use super::adjoint::{Sweep, Way};
-use super::along::forward;
 use super::forward::{Seeded, Unit, Variation, write};
 use super::hessian::Curvature;
-use super::integrator::{AdjointMemory, ForwardMemory, HessianMemory, Integrator, finite, write_state};
+use super::integrator::{AdjointMemory, ForwardMemory, Integrator, finite, write_state};
 use super::step::{Base, Grid};
 use crate::error::{Argument, Error};
+use crate::integrator::Integrator as _;
 use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{ArrayW, MatrixXC, Ode, VectorU, VectorX};
 use crate::quadrature::{Along, begin, finish};
@@ -26,32 +26,6 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         W: WithForward,
     {
         self.forward_along(x0, u, h, None)
-    }
-
-    /// As [`Integrator::forward`], with an integrand.
-    pub(crate) fn forward_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Forward<M, T>, Error>
-    where
-        W: WithForward,
-    {
-        let grid = self.begin(x0, u, h)?;
-        begin(&mut along);
-        let base = W::nominal(&mut self.base)?;
-        let ForwardMemory { sweep, result } = W::forward(&mut self.forward)?;
-        let scheme = &self.scheme;
-        let run = sweep.forward.run(scheme, grid, base, Unit, |point, dxi, at| {
-            forward(&mut along, point, dxi, grid.h * scheme.b[at.stage], false, at)
-        });
-        self.counts = base.point.counts;
-        run?;
-        finish(&mut along)?;
-        write_forward(grid, base, &sweep.forward, &mut result.forward)?;
-        Ok(&result.forward)
     }
 
     /// After [`Integrator::forward`]: the derivatives of `Σ_i weight_i k_i` of the last step, a row
@@ -128,11 +102,11 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         h: T,
         lambda: &VectorX<M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        self.adjoint_along(x0, u, h, lambda, None)
+        self.backward(x0, u, h, lambda, None)
     }
 
-    /// As [`Integrator::adjoint`], with an integrand.
-    pub(crate) fn adjoint_along(
+    /// The same, with an integrand or without.
+    pub(super) fn backward(
         &mut self,
         x0: &VectorX<M, T>,
         u: &VectorU<M, T>,
@@ -250,76 +224,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     {
         self.hessian_along(x0, u, h, lambda, None)
     }
-
-    /// As [`Integrator::hessian`], with an integrand.
-    pub(crate) fn hessian_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
-        begin(&mut along);
-        finite(lambda.as_slice(), Argument::Lambda)?;
-        let grid = self.begin(x0, u, h)?;
-        let base = W::nominal(&mut self.base)?;
-        let sweep = &mut W::nominal(&mut self.adjoint)?.sweep;
-        let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
-        let HessianMemory { curvature, result } = W::hessian(&mut self.hessian)?;
-        let records = W::tape(&mut self.trajectory, grid.steps)?;
-        let multipliers = W::hessian_tape(&mut self.multipliers, grid.steps)?;
-        let scheme = &self.scheme;
-
-        // The adjoint first: then the forward sweep meets each stage with its multipliers known,
-        // and no derivative of a stage has to be kept.
-        let start = base.x;
-        sweep.seed(1, |x, _| lambda.as_slice()[x]);
-        curvature.start();
-        let mut run = || {
-            base.record(scheme, grid, records, &mut None)?;
-            sweep.run(
-                Way { scheme, grid, columns: 1 },
-                &mut base.point,
-                records,
-                Some(multipliers),
-                &mut along,
-            )?;
-            base.x = start;
-            base.point.counts.steps = 0;
-            variation.run(scheme, grid, base, Unit, |point, dxi, at| {
-                let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
-                let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
-                forward(&mut along, point, dxi, grid.h * b, true, at)?;
-                curvature.add(scheme, point, mu, dxi, at)
-            })
-        };
-        let run = run();
-        self.counts = base.point.counts;
-        run?;
-        finish(&mut along)?;
-
-        write_forward(grid, base, variation, &mut result.first.forward)?;
-        let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-        for (w, lambda) in sweep.lambda.as_ref().iter().enumerate() {
-            let [value] = *lambda;
-            if !value.is_finite() {
-                return Err(Error::Overflow { step: 0, index: w });
-            }
-            *gradient_element(&mut result.first, w, nx, nu) = value;
-        }
-        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
-            curvature.add_lower(second);
-        }
-        write_hessian(curvature, result)?;
-        Ok(result)
-    }
 }
 
-fn write_forward<M: Ode, T: Real, const S: usize>(
+pub(super) fn write_forward<M: Ode, T: Real, const S: usize>(
     grid: Grid<T>,
     base: &Base<M, T, S>,
     variation: &Variation<M, T, ArrayW<M, T>, S>,
@@ -334,7 +241,7 @@ fn write_forward<M: Ode, T: Real, const S: usize>(
     Ok(())
 }
 
-fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
+pub(super) fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
     sweep: &Sweep<M, T, R, S>,
     source: Range<usize>,
     result: &mut Adjoint<M, T, C>,
@@ -348,7 +255,7 @@ fn write_gradient<M: Ode, T: Real, R: Array<T>, const S: usize, const C: usize>(
 }
 
 /// Element `w` of the gradient.
-fn gradient_element<M: Ode, T: Real>(
+pub(super) fn gradient_element<M: Ode, T: Real>(
     result: &mut ForwardAdjoint<M, T>,
     w: usize,
     nx: usize,
@@ -363,7 +270,7 @@ fn gradient_element<M: Ode, T: Real>(
     }
 }
 
-fn write_hessian<M: Ode, T: Real>(
+pub(super) fn write_hessian<M: Ode, T: Real>(
     curvature: &mut Curvature<M, T>,
     result: &mut Hessian<M, T>,
 ) -> Result<(), Error> {

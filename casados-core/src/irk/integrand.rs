@@ -13,11 +13,12 @@ use super::forward::sweep::Sweep;
 use super::integrator::Integrator;
 use super::workspace::{Step, Work};
 use crate::error::{Error, Place};
+use crate::integrator::With;
 use crate::irk::coefficients::Coefficients;
-use crate::memory::{Fallback, Memory, WithAdjoint, WithForward, WithHessian};
+use crate::memory::{Fallback, Memory, WithHessian};
 use crate::model::{ArrayW, Dae, VectorU, VectorX, VectorZ};
-use crate::quadrature::{Integrand, With};
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::quadrature::Integrand;
+use crate::result::Hessian;
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 
@@ -132,62 +133,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 }
 
-impl<'a, M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
+impl<'a, M: Dae, B, const S: usize, T: Real, W: WithHessian, Q: Integrand<M, T>>
     With<'a, '_, Integrator<M, B, S, T, W>, Q>
 {
-    /// See [`Integrator::solve`]; the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn solve(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Nominal<M, T>, Error> {
-        self.integrator.solve_along(x0, u, h, Some(self.integrand))
-    }
-
-    /// See [`Integrator::forward`]; the integral and its derivatives.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn forward(self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&'a Forward<M, T>, Error>
-    where
-        W: WithForward,
-    {
-        self.integrator.forward_along(x0, u, h, Some(self.integrand))
-    }
-
-    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn adjoint(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&'a Adjoint<M, T>, Error>
-    where
-        W: WithAdjoint<1>,
-    {
-        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
-    }
-
-    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
-    ///
-    /// # Errors
-    /// See [`Integrator`]; [`Error::NonFiniteFunction`].
-    pub fn hessian(
-        self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-    ) -> Result<&'a Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
-        self.integrator.hessian_along(x0, u, h, lambda, &[], Some(self.integrand))
-    }
-
     /// See [`Integrator::hessian_with_z0`]; gradient and Hessian are those of `λᵀx + νᵀz₀` and the
     /// integral.
     ///
@@ -200,10 +148,7 @@ impl<'a, M: Dae, B, const S: usize, T: Real, W: Memory, Q: Integrand<M, T>>
         h: T,
         lambda: &VectorX<M, T>,
         nu: &VectorZ<M, T>,
-    ) -> Result<&'a Hessian<M, T>, Error>
-    where
-        W: WithHessian,
-    {
+    ) -> Result<&'a Hessian<M, T>, Error> {
         self.integrator.hessian_along(x0, u, h, lambda, nu.as_slice(), Some(self.integrand))
     }
 }

@@ -3,17 +3,17 @@
 
 use super::adjoint::Adjoints;
 use super::dense_output::Point;
-use super::driver::{Arguments, Run};
+use super::driver::Run;
 use super::forward::directional::Directionals;
 use super::forward::memory::ForwardMemory;
 use super::hessian::pass::{HessianMemory, HessianStep};
 use crate::error::Error;
+use crate::integrator::Integrator as _;
 #[cfg(feature = "alloc")]
 use crate::memory::Heap;
 use crate::memory::{Fallback, Inline, Memory};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::options::Options;
-use crate::quadrature::{Along, begin, finish};
 use crate::result::{Dense, Nominal};
 use crate::scalar::Real;
 use crate::statistics::Statistics;
@@ -250,24 +250,6 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// See [`Integrator`].
     pub fn solve(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, h: T) -> Result<&Nominal<M, T>, Error> {
         self.solve_along(x0, u, h, None)
-    }
-
-    /// As [`Integrator::solve`], with an integrand.
-    pub(crate) fn solve_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Nominal<M, T>, Error> {
-        begin(&mut along);
-        self.run.steps(&Arguments { x0, u, h }, |parts, n, step, _| match &mut along {
-            Some(integrand) => parts.work.along_value(parts.coefficients, n, step, &mut **integrand),
-            None => Ok(()),
-        })?;
-        finish(&mut along)?;
-        self.sweep = None;
-        Ok(&self.run.keep()?.result)
     }
 
     /// The solution at the time `t`, as the model sees it, inside the interval of the last

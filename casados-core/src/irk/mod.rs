@@ -22,6 +22,7 @@
 
 mod adjoint;
 mod backward_error;
+mod calls;
 mod coefficients;
 mod dense_output;
 mod directions;

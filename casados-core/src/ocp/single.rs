@@ -7,6 +7,7 @@ use super::names::Names;
 use super::pattern::Origin;
 use crate::error::Error;
 use crate::function::Function;
+use crate::integrator::Integrator as _;
 use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{Dae, Ode, VectorU, VectorX};
 use crate::quadrature::{Integrand, LeastSquares, Quadrature};

@@ -114,13 +114,6 @@ pub trait Integrand<M: Dae, T: Real>: sealed::Sealed {
     fn finish(&mut self) -> Result<(), Error>;
 }
 
-/// An integrator with an integrand: its calls are those of the integrator, and gradients and
-/// Hessians those of `λᵀx + νᵀq`; see [`Integrand`].
-pub struct With<'a, 'b, I, Q: ?Sized> {
-    pub(crate) integrator: &'a mut I,
-    pub(crate) integrand: &'b mut Q,
-}
-
 /// An integrand, or none.
 pub(crate) type Along<'a, 'b, M, T> = Option<&'a mut (dyn Integrand<M, T> + 'b)>;
 

@@ -1,40 +1,14 @@
 //! What the checks ask of an integrator, and its answers as flat arrays.
 
 use crate::error::Error;
-use crate::model::{Dae, Ode, VectorP, VectorU, VectorX};
-use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::integrator::Integrator;
+use crate::memory::Heap;
+use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::result::{Forward, Nominal};
 use crate::shape::{Matrix, Shape};
 use bytemuck::Zeroable;
 use nalgebra::DMatrix;
 use std::vec::Vec;
-
-/// The calls that [`Irk`](crate::Irk) and [`Erk`](crate::Erk) have in common.
-pub trait Integrator<M: Dae> {
-    /// Parameters of all later calls.
-    fn set_parameters(&mut self, p: &VectorP<M, f64>) -> Result<(), Error>;
-    /// Forgets the warm start.
-    fn reset(&mut self);
-    /// The solution.
-    fn solve(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Nominal<M>, Error>;
-    /// The solution and its derivatives.
-    fn forward(&mut self, x0: &VectorX<M, f64>, u: &VectorU<M, f64>, h: f64) -> Result<&Forward<M>, Error>;
-    /// The solution and the gradient of `λᵀx`.
-    fn adjoint(
-        &mut self,
-        x0: &VectorX<M, f64>,
-        u: &VectorU<M, f64>,
-        h: f64,
-        lambda: &VectorX<M, f64>,
-    ) -> Result<&Adjoint<M>, Error>;
-    /// The solution, its derivatives, and the gradient and Hessian of `λᵀx`.
-    fn hessian(
-        &mut self,
-        x0: &VectorX<M, f64>,
-        u: &VectorU<M, f64>,
-        h: f64,
-        lambda: &VectorX<M, f64>,
-    ) -> Result<&Hessian<M>, Error>;
-}
 
 /// One interval: `w = (x₀, u, p)` and its length.
 #[derive(Clone, Debug)]
@@ -52,7 +26,7 @@ impl Interval {
     #[allow(clippy::type_complexity)]
     fn prepare<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<M>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
     ) -> Result<(VectorX<M, f64>, VectorU<M, f64>), Error> {
         let (nx, nu) = (M::Shape::NX, M::Shape::NU);
         if M::Shape::NP > 0 {
@@ -63,7 +37,10 @@ impl Interval {
     }
 
     /// `(x, z, z0)`
-    pub fn solve<M: Dae>(&self, integrator: &mut impl Integrator<M>) -> Result<Vec<f64>, Error> {
+    pub fn solve<M: Dae>(
+        &self,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
+    ) -> Result<Vec<f64>, Error> {
         let (x0, u) = self.prepare(integrator)?;
         Ok(states(integrator.solve(&x0, &u, self.h)?))
     }
@@ -71,7 +48,7 @@ impl Interval {
     /// `(x, z, z0)` and its derivatives by `w`.
     pub fn forward<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<M>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
     ) -> Result<(Vec<f64>, DMatrix<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
         let forward = integrator.forward(&x0, &u, self.h)?;
@@ -81,7 +58,7 @@ impl Interval {
     /// `(x, z, z0)` and the gradient by `w`.
     pub fn adjoint<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<M>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
         lambda: &[f64],
     ) -> Result<(Vec<f64>, Vec<f64>), Error> {
         let (x0, u) = self.prepare(integrator)?;
@@ -93,7 +70,7 @@ impl Interval {
     /// Everything in one call.
     pub fn hessian<M: Dae>(
         &self,
-        integrator: &mut impl Integrator<M>,
+        integrator: &mut impl Integrator<Model = M, Number = f64, Memory = Heap>,
         lambda: &[f64],
     ) -> Result<Answer, Error> {
         let (x0, u) = self.prepare(integrator)?;
@@ -169,64 +146,3 @@ fn derivatives<M: Dae>(f: &Forward<M>) -> DMatrix<f64> {
         }
     })
 }
-
-/// The trait of an integrator that has the calls.
-macro_rules! integrator {
-    ([$($generics:tt)*] $model:ident, $type:ty, $reset:expr) => {
-        impl<$($generics)*> Integrator<$model> for $type {
-            fn set_parameters(&mut self, p: &VectorP<$model, f64>) -> Result<(), Error> {
-                <$type>::set_parameters(self, p)
-            }
-            fn reset(&mut self) {
-                let reset: fn(&mut Self) = $reset;
-                reset(self);
-            }
-            fn solve(
-                &mut self,
-                x0: &VectorX<$model, f64>,
-                u: &VectorU<$model, f64>,
-                h: f64,
-            ) -> Result<&Nominal<$model>, Error> {
-                <$type>::solve(self, x0, u, h)
-            }
-            fn forward(
-                &mut self,
-                x0: &VectorX<$model, f64>,
-                u: &VectorU<$model, f64>,
-                h: f64,
-            ) -> Result<&Forward<$model>, Error> {
-                <$type>::forward(self, x0, u, h)
-            }
-            fn adjoint(
-                &mut self,
-                x0: &VectorX<$model, f64>,
-                u: &VectorU<$model, f64>,
-                h: f64,
-                lambda: &VectorX<$model, f64>,
-            ) -> Result<&Adjoint<$model>, Error> {
-                <$type>::adjoint(self, x0, u, h, lambda)
-            }
-            fn hessian(
-                &mut self,
-                x0: &VectorX<$model, f64>,
-                u: &VectorU<$model, f64>,
-                h: f64,
-                lambda: &VectorX<$model, f64>,
-            ) -> Result<&Hessian<$model>, Error> {
-                <$type>::hessian(self, x0, u, h, lambda)
-            }
-        }
-    };
-}
-
-// An explicit method has no warm start.
-integrator!(
-    [M: Ode, B, const S: usize] M,
-    crate::erk::Integrator<M, B, S, f64, crate::memory::Heap>,
-    |_| {}
-);
-integrator!(
-    [M: Dae, B, const S: usize] M,
-    crate::irk::Integrator<M, B, S, f64, crate::memory::Heap>,
-    |irk| irk.reset()
-);

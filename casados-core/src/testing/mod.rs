@@ -20,9 +20,12 @@ mod convergence;
 mod derivatives;
 mod differences;
 mod evaluate;
+mod exact;
 mod facts;
 mod forward;
 mod integrator;
+mod names;
+mod noise;
 mod points;
 mod report;
 mod sensitivities;
@@ -31,11 +34,11 @@ pub use crate::scalar::lanes::{Level, limit, limit_cache};
 pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};
 pub use derivatives::{check_by_differences, check_derivatives, check_pattern};
+pub use exact::{Exact, check_exact};
 pub use forward::Forward;
-pub use integrator::Integrator;
 pub use points::{Points, Random};
 pub use report::{Deviation, Report, Row};
-pub use sensitivities::{Exact, check_exact, check_sensitivities};
+pub use sensitivities::check_sensitivities;
 
 #[cfg(test)]
 mod tests;

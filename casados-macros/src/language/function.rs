@@ -21,19 +21,7 @@ impl Evaluator {
     ) -> Evaluated {
         let item = &function.item;
         let name = &item.sig.ident;
-        let mut frame = self.calls.clone();
-        while let Some(calls) = frame {
-            if Rc::ptr_eq(&calls.function, item) {
-                return Err(error(
-                    at,
-                    format!(
-                        "`{name}` calls itself, and a graph has no end then: write the recursion as a loop"
-                    ),
-                )
-                .into());
-            }
-            frame = calls.parent.clone();
-        }
+        self.refuse_recursion(item, name, at)?;
         if item.sig.inputs.len() != arguments.len() {
             let (expected, found) = (item.sig.inputs.len(), arguments.len());
             return Err(
@@ -81,43 +69,8 @@ impl Evaluator {
                 (None, Some((skip, expressions))) => self.expression(&expressions[index - skip], &hint)?,
                 (None, None) => Value::Uninitialised,
             };
-            let value = match input {
-                syn::FnArg::Typed(input) => {
-                    let value = match (&*input.ty, value) {
-                        (syn::Type::Reference(ty), value) if ty.mutability.is_some() => value,
-                        (syn::Type::Path(_) | syn::Type::ImplTrait(_), value)
-                            if matches!(hint, Type::Unknown) =>
-                        {
-                            value
-                        }
-                        (_, value) => self.load(value, at)?,
-                    };
-                    let value = self.coerce(value, &hint, at)?;
-                    if generic {
-                        let ty = self.type_of(&value);
-                        if !self.unify(&input.ty, &ty, &scope) {
-                            return Err(error(
-                                at,
-                                format!(
-                                    "argument {} of `{name}` is {}, which does not fit its type",
-                                    index + 1,
-                                    value.kind()
-                                ),
-                            )
-                            .into());
-                        }
-                    }
-                    value
-                }
-                syn::FnArg::Receiver(receiver) => match &receiver.kind {
-                    syn::ReceiverKind::Reference(_, _, Some(_)) => match value {
-                        value @ Value::Reference(_) => value,
-                        value => Value::Reference(Place::new(value)),
-                    },
-                    _ => self.load(value, at)?,
-                },
-            };
-            values.push(value);
+            let scope = generic.then_some(&scope);
+            values.push(self.argument(input, value, &hint, (name, index), scope, at)?);
         }
         self.check_known(generics, &scope, name, at)?;
         if let (Some((implementation, _)), Some(around)) = (&function.owner, &block_scope) {
@@ -157,6 +110,73 @@ impl Evaluator {
             _ => self.load(value, at)?,
         };
         Ok(self.coerce(value, &returns, at)?)
+    }
+
+    /// A graph of a function that calls itself would have no end.
+    fn refuse_recursion(&self, item: &Rc<syn::ItemFn>, name: &syn::Ident, at: At) -> Evaluated<()> {
+        let mut frame = self.calls.clone();
+        while let Some(calls) = frame {
+            if Rc::ptr_eq(&calls.function, item) {
+                return Err(error(
+                    at,
+                    format!(
+                        "`{name}` calls itself, and a graph has no end then: write the recursion as a loop"
+                    ),
+                )
+                .into());
+            }
+            frame = calls.parent.clone();
+        }
+        Ok(())
+    }
+
+    /// The value of one argument, as the function has it; `scope` is that of its generic parameters,
+    /// if there are any.
+    fn argument(
+        &mut self,
+        input: &syn::FnArg,
+        value: Value,
+        hint: &Type,
+        (name, index): (&syn::Ident, usize),
+        scope: Option<&Rc<Scope>>,
+        at: At,
+    ) -> Evaluated {
+        Ok(match input {
+            syn::FnArg::Typed(input) => {
+                let value = match (&*input.ty, value) {
+                    (syn::Type::Reference(ty), value) if ty.mutability.is_some() => value,
+                    (syn::Type::Path(_) | syn::Type::ImplTrait(_), value)
+                        if matches!(hint, Type::Unknown) =>
+                    {
+                        value
+                    }
+                    (_, value) => self.load(value, at)?,
+                };
+                let value = self.coerce(value, hint, at)?;
+                if let Some(scope) = scope {
+                    let ty = self.type_of(&value);
+                    if !self.unify(&input.ty, &ty, scope) {
+                        return Err(error(
+                            at,
+                            format!(
+                                "argument {} of `{name}` is {}, which does not fit its type",
+                                index + 1,
+                                value.kind()
+                            ),
+                        )
+                        .into());
+                    }
+                }
+                value
+            }
+            syn::FnArg::Receiver(receiver) => match &receiver.kind {
+                syn::ReceiverKind::Reference(_, _, Some(_)) => match value {
+                    value @ Value::Reference(_) => value,
+                    value => Value::Reference(Place::new(value)),
+                },
+                _ => self.load(value, at)?,
+            },
+        })
     }
 
     /// Executes the body of a function or closure: `return` leads to its end.

@@ -1,5 +1,7 @@
 //! Patterns: what they match, and which variables they declare.
 
+mod parts;
+
 use super::arithmetic::Comparison;
 use super::environment::{Names, Scope};
 use super::evaluator::{At, Evaluated, Evaluator, error, unsupported};
@@ -7,9 +9,8 @@ use super::items::Symbol;
 use super::path::Named;
 use super::place::{Place, Projection};
 use super::types::Type;
-use super::value::{Struct, Value};
+use super::value::Value;
 use crate::graph::Node;
-use quote::ToTokens;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -125,32 +126,7 @@ impl Evaluator {
             syn::Pat::Tuple(tuple) => self.match_parts(&tuple.elems, pattern, subject, bindings),
             syn::Pat::Slice(slice) => self.match_slice(slice, subject, bindings),
             syn::Pat::Struct(inner) => self.match_struct(inner, subject, bindings),
-            syn::Pat::TupleStruct(inner) => {
-                let path =
-                    syn::ExprPath { attrs: Vec::new(), qself: inner.qself.clone(), path: inner.path.clone() };
-                let value = self.subject_value(&subject, pattern)?;
-                if let Value::Option(content) = &value {
-                    return match (path.path.segments.last(), content) {
-                        (Some(name), Some(_)) if name.ident == "Some" => {
-                            let inside = self.subject_part(&subject, Projection::Some, pattern)?;
-                            match inner.elems.first() {
-                                Some(pattern) => self.matches(pattern, inside, bindings),
-                                None => Ok(Truth::Known(true)),
-                            }
-                        }
-                        _ => Ok(Truth::Known(false)),
-                    };
-                }
-                match (self.named(&path)?, &value) {
-                    (Named::Value(Value::Constructor(_, variant)), Value::Struct(structure)) => {
-                        if structure.variant != variant {
-                            return Ok(Truth::Known(false));
-                        }
-                        self.match_parts(&inner.elems, pattern, subject, bindings)
-                    }
-                    _ => Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into()),
-                }
-            }
+            syn::Pat::TupleStruct(inner) => self.match_tuple_struct(inner, subject, bindings),
             syn::Pat::Path(path) => {
                 let value = self.subject_value(&subject, pattern)?;
                 let constant = self.path_value(path)?;
@@ -166,53 +142,8 @@ impl Evaluator {
                 let constant = self.block(&block.block, &Type::Unknown)?;
                 self.match_constant(&value, &constant, pattern)
             }
-            syn::Pat::Range(range) => {
-                let value = self.subject_value(&subject, pattern)?;
-                let mut truth = Truth::Known(true);
-                if let Some(start) = &range.start {
-                    let start = self.expression(start, &Type::Unknown)?;
-                    let above = self.compare(Comparison::Le, &start, &value, pattern)?;
-                    truth = self.both(truth, &above, pattern)?;
-                }
-                if let Some(end) = &range.end {
-                    let end = self.expression(end, &Type::Unknown)?;
-                    let comparison = match range.limits {
-                        syn::RangeLimits::HalfOpen(_) => Comparison::Lt,
-                        syn::RangeLimits::Closed(_) => Comparison::Le,
-                    };
-                    let below = self.compare(comparison, &value, &end, pattern)?;
-                    truth = self.both(truth, &below, pattern)?;
-                }
-                Ok(truth)
-            }
-            syn::Pat::Or(or) => {
-                let mut some: Option<Node> = None;
-                for case in &or.cases {
-                    let mut inner = Vec::new();
-                    match self.matches(case, subject.clone(), &mut inner)? {
-                        Truth::Known(false) => {}
-                        Truth::Known(true) if some.is_none() => {
-                            bindings.extend(inner);
-                            return Ok(Truth::Known(true));
-                        }
-                        _ if !inner.is_empty() => {
-                            return Err(unsupported(
-                                case,
-                                "a variable in one of several patterns that depend on model quantities",
-                            )
-                            .into());
-                        }
-                        Truth::Known(true) => return Ok(Truth::Known(true)),
-                        Truth::When(condition) => {
-                            some = Some(match some {
-                                Some(before) => self.graph.or(before, condition),
-                                None => condition,
-                            });
-                        }
-                    }
-                }
-                Ok(some.map_or(Truth::Known(false), Truth::When))
-            }
+            syn::Pat::Range(range) => self.match_range(range, subject),
+            syn::Pat::Or(or) => self.match_any(or, subject, bindings),
             syn::Pat::Guard(guard) => {
                 let truth = self.matches(&guard.pat, subject, bindings)?;
                 if truth == Truth::Known(false) {
@@ -227,6 +158,88 @@ impl Evaluator {
             }
             _ => Err(unsupported(pattern, "this pattern").into()),
         }
+    }
+
+    fn match_tuple_struct(
+        &mut self,
+        pattern: &syn::PatTupleStruct,
+        subject: Subject,
+        bindings: &mut Bindings,
+    ) -> Evaluated<Truth> {
+        let path =
+            syn::ExprPath { attrs: Vec::new(), qself: pattern.qself.clone(), path: pattern.path.clone() };
+        let value = self.subject_value(&subject, pattern)?;
+        if let Value::Option(content) = &value {
+            return match (path.path.segments.last(), content) {
+                (Some(name), Some(_)) if name.ident == "Some" => {
+                    let inside = self.subject_part(&subject, Projection::Some, pattern)?;
+                    match pattern.elems.first() {
+                        Some(content) => self.matches(content, inside, bindings),
+                        None => Ok(Truth::Known(true)),
+                    }
+                }
+                _ => Ok(Truth::Known(false)),
+            };
+        }
+        match (self.named(&path)?, &value) {
+            (Named::Value(Value::Constructor(_, variant)), Value::Struct(structure)) => {
+                if structure.variant != variant {
+                    return Ok(Truth::Known(false));
+                }
+                self.match_parts(&pattern.elems, pattern, subject, bindings)
+            }
+            _ => Err(unsupported(pattern, format!("this pattern on {}", value.kind())).into()),
+        }
+    }
+
+    fn match_range(&mut self, range: &syn::PatRange, subject: Subject) -> Evaluated<Truth> {
+        let value = self.subject_value(&subject, range)?;
+        let mut truth = Truth::Known(true);
+        if let Some(start) = &range.start {
+            let start = self.expression(start, &Type::Unknown)?;
+            let above = self.compare(Comparison::Le, &start, &value, range)?;
+            truth = self.both(truth, &above, range)?;
+        }
+        if let Some(end) = &range.end {
+            let end = self.expression(end, &Type::Unknown)?;
+            let comparison = match range.limits {
+                syn::RangeLimits::HalfOpen(_) => Comparison::Lt,
+                syn::RangeLimits::Closed(_) => Comparison::Le,
+            };
+            let below = self.compare(comparison, &value, &end, range)?;
+            truth = self.both(truth, &below, range)?;
+        }
+        Ok(truth)
+    }
+
+    /// The first of several patterns that matches.
+    fn match_any(&mut self, or: &syn::PatOr, subject: Subject, bindings: &mut Bindings) -> Evaluated<Truth> {
+        let mut some: Option<Node> = None;
+        for case in &or.cases {
+            let mut inner = Vec::new();
+            match self.matches(case, subject.clone(), &mut inner)? {
+                Truth::Known(false) => {}
+                Truth::Known(true) if some.is_none() => {
+                    bindings.extend(inner);
+                    return Ok(Truth::Known(true));
+                }
+                _ if !inner.is_empty() => {
+                    return Err(unsupported(
+                        case,
+                        "a variable in one of several patterns that depend on model quantities",
+                    )
+                    .into());
+                }
+                Truth::Known(true) => return Ok(Truth::Known(true)),
+                Truth::When(condition) => {
+                    some = Some(match some {
+                        Some(before) => self.graph.or(before, condition),
+                        None => condition,
+                    });
+                }
+            }
+        }
+        Ok(some.map_or(Truth::Known(false), Truth::When))
     }
 
     fn match_constant(&mut self, value: &Value, constant: &Value, at: At) -> Evaluated<Truth> {
@@ -252,7 +265,7 @@ impl Evaluator {
         })
     }
 
-    fn all(&mut self, truths: Vec<Truth>) -> Truth {
+    pub(super) fn all(&mut self, truths: Vec<Truth>) -> Truth {
         let mut result = Truth::Known(true);
         for truth in truths {
             result = match (result, truth) {
@@ -314,147 +327,5 @@ impl Evaluator {
             Named::Value(value) => Some(value),
             _ => None,
         })
-    }
-
-    fn subject_part(&mut self, subject: &Subject, projection: Projection, at: At) -> Evaluated<Subject> {
-        Ok(match subject {
-            Subject::Value(Value::Option(Some(value))) if projection == Projection::Some => {
-                Subject::Value((**value).clone())
-            }
-            Subject::Value(value) => Subject::Value(self.part(value, projection, at)?),
-            Subject::Place(place, by_reference) => {
-                Subject::Place(self.project(place, projection, at)?, *by_reference)
-            }
-        })
-    }
-
-    /// Tuples and tuple structs.
-    fn match_parts(
-        &mut self,
-        patterns: &syn::punctuated::Punctuated<syn::Pat, syn::Token![,]>,
-        at: At,
-        subject: Subject,
-        bindings: &mut Bindings,
-    ) -> Evaluated<Truth> {
-        let length = match self.subject_value(&subject, at)? {
-            Value::Tuple(parts) => parts.len(),
-            Value::Struct(structure) => structure.fields.len(),
-            other => {
-                return Err(error(at, format!("this pattern does not match {}", other.kind())).into());
-            }
-        };
-        let rest = patterns.iter().position(|pattern| matches!(pattern, syn::Pat::Rest(_)));
-        let count = patterns.len() - usize::from(rest.is_some());
-        if count > length || rest.is_none() && count != length {
-            return Err(
-                error(at, format!("this pattern has {count} parts, but the value has {length}")).into()
-            );
-        }
-        let mut truths = Vec::new();
-        for (index, pattern) in patterns.iter().enumerate() {
-            let index = match rest {
-                Some(rest) if index == rest => continue,
-                Some(rest) if index > rest => length - (patterns.len() - index),
-                _ => index,
-            };
-            let part = self.subject_part(&subject, Projection::Field(index), at)?;
-            truths.push(self.matches(pattern, part, bindings)?);
-        }
-        Ok(self.all(truths))
-    }
-
-    fn match_slice(
-        &mut self,
-        slice: &syn::PatSlice,
-        subject: Subject,
-        bindings: &mut Bindings,
-    ) -> Evaluated<Truth> {
-        let subject = match subject {
-            Subject::Value(value @ Value::Opaque(_)) => {
-                // `let [a, b] = CONSTANT;` tells the length.
-                let ty = Type::Array(Rc::new(Type::Real), Some(slice.elems.len()));
-                Subject::Value(self.coerce(value, &ty, slice)?)
-            }
-            subject => subject,
-        };
-        let length = match self.subject_value(&subject, slice)? {
-            Value::Array(elements) => elements.len(),
-            other => {
-                return Err(error(slice, format!("this pattern does not match {}", other.kind())).into());
-            }
-        };
-        let rest = slice.elems.iter().position(is_rest);
-        let count = slice.elems.len() - usize::from(rest.is_some());
-        if count > length || rest.is_none() && count != length {
-            return Ok(Truth::Known(false));
-        }
-        let mut truths = Vec::new();
-        for (index, pattern) in slice.elems.iter().enumerate() {
-            let part = match rest {
-                Some(rest) if index == rest => {
-                    if matches!(pattern, syn::Pat::Rest(_)) {
-                        continue;
-                    }
-                    let end = length - (slice.elems.len() - 1 - index);
-                    let part = self.subject_part(&subject, Projection::Slice(index, end), slice)?;
-                    let syn::Pat::Ident(name) = pattern else { continue };
-                    let plain = syn::Pat::Ident(syn::PatIdent { subpat: None, ..name.clone() });
-                    truths.push(self.matches(&plain, part, bindings)?);
-                    continue;
-                }
-                Some(rest) if index > rest => length - (slice.elems.len() - index),
-                _ => index,
-            };
-            let part = self.subject_part(&subject, Projection::Index(part), slice)?;
-            truths.push(self.matches(pattern, part, bindings)?);
-        }
-        Ok(self.all(truths))
-    }
-
-    fn match_struct(
-        &mut self,
-        pattern: &syn::PatStruct,
-        subject: Subject,
-        bindings: &mut Bindings,
-    ) -> Evaluated<Truth> {
-        let value = self.subject_value(&subject, pattern)?;
-        let Value::Struct(structure) = &value else {
-            return Err(error(pattern, format!("this pattern does not match {}", value.kind())).into());
-        };
-        if !is_variant(structure, &pattern.path) {
-            return Ok(Truth::Known(false));
-        }
-        let fields = &structure.definition.variants[structure.variant].fields;
-        let mut truths = Vec::new();
-        for field in &pattern.fields {
-            let name = field.member.to_token_stream().to_string();
-            let Some(index) = fields.iter().position(|(field, _)| *field == name) else {
-                return Err(
-                    error(field, format!("`{}` has no field `{name}`", structure.definition.name)).into()
-                );
-            };
-            let part = self.subject_part(&subject, Projection::Field(index), pattern)?;
-            truths.push(self.matches(&field.pat, part, bindings)?);
-        }
-        Ok(self.all(truths))
-    }
-}
-
-/// Whether a value of an enum is the variant that the path names; structs always are.
-fn is_variant(structure: &Struct, path: &syn::Path) -> bool {
-    !structure.definition.is_enum
-        || path
-            .segments
-            .last()
-            .is_some_and(|last| last.ident == structure.definition.variants[structure.variant].name)
-}
-
-fn is_rest(pattern: &syn::Pat) -> bool {
-    match pattern {
-        syn::Pat::Rest(_) => true,
-        syn::Pat::Ident(name) => {
-            name.subpat.as_ref().is_some_and(|(_, inner)| matches!(**inner, syn::Pat::Rest(_)))
-        }
-        _ => false,
     }
 }

@@ -15,20 +15,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.forward_along(x0, u, h, None)
     }
 
-    /// As [`Integrator::forward`], with an integrand.
-    pub(crate) fn forward_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Forward<M, T>, Error> {
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, memory, _) = self.parts(span)?;
-        frozen.forward::<B>(state, x0, memory, None, along)?;
-        Ok(&self.done(span)?.hessian.first.forward)
-    }
-
     /// The solution, and the gradient of `λᵀx` with respect to `x₀`, `u` and `p`; as
     /// [`Integrator::forward`].
     ///
@@ -44,24 +30,6 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         self.adjoint_along(x0, u, h, lambda, None)
     }
 
-    /// As [`Integrator::adjoint`], with an integrand.
-    pub(crate) fn adjoint_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Adjoint<M, T>, Error> {
-        self.last = None;
-        check(Argument::Lambda, lambda.as_slice())?;
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, memory, _) = self.parts(span)?;
-        frozen.solve::<B>(state, x0, reborrow(&mut along))?;
-        frozen.adjoint::<B>(state, lambda, memory, along)?;
-        Ok(&self.done(span)?.adjoint)
-    }
-
     /// The solution, its derivatives, and the gradient and the Hessian of `λᵀx`; as
     /// [`Integrator::forward`].
     ///
@@ -75,24 +43,5 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
         lambda: &VectorX<M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         self.hessian_along(x0, u, h, lambda, None)
-    }
-
-    /// As [`Integrator::hessian`], with an integrand.
-    pub(crate) fn hessian_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        mut along: Along<'_, '_, M, T>,
-    ) -> Result<&Hessian<M, T>, Error> {
-        self.last = None;
-        check(Argument::Lambda, lambda.as_slice())?;
-        let span = self.steps(x0, u, h)?;
-        let (mut frozen, state, memory, history) = self.parts(span)?;
-        history.clear();
-        frozen.forward::<B>(state, x0, memory, Some(history), reborrow(&mut along))?;
-        frozen.hessian::<B>(state, lambda, memory, history, along)?;
-        Ok(&self.done(span)?.hessian)
     }
 }

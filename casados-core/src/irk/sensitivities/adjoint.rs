@@ -42,21 +42,6 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.backward(&Arguments { x0, u, h }, lambda.as_slice(), None)
     }
 
-    /// As [`Integrator::adjoint`], with an integrand.
-    pub(crate) fn adjoint_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        lambda: &VectorX<M, T>,
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Adjoint<M, T>, Error>
-    where
-        W: WithAdjoint<1>,
-    {
-        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), along)
-    }
-
     /// The solution, and the gradients of `λᵀx₊` for `C` seeds `λ`, the columns of `lambdas`.
     ///
     /// # Errors
@@ -74,7 +59,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.backward(&Arguments { x0, u, h }, lambdas.as_slice(), None)
     }
 
-    fn backward<const C: usize>(
+    pub(in crate::irk) fn backward<const C: usize>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
         seeds: &[T],

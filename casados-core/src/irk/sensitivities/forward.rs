@@ -35,21 +35,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        self.forward_along(x0, u, h, None)
-    }
-
-    /// As [`Integrator::forward`], with an integrand.
-    pub(crate) fn forward_along(
-        &mut self,
-        x0: &VectorX<M, T>,
-        u: &VectorU<M, T>,
-        h: T,
-        along: Along<'_, '_, M, T>,
-    ) -> Result<&Forward<M, T>, Error>
-    where
-        W: WithForward,
-    {
-        self.differentiate::<false>(&Arguments { x0, u, h }, along, None)?;
+        self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
         self.keep_forward()
     }
 
@@ -67,7 +53,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         self.keep_forward().map(|_| ())
     }
 
-    /// The same, with derivatives refined where digits were lost.
+    /// As [`Integrator::forward`], with an integrand, and with derivatives refined where digits were lost.
     #[cfg(feature = "alloc")]
     pub(crate) fn forward_refined(
         &mut self,
@@ -124,7 +110,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 
     /// Derivatives, written to the memory of `forward` or elsewhere.
-    fn differentiate<const REFINED: bool>(
+    pub(in crate::irk) fn differentiate<const REFINED: bool>(
         &mut self,
         arguments: &Arguments<'_, M, T>,
         mut along: Along<'_, '_, M, T>,
@@ -152,7 +138,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 
     /// After a successful call, whose stages and their derivatives are kept.
-    pub(super) fn keep_forward(&mut self) -> Result<&Forward<M, T>, Error>
+    pub(in crate::irk) fn keep_forward(&mut self) -> Result<&Forward<M, T>, Error>
     where
         W: WithForward,
     {

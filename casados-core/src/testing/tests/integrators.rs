@@ -2,8 +2,12 @@
 
 use super::example::*;
 use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::memory::Heap;
+use crate::quadrature::Along;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
-use crate::testing::{Exact, Integrator, Report, check_exact, check_sensitivities, convergence};
+use crate::statistics::Statistics;
+use crate::testing::{Exact, Report, check_exact, check_sensitivities, convergence};
 use nalgebra::SVector;
 
 /// An integrator whose answers are those of `x = x₀ e^{uh} + p x₀²`, `z = p x₀`, `z₀ = u x₀`, with
@@ -58,36 +62,49 @@ impl<const FAULT: u8> Closed<FAULT> {
     }
 }
 
-impl<const FAULT: u8> Integrator<Example<NO_FAULT>> for Closed<FAULT> {
+impl<const FAULT: u8> Integrator for Closed<FAULT> {
+    type Model = Example<NO_FAULT>;
+    type Number = f64;
+    type Memory = Heap;
+
     fn set_parameters(&mut self, p: &SVector<f64, 1>) -> Result<(), Error> {
         self.p = p[0];
         Ok(())
     }
+    fn set_time(&mut self, _: f64) -> Result<(), Error> {
+        Ok(())
+    }
     fn reset(&mut self) {}
-    fn solve(
+    fn statistics(&self) -> Statistics {
+        Statistics::default()
+    }
+    fn solve_along(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
         h: f64,
+        _: Along<'_, '_, Self::Model, f64>,
     ) -> Result<&Nominal<Example<NO_FAULT>>, Error> {
         self.evaluate(x0[0], u[0], h, 1.0);
         Ok(&self.result)
     }
-    fn forward(
+    fn forward_along(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
         h: f64,
+        _: Along<'_, '_, Self::Model, f64>,
     ) -> Result<&Forward<Example<NO_FAULT>>, Error> {
         self.evaluate(x0[0], u[0], h, 1.0);
         Ok(&self.result)
     }
-    fn adjoint(
+    fn adjoint_along(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
         h: f64,
         lambda: &SVector<f64, 1>,
+        _: Along<'_, '_, Self::Model, f64>,
     ) -> Result<&Adjoint<Example<NO_FAULT>>, Error> {
         self.evaluate(x0[0], u[0], h, lambda[0]);
         let first = self.result.first;
@@ -99,12 +116,13 @@ impl<const FAULT: u8> Integrator<Example<NO_FAULT>> for Closed<FAULT> {
         };
         Ok(&self.adjoint)
     }
-    fn hessian(
+    fn hessian_along(
         &mut self,
         x0: &SVector<f64, 1>,
         u: &SVector<f64, 1>,
         h: f64,
         lambda: &SVector<f64, 1>,
+        _: Along<'_, '_, Self::Model, f64>,
     ) -> Result<&Hessian<Example<NO_FAULT>>, Error> {
         self.evaluate(x0[0], u[0], h, lambda[0]);
         Ok(&self.result)
@@ -308,7 +326,10 @@ mod logistic {
         Options { steps, ..Default::default() }
     }
 
-    fn check<I: Integrator<Logistic>>(build: impl Fn(usize) -> Result<I, Error>, steps: usize) {
+    fn check<I: Integrator<Model = Logistic, Number = f64, Memory = Heap>>(
+        build: impl Fn(usize) -> Result<I, Error>,
+        steps: usize,
+    ) {
         let v = SVector::<f64, 1>::new;
         let [x0, u, p] = AT.map(v);
         let integrate = |steps| build(steps).expect("options are valid");

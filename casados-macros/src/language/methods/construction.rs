@@ -102,17 +102,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
         | "from_row_iterator"
         | "from_column_iterator"
         | "from_iterator" => {
-            let mut elements = Vec::new();
-            let source = evaluator.load(call.only()?.clone(), at)?;
-            let mut iter = super::iterator::into_iter(evaluator, source, at)?;
-            let limit = match (rows, columns) {
-                (Some(rows), Some(columns)) => rows * columns,
-                _ => usize::MAX,
-            };
-            while elements.len() < limit {
-                let Some(value) = iter.next(evaluator, at)? else { break };
-                elements.push(Value::Real(evaluator.real(&value, at)?));
-            }
+            let elements = elements_of(evaluator, call, rows.zip(columns))?;
             let (rows, columns) = match (rows, columns) {
                 (None, Some(1)) => (elements.len(), 1),
                 _ => size()?,
@@ -128,30 +118,7 @@ pub fn function(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> R
             Value::Array(elements) => from_arrays(evaluator, &elements, rows, columns, at)?,
             other => other,
         },
-        "from_columns" | "from_rows" => {
-            let Value::Array(parts) = evaluator.load(call.only()?.clone(), at)? else {
-                return Err(error(at, format!("`{name}` takes an array of vectors")));
-            };
-            let mut vectors: Vec<Rc<Matrix>> = Vec::new();
-            for part in parts.iter() {
-                match evaluator.load(part.clone(), at)? {
-                    Value::Matrix(vector) => vectors.push(vector),
-                    other => return Err(error(at, format!("expected a vector, found {}", other.kind()))),
-                }
-            }
-            let length = vectors.first().map_or(0, |vector| vector.elements.len());
-            if vectors.iter().any(|vector| vector.elements.len() != length) {
-                return Err(error(at, "the vectors have different lengths"));
-            }
-            let by_columns = name == "from_columns";
-            let (height, width) = if by_columns { (length, vectors.len()) } else { (vectors.len(), length) };
-            if rows.is_some_and(|rows| rows != height) || columns.is_some_and(|columns| columns != width) {
-                return Err(error(at, format!("these vectors make a {height} x {width} matrix")));
-            }
-            from_fn(height, width, |r, c| {
-                Ok(if by_columns { vectors[c].elements[r].clone() } else { vectors[r].elements[c].clone() })
-            })?
-        }
+        "from_columns" | "from_rows" => from_vectors(evaluator, name, call, (rows, columns))?,
         "from_diagonal" => {
             let Value::Matrix(diagonal) = evaluator.load(call.only()?.clone(), at)? else {
                 return Err(error(at, "`from_diagonal` takes a vector"));
@@ -196,4 +163,50 @@ fn from_fn(
         }
     }
     Ok(Value::matrix(rows, columns, elements))
+}
+
+/// Numbers of an iterator, at most as many as there are elements.
+fn elements_of(evaluator: &mut Evaluator, call: &Call, size: Option<(usize, usize)>) -> Result<Vec<Value>> {
+    let at = call.at;
+    let mut elements = Vec::new();
+    let source = evaluator.load(call.only()?.clone(), at)?;
+    let mut iter = super::iterator::into_iter(evaluator, source, at)?;
+    let limit = size.map_or(usize::MAX, |(rows, columns)| rows * columns);
+    while elements.len() < limit {
+        let Some(value) = iter.next(evaluator, at)? else { break };
+        elements.push(Value::Real(evaluator.real(&value, at)?));
+    }
+    Ok(elements)
+}
+
+/// `from_columns`, `from_rows`
+fn from_vectors(
+    evaluator: &mut Evaluator,
+    name: &str,
+    call: &Call,
+    (rows, columns): (Option<usize>, Option<usize>),
+) -> Result<Value> {
+    let at = call.at;
+    let Value::Array(parts) = evaluator.load(call.only()?.clone(), at)? else {
+        return Err(error(at, format!("`{name}` takes an array of vectors")));
+    };
+    let mut vectors: Vec<Rc<Matrix>> = Vec::new();
+    for part in parts.iter() {
+        match evaluator.load(part.clone(), at)? {
+            Value::Matrix(vector) => vectors.push(vector),
+            other => return Err(error(at, format!("expected a vector, found {}", other.kind()))),
+        }
+    }
+    let length = vectors.first().map_or(0, |vector| vector.elements.len());
+    if vectors.iter().any(|vector| vector.elements.len() != length) {
+        return Err(error(at, "the vectors have different lengths"));
+    }
+    let by_columns = name == "from_columns";
+    let (height, width) = if by_columns { (length, vectors.len()) } else { (vectors.len(), length) };
+    if rows.is_some_and(|rows| rows != height) || columns.is_some_and(|columns| columns != width) {
+        return Err(error(at, format!("these vectors make a {height} x {width} matrix")));
+    }
+    from_fn(height, width, |r, c| {
+        Ok(if by_columns { vectors[c].elements[r].clone() } else { vectors[r].elements[c].clone() })
+    })
 }

@@ -24,46 +24,8 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
             let length = array_length(call)?;
             Value::array(vec![call.only()?.clone(); length])
         }
-        ("iter", "repeat") => Value::iterator(Iter::Repeat(call.only()?.clone())),
-        ("iter", "repeat_n") => {
-            call.expect(2)?;
-            let n = evaluator.usize(&call.arguments[1], at)?;
-            Value::iterator(Iter::Take(Box::new(Iter::Repeat(call.arguments[0].clone())), n))
-        }
-        ("iter", "from_fn") => Value::iterator(Iter::FromFn(call.only()?.clone())),
-        ("iter", "once") => Value::iterator(Iter::of(vec![call.only()?.clone()])),
-        ("iter", "empty") => Value::iterator(Iter::of(Vec::new())),
-        ("iter", "successors") => {
-            call.expect(2)?;
-            match &call.arguments[0] {
-                Value::Option(first) => {
-                    Value::iterator(Iter::Successors(first.clone(), call.arguments[1].clone()))
-                }
-                other => return Err(error(at, format!("expected an `Option`, found {}", other.kind()))),
-            }
-        }
-        ("iter", "zip") => {
-            call.expect(2)?;
-            let a = iterator::into_iter(evaluator, call.arguments[0].clone(), at)?;
-            let b = iterator::into_iter(evaluator, call.arguments[1].clone(), at)?;
-            Value::iterator(Iter::Zip(Box::new(a), Box::new(b)))
-        }
-        ("mem", "swap") => {
-            call.expect(2)?;
-            let (a, b) = (reference(&call.arguments[0], at)?, reference(&call.arguments[1], at)?);
-            let (x, y) = (evaluator.read(&a, at)?, evaluator.read(&b, at)?);
-            evaluator.write(&a, y, at)?;
-            evaluator.write(&b, x, at)?;
-            Value::unit()
-        }
-        ("mem", "replace") => {
-            call.expect(2)?;
-            let place = reference(&call.arguments[0], at)?;
-            let old = evaluator.read(&place, at)?;
-            let new = evaluator.load(call.arguments[1].clone(), at)?;
-            evaluator.write(&place, new, at)?;
-            old
-        }
+        ("iter", _) => return made_iterator(evaluator, name, call),
+        ("mem", "swap" | "replace") => exchange(evaluator, name, call)?,
         ("cmp", "min" | "max") => {
             call.expect(2)?;
             let a = evaluator.integer(&call.arguments[0], at)?;
@@ -113,6 +75,56 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
         _ => return Ok(None),
     };
     Ok(Some(value))
+}
+
+/// Iterators of `core::iter`.
+fn made_iterator(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    Ok(Some(match name {
+        "repeat" => Value::iterator(Iter::Repeat(call.only()?.clone())),
+        "repeat_n" => {
+            call.expect(2)?;
+            let n = evaluator.usize(&call.arguments[1], at)?;
+            Value::iterator(Iter::Take(Box::new(Iter::Repeat(call.arguments[0].clone())), n))
+        }
+        "from_fn" => Value::iterator(Iter::FromFn(call.only()?.clone())),
+        "once" => Value::iterator(Iter::of(vec![call.only()?.clone()])),
+        "empty" => Value::iterator(Iter::of(Vec::new())),
+        "successors" => {
+            call.expect(2)?;
+            match &call.arguments[0] {
+                Value::Option(first) => {
+                    Value::iterator(Iter::Successors(first.clone(), call.arguments[1].clone()))
+                }
+                other => return Err(error(at, format!("expected an `Option`, found {}", other.kind()))),
+            }
+        }
+        "zip" => {
+            call.expect(2)?;
+            let a = iterator::into_iter(evaluator, call.arguments[0].clone(), at)?;
+            let b = iterator::into_iter(evaluator, call.arguments[1].clone(), at)?;
+            Value::iterator(Iter::Zip(Box::new(a), Box::new(b)))
+        }
+        _ => return Ok(None),
+    }))
+}
+
+/// `mem::swap`, `mem::replace`
+fn exchange(evaluator: &mut Evaluator, name: &str, call: &Call) -> Result<Value> {
+    let at = call.at;
+    call.expect(2)?;
+    let place = reference(&call.arguments[0], at)?;
+    let old = evaluator.read(&place, at)?;
+    if name == "swap" {
+        let other = reference(&call.arguments[1], at)?;
+        let new = evaluator.read(&other, at)?;
+        evaluator.write(&place, new, at)?;
+        evaluator.write(&other, old, at)?;
+        return Ok(Value::unit());
+    }
+    let new = evaluator.load(call.arguments[1].clone(), at)?;
+    evaluator.write(&place, new, at)?;
+    Ok(old)
 }
 
 /// `core::array::from_fn`

@@ -18,31 +18,7 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         };
     }
     let mut others = Vec::new();
-    if matches!(
-        call.name,
-        "pow"
-            | "min"
-            | "max"
-            | "clamp"
-            | "abs_diff"
-            | "rem_euclid"
-            | "div_euclid"
-            | "div_ceil"
-            | "is_multiple_of"
-            | "next_multiple_of"
-            | "saturating_sub"
-            | "saturating_add"
-            | "saturating_mul"
-            | "wrapping_add"
-            | "wrapping_sub"
-            | "wrapping_mul"
-            | "checked_add"
-            | "checked_sub"
-            | "checked_mul"
-            | "checked_div"
-            | "checked_pow"
-            | "ilog"
-    ) {
+    if takes_integers(call.name) {
         call.expect(if call.name == "clamp" { 2 } else { 1 })?;
         for argument in &call.arguments {
             others.push(evaluator.integer(argument, call.at)?);
@@ -112,6 +88,35 @@ pub fn method(evaluator: &mut Evaluator, a: Integer, call: &Call) -> Result<Opti
         },
         _ => Ok(None),
     }
+}
+
+/// Whether a method has integers for its arguments.
+fn takes_integers(name: &str) -> bool {
+    matches!(
+        name,
+        "pow"
+            | "min"
+            | "max"
+            | "clamp"
+            | "abs_diff"
+            | "rem_euclid"
+            | "div_euclid"
+            | "div_ceil"
+            | "is_multiple_of"
+            | "next_multiple_of"
+            | "saturating_sub"
+            | "saturating_add"
+            | "saturating_mul"
+            | "wrapping_add"
+            | "wrapping_sub"
+            | "wrapping_mul"
+            | "checked_add"
+            | "checked_sub"
+            | "checked_mul"
+            | "checked_div"
+            | "checked_pow"
+            | "ilog"
+    )
 }
 
 fn bits(value: u32) -> Value {

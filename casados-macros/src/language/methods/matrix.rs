@@ -124,92 +124,13 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
             let operation = if call.name == "component_mul" { Binary::Mul } else { Binary::Div };
             zip(evaluator, matrix, &other, operation, at).map(|m| Some(Value::Matrix(Rc::new(m))))
         }
-        "cross" => {
-            let other = argument(evaluator, call, 0)?;
-            same_shape(matrix, &other, call)?;
-            let (a, b) = (nodes(evaluator, matrix, at)?, nodes(evaluator, &other, at)?);
-            let (&[ax, ay, az], &[bx, by, bz]) = (a.as_slice(), b.as_slice()) else {
-                return Err(error(at, "`cross` is of vectors of three elements"));
-            };
-            let mut minor = |a, b, c, d| {
-                let (ab, cd) =
-                    (evaluator.graph.binary(Binary::Mul, a, b), evaluator.graph.binary(Binary::Mul, c, d));
-                Value::Real(evaluator.graph.binary(Binary::Sub, ab, cd))
-            };
-            let elements = vec![minor(ay, bz, az, by), minor(az, bx, ax, bz), minor(ax, by, ay, bx)];
-            Ok(Some(Value::matrix(matrix.rows, matrix.columns, elements)))
-        }
-        "cross_matrix" => {
-            let &[x, y, z] = nodes(evaluator, matrix, at)?.as_slice() else {
-                return Err(error(at, "`cross_matrix` is of a vector of three elements"));
-            };
-            let zero = evaluator.graph.constant(0.0);
-            let minus = [x, y, z].map(|a| evaluator.graph.unary(Unary::Neg, a));
-            let columns = [zero, z, minus[1], minus[2], zero, x, y, minus[0], zero];
-            Ok(Some(Value::matrix(3, 3, columns.into_iter().map(Value::Real).collect())))
-        }
-        "sum" | "trace" | "product" | "mean" => {
-            let all = nodes(evaluator, matrix, at)?;
-            let terms = if call.name == "trace" {
-                if matrix.rows != matrix.columns {
-                    return Err(error(at, "`trace` is of a square matrix"));
-                }
-                all.into_iter().step_by(matrix.rows + 1).collect()
-            } else {
-                all
-            };
-            let (operation, start) =
-                if call.name == "product" { (Binary::Mul, 1.0) } else { (Binary::Add, 0.0) };
-            let start = evaluator.graph.constant(start);
-            let count = terms.len();
-            let sum = terms.into_iter().fold(start, |sum, term| evaluator.graph.binary(operation, sum, term));
-            if call.name == "mean" && count > 0 {
-                let count = evaluator.graph.constant(count as f64);
-                return real(evaluator.graph.binary(Binary::Div, sum, count));
-            }
-            real(sum)
-        }
+        "cross" => cross(evaluator, matrix, call),
+        "cross_matrix" => cross_matrix(evaluator, matrix, call),
+        "sum" | "trace" | "product" | "mean" => sum(evaluator, matrix, call),
         "determinant" => determinant(evaluator, matrix, at).map(|node| Some(Value::Real(node))),
-        "tr_mul" | "ad_mul" => {
-            let other = argument(evaluator, call, 0)?;
-            if matrix.rows != other.rows {
-                return Err(error(at, "the numbers of rows differ"));
-            }
-            let mut elements = Vec::new();
-            for j in 0..other.columns {
-                for i in 0..matrix.columns {
-                    let (a, b) = (column(matrix, i), column(&other, j));
-                    elements.push(Value::Real(dot(evaluator, &a, &b, at)?));
-                }
-            }
-            Ok(Some(Value::matrix(matrix.columns, other.columns, elements)))
-        }
-        "kronecker" => {
-            let other = argument(evaluator, call, 0)?;
-            let mut elements = Vec::new();
-            for (j1, j2) in pairs(matrix.columns, other.columns) {
-                for (i1, i2) in pairs(matrix.rows, other.rows) {
-                    let (a, b) =
-                        (&matrix.elements[i1 + j1 * matrix.rows], &other.elements[i2 + j2 * other.rows]);
-                    elements.push(evaluator.binary(Operator::Mul, a, b, at)?);
-                }
-            }
-            Ok(Some(Value::matrix(matrix.rows * other.rows, matrix.columns * other.columns, elements)))
-        }
-        "lerp" => {
-            call.expect(2)?;
-            // nalgebra: rhs * t, then self * (1 - t) added.
-            let other = argument(evaluator, call, 0)?;
-            same_shape(matrix, &other, call)?;
-            let t = evaluator.real(&call.arguments[1], at)?;
-            let one = evaluator.graph.constant(1.0);
-            let rest = evaluator.graph.binary(Binary::Sub, one, t);
-            let (a, b) = (
-                scale(evaluator, matrix, Binary::Mul, rest, at)?,
-                scale(evaluator, &other, Binary::Mul, t, at)?,
-            );
-            evaluator.binary(Operator::Add, &a, &b, at).map(Some)
-        }
+        "tr_mul" | "ad_mul" => transposed_product(evaluator, matrix, call),
+        "kronecker" => kronecker(evaluator, matrix, call),
+        "lerp" => lerp(evaluator, matrix, call),
         "neg" => evaluator.negate(&Value::Matrix(matrix.clone()), at).map(Some),
         "add" | "sub" | "mul" | "div" => {
             let Some((Some(operator), _)) = super::float::operator(call.name) else { return Ok(None) };
@@ -219,6 +140,105 @@ fn algebra(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Resul
         "max" | "min" => Err(unsupported(at, format!("`{}` of a matrix", call.name))),
         _ => Ok(None),
     }
+}
+
+/// `a × b`
+fn cross(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    let other = argument(evaluator, call, 0)?;
+    same_shape(matrix, &other, call)?;
+    let (a, b) = (nodes(evaluator, matrix, at)?, nodes(evaluator, &other, at)?);
+    let (&[ax, ay, az], &[bx, by, bz]) = (a.as_slice(), b.as_slice()) else {
+        return Err(error(at, "`cross` is of vectors of three elements"));
+    };
+    let mut minor = |a, b, c, d| {
+        let (ab, cd) = (evaluator.graph.binary(Binary::Mul, a, b), evaluator.graph.binary(Binary::Mul, c, d));
+        Value::Real(evaluator.graph.binary(Binary::Sub, ab, cd))
+    };
+    let elements = vec![minor(ay, bz, az, by), minor(az, bx, ax, bz), minor(ax, by, ay, bx)];
+    Ok(Some(Value::matrix(matrix.rows, matrix.columns, elements)))
+}
+
+/// The matrix that multiplies by a vector product.
+fn cross_matrix(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    let &[x, y, z] = nodes(evaluator, matrix, at)?.as_slice() else {
+        return Err(error(at, "`cross_matrix` is of a vector of three elements"));
+    };
+    let zero = evaluator.graph.constant(0.0);
+    let minus = [x, y, z].map(|a| evaluator.graph.unary(Unary::Neg, a));
+    let columns = [zero, z, minus[1], minus[2], zero, x, y, minus[0], zero];
+    Ok(Some(Value::matrix(3, 3, columns.into_iter().map(Value::Real).collect())))
+}
+
+/// Sums and products of elements.
+fn sum(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    let real = |node: Node| Ok(Some(Value::Real(node)));
+    let all = nodes(evaluator, matrix, at)?;
+    let terms = if call.name == "trace" {
+        if matrix.rows != matrix.columns {
+            return Err(error(at, "`trace` is of a square matrix"));
+        }
+        all.into_iter().step_by(matrix.rows + 1).collect()
+    } else {
+        all
+    };
+    let (operation, start) = if call.name == "product" { (Binary::Mul, 1.0) } else { (Binary::Add, 0.0) };
+    let start = evaluator.graph.constant(start);
+    let count = terms.len();
+    let sum = terms.into_iter().fold(start, |sum, term| evaluator.graph.binary(operation, sum, term));
+    if call.name == "mean" && count > 0 {
+        let count = evaluator.graph.constant(count as f64);
+        return real(evaluator.graph.binary(Binary::Div, sum, count));
+    }
+    real(sum)
+}
+
+/// `Aᵀ B`
+fn transposed_product(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    let other = argument(evaluator, call, 0)?;
+    if matrix.rows != other.rows {
+        return Err(error(at, "the numbers of rows differ"));
+    }
+    let mut elements = Vec::new();
+    for j in 0..other.columns {
+        for i in 0..matrix.columns {
+            let (a, b) = (column(matrix, i), column(&other, j));
+            elements.push(Value::Real(dot(evaluator, &a, &b, at)?));
+        }
+    }
+    Ok(Some(Value::matrix(matrix.columns, other.columns, elements)))
+}
+
+/// The product of each element with the whole of another matrix.
+fn kronecker(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    let other = argument(evaluator, call, 0)?;
+    let mut elements = Vec::new();
+    for (j1, j2) in pairs(matrix.columns, other.columns) {
+        for (i1, i2) in pairs(matrix.rows, other.rows) {
+            let (a, b) = (&matrix.elements[i1 + j1 * matrix.rows], &other.elements[i2 + j2 * other.rows]);
+            elements.push(evaluator.binary(Operator::Mul, a, b, at)?);
+        }
+    }
+    Ok(Some(Value::matrix(matrix.rows * other.rows, matrix.columns * other.columns, elements)))
+}
+
+/// Between two matrices.
+fn lerp(evaluator: &mut Evaluator, matrix: &Rc<Matrix>, call: &Call) -> Result<Option<Value>> {
+    let at = call.at;
+    call.expect(2)?;
+    // nalgebra: rhs * t, then self * (1 - t) added.
+    let other = argument(evaluator, call, 0)?;
+    same_shape(matrix, &other, call)?;
+    let t = evaluator.real(&call.arguments[1], at)?;
+    let one = evaluator.graph.constant(1.0);
+    let rest = evaluator.graph.binary(Binary::Sub, one, t);
+    let (a, b) =
+        (scale(evaluator, matrix, Binary::Mul, rest, at)?, scale(evaluator, &other, Binary::Mul, t, at)?);
+    evaluator.binary(Operator::Add, &a, &b, at).map(Some)
 }
 
 /// Methods that rearrange, and iterators.

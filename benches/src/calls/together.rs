@@ -1,0 +1,80 @@
+//! All intervals in one call of a batch.
+
+use super::Together;
+use super::results::{Results, of_adjoint, of_forward, of_hessian, of_nominal, places, vector};
+use crate::case::{Case, Mode, Values};
+use casados::model::{VectorU, VectorX};
+use casados::prelude::*;
+use casados::{BatchError, Intervals, batch};
+use std::hint::black_box;
+
+/// A batch with its intervals and its results in place.
+pub(super) struct Side<M: Dae, B, const S: usize> {
+    batch: batch::Integrator<M, B, S, f64>,
+    x0: Vec<VectorX<M, f64>>,
+    u: Vec<VectorU<M, f64>>,
+    lambda: Vec<VectorX<M, f64>>,
+    h: f64,
+    results: Results<M>,
+}
+
+impl<M: Dae, B, const S: usize> Side<M, B, S> {
+    pub(super) fn new(case: &Case, batch: batch::Integrator<M, B, S, f64>) -> Self {
+        Self {
+            batch,
+            x0: case.inputs.iter().map(|(x0, _)| vector(x0)).collect(),
+            u: case.inputs.iter().map(|(_, u)| vector(u)).collect(),
+            lambda: vec![vector(&case.lambda); case.inputs.len()],
+            h: case.t,
+            results: Results::NONE,
+        }
+    }
+}
+
+impl<M: Dae, B: Send + Sync, const S: usize> Together for Side<M, B, S> {
+    fn call(&mut self, mode: Mode) -> Result<(), BatchError> {
+        let Self { batch, x0, u, lambda, h, results } = self;
+        let count = x0.len();
+        let intervals = Intervals {
+            x0: black_box(x0),
+            u: black_box(u),
+            h: core::slice::from_ref(h),
+            ..Default::default()
+        };
+        match mode {
+            Mode::Simulation => {
+                let nominal = places(&mut results.nominal, count);
+                batch.solve(&intervals, nominal)?;
+                black_box(nominal);
+            }
+            Mode::Forward => {
+                let forward = places(&mut results.forward, count);
+                batch.forward(&intervals, forward)?;
+                black_box(forward);
+            }
+            Mode::Adjoint => {
+                let adjoint = places(&mut results.adjoint, count);
+                batch.adjoint(&intervals, lambda, adjoint)?;
+                black_box(adjoint);
+            }
+            Mode::Hessian => {
+                let hessian = places(&mut results.hessian, count);
+                batch.hessian(&intervals, lambda, hessian)?;
+                black_box(hessian);
+            }
+        }
+        Ok(())
+    }
+
+    fn values(&mut self, mode: Mode) -> Result<Values, BatchError> {
+        self.call(mode)?;
+        let mut values = Values::default();
+        match mode {
+            Mode::Simulation => of_nominal(&self.results.nominal[0], &mut values),
+            Mode::Forward => of_forward(&self.results.forward[0], &mut values),
+            Mode::Adjoint => of_adjoint(&self.results.adjoint[0], &mut values),
+            Mode::Hessian => of_hessian(&self.results.hessian[0], &mut values),
+        }
+        Ok(values)
+    }
+}

@@ -1,0 +1,69 @@
+//! An integrator with an integrand.
+
+use super::{Integrator, U, X};
+use crate::error::Error;
+use crate::memory::{WithAdjoint, WithForward, WithHessian};
+use crate::quadrature::Integrand;
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+
+/// An integrator with an integrand: its calls are those of the integrator, and gradients and
+/// Hessians those of `λᵀx + νᵀq`; see [`Integrand`].
+pub struct With<'a, 'b, I, Q: ?Sized> {
+    pub(crate) integrator: &'a mut I,
+    pub(crate) integrand: &'b mut Q,
+}
+
+impl<'a, I: Integrator, Q: Integrand<I::Model, I::Number>> With<'a, '_, I, Q> {
+    /// See [`Integrator::solve`]; the integral.
+    ///
+    /// # Errors
+    /// Those of the integrator; [`Error::NonFiniteFunction`].
+    pub fn solve(self, x0: &X<I>, u: &U<I>, h: I::Number) -> Result<&'a Nominal<I::Model, I::Number>, Error> {
+        self.integrator.solve_along(x0, u, h, Some(self.integrand))
+    }
+
+    /// See [`Integrator::forward`]; the integral and its derivatives.
+    ///
+    /// # Errors
+    /// Those of the integrator; [`Error::NonFiniteFunction`].
+    pub fn forward(self, x0: &X<I>, u: &U<I>, h: I::Number) -> Result<&'a Forward<I::Model, I::Number>, Error>
+    where
+        I::Memory: WithForward,
+    {
+        self.integrator.forward_along(x0, u, h, Some(self.integrand))
+    }
+
+    /// See [`Integrator::adjoint`]; the gradient is that of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// Those of the integrator; [`Error::NonFiniteFunction`].
+    pub fn adjoint(
+        self,
+        x0: &X<I>,
+        u: &U<I>,
+        h: I::Number,
+        lambda: &X<I>,
+    ) -> Result<&'a Adjoint<I::Model, I::Number>, Error>
+    where
+        I::Memory: WithAdjoint<1>,
+    {
+        self.integrator.adjoint_along(x0, u, h, lambda, Some(self.integrand))
+    }
+
+    /// See [`Integrator::hessian`]; gradient and Hessian are those of `λᵀx` and the integral.
+    ///
+    /// # Errors
+    /// Those of the integrator; [`Error::NonFiniteFunction`].
+    pub fn hessian(
+        self,
+        x0: &X<I>,
+        u: &U<I>,
+        h: I::Number,
+        lambda: &X<I>,
+    ) -> Result<&'a Hessian<I::Model, I::Number>, Error>
+    where
+        I::Memory: WithHessian,
+    {
+        self.integrator.hessian_along(x0, u, h, lambda, Some(self.integrand))
+    }
+}

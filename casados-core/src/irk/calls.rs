@@ -1,0 +1,94 @@
+//! The calls that all integrators have in common.
+
+use super::driver::Arguments;
+use super::integrator::Integrator;
+use crate::error::Error;
+use crate::integrator;
+use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
+use crate::model::{Dae, VectorP, VectorU, VectorX};
+use crate::quadrature::{Along, begin, finish};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::Matrix;
+use crate::statistics::Statistics;
+
+impl<M: Dae, B, const S: usize, T: Real, W: Memory> integrator::Integrator for Integrator<M, B, S, T, W> {
+    type Model = M;
+    type Number = T;
+    type Memory = W;
+
+    fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        self.run.set_parameters(p)
+    }
+
+    fn set_time(&mut self, t: T) -> Result<(), Error> {
+        self.run.set_time(t)
+    }
+
+    fn reset(&mut self) {
+        self.run.reset();
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.run.statistics
+    }
+
+    fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        begin(&mut along);
+        self.run.steps(&Arguments { x0, u, h }, |parts, n, step, _| match &mut along {
+            Some(integrand) => parts.work.along_value(parts.coefficients, n, step, &mut **integrand),
+            None => Ok(()),
+        })?;
+        finish(&mut along)?;
+        self.sweep = None;
+        Ok(&self.run.keep()?.result)
+    }
+
+    fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        W: WithForward,
+    {
+        self.differentiate::<false>(&Arguments { x0, u, h }, along, None)?;
+        self.keep_forward()
+    }
+
+    fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error>
+    where
+        W: WithAdjoint<1>,
+    {
+        self.backward(&Arguments { x0, u, h }, lambda.as_slice(), along)
+    }
+
+    fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        W: WithHessian,
+    {
+        Self::hessian_along(self, x0, u, h, lambda, &[], along)
+    }
+}
