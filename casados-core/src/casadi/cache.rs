@@ -5,9 +5,9 @@
 //! iterate, each by a graph of its own over the same intervals. So there is an entry for each of
 //! the inputs, found by their bits.
 //!
-//! Where stages are known, derivatives are computed without solving for anything, and hardly anybody
-//! asks for the same ones twice. So they are kept from when somebody does: memory that was touched
-//! hundreds of inputs ago is slower to write than a Jacobian is to copy.
+//! Where stages are known, derivatives are computed without solving for anything, and hardly
+//! anybody asks for the same ones twice. So they are kept from when somebody does: memory that was
+//! touched hundreds of inputs ago is slower to write than a Jacobian is to copy.
 
 use alloc::vec::Vec;
 use std::collections::HashMap;
@@ -220,8 +220,8 @@ pub fn equal(one: &[f64], other: &[f64]) -> bool {
     one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-/// What inputs are found by: four products side by side, and the finaliser of `splitmix64` (S. Vigna,
-/// public domain).
+/// What inputs are found by: four products side by side, and the finaliser of `splitmix64`
+/// (S. Vigna, public domain).
 pub fn key(inputs: &[f64]) -> u64 {
     let mut lanes: [u64; 4] =
         [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03, 0xaef1_7502_108e_f2d9, 0xf135_7aea_2e62_a9c5];

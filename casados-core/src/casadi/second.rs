@@ -1,5 +1,5 @@
-//! Second derivatives over `(x₀, u, p)` as integrators have them: the blocks `xx`, `xu`, `uu`, `xp`,
-//! `up` and `pp`, one behind the other, each column by column.
+//! Second derivatives over `(x₀, u, p)` as integrators have them: the blocks `xx`, `xu`, `uu`,
+//! `xp`, `up` and `pp`, one behind the other, each column by column.
 
 /// Where the blocks are, for so many states, controls and parameters.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +19,8 @@ impl Blocks {
         before.map(|(row, column)| sizes[row] * sizes.get(column).copied().unwrap_or(0)).sum()
     }
 
-    /// Where the derivatives by two kinds of variables begin, and the distances of rows and columns.
+    /// Where the derivatives by two kinds of variables begin, and the distances of rows and of
+    /// columns.
     pub fn place(self, row: usize, column: usize) -> [usize; 3] {
         let Self(sizes) = self;
         if row <= column {
