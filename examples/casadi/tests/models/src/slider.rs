@@ -4,7 +4,6 @@ use casados::casadi::Program;
 use casados::dae;
 use casados::ocp::{Horizon, LeastSquaresCost, Problem};
 use casados::prelude::*;
-use slider::Slider;
 use std::error::Error;
 
 /// A mass on a table, in a wind.
