@@ -232,9 +232,13 @@ impl Client for Problems {
                 worker.multipliers.copy_from_slice(&worker.input_multipliers);
             }
         }
-        for (output, port) in signature.outputs.iter().enumerate() {
-            if call.wants(output) {
-                self.compute(worker, port).map_err(|error| Failure(error.to_string()))?;
+        // Derivatives first, with which values come.
+        let is_value = |port: &Port| [c"f", c"g"].contains(&port.name.as_ref());
+        for values in [false, true] {
+            for (output, port) in signature.outputs.iter().enumerate() {
+                if is_value(port) == values && call.wants(output) {
+                    self.compute(worker, port).map_err(|error| Failure(error.to_string()))?;
+                }
             }
         }
         for (output, port) in signature.outputs.iter().enumerate() {
