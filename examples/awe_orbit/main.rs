@@ -19,6 +19,7 @@ mod awe;
 mod conditions;
 #[path = "../../tests/data/mod.rs"]
 mod data;
+mod guess;
 mod plot;
 mod problem;
 
@@ -27,6 +28,7 @@ use casados::ocp::{Collocation, Formulation, HeapIpm, HeapOcp, Iteration, Outcom
 use casados::prelude::*;
 use conditions::Conditions;
 use data::Record;
+use guess::guess;
 use plot::{Convergence, Picture};
 use std::error::Error;
 use std::path::PathBuf;
@@ -64,7 +66,7 @@ fn run() -> Result<(), Failure> {
         "                          total   functions       steps   iterations       objective  residual  checked"
     );
     for name in GUESSES {
-        let guess = problem::guess(&reference.record(name)?)?;
+        let guess = guess(&reference.record(name)?)?;
         for method in ["shooting", "collocation"] {
             let (outcome, log) = match method {
                 "shooting" => solve(&mut shooting, &guess)?,

@@ -1,7 +1,6 @@
 //! The problem: the most power on a periodic orbit.
 
 use crate::awe::Awe;
-use crate::data::Record;
 use casados::model::Dae;
 use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
 use casados::prelude::*;
@@ -90,17 +89,6 @@ where
     }
     ocp.bound("u.delta", .., -2.0, 2.0)?.bound("u.kappa", .., -100.0, 100.0)?;
     Ok(ocp)
-}
-
-/// States at all nodes and controls of all intervals of a guess.
-pub fn guess(record: &Record) -> Result<[Vec<Vec<f64>>; 2], Box<dyn Error>> {
-    let (states, controls) = (record.vectors("x")?, record.vectors("u")?);
-    let node = |k: usize| {
-        let mut x = states.get(k % states.len()).cloned().unwrap_or_default();
-        x.resize(23, 0.0);
-        x
-    };
-    Ok([(0..=INTERVALS).map(node).collect(), controls])
 }
 
 /// A guess as the iterate.

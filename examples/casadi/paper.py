@@ -2,16 +2,19 @@
 """Runs the experiments of the paper again, each tool up to five times by turns, and writes docs/paper.md.
 
 To be run by a Python that has casadi, matplotlib and numpy. acados takes part if
-`ACADOS_SOURCE_DIR` is set. A whole run takes a quarter of an hour, and the libraries before it as
-long.
+`ACADOS_SOURCE_DIR` is set. A whole run takes half an hour with the libraries. What was run is
+remembered in target/paper/, so that a run that was interrupted goes on where it was, and only what
+has changed is run again.
 """
 
 import argparse
 import datetime
+import hashlib
 import json
 import os
 import pathlib
 import sys
+import time
 
 # One thread, before anybody makes more.
 for variable in ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"]:
@@ -26,64 +29,93 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="three masses and the orbit, twice; the page goes to target/")
     parser.add_argument("--masses", default="3,4,5,6,7", help="sizes of the chain")
-    parser.add_argument("--built", action="store_true", help="take libraries that are there, and leave out what is not")
-    parser.add_argument("--more", action="store_true", help="add chains to the last results")
-    parser.add_argument("--page", action="store_true", help="write the page from the last results alone")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="begin nothing after this time")
+    parser.add_argument("--again", action="store_true", help="forget what was run")
+    parser.add_argument("--page", action="store_true", help="write the page from what was run alone")
     return parser.parse_args()
 
 
-def libraries(cases, built, kept):
-    """Builds the library of each case, or finds those that are there."""
-    from common import build, library
+class Results:
+    """What was measured, with the library that it was measured with."""
 
-    there = {}
-    for name, features in cases.items():
-        path = pathlib.Path(library(name))
-        seconds = kept.get(name, {}).get("seconds", 0.0) if built else build(name, features)
-        if path.exists():
-            there[name] = {"seconds": seconds, "bytes": path.stat().st_size}
+    def __init__(self, path, again):
+        self.path = path
+        there = path.exists() and not again
+        self.all = json.loads(path.read_text()) if there else {"orbit": {}, "intervals": {}, "chains": {}, "calls": {}}
+        for key in ["builds", "of"]:
+            self.all.setdefault(key, {})
+
+    def write(self):
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self.path.write_text(json.dumps(self.all, indent=1))
+
+    def build(self, name, features):
+        """Builds a library; its time is kept from when that took any."""
+        from common import build, library
+
+        seconds, path = build(name, features), pathlib.Path(library(name))
+        known = self.all["builds"].get(name, {})
+        content = path.read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        if known.get("digest") != digest or seconds > known["seconds"] > 0:
+            known = {"seconds": seconds, "bytes": len(content), "digest": digest}
+        self.all["builds"][name] = known
+
+    def run(self, name, key, run):
+        """Runs an experiment with a library, unless that was done."""
+        part, digest = key[0], self.all["builds"][name]["digest"]
+        stamp = " ".join(key)
+        if self.all["of"].get(stamp) == digest:
+            return
+        measured = run()
+        if len(key) == 1:
+            self.all[part] = measured
         else:
-            print(f"{name}: no library, left out")
-    return there
+            self.all[part][key[1]] = measured
+        self.all["of"][stamp] = digest
+        self.write()
+
+
+def experiments(given):
+    """Names of libraries, their features, and what is run with each: where it belongs, and how."""
+    import chain
+    import orbit
+
+    rounds, seconds = (2, 5.0) if given.quick else (5, 10.0)
+    yield "awe", "orbit", {
+        ("orbit",): lambda: orbit.solve(rounds, seconds),
+        ("intervals",): lambda: orbit.intervals(rounds, seconds),
+    }
+    masses = [3] if given.quick else [int(m) for m in given.masses.split(",")]
+    slow = ["CasADi CVODES", "CasADi IDAS"] if given.quick else []
+    for m in masses:
+        for setting in ["s2n1"] if given.quick else list(chain.SETTINGS):
+            features = ",".join(filter(None, [FEATURES[m], "order-8" * (setting == "s4n4")]))
+            runs = {("chains", f"{m} {setting}"): lambda m=m, setting=setting: chain.run(m, setting, rounds, seconds, slow)}
+            if m == max(masses) and setting == "s2n1":
+                runs[("calls",)] = lambda m=m, setting=setting: chain.calls(m, setting)
+            yield f"chain_{m}_{setting}", features, runs
 
 
 def main():
-    given = arguments()
-    import chain
+    given, begin = arguments(), time.monotonic()
     import common
-    import orbit
     import page
 
-    last = common.FOLDER / ("quick.json" if given.quick else "results.json")
-    results = json.loads(last.read_text()) if last.exists() else {}
-    masses = [3] if given.quick else [int(m) for m in given.masses.split(",")]
-    settings = ["s2n1"] if given.quick else list(chain.SETTINGS)
-    rounds, seconds = (2, 5.0) if given.quick else (5, 10.0)
+    results = Results(common.FOLDER / ("quick.json" if given.quick else "results.json"), given.again)
     target = common.FOLDER / "paper.md" if given.quick else common.ROOT / "docs" / "paper.md"
     if not given.page:
-        cases = {} if given.more else {"awe": "orbit"}
-        for m in masses:
-            for setting in settings:
-                cases[f"chain_{m}_{setting}"] = ",".join(filter(None, [FEATURES[m], "order-8" * (setting == "s4n4")]))
-        builds = libraries(cases, given.built, results.get("builds", {}))
-        results = results if given.more else {"orbit": {}, "intervals": {}, "chains": {}, "builds": {}}
-        results |= {"machine": page.machine(), "date": f"{datetime.date.today():%B %Y}"}
-        results["builds"] |= builds
-        results["added"] = given.more
-        if "awe" in builds:
-            results["orbit"] = orbit.solve(rounds, seconds)
-            results["intervals"] = orbit.intervals(rounds, seconds)
-        for m in masses:
-            for setting in settings:
-                if f"chain_{m}_{setting}" in builds:
-                    slow = ["CasADi CVODES", "CasADi IDAS"] if given.quick else []
-                    results["chains"][f"{m} {setting}"] = chain.run(m, setting, rounds, seconds, slow)
-                    last.write_text(json.dumps(results, indent=1))
-        there = [m for m in masses if f"chain_{m}_s2n1" in builds]
-        if there:
-            results["calls"] = chain.calls(max(there), "s2n1")
-        last.write_text(json.dumps(results, indent=1))
-    page.write(results, target)
+        # Before the time of others is taken, what they share.
+        common.cargo("nothing")
+        results.all |= {"machine": page.machine(), "date": f"{datetime.date.today():%B %Y}"}
+        for name, features, runs in experiments(given):
+            for action in [lambda: results.build(name, features), *[lambda k=k, run=run: results.run(name, k, run) for k, run in runs.items()]]:
+                if time.monotonic() - begin > given.seconds:
+                    print("time is up: run it again to go on")
+                    return
+                action()
+                results.write()
+    page.write(results.all, target)
     print(f"written: {target}")
 
 

@@ -35,8 +35,9 @@ pub struct Group<M: Dae, E: Lanes, const S: usize> {
     steps: Places<Step<M, E, S>>,
     /// Whether start values were given.
     given: bool,
-    /// The warm start.
+    /// The warm start, or solutions.
     record: Places<Step<M, E, S>>,
+    pub solved: bool,
     lambda: Place<ArrayX<M, E>>,
     /// Weights of the algebraic states at the start, and whether there are any.
     nu: Place<VectorZ<M, E>>,
@@ -63,6 +64,7 @@ macro_rules! pass {
         $group.statistics = Statistics::default();
         let count = $group.options.steps;
         let from = match $group.options.start {
+            _ if $group.solved => InitialGuess::Solution(Heap::tape(&mut $group.record, count)?),
             Start::Warm if $warm => InitialGuess::Previous(Heap::tape(&mut $group.record, count)?),
             Start::Zero => InitialGuess::Zero,
             _ if $group.given => InitialGuess::Given,
@@ -88,6 +90,7 @@ impl<M: Dae, E: Lanes, const S: usize> Group<M, E, S> {
             steps: Default::default(),
             given: false,
             record: Default::default(),
+            solved: false,
             lambda: Default::default(),
             nu: Default::default(),
             weighted: false,
@@ -302,12 +305,16 @@ impl<M: Dae, E: Lanes, const S: usize> Pass<'_, M, E, S> {
             let kept = if HessianStep::<M, E, S>::DIRECT { remembered.last() } else { None };
             let kept = kept.and_then(|record| record.kept(false));
             let equations = StageEquations { coefficients, kept, n, x };
-            let solved = work.newton(equations, options, y, statistics);
+            let mut exact = false;
+            if !matches!(from, InitialGuess::Solution(_)) {
+                let solved = work.newton(equations, options, y, statistics);
+                good = E::and(good, solved.converged);
+                exact = solved.exact;
+            }
             work.advance(coefficients, options.compensated, step, n, count);
-            good = E::and(good, solved.converged);
             let mut pass =
                 Pass { options, coefficients, statistics, work, steps: &mut [], from: InitialGuess::Zero };
-            good = E::and(good, after(&mut pass, n, step, solved.exact, record.first_mut()));
+            good = E::and(good, after(&mut pass, n, step, exact, record.first_mut()));
             self.statistics.steps += 1;
         }
         good

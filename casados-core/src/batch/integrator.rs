@@ -40,6 +40,9 @@ pub struct Integrator<M: Dae, B, const S: usize, T: Real> {
     /// The stages of every step of every interval, and whether there are any.
     records: Vec<ArrayK<M, [T; S]>>,
     warm: Vec<bool>,
+    /// Whether stages are remembered without a warm start, too; and whether those are solutions.
+    keeps: bool,
+    solved: bool,
     statistics: BatchStatistics,
 }
 
@@ -79,6 +82,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
             status: Vec::new(),
             records: Vec::new(),
             warm: Vec::new(),
+            keeps: false,
+            solved: false,
             statistics: BatchStatistics::default(),
         })
     }
@@ -106,6 +111,14 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// Forgets the warm start.
     pub fn reset(&mut self) {
         self.warm.fill(false);
+    }
+
+    /// From now on all calls remember their stages. With `solved` those of the following calls are
+    /// those of the last one, where it was successful: they are at the same inputs, and only
+    /// differentiate.
+    #[cfg(feature = "casadi")]
+    pub(crate) fn keep_stages(&mut self, solved: bool) {
+        (self.keeps, self.solved) = (true, solved);
     }
 
     /// The options.
@@ -225,7 +238,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         let (count, steps) = (results.len(), self.options.steps);
         self.status.clear();
         fill(&mut self.status, count, Ok(()))?;
-        if self.options.start == Start::Warm {
+        if self.options.start == Start::Warm || self.keeps {
             fill(&mut self.warm, count, false)?;
             fill(&mut self.records, count.saturating_mul(steps), Zeroable::zeroed())?;
         }
@@ -237,7 +250,7 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
             if missing || lanes > 1 { 1 } else { width::<M, T, Nominal<M, T>, S>(&self.options.newton) };
         let given = self.given.as_ref().map(|(xdot, z)| [xdot.as_slice(), z.as_slice()]);
         let (options, tableau) = (&self.options, &self.tableau);
-        let work = Work { inputs, options, tableau, given, lanes, simulated };
+        let work = Work { inputs, options, tableau, given, lanes, simulated, solved: self.solved };
         let share = Share {
             first: 0,
             results,

@@ -72,6 +72,8 @@ pub struct Work<'a, M: Dae, T: Real, const S: usize> {
     pub lanes: usize,
     /// How many are simulated together before each is differentiated alone.
     pub simulated: usize,
+    /// Whether records are solutions at these inputs.
+    pub solved: bool,
 }
 
 impl<M: Dae, T: Real, const S: usize> Work<'_, M, T, S> {
@@ -269,6 +271,7 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
         let warm = share.warm.get_mut(index);
         match (&record, &warm, self.stages.chunks_exact(steps).nth(index)) {
             (_, _, Some(stages)) if solved => irk.set_solution(stages)?,
+            (Some(record), Some(true), _) if work.solved => irk.set_solution(record)?,
             (Some(record), Some(true), _) => irk.set_record(record)?,
             _ => irk.reset(),
         }
@@ -343,7 +346,7 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
 
         let steps = work.options.steps;
         let mut records: [&[ArrayK<M, [T; S]>]; MOST_LANES] = [&[]; MOST_LANES];
-        let mut warm = work.options.start == Start::Warm;
+        let mut warm = work.options.start == Start::Warm || work.solved;
         if warm {
             for (lane, record) in records.iter_mut().enumerate().take(E::LANES) {
                 let from = share.records.chunks_exact(steps).nth(index(lane));
@@ -353,6 +356,7 @@ impl<M: Dae, T: Real, R: Answer<M, T>, const S: usize> Widest<T> for Together<'_
         }
         group.place(lanes.get(..E::LANES).unwrap_or_default(), work.given, warm.then_some(&records))?;
 
+        group.solved = warm && work.solved;
         let (good, wide) = R::together(group, warm)?;
         for (done, interval) in done.iter_mut().zip(intervals).take(E::LANES) {
             *done = interval.is_some();

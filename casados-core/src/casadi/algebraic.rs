@@ -8,6 +8,7 @@
 //! multipliers `λ + ζ_xᵀν` of the state.
 
 use super::interval::Consistent;
+use super::second::Blocks;
 
 /// The numbers of states, algebraic states and directions, and of rows of `∂y/∂w`.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +47,13 @@ pub fn write_jacobian(sizes: Sizes, zeta: &Consistent, jacobian: &mut [f64]) {
 }
 
 /// Adds `Dᵀ ∇²(νᵀζ) D` to the Hessian, where `X` are the first rows of the Jacobian.
-pub fn add_to_hessian(sizes: Sizes, zeta: &Consistent, jacobian: &[f64], hessian: &mut [f64]) {
+pub fn add_to_hessian(
+    sizes: Sizes,
+    blocks: Blocks,
+    zeta: &Consistent,
+    jacobian: &[f64],
+    hessian: &mut [f64],
+) {
     let Sizes { nx, nw, ny, .. } = sizes;
     // The column of `D` for a direction.
     let column = |w: usize| {
@@ -56,13 +63,15 @@ pub fn add_to_hessian(sizes: Sizes, zeta: &Consistent, jacobian: &[f64], hessian
         })
     };
     for b in 0..nw {
-        let product: alloc::vec::Vec<f64> =
-            (0..nw).map(|i| column(b).enumerate().map(|(j, d)| zeta.hessian[i + nw * j] * d).sum()).collect();
+        let row = |i| column(b).enumerate().map(|(j, d)| zeta.hessian[blocks.index(i, j)] * d).sum();
+        let product: alloc::vec::Vec<f64> = (0..nw).map(row).collect();
         for a in 0..=b {
             let value: f64 = column(a).zip(&product).map(|(d, product)| d * product).sum();
-            hessian[a + nw * b] += value;
-            if a != b {
-                hessian[b + nw * a] += value;
+            // Blocks on the diagonal have both triangles.
+            let [place, mirrored] = [blocks.index(a, b), blocks.index(b, a)];
+            hessian[place] += value;
+            if place != mirrored {
+                hessian[mirrored] += value;
             }
         }
     }

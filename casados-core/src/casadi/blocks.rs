@@ -2,7 +2,8 @@
 
 use super::cache::{Answer, equal};
 use super::function::{Call, Port, Signature};
-use super::signature::{self, Output, Source};
+use super::second::Blocks;
+use super::signature::{self, Output, Run, Source};
 use crate::model::Dae;
 use crate::result::{Adjoint, Forward, Hessian};
 use crate::shape::{Matrix, Shape};
@@ -90,12 +91,17 @@ pub fn write<T>(answer: &Answer<T>, outputs: &[Output], call: &mut dyn Call) {
         };
         if let Some(from) = part.get() {
             let mut rest = to;
-            for run in runs {
-                let (to, behind) = rest.split_at_mut(run.len().min(rest.len()));
+            for &Run { first, stride, count } in runs {
+                let (to, behind) = rest.split_at_mut(count.min(rest.len()));
                 rest = behind;
-                match from.get(run.clone()) {
-                    Some(from) => to.copy_from_slice(from),
-                    None => to.fill(f64::NAN),
+                let from = from.get(first..=first + stride * (count - 1)).unwrap_or_default();
+                if stride == 1 && from.len() == to.len() {
+                    to.copy_from_slice(from);
+                } else if from.is_empty() {
+                    to.fill(f64::NAN);
+                } else {
+                    let from = from.iter().step_by(stride);
+                    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
                 }
             }
         }
@@ -141,27 +147,25 @@ pub fn jacobian<M: Dae>(result: &Forward<M>, ny: usize, to: &mut [f64]) {
     rows(blocks, M::Shape::NX, 0, ny, to);
 }
 
-/// Both triangles over `(x₀, u, p)`.
+/// The blocks, one behind the other.
 pub fn hessian<M: Dae>(result: &Hessian<M>, to: &mut [f64]) {
-    let (nx, nu, nw) = (M::Shape::NX, M::Shape::NU, M::Shape::NW);
-    let blocks: [(&[f64], [usize; 2], usize); 6] = [
-        (result.h_xx.as_slice(), [0, 0], nx),
-        (result.h_xu.as_slice(), [0, nx], nx),
-        (result.h_uu.as_slice(), [nx, nx], nu),
-        (result.h_xp.as_slice(), [0, nx + nu], nx),
-        (result.h_up.as_slice(), [nx, nx + nu], nu),
-        (result.h_pp.as_slice(), [nx + nu, nx + nu], nw - nx - nu),
+    let blocks = [
+        result.h_xx.as_slice(),
+        result.h_xu.as_slice(),
+        result.h_uu.as_slice(),
+        result.h_xp.as_slice(),
+        result.h_up.as_slice(),
+        result.h_pp.as_slice(),
     ];
-    for (block, [row, column], rows) in blocks {
-        for (j, values) in block.chunks_exact(rows.max(1)).enumerate() {
-            let j = column + j;
-            to[row + nw * j..row + nw * j + rows].copy_from_slice(values);
-            // Blocks on the diagonal have both triangles.
-            if row != column {
-                for (i, value) in values.iter().enumerate() {
-                    to[j + nw * (row + i)] = *value;
-                }
-            }
-        }
+    let mut rest = to;
+    for block in blocks {
+        let (to, behind) = rest.split_at_mut(block.len());
+        to.copy_from_slice(block);
+        rest = behind;
     }
+}
+
+/// Where those of a model are.
+pub fn second<M: Dae>() -> Blocks {
+    Blocks([M::Shape::NX, M::Shape::NU, M::Shape::NP])
 }

@@ -4,6 +4,10 @@
 //! IPOPT asks for all constraints, then for their Jacobian, then for the Hessian at the same
 //! iterate, each by a graph of its own over the same intervals. So there is an entry for each of
 //! the inputs, found by their bits.
+//!
+//! Where stages are known, derivatives are computed without solving for anything, and hardly
+//! anybody asks for the same ones twice. So they are kept from when somebody does: memory that was
+//! touched hundreds of inputs ago is slower to write than a Jacobian is to copy.
 
 use alloc::vec::Vec;
 use std::collections::HashMap;
@@ -80,6 +84,15 @@ impl<T> Answer<T> {
         self.algebraic = [false; 2];
     }
 
+    /// Takes values and stages that another one knows about the same inputs.
+    fn take_stages(&mut self, other: &mut Self) {
+        if other.value.valid {
+            self.algebraic[0] = other.algebraic[0];
+        }
+        self.value.take(&mut other.value);
+        self.tape.take(&mut other.tape);
+    }
+
     /// Takes what another one knows about the same inputs.
     fn take(&mut self, other: &mut Self) {
         for (part, is_new) in [other.value.valid, other.jacobian.valid].into_iter().enumerate() {
@@ -104,66 +117,101 @@ impl<T> Answer<T> {
 #[derive(Debug)]
 pub struct Cache<T> {
     entries: Vec<Entry<T>>,
-    /// Where the entry of a hash is.
+    /// Where the entry of a key is.
     places: HashMap<u64, usize, BuildHasherDefault<Hashed>>,
     capacity: usize,
     /// The oldest entry, if there are as many as may be.
     oldest: usize,
+    /// Whether derivatives are kept, too.
+    derivatives: bool,
 }
 
 #[derive(Debug)]
 struct Entry<T> {
-    hash: u64,
+    key: u64,
     inputs: Vec<f64>,
     answer: Answer<T>,
+    given: Given,
+}
+
+/// Derivatives that were computed, whether they were kept or not.
+#[derive(Clone, Copy, Debug, Default)]
+struct Given {
+    jacobian: bool,
+    /// The key of the multipliers of those of second order.
+    second: Option<u64>,
 }
 
 impl<T: Default> Cache<T> {
     /// A cache of at most this number of entries, which have their memory from when they are
-    /// needed.
-    pub fn new(capacity: usize) -> Self {
-        Self { entries: Vec::new(), places: HashMap::default(), capacity, oldest: 0 }
+    /// needed; of derivatives from the start, or from when some are asked for a second time.
+    pub fn new(capacity: usize, derivatives: bool) -> Self {
+        Self { entries: Vec::new(), places: HashMap::default(), capacity, oldest: 0, derivatives }
     }
 
-    /// What is known about these inputs.
-    pub fn find(&self, inputs: &[f64]) -> Option<&Answer<T>> {
-        let entry = self.entries.get(*self.places.get(&hash(inputs))?)?;
-        equal(&entry.inputs, inputs).then_some(&entry.answer)
+    /// What is known about these inputs, whose [`key`] this is.
+    pub fn find(&self, key: u64, inputs: &[f64]) -> Option<&Answer<T>> {
+        self.entry(key, inputs).map(|entry| &entry.answer)
     }
 
-    /// Takes what is known about these inputs, and leaves some other memory in its place. The
-    /// oldest inputs are forgotten if there is no place.
-    pub fn store(&mut self, inputs: &[f64], answer: &mut Answer<T>) {
-        let hash = hash(inputs);
-        if let Some(entry) = self.places.get(&hash).and_then(|&place| self.entries.get_mut(place)) {
-            if !equal(&entry.inputs, inputs) {
-                entry.inputs.copy_from_slice(inputs);
-                entry.answer.clear();
-            }
-            entry.answer.take(answer);
+    fn entry(&self, key: u64, inputs: &[f64]) -> Option<&Entry<T>> {
+        self.entries.get(*self.places.get(&key)?).filter(|entry| equal(&entry.inputs, inputs))
+    }
+
+    /// Whether derivatives are kept.
+    pub fn keeps_derivatives(&self) -> bool {
+        self.derivatives
+    }
+
+    /// Derivatives at these inputs are wanted that are not there, the Jacobian or those of second
+    /// order for some multipliers: if they were computed before, derivatives are kept from now on.
+    pub fn missed(&mut self, key: u64, inputs: &[f64], jacobian: bool, lambda: Option<&[f64]>) {
+        if self.derivatives {
             return;
         }
+        let Some(Entry { given, .. }) = self.entry(key, inputs) else { return };
+        let again = lambda.is_some_and(|lambda| given.second == Some(self::key(lambda)));
+        self.derivatives = again || jacobian && given.jacobian;
+    }
+
+    /// Takes what is to be kept about these inputs, and leaves some other memory in its place. The
+    /// oldest inputs are forgotten if there is no place.
+    pub fn store(&mut self, key: u64, inputs: &[f64], answer: &mut Answer<T>) {
         if self.capacity == 0 {
             return;
         }
-        let place = if self.entries.len() < self.capacity {
-            self.entries.push(Entry { hash, inputs: inputs.to_vec(), answer: Answer::default() });
-            self.entries.len() - 1
-        } else {
-            let oldest = self.oldest;
-            self.oldest = (oldest + 1) % self.capacity;
-            oldest
-        };
-        if let Some(entry) = self.entries.get_mut(place) {
-            if entry.hash != hash {
-                self.places.remove(&entry.hash);
-                entry.hash = hash;
-                entry.inputs.copy_from_slice(inputs);
-                entry.answer.clear();
+        let place = match self.places.get(&key) {
+            Some(&place) => place,
+            None if self.entries.len() < self.capacity => {
+                let (answer, given) = (Answer::default(), Given::default());
+                self.entries.push(Entry { key, inputs: inputs.to_vec(), answer, given });
+                self.entries.len() - 1
             }
-            entry.answer.take(answer);
+            None => {
+                let oldest = self.oldest;
+                self.oldest = (oldest + 1) % self.capacity;
+                oldest
+            }
+        };
+        let Some(entry) = self.entries.get_mut(place) else { return };
+        if !equal(&entry.inputs, inputs) {
+            if entry.key != key {
+                self.places.remove(&entry.key);
+            }
+            entry.inputs.copy_from_slice(inputs);
+            entry.answer.clear();
+            (entry.key, entry.given) = (key, Given::default());
         }
-        self.places.insert(hash, place);
+        if self.derivatives {
+            entry.answer.take(answer);
+        } else {
+            entry.given.jacobian |= answer.jacobian.valid;
+            if let Some(lambda) = answer.lambda.get() {
+                entry.given.second = Some(self::key(lambda));
+            }
+            entry.answer.take_stages(answer);
+        }
+        self.places.insert(key, place);
     }
 }
 
@@ -172,10 +220,18 @@ pub fn equal(one: &[f64], other: &[f64]) -> bool {
     one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
-/// The finaliser of `splitmix64` (S. Vigna, public domain), after each number.
-fn hash(inputs: &[f64]) -> u64 {
-    inputs.iter().fold(0x9e37_79b9_7f4a_7c15, |hash: u64, input| {
-        let mut mixed = hash.rotate_left(23) ^ input.to_bits();
+/// What inputs are found by: four products side by side, and the finaliser of `splitmix64`
+/// (S. Vigna, public domain).
+pub fn key(inputs: &[f64]) -> u64 {
+    let mut lanes: [u64; 4] =
+        [0x9e37_79b9_7f4a_7c15, 0xd1b5_4a32_d192_ed03, 0xaef1_7502_108e_f2d9, 0xf135_7aea_2e62_a9c5];
+    for chunk in inputs.chunks(4) {
+        for (lane, input) in lanes.iter_mut().zip(chunk) {
+            *lane = (*lane ^ input.to_bits()).wrapping_mul(0xff51_afd7_ed55_8ccd).rotate_left(29);
+        }
+    }
+    lanes.into_iter().fold(inputs.len() as u64, |hash, lane| {
+        let mut mixed = hash.rotate_left(23) ^ lane;
         mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         mixed ^ (mixed >> 31)

@@ -85,10 +85,14 @@ pub unsafe fn evaluate<C: Client>(
     memory: c_int,
 ) -> c_int {
     let run = AssertUnwindSafe(|| {
-        let client = library.client()?;
-        let Signature { inputs, outputs } = client.signatures().get(function)?;
+        let begun = library.begin(memory).ok()?;
+        let client = begun.client();
+        let (inputs, outputs) = match client.signatures().get(function) {
+            Some(Signature { inputs, outputs }) => (&inputs[..], &outputs[..]),
+            None => Default::default(),
+        };
         let mut call = Pointers { inputs, outputs, arguments, results };
-        library.evaluate(function, &mut call, memory).ok()
+        library.end(begun, function, &mut call).ok()
     });
     match catch_unwind(run) {
         Ok(Some(())) => 0,

@@ -1,6 +1,7 @@
 //! A function as CasADi sees it: names and patterns of its inputs and outputs.
 
 use super::sparsity::Sparsity;
+use alloc::borrow::Cow;
 use alloc::vec::Vec;
 use core::ffi::CStr;
 
@@ -8,15 +9,15 @@ use core::ffi::CStr;
 #[derive(Clone, Debug)]
 pub struct Port {
     /// Its name.
-    pub name: &'static CStr,
+    pub name: Cow<'static, CStr>,
     /// Its non-zeros.
     pub sparsity: Sparsity,
 }
 
 impl Port {
     /// A port of this name with these non-zeros.
-    pub fn new(name: &'static CStr, sparsity: Sparsity) -> Self {
-        Self { name, sparsity }
+    pub fn new(name: impl Into<Cow<'static, CStr>>, sparsity: Sparsity) -> Self {
+        Self { name: name.into(), sparsity }
     }
 }
 

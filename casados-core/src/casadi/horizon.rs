@@ -1,8 +1,10 @@
 //! A batch as the functions of one integrator, of all intervals of a horizon at once: `x0`, `u`,
 //! `p` and `xf` have a column for each interval, derivatives are block-diagonal.
 
-use super::blocks::{Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, write};
-use super::cache::{Answer, Cache};
+use super::blocks::{
+    Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, second, write,
+};
+use super::cache::{Answer, Cache, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integrators::Settings;
@@ -69,7 +71,8 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Horizon for batch::Integrat
             self.hessian(intervals, lambda, &mut results).map_err(failed)?;
             let slopes = answer.jacobian.set(count * nx * nw).chunks_exact_mut((nx * nw).max(1));
             let gradients = answer.gradient.set(count * nw).chunks_exact_mut(nw.max(1));
-            let curvatures = answer.hessian.set(count * nw * nw).chunks_exact_mut((nw * nw).max(1));
+            let length = second::<M>().len();
+            let curvatures = answer.hessian.set(count * length).chunks_exact_mut(length.max(1));
             let places = values.zip(slopes).zip(gradients.zip(curvatures));
             for (result, ((value, slope), (first, second))) in results.iter().zip(places) {
                 value.copy_from_slice(result.x.as_slice());
@@ -144,7 +147,7 @@ impl<B: Horizon> Horizons<B> {
         let outputs = [0..nx, nx..nx, nx..nx];
         let shape = signature::Shape { count, inputs, outputs, value: &value, hessian: &hessian };
         let (signatures, outputs) = shape.functions().into_iter().unzip();
-        let cache = Mutex::new(Cache::new(settings.cache));
+        let cache = Mutex::new(Cache::new(settings.cache, true));
         let integrations = AtomicU64::new(0);
         Self { settings, count, signatures, outputs, cache, integrations, batch: PhantomData }
     }
@@ -197,10 +200,11 @@ impl<B: Horizon> Client for Horizons<B> {
         }
         read_inputs(signature, call, &mut worker.inputs);
         read_multipliers(signature, call, &mut worker.lambda);
+        let key = key(&worker.inputs);
         {
             let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(answer) =
-                cache.find(&worker.inputs).filter(|answer| wanted.is_in(answer, &worker.lambda))
+                cache.find(key, &worker.inputs).filter(|answer| wanted.is_in(answer, &worker.lambda))
             {
                 write(answer, outputs, call);
                 return Ok(());
@@ -210,7 +214,7 @@ impl<B: Horizon> Client for Horizons<B> {
         self.compute(worker, wanted)?;
         write(&worker.answer, outputs, call);
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.store(&worker.inputs, &mut worker.answer);
+        cache.store(key, &worker.inputs, &mut worker.answer);
         Ok(())
     }
 

@@ -5,9 +5,9 @@
 
 use super::algebraic::{self, Sizes};
 use super::blocks::{
-    Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, rows, write,
+    Wanted, gradient, gradient_of, hessian, jacobian, read_inputs, read_multipliers, rows, second, write,
 };
-use super::cache::{Answer, Cache, Part};
+use super::cache::{Answer, Cache, Part, key};
 use super::dependence::{self, Dimensions};
 use super::function::{Call, Signature};
 use super::integral::{Integral, Nothing};
@@ -68,6 +68,8 @@ pub struct Worker<I: Interval, Q: Integral<I::Model>> {
     inputs: Vec<f64>,
     lambda: Vec<f64>,
     answer: Answer<I::Tape>,
+    /// Whether the cache keeps derivatives.
+    keeps: bool,
     /// Algebraic states at the end.
     zeta: Consistent,
 }
@@ -106,7 +108,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         let inputs = [0..nx, nx..nx + nu, nx + nu..nw];
         let shape = signature::Shape { count: 1, inputs, outputs, value: &value, hessian: &hessian };
         let (signatures, outputs) = shape.functions().into_iter().unzip();
-        let cache = Mutex::new(Cache::new(settings.cache));
+        let cache = Mutex::new(Cache::new(settings.cache, !I::RECORDS));
         let integrations = AtomicU64::new(0);
         Self { settings, signatures, outputs, cache, integrations, integrals: PhantomData }
     }
@@ -115,13 +117,15 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
     fn known(
         &self,
         worker: &mut Worker<I, Q>,
+        key: u64,
         wanted: &Wanted,
         outputs: &[Output],
         call: &mut dyn Call,
     ) -> bool {
-        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         worker.answer.clear();
-        let Some(answer) = cache.find(&worker.inputs) else { return false };
+        worker.keeps = cache.keeps_derivatives();
+        let Some(answer) = cache.find(key, &worker.inputs) else { return false };
         if wanted.is_in(answer, &worker.lambda) {
             write(answer, outputs, call);
             return true;
@@ -129,12 +133,15 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
         if let Some(tape) = answer.tape.get() {
             worker.answer.tape.open().clone_from(tape);
         }
+        let lambda = (wanted.gradient || wanted.hessian).then_some(&worker.lambda[..]);
+        cache.missed(key, &worker.inputs, wanted.jacobian, lambda);
+        worker.keeps = cache.keeps_derivatives();
         false
     }
 
     /// Computes what is wanted, from stages that are known if there are any.
     fn compute(&self, worker: &mut Worker<I, Q>, wanted: &Wanted) -> Result<(), Failure> {
-        let Worker { integrator, integrals, inputs, lambda, answer, zeta } = worker;
+        let Worker { integrator, integrals, inputs, lambda, answer, keeps, zeta } = worker;
         let sizes @ Sizes { nx, nz, ny, .. } = Self::sizes(&self.settings);
         let (x0, rest) = inputs.split_at(nx);
         let (u, p) = rest.split_at(Self::NU);
@@ -163,7 +170,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
                 integrator.restore(tape)?;
             }
         }
-        let asked = Asked { point: &point, seed: &seed, wanted: *wanted, sizes };
+        let asked = Asked { point: &point, seed: &seed, wanted: *wanted, keeps: *keeps || algebraic, sizes };
         asked.of(integrator, Q::along(integrals, of_integrals), answer)?;
         keep(integrator, &mut answer.tape)?;
         if adjoint {
@@ -189,7 +196,7 @@ impl<I: Interval, Q: Integral<I::Model>> Integrators<I, Q> {
             }
             if wanted.hessian {
                 let Some(jacobian) = answer.jacobian.get() else { return Ok(()) };
-                algebraic::add_to_hessian(sizes, zeta, jacobian, answer.hessian.open());
+                algebraic::add_to_hessian(sizes, second::<I::Model>(), zeta, jacobian, answer.hessian.open());
             }
         }
         Ok(())
@@ -216,6 +223,8 @@ struct Asked<'a, M: Dae> {
     point: &'a Point<M>,
     seed: &'a VectorX<M, f64>,
     wanted: Wanted,
+    /// Whether the Jacobian is needed where it is computed for the Hessian.
+    keeps: bool,
     sizes: Sizes,
 }
 
@@ -227,14 +236,16 @@ impl<M: Dae> Asked<'_, M> {
         along: Along<'_, M>,
         answer: &mut Answer<I::Tape>,
     ) -> Result<(), Failure> {
-        let Self { point, seed, wanted, sizes: Sizes { nx, nw, ny, .. } } = *self;
+        let Self { point, seed, wanted, keeps, sizes: Sizes { nx, nw, ny, .. } } = *self;
         let values = answer.value.set(ny);
         if wanted.hessian {
             let result = integrator.curvature(point, seed, along)?;
             values[..nx].copy_from_slice(result.x.as_slice());
-            jacobian(result, ny, answer.jacobian.set(ny * nw));
+            if wanted.jacobian || keeps {
+                jacobian(result, ny, answer.jacobian.set(ny * nw));
+            }
             gradient_of(result, answer.gradient.set(nw));
-            hessian(result, answer.hessian.set(nw * nw));
+            hessian(result, answer.hessian.set(second::<M>().len()));
         } else if wanted.gradient {
             let result = integrator.gradient(point, seed, along)?;
             values[..nx].copy_from_slice(result.x.as_slice());
@@ -293,6 +304,7 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
             inputs: vec![0.0; Self::NW],
             lambda: vec![0.0; Self::sizes(&self.settings).ny],
             answer: Answer::default(),
+            keeps: false,
             zeta: Consistent::default(),
         })
     }
@@ -313,14 +325,15 @@ impl<I: Interval, Q: Integral<I::Model>> Client for Integrators<I, Q> {
         }
         read_inputs(signature, call, &mut worker.inputs);
         read_multipliers(signature, call, &mut worker.lambda);
-        if self.known(worker, &wanted, outputs, call) {
+        let key = key(&worker.inputs);
+        if self.known(worker, key, &wanted, outputs, call) {
             return Ok(());
         }
         // Stages that were not taken by a call that was refused are not those of the next one.
         self.compute(worker, &wanted).inspect_err(|_| worker.integrator.forget())?;
         write(&worker.answer, outputs, call);
         let mut cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        cache.store(&worker.inputs, &mut worker.answer);
+        cache.store(key, &worker.inputs, &mut worker.answer);
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use crate::model::{ArrayK, Dae, Ode, VectorP, VectorU, VectorX};
 use crate::options::Options;
 use crate::quadrature::Integrand;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
-use crate::shape::{Matrix, Shape};
+use crate::shape::Matrix;
 use crate::tableau::Method;
 use crate::{erk, irk};
 use alloc::vec::Vec;
@@ -106,7 +106,9 @@ pub trait Interval: Sized + Send + 'static {
         Err(Error::NoInterpolation)
     }
 
-    /// Copies the stages of the last call, of a method that solves equations for them.
+    /// Whether there are stages to be recorded: those of a method that solves equations for them.
+    const RECORDS: bool = false;
+    /// Copies the stages of the last call, if there are any to be recorded.
     ///
     /// # Errors
     /// [`Error::NoResult`]
@@ -202,6 +204,7 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
     }
     calls!(M, &[]);
 
+    const RECORDS: bool = true;
     fn record(&mut self, tape: &mut Self::Tape) -> Result<bool, Error> {
         tape.resize(self.options().steps, Zeroable::zeroed());
         irk::Integrator::record(self, tape).map(|()| true)
@@ -230,7 +233,7 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Interval for irk::Integrato
         } else {
             let result = self.hessian_with_z0(&at.x0, &at.u, 0.0, &Zeroable::zeroed(), &vector(nu))?;
             copy(to, result);
-            to.hessian.resize(M::Shape::NW * M::Shape::NW, 0.0);
+            to.hessian.resize(super::blocks::second::<M>().len(), 0.0);
             super::blocks::hessian(result, &mut to.hessian);
         }
         Ok(())

@@ -8,9 +8,9 @@
 //! lower ≤ x + e_lower − e_upper ≤ upper        e ≥ 0, at the cost linear · e + ½ quadratic · e²
 //! ```
 
+use super::entries::{Entries, Slot, Term};
 use super::program::{Limit, Program};
-use super::sparsity::Sparsity;
-use crate::qp::{QpView, StageDims};
+use crate::qp::{QpView, StageDims, add_symmetric};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -29,6 +29,8 @@ pub struct Layout {
     soft: Vec<usize>,
     pub jacobian: Entries,
     pub hessian: Entries,
+    /// The upper triangle of the Hessian.
+    pub upper: Entries,
     /// Bounds of variables, and of constraints.
     pub bounds: [Vec<[f64; 2]>; 2],
 }
@@ -42,74 +44,11 @@ struct Slack {
     quadratic: f64,
 }
 
-/// A matrix as a sum: what is added to which entry.
-#[derive(Default)]
-pub struct Entries {
-    pub sparsity: Sparsity,
-    /// Numbers of the matrices of the stages: entry, and place there.
-    stages: Vec<Vec<(u32, u32)>>,
-    constants: Vec<(u32, f64)>,
-}
-
-/// A number that is added to an entry: where it is in the matrix of a stage, or its value.
-#[derive(Clone, Copy)]
-enum Slot {
-    Entry { stage: usize, index: usize },
-    Constant(f64),
-}
-
-impl Entries {
-    /// The matrix of these numbers, each at a row and a column.
-    fn new(rows: usize, columns: usize, mut slots: Vec<([usize; 2], Slot)>) -> Self {
-        slots.sort_by_key(|&([row, column], _)| (column, row));
-        let mut entries: Vec<(usize, usize)> =
-            slots.iter().map(|&([row, column], _)| (row, column)).collect();
-        entries.dedup();
-        let (mut stages, mut constants, mut entry) = (Vec::<Vec<_>>::new(), Vec::new(), 0);
-        for ([row, column], slot) in slots {
-            while entries.get(entry).is_some_and(|&here| here != (row, column)) {
-                entry += 1;
-            }
-            match slot {
-                Slot::Entry { stage, index } => {
-                    if stages.len() <= stage {
-                        stages.resize(stage + 1, Vec::new());
-                    }
-                    stages[stage].push((entry as u32, index as u32));
-                }
-                Slot::Constant(value) => constants.push((entry as u32, value)),
-            }
-        }
-        Self { sparsity: Sparsity::from_entries(rows, columns, entries), stages, constants }
-    }
-
-    /// The values of the entries, out of the matrices of the stages.
-    pub fn write<'a>(
-        &self,
-        qp: &QpView<'a, f64>,
-        choose: impl Fn((&'a [f64], &'a [f64])) -> &'a [f64],
-        to: &mut Vec<f64>,
-    ) {
-        to.clear();
-        to.resize(self.sparsity.entries().len(), 0.0);
-        for (stage, terms) in qp.stages().zip(&self.stages) {
-            let arrays = stage.arrays();
-            let matrix = choose((arrays.matrix, arrays.hessian));
-            for &(entry, place) in terms {
-                to[entry as usize] += matrix[place as usize];
-            }
-        }
-        for &(entry, value) in &self.constants {
-            to[entry as usize] += value;
-        }
-    }
-}
-
 /// What a layout is made of while it grows.
 struct Draft {
     layout: Layout,
-    jacobian: Vec<([usize; 2], Slot)>,
-    hessian: Vec<([usize; 2], Slot)>,
+    jacobian: Vec<Term>,
+    hessian: Vec<Term>,
 }
 
 impl Layout {
@@ -131,7 +70,9 @@ impl Layout {
         let Draft { mut layout, jacobian, hessian } = draft;
         let (n, m) = (layout.variables, layout.constraints);
         layout.jacobian = Entries::new(m, n, jacobian);
+        let upper = hessian.iter().copied().filter(|([row, column], _)| row <= column).collect();
         layout.hessian = Entries::new(n, n, hessian);
+        layout.upper = Entries::new(n, n, upper);
         layout
     }
 
@@ -186,17 +127,20 @@ impl Layout {
     pub fn gradient(&self, qp: &QpView<'_, f64>, x: &[f64], v: &[f64], to: &mut Vec<f64>) {
         to.clear();
         to.resize(self.variables, 0.0);
-        let mut begin = 0;
+        let (mut begin, mut here, mut product) = (0, Vec::new(), Vec::new());
         for stage in qp.stages() {
             let arrays = stage.arrays();
-            let v = &v[begin..begin + arrays.n];
             let columns = &self.columns[begin..begin + arrays.n];
-            begin += arrays.n;
-            for (i, &column) in columns.iter().enumerate() {
-                let product: f64 =
-                    (0..arrays.n).map(|j| arrays.hessian[i.min(j) * arrays.ld + i.max(j)] * v[j]).sum();
-                to[column] += arrays.gradient[i] + product;
+            for part in [&mut here, &mut product] {
+                part.clear();
+                part.resize(arrays.ld, 0.0);
             }
+            here[..arrays.n].copy_from_slice(&v[begin..begin + arrays.n]);
+            add_symmetric(&mut product, arrays.hessian, arrays.ld, &here, arrays.n);
+            for ((&column, gradient), product) in columns.iter().zip(arrays.gradient).zip(&product) {
+                to[column] += gradient + product;
+            }
+            begin += arrays.n;
         }
         for slack in &self.slacks {
             to[slack.variable] += slack.linear + slack.quadratic * x[slack.variable];

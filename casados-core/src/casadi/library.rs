@@ -142,20 +142,47 @@ impl<C: Client> Library<C> {
         }
     }
 
-    /// Computes the outputs of a function that are wanted.
+    /// A call begins: it has the memory, until it ends.
     ///
     /// # Errors
-    /// Those of the client; a memory that was not checked out; a panic.
-    pub fn evaluate(&self, function: usize, call: &mut dyn Call, id: i32) -> Result<(), Failure> {
-        let client = self.client().ok_or_else(|| Failure("the library has no client".into()))?;
-        let worker = self.state().take(id).ok_or_else(|| Failure::memory(id))?;
+    /// A memory that was not checked out; no client.
+    pub fn begin(&self, id: i32) -> Result<Begun<C>, Failure> {
+        let mut state = self.state();
+        let client = match &state.client {
+            Some(client) => Arc::clone(client),
+            None => {
+                drop(state);
+                let made = self.client().ok_or_else(|| Failure("the library has no client".into()))?;
+                state = self.state();
+                made
+            }
+        };
+        let worker = state.take(id).ok_or_else(|| Failure::memory(id));
+        drop(state);
+        let worker = worker.inspect_err(|failure| say(&failure.0))?;
+        Ok(Begun { client, worker, id })
+    }
+
+    /// Computes the outputs of a function that are wanted, which ends the call.
+    ///
+    /// # Errors
+    /// Those of the client; no such function; a panic.
+    pub fn end(
+        &self,
+        Begun { worker, client, id }: Begun<C>,
+        function: usize,
+        call: &mut dyn Call,
+    ) -> Result<(), Failure> {
         // After a panic the worker is gone, and the next call has a new one.
         let outcome = guarded(AssertUnwindSafe(|| {
             let mut worker = match worker {
                 Some(worker) => worker,
                 None => Box::new(client.worker()?),
             };
-            let outcome = client.evaluate(&mut worker, function, call);
+            let outcome = match client.signatures().get(function) {
+                Some(_) => client.evaluate(&mut worker, function, call),
+                None => Err(Failure("there is no such function".into())),
+            };
             Ok::<_, Failure>((worker, outcome))
         }));
         let (worker, outcome) = match outcome {
@@ -164,6 +191,20 @@ impl<C: Client> Library<C> {
         };
         self.state().give(id, worker);
         outcome.inspect_err(|failure| say(&failure.0))
+    }
+}
+
+/// A call that has begun.
+pub struct Begun<C: Client> {
+    client: Arc<C>,
+    worker: Option<Box<C::Worker>>,
+    id: i32,
+}
+
+impl<C: Client> Begun<C> {
+    /// Whose function is called.
+    pub fn client(&self) -> Arc<C> {
+        Arc::clone(&self.client)
     }
 }
 

@@ -38,19 +38,23 @@ mod algebraic;
 mod blocks;
 mod cache;
 mod dependence;
+mod entries;
 mod export;
 #[doc(hidden)]
 pub mod ffi;
 mod function;
+mod groups;
 mod horizon;
 mod integral;
 mod integrators;
 mod interval;
 mod layout;
 mod library;
+mod nlp;
 mod pattern;
 mod problem;
 mod program;
+mod second;
 mod signature;
 mod sparsity;
 #[cfg(test)]

@@ -5,12 +5,13 @@
 //! those of any external function.
 
 use super::function::{Call, Port, Signature};
+use super::groups::{Group, groups};
 use super::layout::Layout;
 use super::library::{Client, Failure};
-use super::program::Program;
-use super::sparsity::Sparsity;
+use super::nlp::signatures;
+use super::program::{Program, Trial};
 use crate::ocp::OcpError;
-use crate::qp::StageDims;
+use crate::qp::{Solution, StageDims};
 use alloc::boxed::Box;
 use alloc::string::{String, ToString};
 use alloc::vec;
@@ -28,6 +29,8 @@ pub struct Problems {
     make: Make,
     layout: Layout,
     signatures: Vec<Signature>,
+    /// States and controls by their names.
+    groups: Vec<Group>,
     /// Where the entries of the transposed Jacobian are among those of the Jacobian.
     transposed: Vec<usize>,
     /// Where those of the upper triangle are among those of the Hessian.
@@ -53,15 +56,22 @@ pub struct Worker {
     objective: f64,
     ends: Vec<f64>,
     gradient: Vec<f64>,
+    /// The Hessian where `σ` is zero.
+    difference: Vec<f64>,
+    /// Room for a point, for multipliers over `σ`, and for a Jacobian.
+    room: Trial,
+    scaled: Vec<f64>,
     jacobian: Vec<f64>,
-    hessian: Vec<f64>,
 }
 
 /// What is known at the last point.
 #[derive(Clone, Copy, Default)]
 struct Known {
     value: bool,
+    /// Whether the QP of the program is linearised there.
     first: bool,
+    gradient: bool,
+    /// Whether it has the Hessian of the last multipliers.
     second: bool,
 }
 
@@ -74,21 +84,23 @@ impl Problems {
         let made = make().map_err(|error| error.to_string());
         let made = made.and_then(|mut program| {
             program.check()?;
-            Ok(Layout::new(program.as_mut()))
+            Ok((Layout::new(program.as_mut()), groups(program.names())))
         });
-        let (layout, wrong) = match made {
-            Ok(layout) => (layout, None),
-            Err(wrong) => (Layout::default(), Some(wrong)),
+        let ((layout, groups), wrong) = match made {
+            Ok(made) => (made, None),
+            Err(wrong) => (Default::default(), Some(wrong)),
         };
         let (transposed_pattern, transposed) = layout.jacobian.sparsity.transposed();
-        let signatures = signatures(&layout, transposed_pattern);
+        let signatures = signatures(&layout, &groups, transposed_pattern);
         let entries = layout.hessian.sparsity.entries().iter().enumerate();
         let upper = entries.filter(|(_, (row, column))| row <= column).map(|(entry, _)| entry).collect();
-        Self { make, layout, signatures, transposed, upper, wrong, integrations: AtomicU64::new(0) }
+        Self { make, layout, signatures, groups, transposed, upper, wrong, integrations: AtomicU64::new(0) }
     }
 
-    fn count(&self) {
-        let intervals = self.layout.dims.len().saturating_sub(1) as u64;
+    /// What comes before intervals are integrated, or differentiated where they were.
+    fn begin(&self, program: &mut dyn Program, known: bool) {
+        let known = program.keep_stages(known);
+        let intervals = if known { 0 } else { self.layout.dims.len().saturating_sub(1) as u64 };
         self.integrations.fetch_add(intervals, Ordering::Relaxed);
     }
 
@@ -103,8 +115,8 @@ impl Problems {
             worker.follows = false;
             return Ok(());
         }
-        self.count();
-        worker.objective = worker.program.value(&worker.v, &mut worker.ends)?;
+        self.begin(worker.program.as_mut(), false);
+        worker.objective = worker.program.value(&worker.v, &mut worker.room, &mut worker.ends)?;
         worker.known.value = true;
         Ok(())
     }
@@ -112,21 +124,24 @@ impl Problems {
     fn first(&self, worker: &mut Worker) -> Result<(), OcpError> {
         worker.follows = true;
         if !worker.known.first {
-            self.count();
+            // What an error interrupts is known no more.
+            let known = core::mem::take(&mut worker.known).value;
             let Worker { program, v, ends, .. } = worker;
+            self.begin(program.as_mut(), known);
             worker.objective = program.first(v, ends)?;
-            self.linearised(worker);
+            (worker.known.value, worker.known.first) = (true, true);
         }
         Ok(())
     }
 
-    /// What every linearisation tells.
-    fn linearised(&self, worker: &mut Worker) {
-        let Worker { program, x, v, gradient, jacobian, known, .. } = worker;
-        let qp = program.qp();
-        self.layout.gradient(&qp, x, v, gradient);
-        self.layout.jacobian.write(&qp, |stage| stage.0, jacobian);
-        (known.value, known.first) = (true, true);
+    fn gradient(&self, worker: &mut Worker) -> Result<(), OcpError> {
+        self.first(worker)?;
+        let Worker { program, x, v, gradient, known, .. } = worker;
+        if !known.gradient {
+            self.layout.gradient(&program.qp(), x, v, gradient);
+            known.gradient = true;
+        }
+        Ok(())
     }
 
     /// `σ H(μ/σ)`, and where `σ` is zero what is linear in `μ`: `H(μ) − H(0)`, both with `σ = 1`.
@@ -134,30 +149,27 @@ impl Problems {
         if worker.known.second {
             return Ok(());
         }
-        let Worker { program, v, ends, multipliers, hessian, .. } = worker;
+        let known = core::mem::take(&mut worker.known);
+        let Worker { program, v, ends, multipliers, scaled, difference, .. } = worker;
         let Some((&sigma, mu)) = multipliers.split_first() else { return Ok(()) };
         let factor = if sigma == 0.0 { 1.0 } else { sigma };
-        let scaled: Vec<f64> = mu.iter().take(self.layout.functions).map(|mu| mu / factor).collect();
-        self.count();
-        worker.objective = program.second(v, &scaled, ends)?;
-        self.layout.hessian.write(&program.qp(), |stage| stage.1, hessian);
-        for value in hessian.iter_mut() {
-            *value *= factor;
-        }
-        if !worker.known.first {
-            self.linearised(worker);
-        }
+        scaled.clear();
+        scaled.extend(mu.iter().take(self.layout.functions).map(|mu| mu / factor));
+        self.begin(program.as_mut(), known.value);
+        worker.objective = program.second(v, scaled, ends)?;
         if sigma == 0.0 {
-            self.count();
-            let Worker { program, v, ends, hessian, .. } = worker;
-            program.second(v, &vec![0.0; scaled.len()], ends)?;
-            let mut objective = Vec::new();
-            self.layout.hessian.write(&program.qp(), |stage| stage.1, &mut objective);
-            for (value, objective) in hessian.iter_mut().zip(&objective) {
+            let mut objective = vec![0.0; self.layout.hessian.sparsity.entries().len()];
+            difference.resize(objective.len(), 0.0);
+            self.layout.hessian.write(&program.qp(), |stage| stage.1, 1.0, difference);
+            scaled.fill(0.0);
+            self.begin(program.as_mut(), true);
+            program.second(v, scaled, ends)?;
+            self.layout.hessian.write(&program.qp(), |stage| stage.1, 1.0, &mut objective);
+            for (value, objective) in difference.iter_mut().zip(&objective) {
                 *value -= objective;
             }
         }
-        worker.known.second = true;
+        worker.known = Known { value: true, first: true, second: true, ..known };
         Ok(())
     }
 }
@@ -190,8 +202,10 @@ impl Client for Problems {
             objective: 0.0,
             ends: Vec::new(),
             gradient: Vec::new(),
-            jacobian: Vec::new(),
-            hessian: Vec::new(),
+            difference: Vec::new(),
+            room: Solution::new(&self.layout.dims).map_err(|error| Failure(error.to_string()))?,
+            scaled: Vec::new(),
+            jacobian: vec![0.0; self.transposed.len()],
         })
     }
 
@@ -207,7 +221,7 @@ impl Client for Problems {
             worker.x.copy_from_slice(&worker.input);
             self.layout.gather(&worker.x, &mut worker.v);
         }
-        let seed = |port: &Port| [c"lam_f", c"adj_f"].contains(&port.name);
+        let seed = |port: &Port| [c"lam_f", c"adj_f"].contains(&port.name.as_ref());
         if let Some(input) = signature.inputs.iter().position(seed) {
             if let Some((sigma, mu)) = worker.input_multipliers.split_first_mut() {
                 call.read(input, core::slice::from_mut(sigma));
@@ -218,9 +232,13 @@ impl Client for Problems {
                 worker.multipliers.copy_from_slice(&worker.input_multipliers);
             }
         }
-        for (output, port) in signature.outputs.iter().enumerate() {
-            if call.wants(output) {
-                self.compute(worker, port).map_err(|error| Failure(error.to_string()))?;
+        // Derivatives first, with which values come.
+        let is_value = |port: &Port| [c"f", c"g"].contains(&port.name.as_ref());
+        for values in [false, true] {
+            for (output, port) in signature.outputs.iter().enumerate() {
+                if is_value(port) == values && call.wants(output) {
+                    self.compute(worker, port).map_err(|error| Failure(error.to_string()))?;
+                }
             }
         }
         for (output, port) in signature.outputs.iter().enumerate() {
@@ -240,33 +258,43 @@ impl Problems {
     fn compute(&self, worker: &mut Worker, port: &Port) -> Result<(), OcpError> {
         match port.name.to_bytes() {
             b"f" | b"g" => self.value(worker),
-            b"grad_f_x" | b"jac_f_x" | b"jac_g_x" | b"grad_gamma_x" | b"adj_x" => self.first(worker),
-            b"jac_adj_x_adj_f" | b"jac_adj_x_adj_g" => self.first(worker),
+            b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => self.gradient(worker),
+            b"jac_g_x" => self.first(worker),
+            b"jac_adj_x_adj_g" => self.first(worker).map(|()| self.jacobian(worker)),
+            b"grad_gamma_x" | b"adj_x" => self.gradient(worker).map(|()| self.jacobian(worker)),
             b"triu_hess_gamma_x_x" | b"jac_adj_x_x" => self.second(worker),
             _ => Ok(()),
         }
     }
 
+    fn jacobian(&self, Worker { program, jacobian, .. }: &mut Worker) {
+        self.layout.jacobian.write(&program.qp(), |stage| stage.0, 1.0, jacobian);
+    }
+
     /// An output; those of other names have no entries.
     fn write(&self, worker: &Worker, port: &Port, to: &mut [f64]) {
+        let Some((&sigma, mu)) = worker.multipliers.split_first() else { return };
         match port.name.to_bytes() {
             b"f" => to.fill(worker.objective + self.layout.penalty(&worker.x)),
             b"g" => self.layout.constraints(&worker.x, &worker.v, &worker.ends, to),
             b"grad_f_x" | b"jac_f_x" | b"jac_adj_x_adj_f" => to.copy_from_slice(&worker.gradient),
-            b"jac_g_x" => to.copy_from_slice(&worker.jacobian),
+            b"jac_g_x" => self.layout.jacobian.write(&worker.program.qp(), |stage| stage.0, 1.0, to),
             b"jac_adj_x_adj_g" => {
                 for (to, &entry) in to.iter_mut().zip(&self.transposed) {
                     *to = worker.jacobian[entry];
                 }
             }
-            b"jac_adj_x_x" => to.copy_from_slice(&worker.hessian),
-            b"triu_hess_gamma_x_x" => {
+            b"jac_adj_x_x" if sigma == 0.0 => to.copy_from_slice(&worker.difference),
+            b"triu_hess_gamma_x_x" if sigma == 0.0 => {
                 for (to, &entry) in to.iter_mut().zip(&self.upper) {
-                    *to = worker.hessian[entry];
+                    *to = worker.difference[entry];
                 }
             }
+            b"jac_adj_x_x" => self.layout.hessian.write(&worker.program.qp(), |stage| stage.1, sigma, to),
+            b"triu_hess_gamma_x_x" => {
+                self.layout.upper.write(&worker.program.qp(), |stage| stage.1, sigma, to);
+            }
             b"grad_gamma_x" | b"adj_x" => {
-                let Some((sigma, mu)) = worker.multipliers.split_first() else { return };
                 for (to, gradient) in to.iter_mut().zip(&worker.gradient) {
                     *to = sigma * gradient;
                 }
@@ -278,7 +306,11 @@ impl Problems {
             }
             b"x" => self.trajectory(worker, |dims| 0..dims.nx, to),
             b"u" => self.trajectory(worker, |dims| dims.nx..dims.nx + dims.nu, to),
-            _ => {}
+            _ => {
+                if let Some(group) = self.groups.iter().find(|group| *group.name == *port.name) {
+                    self.trajectory(worker, |dims| group.places(dims), to);
+                }
+            }
         }
     }
 
@@ -308,70 +340,4 @@ impl Problems {
             }
         }
     }
-}
-
-/// Inputs and outputs of all functions.
-fn signatures(layout: &Layout, transposed: Sparsity) -> Vec<Signature> {
-    let [jacobian, hessian] = [&layout.jacobian.sparsity, &layout.hessian.sparsity];
-    let (n, m) = (layout.variables, layout.constraints);
-    let last = layout.dims.len().saturating_sub(1);
-    let (nx, nu) = layout.dims.first().map_or((0, 0), |first| (first.nx, first.nu));
-    let [states, controls] = [[nx, layout.dims.len()], [nu, last]];
-    let columns =
-        |name, [rows, columns]: [usize; 2]| Port::new(name, Sparsity::new(rows, columns, |_, _| true));
-    let port = |name, rows| Port::new(name, Sparsity::vector(rows));
-    let zero = |name, rows, columns| Port::new(name, Sparsity::zero(rows, columns));
-    let point = vec![port(c"x", n), port(c"p", 0)];
-    let lagrangian = [point.clone(), vec![port(c"lam_f", 1), port(c"lam_g", m)]].concat();
-    let (f, g) = (port(c"f", 1), port(c"g", m));
-    let jac_g = Port::new(c"jac_g_x", jacobian.clone());
-    let nominal = [point.clone(), vec![zero(c"out_f", 1, 1), zero(c"out_g", m, 1)]].concat();
-    let adjoint = [nominal.clone(), vec![port(c"adj_f", 1), port(c"adj_g", m)]].concat();
-    let second = [adjoint.clone(), vec![zero(c"out_adj_x", n, 1), zero(c"out_adj_p", 0, 1)]].concat();
-    let of_point = |outputs| Signature { inputs: point.clone(), outputs };
-    let of_lagrangian = |outputs| Signature { inputs: lagrangian.clone(), outputs };
-    vec![
-        of_point(vec![f.clone(), g.clone()]),
-        of_point(vec![f.clone()]),
-        of_point(vec![g.clone()]),
-        of_point(vec![f.clone(), port(c"grad_f_x", n)]),
-        of_point(vec![g.clone(), jac_g.clone()]),
-        of_lagrangian(vec![Port::new(c"triu_hess_gamma_x_x", hessian.upper())]),
-        of_lagrangian(vec![f, g, port(c"grad_gamma_x", n), port(c"grad_gamma_p", 0)]),
-        Signature {
-            inputs: Vec::new(),
-            outputs: vec![port(c"lbx", n), port(c"ubx", n), port(c"x0", n), port(c"lbg", m), port(c"ubg", m)],
-        },
-        Signature {
-            inputs: nominal,
-            outputs: vec![
-                Port::new(c"jac_f_x", Sparsity::new(1, n, |_, _| true)),
-                zero(c"jac_f_p", 1, 0),
-                jac_g,
-                zero(c"jac_g_p", m, 0),
-            ],
-        },
-        Signature { inputs: adjoint, outputs: vec![port(c"adj_x", n), port(c"adj_p", 0)] },
-        Signature {
-            inputs: second,
-            outputs: vec![
-                Port::new(c"jac_adj_x_x", hessian.clone()),
-                zero(c"jac_adj_x_p", n, 0),
-                zero(c"jac_adj_x_out_f", n, 1),
-                zero(c"jac_adj_x_out_g", n, m),
-                port(c"jac_adj_x_adj_f", n),
-                Port::new(c"jac_adj_x_adj_g", transposed),
-                zero(c"jac_adj_p_x", 0, n),
-                zero(c"jac_adj_p_p", 0, 0),
-                zero(c"jac_adj_p_out_f", 0, 1),
-                zero(c"jac_adj_p_out_g", 0, m),
-                zero(c"jac_adj_p_adj_f", 0, 1),
-                zero(c"jac_adj_p_adj_g", 0, m),
-            ],
-        },
-        Signature {
-            inputs: vec![port(c"x", n)],
-            outputs: vec![columns(c"x", states), columns(c"u", controls)],
-        },
-    ]
 }

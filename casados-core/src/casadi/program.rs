@@ -2,7 +2,7 @@
 
 use super::pattern::{StagePattern, of_stage};
 use crate::ocp::{
-    Convexification, Curvature, Exact, Formulation, GaussNewton, HeapOcp, OcpError, SecondOrder,
+    Convexification, Curvature, Dynamics, Exact, Formulation, GaussNewton, HeapOcp, OcpError, SecondOrder,
 };
 use crate::qp::{Bounds, QpView, Solution, StageDims, marked};
 use alloc::string::{String, ToString};
@@ -19,6 +19,8 @@ use alloc::vec::Vec;
 pub trait Program: Send {
     /// Dimensions of the stages.
     fn dims(&self) -> Vec<StageDims>;
+    /// What states and controls are called.
+    fn names(&self) -> [&'static [&'static str]; 2];
     /// Which states are periodic, and which controls are shared.
     fn couplings(&self) -> [Vec<usize>; 2];
     /// Where the matrices of a stage may differ from zero.
@@ -34,11 +36,15 @@ pub trait Program: Send {
     fn check(&mut self) -> Result<(), String>;
     /// States and controls of the iterate, stage after stage.
     fn point(&self) -> Vec<f64>;
-    /// The objective, and `φ` of every interval and `g` of every stage in `ends`.
+    /// Keeps the stages of the following calls; those of the last one are theirs if `known`: it was
+    /// at the same point, and successful. Whether intervals are not integrated again.
+    fn keep_stages(&mut self, known: bool) -> bool;
+    /// The objective, and `φ` of every interval and `g` of every stage in `ends`; with room for a
+    /// point.
     ///
     /// # Errors
     /// Those of functions and integrators.
-    fn value(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError>;
+    fn value(&mut self, v: &[f64], room: &mut Trial, ends: &mut Vec<f64>) -> Result<f64, OcpError>;
     /// The same from the problem linearised there, which [`Program::qp`] is then.
     ///
     /// # Errors
@@ -52,6 +58,9 @@ pub trait Program: Send {
     /// The problem linearised.
     fn qp(&self) -> QpView<'_, f64>;
 }
+
+/// A point of all stages.
+pub type Trial = Solution<f64, Vec<StageDims>, Vec<f64>>;
 
 /// A side of a bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,6 +96,11 @@ where
 {
     fn dims(&self) -> Vec<StageDims> {
         HeapOcp::qp(self).dims().to_vec()
+    }
+
+    fn names(&self) -> [&'static [&'static str]; 2] {
+        let names = HeapOcp::names(self);
+        [names.x, names.u]
     }
 
     fn couplings(&self) -> [Vec<usize>; 2] {
@@ -128,12 +142,15 @@ where
         self.iterate().stages().flat_map(|stage| stage.x.iter().chain(stage.u).copied()).collect()
     }
 
-    fn value(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
+    fn keep_stages(&mut self, known: bool) -> bool {
+        self.problem().parts().dynamics.keep_stages(known) && known
+    }
+
+    fn value(&mut self, v: &[f64], room: &mut Trial, ends: &mut Vec<f64>) -> Result<f64, OcpError> {
         ends.clear();
         ends.resize(HeapOcp::ends(self), 0.0);
-        let mut at = Solution::new(HeapOcp::qp(self).dims())?;
-        write(&mut at, v, &[]);
-        self.evaluate(&at, ends)
+        write(room, v, &[]);
+        self.evaluate(room, ends)
     }
 
     fn first(&mut self, v: &[f64], ends: &mut Vec<f64>) -> Result<f64, OcpError> {
@@ -165,7 +182,7 @@ fn linearise<P: Formulation<f64>, C: Curvature<P::Dynamics, f64>>(
 }
 
 /// States, controls and multipliers to where the problem reads them.
-fn write(to: &mut Solution<f64, Vec<StageDims>, Vec<f64>>, v: &[f64], multipliers: &[f64]) {
+fn write(to: &mut Trial, v: &[f64], multipliers: &[f64]) {
     let (mut v, mut multipliers) = (v.iter(), multipliers.iter());
     let stages = to.dims().len();
     for stage in 0..stages {

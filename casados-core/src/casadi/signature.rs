@@ -6,6 +6,7 @@
 //! Jacobians are ordered by output, then by input.
 
 use super::function::{Port, Signature};
+use super::second::Blocks;
 use super::sparsity::{Relation, Sparsity};
 use alloc::vec::Vec;
 use core::ffi::CStr;
@@ -30,6 +31,14 @@ pub enum Source {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry(pub usize);
 
+/// Places at equal distances, at least one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Run {
+    pub first: usize,
+    pub stride: usize,
+    pub count: usize,
+}
+
 /// Where the numbers of an output come from.
 #[derive(Clone, Debug)]
 pub struct Output {
@@ -37,19 +46,22 @@ pub struct Output {
     pub source: Source,
     /// The place of each non-zero there.
     pub entries: Vec<Entry>,
-    /// The places as ranges without gaps, in their order.
-    pub runs: Vec<Range<usize>>,
+    /// The same as places at equal distances, in their order.
+    pub runs: Vec<Run>,
     /// Whether these are of algebraic states.
     pub algebraic: bool,
 }
 
 impl Output {
     fn new(source: Source, entries: Vec<Entry>, algebraic: bool) -> Self {
-        let mut runs: Vec<Range<usize>> = Vec::new();
+        let mut runs: Vec<Run> = Vec::new();
         for &Entry(place) in &entries {
             match runs.last_mut() {
-                Some(run) if run.end == place => run.end += 1,
-                _ => runs.push(place..place + 1),
+                Some(run) if run.count == 1 && place > run.first => {
+                    (run.stride, run.count) = (place - run.first, 2);
+                }
+                Some(run) if run.count > 1 && run.first + run.stride * run.count == place => run.count += 1,
+                _ => runs.push(Run { first: place, stride: 1, count: 1 }),
             }
         }
         Self { source, entries, runs, algebraic }
@@ -87,7 +99,7 @@ const BY_SEEDS: [[&CStr; 3]; 3] = [
 
 /// Whether an input holds multipliers of an output.
 pub fn is_seed(port: &Port) -> bool {
-    SEEDS.contains(&port.name)
+    SEEDS.contains(&port.name.as_ref())
 }
 
 /// What one interval has.
@@ -106,6 +118,11 @@ pub struct Shape<'a> {
 }
 
 impl Shape<'_> {
+    /// Where the blocks of second derivatives are.
+    fn blocks(&self) -> Blocks {
+        Blocks([0, 1, 2].map(|kind| self.inputs[kind].len()))
+    }
+
     /// Elements of `w`.
     fn directions(&self) -> usize {
         self.inputs.iter().map(Range::len).sum()
@@ -152,7 +169,7 @@ impl Shape<'_> {
     /// A column for each interval.
     fn ports(&self, names: &[&'static CStr], ranges: &[Range<usize>], zero: bool) -> Vec<Port> {
         let sparsity = |length| Sparsity::new(length, self.count, |_, _| !zero);
-        names.iter().zip(ranges).map(|(name, range)| Port::new(name, sparsity(range.len()))).collect()
+        names.iter().zip(ranges).map(|(name, range)| Port::new(*name, sparsity(range.len()))).collect()
     }
 
     fn vectors(
@@ -191,13 +208,13 @@ impl Shape<'_> {
 
     /// The blocks of the derivatives of `∇(λᵀy)`.
     fn second(&self) -> (Vec<Port>, Vec<Output>) {
-        let (directions, rows) = (self.directions(), self.rows());
+        let rows = self.rows();
         let mut blocks = (Vec::new(), Vec::new());
         for (gradient, row) in self.inputs.iter().enumerate() {
-            for (name, column) in HESSIANS[gradient].iter().zip(&self.inputs) {
+            for (kind, (name, column)) in HESSIANS[gradient].iter().zip(&self.inputs).enumerate() {
                 let sparsity = self.hessian.block(row.clone(), column.clone());
-                let first = row.start + directions * column.start;
-                let place = Place { first, row: 1, column: directions, algebraic: false };
+                let [first, row, column] = self.blocks().place(gradient, kind);
+                let place = Place { first, row, column, algebraic: false };
                 self.push(&mut blocks, name, &sparsity, Source::Hessian, place);
             }
             for (kind, output) in self.present() {
@@ -228,7 +245,7 @@ impl Shape<'_> {
     ) {
         // How much there is of one interval.
         let length = match source {
-            Source::Hessian => self.directions() * self.directions(),
+            Source::Hessian => self.blocks().len(),
             _ => self.rows() * self.directions(),
         };
         let of = |k: usize| {

@@ -214,6 +214,14 @@ pub trait Dynamics<T: Real> {
         Ok(())
     }
 
+    /// From now on stages of intervals are remembered, if that saves anything. With `solved` the
+    /// following calls are at the point of the last one, which was successful. Whether they are.
+    #[doc(hidden)]
+    fn keep_stages(&mut self, solved: bool) -> bool {
+        let _ = solved;
+        false
+    }
+
     /// The ends of all intervals, and integral costs.
     ///
     /// # Errors

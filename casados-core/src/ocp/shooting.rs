@@ -114,6 +114,12 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
     const ALGEBRAIC: bool = true;
     const ORIGIN: Origin = origin::<M>();
 
+    #[cfg(feature = "casadi")]
+    fn keep_stages(&mut self, solved: bool) -> bool {
+        self.batch.keep_stages(solved);
+        true
+    }
+
     fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.take(nodes, false)?;
         places(&mut self.nominal, nodes.len())?;

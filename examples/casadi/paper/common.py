@@ -30,13 +30,17 @@ def data(name):
         return json.load(file)
 
 
+def cargo(features):
+    command = ["cargo", "build", "--quiet", "--locked", "--release", "--package", "casados-casadi-paper"]
+    subprocess.run([*command, "--features", features], cwd=HERE, check=True)
+
+
 def build(name, features):
     """The library of some features, and the CPU seconds that this took."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     spent = lambda: sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
     begin = spent()
-    command = ["cargo", "build", "--quiet", "--release", "--package", "casados-casadi-paper", "--features", features]
-    subprocess.run(command, cwd=HERE, check=True)
+    cargo(features)
     target = FOLDER / f"lib{name}.so"
     shutil.copy(HERE / "target" / "release" / "libpaper.so", target)
     return spent() - begin

@@ -130,8 +130,6 @@ def interval(rows, mode):
 def write(results, path):
     chains, orbit, intervals = results["chains"], results["orbit"], results["intervals"]
     parts = [HEAD.format(casadi=ca.__version__, machine=results.get("machine", ""), date=results.get("date", ""))]
-    if results.get("added"):
-        parts.append(ADDED)
     for number, setting in enumerate(SETTINGS, 1):
         if not any(key.endswith(setting) for key in chains):
             continue
@@ -188,11 +186,9 @@ order by minimum degree and no scaling, the same for all. Three forms of casados
 | whole problem | `nlpsol("s", "ipopt", "lib.so")`: costs, constraints and dynamics in the library |
 | horizon | costs and constraints by CasADi, all 40 intervals by one call of `export_horizon!` |
 | intervals | the same with 40 calls of `export!`, what the paper does |
-"""
 
-ADDED = """
-Sizes of the chain were run one after the other (`paper.py --more`); those without a column were
-not run.
+Libraries were measured one after the other, and what has not changed since an earlier run was not
+run again. Sizes of the chain without a column were not run.
 """
 
 CHAIN = """

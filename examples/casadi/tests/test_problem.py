@@ -144,7 +144,55 @@ class Solvers(unittest.TestCase):
                 np.testing.assert_allclose(value, values[0], rtol=1e-13, atol=1e-14)
             counts.append(integrations("nlp") - last)
             last = integrations("nlp")
-        self.assertEqual(counts, [2 * N, N, N, N])
+        # Stages are those of the values, where these came first.
+        self.assertEqual(counts, [N, N, N, N])
+
+    def test_derivatives_of_known_stages(self):
+        """Jacobian and Hessian after values, and at once."""
+        p, names = casadi.DM(0, 1), ["nlp_f", "nlp_g", "nlp_grad_f", "nlp_jac_g", "nlp_hess_l"]
+        functions = {name: external(name) for name in names}
+
+        def call(name, x, mu):
+            more = (0.7, mu) if name == "nlp_hess_l" else ()
+            return full(functions[name].call([x, p, *more])[-1])
+
+        last = integrations("nlp")
+        for seed in range(11, 14):
+            x, mu = point(seed)
+            after = [call(name, x, mu) for name in names]
+            self.assertEqual(integrations("nlp") - last, N)
+            # The last point is forgotten.
+            call("nlp_f", point(seed + 10)[0], mu)
+            alone = [call(name, x, mu) for name in reversed(names)][::-1]
+            self.assertEqual(integrations("nlp") - last, 3 * N)
+            last = integrations("nlp")
+            for a, b in zip(after, alone):
+                np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-13)
+
+    def test_intervals_without_memory_of_stages(self):
+        """Where intervals are integrated one by one, derivatives come with the values."""
+        p, n = casadi.DM(0, 1), external("slide").size1_in(0)
+        g, jac, hess = external("slide_g"), external("slide_jac_g"), external("slide_hess_l")
+        counts, last = [], integrations("slide")
+        at, mu = lambda seed: np.random.default_rng(seed).uniform(-1, 1, n), np.ones(g.size1_out(0))
+        for seed, asked in [(1, "gj"), (2, "gj"), (3, "g"), (4, "g"), (5, "gh")]:
+            for name in asked:
+                {"g": lambda: g(at(seed), p), "j": lambda: jac(at(seed), p), "h": lambda: hess(at(seed), p, 1, mu)}[name]()
+            counts.append(integrations("slide") - last)
+            last = integrations("slide")
+        self.assertEqual(counts, [8, 4, 4, 4, 8])
+
+    def test_names_of_states_and_controls(self):
+        trajectory = external("slide_trajectory")
+        names = ["x", "u", "x_place", "x_speed", "u_push"]
+        self.assertEqual([trajectory.name_out(i) for i in range(trajectory.n_out())], names)
+        # Of the places of all variables: which of them a state is.
+        places = trajectory(x=list(range(trajectory.size1_in(0))))
+        np.testing.assert_array_equal(full(places["x_speed"]), [[6 * k + 2 for k in range(5)], [6 * k + 3 for k in range(5)]])
+        np.testing.assert_array_equal(full(places["u_push"]), [[6 * k + 4 for k in range(4)], [6 * k + 5 for k in range(4)]])
+        np.testing.assert_array_equal(full(places["x"])[:2], full(places["x_place"]))
+        bounds = external("slide_bounds")()
+        np.testing.assert_array_equal(full(trajectory(x=bounds["ubx"])["u_push"]), np.full((2, 4), 2.0))
 
 
 if __name__ == "__main__":

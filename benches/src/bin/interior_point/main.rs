@@ -16,6 +16,8 @@ mod awe;
 mod chain_problem;
 #[path = "../../../../tests/data/mod.rs"]
 mod data;
+#[path = "../../../../examples/awe_orbit/guess.rs"]
+mod guess;
 #[path = "../../../../examples/awe_orbit/problem.rs"]
 mod problem;
 mod starts;
@@ -195,7 +197,7 @@ fn times(table: &mut String, orbit: &Record, ipopt: &mut Option<Peer>) -> Result
         runner(problem::orbit(Collocation::new(Irk::<Awe, RadauIIA<4>>::new(OPTIONS)?)?, h)?)?;
     let request = json!({ "problem": "orbit", "h": h, "iterations": 200 });
     for name in ["guess_dc", "guess_pow", "guess_init"] {
-        let guess = problem::guess(&orbit.record(name)?)?;
+        let guess = guess::guess(&orbit.record(name)?)?;
         let mut methods: [(&str, Runner<'_>); 2] =
             [("shooting", &mut shooting), ("collocation", &mut collocation)];
         compare(table, &format!("orbit from `{name}`"), &guess, &mut methods, ipopt, &request)?;
@@ -263,7 +265,7 @@ fn scaling(table: &mut String, orbit: &Record) -> Result<(), Failure> {
         writeln!(table, "| {n} | {} | {time:.2} |", outcome.iterations)?;
     }
     let h = orbit.number("T")?;
-    let guess = problem::guess(&orbit.record("guess_dc")?)?;
+    let guess = guess::guess(&orbit.record("guess_dc")?)?;
     let shooting = || Ok::<_, Failure>(Shooting::new(Batch::<Awe, RadauIIA<4>>::new(OPTIONS)?));
     let (mut periodic, mut plain) = (problem::orbit(shooting()?, h)?, problem::flight(shooting()?, h)?);
     plain.fix_initial_state(&guess[0][0])?;

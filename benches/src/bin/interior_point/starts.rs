@@ -1,6 +1,6 @@
 //! How often methods succeed from random starts.
 
-use super::{Failure, Guess, OPTIONS, Runner, median, problem, rest, runner};
+use super::{Failure, Guess, OPTIONS, Runner, guess, median, problem, rest, runner};
 use super::{chain, chain_batch, chain_collocation, chain_problem, chain_request};
 use crate::awe::Awe;
 use crate::data::Record;
@@ -134,7 +134,7 @@ pub fn random(
         table,
         "| | solved | of these at the best objective | iterations, median | most |\n| --- | --- | --- | --- | --- |"
     )?;
-    let circle = problem::guess(&orbit.record("guess_init")?)?;
+    let circle = guess::guess(&orbit.record("guess_init")?)?;
     let size = ranges(&circle[0]).into_iter().map(|range| 0.2 * range).collect::<Vec<_>>();
     let guesses: Vec<Guess> =
         (0..count as u64).map(|seed| beside(&circle, seed, [&size, &[0.1, 0.1, 0.1, 1.0]])).collect();

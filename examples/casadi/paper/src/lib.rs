@@ -3,6 +3,12 @@
 //!
 //! One library is one model with one method: features say which.
 
+#![cfg(not(feature = "nothing"))]
+
+#[cfg(feature = "orbit")]
+#[path = "../../../models/awe.rs"]
+#[allow(dead_code)]
+mod awe;
 #[cfg(feature = "orbit")]
 mod orbit;
 #[cfg(not(feature = "orbit"))]
@@ -31,7 +37,7 @@ pub struct Report {
     pub iterations: f64,
     /// Seconds of the whole run.
     pub total: f64,
-    /// Seconds in functions and integrators.
+    /// Seconds in functions and integrators: derivatives, and values at trial points.
     pub functions: f64,
 }
 
@@ -42,7 +48,7 @@ impl Report {
             objective: outcome.objective,
             iterations: outcome.iterations as f64,
             total,
-            functions: outcome.times.linearise,
+            functions: outcome.times.linearise + outcome.times.search,
         }
     }
 }

@@ -61,31 +61,35 @@ pub fn measure<const NX: usize>(
     }
     // SAFETY: it takes no arguments.
     let memory = unsafe { chain_checkout() };
+    let mut exported = |x: &[f64; NX]| {
+        let mut arguments = vec![core::ptr::null(); inputs];
+        (arguments[0], arguments[1]) = (x.as_ptr(), u.as_ptr());
+        if let Some(place) = arguments.get_mut(seed) {
+            *place = lambda.as_ptr();
+        }
+        let begin = Instant::now();
+        // SAFETY: as many pointers as there are inputs and outputs, null or to arrays that are long
+        // enough; the memory was checked out above.
+        let status =
+            unsafe { function(arguments.as_ptr(), places.as_mut_ptr(), null_mut(), null_mut(), memory) };
+        (status == 0).then(|| begin.elapsed().as_nanos() as f64)
+    };
     let mut shortest = [f64::INFINITY; 3];
     for call in 0..calls {
         x[0] = start[0] + 1e-9 * f64::from(call);
-        let mut exported = || {
-            let mut arguments = vec![core::ptr::null(); inputs];
-            (arguments[0], arguments[1]) = (x.as_ptr(), u.as_ptr());
-            if let Some(place) = arguments.get_mut(seed) {
-                *place = lambda.as_ptr();
-            }
-            let begin = Instant::now();
-            // SAFETY: as many pointers as there are inputs and outputs, null or to arrays that are
-            // long enough; the memory was checked out above.
-            let status =
-                unsafe { function(arguments.as_ptr(), places.as_mut_ptr(), null_mut(), null_mut(), memory) };
-            (status == 0).then(|| begin.elapsed().as_nanos() as f64)
-        };
-        let [first, again] = [exported()?, exported()?];
+        let first = exported(&x)?;
         let begin = Instant::now();
         if !bare(&x, &u) {
             return None;
         }
         let direct = begin.elapsed().as_nanos() as f64;
-        for (shortest, taken) in shortest.iter_mut().zip([direct, first, again]) {
-            *shortest = shortest.min(taken);
-        }
+        (shortest[0], shortest[1]) = (shortest[0].min(direct), shortest[1].min(first));
+    }
+    // By themselves: who asks for the same derivatives again has them kept from then on.
+    for call in 0..calls {
+        x[0] = start[0] - 1e-9 * f64::from(call + 1);
+        exported(&x)?;
+        shortest[2] = shortest[2].min(exported(&x)?);
     }
     // SAFETY: the memory was checked out above.
     unsafe { chain_release(memory) };

@@ -2,6 +2,7 @@
 
 mod problem;
 mod reference;
+mod slider;
 mod voyage;
 
 use casados::prelude::*;
