@@ -10,9 +10,9 @@
 
 #[cfg(feature = "alloc")]
 use super::HeapOcp;
+use super::curvature::{Curvature, GaussNewton};
 use super::error::OcpError;
 use super::instance::Ocp;
-use super::linearise::{Curvature, GaussNewton};
 use super::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
