@@ -72,8 +72,8 @@ pub enum Update {
     /// sᵀB s`: positive definite whatever `y` is.
     #[default]
     DampedBfgs,
-    /// `B ← B + r rᵀ / sᵀr` with `r = y − B s`: as indefinite as the Hessian itself is. QPs that are
-    /// not convex are regularised, as those of [`Exact`].
+    /// `B ← B + r rᵀ / sᵀr` with `r = y − B s`: as indefinite as the Hessian itself is. QPs that
+    /// are not convex are regularised, as those of [`Exact`].
     RankOne,
 }
 

@@ -3,7 +3,8 @@
 //! `CASADOS_PYTHON` or `python3` has it).
 //!
 //! ```text
-//! cargo run --release --manifest-path benches/Cargo.toml --bin ocp_collection [-- [--variations] [part of a name]]
+//! cargo run --release --manifest-path benches/Cargo.toml --bin ocp_collection
+//! .. -- [--variations] [part of a name]
 //! ```
 
 #[path = "../../../../examples/models/ocps/mod.rs"]

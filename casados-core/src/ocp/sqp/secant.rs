@@ -1,7 +1,8 @@
 //! Hessians of the Lagrangian from its gradients, stage by stage.
 //!
 //! ```text
-//! s = v⁺ − v        y = ∇L(v⁺, λ⁺) − ∇L(v, λ⁺)        L_k = l_k + πᵀφ + (λ_u − λ_l)ᵀg, over v = (x, u)
+//! s = v⁺ − v        y = ∇L(v⁺, λ⁺) − ∇L(v, λ⁺)        v = (x, u)
+//! L = l + πᵀφ + (λ_u − λ_l)ᵀg
 //! r = θ y + (1 − θ) B s        B ← B − B s sᵀB / sᵀB s + r rᵀ / sᵀr
 //! ```
 //!
@@ -261,8 +262,8 @@ fn damped_bfgs<T: Real>(b: &mut [T], ld: usize, [s, v]: [&[T]; 2], y: &mut [T], 
     }
 }
 
-/// `B ← B + r rᵀ / sᵀr` with `r = y − B s`, which `y` becomes, as [`damped_bfgs`] has its arguments.
-/// Nothing changes where `sᵀr` is a small part of what it can be.
+/// `B ← B + r rᵀ / sᵀr` with `r = y − B s`, which `y` becomes; arguments are as those of
+/// [`damped_bfgs`]. Nothing changes where `sᵀr` is a small part of what it can be.
 fn rank_one<T: Real>(b: &mut [T], ld: usize, [s, v]: [&[T]; 2], y: &mut [T], bs: &mut [T]) {
     let n = y.len();
     bs.fill(T::ZERO);
