@@ -127,7 +127,8 @@ impl Summary {
 
 /// A row of the table: iterations, or how it ended.
 fn print(name: &str, made: &[Made]) {
-    let best = made.iter().filter(|made| made.solved).map(|made| made.objective).fold(f64::INFINITY, f64::min);
+    let best =
+        made.iter().filter(|made| made.solved).map(|made| made.objective).fold(f64::INFINITY, f64::min);
     print!("| {name} |");
     for Made { solved, iterations, objective, status } in made {
         let worse = objective - best > APART * (1.0 + best.abs());
