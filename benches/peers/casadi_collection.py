@@ -1,10 +1,12 @@
-"""IPOPT on the problems of ocps.py: for benches/src/bin/ocp_collection.rs, and the references of
+"""IPOPT on the problems of ocps.py: for benches/src/bin/ocp_collection, and the references of
 tests/collection.rs.
 
 Reads one JSON object a line from standard input and answers each with one on standard output:
 
-    {"problem": "car"}
+    {"problem": "car", "grid": {"intervals": 1.0, "length": 1.0}, "bounds": 1.0, "x": [[..], ..], "u": [[..], ..]}
     {"status": "Solve_Succeeded", "iterations": 15, "objective": 8.04} | {"error": ".."}
+
+where `grid` is what the horizon is multiplied by, `bounds` are those of controls, `x` and `u` the guess.
 
 With the argument --write it writes tests/data/ocp/collection.json instead: objectives of all
 minima that it finds at a tolerance of 1e-10 with bounds that are not relaxed, from the plain guess
@@ -83,8 +85,12 @@ def serve():
     known = {make.__name__: make for make in ocps.ALL + ocps.INFEASIBLE}
     for request in sys.stdin:
         try:
-            o = known[json.loads(request)["problem"]]()
-            answer = solve(o, o.x)
+            request = json.loads(request)
+            ocps.GRID.update(request["grid"])
+            o = known[request["problem"]]()
+            o.u = np.array(request["u"])
+            o.u_lower, o.u_upper = request["bounds"] * o.u_lower, request["bounds"] * o.u_upper
+            answer = solve(o, np.array(request["x"]))
         except Exception as error:  # noqa: BLE001: whatever it is, the other side is to know
             answer = {"error": str(error)}
         print(json.dumps(answer), flush=True)

@@ -7,6 +7,16 @@ import casadi as ca
 import numpy as np
 
 inf = np.inf
+# Intervals and lengths of horizons, as parts of those that problems are given with.
+GRID = {"intervals": 1.0, "length": 1.0}
+
+
+def grid(given):
+    return int(np.floor(GRID["intervals"] * given + 0.5))
+
+
+def over(length, n):
+    return GRID["length"] * length / n
 
 
 def rk4(f, nx, nu, h, steps):
@@ -76,10 +86,10 @@ def car(most=50.0):
         motion = [speed * ca.cos(heading), speed * ca.sin(heading), speed / 2.7 * ca.tan(steering)]
         return time * ca.vertcat(*motion, acceleration, u, 0)
 
-    n, time = 40, min(10.0, most)
+    n, time = grid(40), min(10.0, most)
     x = line([0, 0, 0, 5, 0, 0, time], [50, 20, 0, 5, 0, 0, time], n)
     return ocp(
-        rk4(f, 7, 2, 1 / n, 1), n, 1 / n, x, [0, 0], lambda x, u: 1e-3 * ca.sumsqr(u), lambda x: x[6],
+        rk4(f, 7, 2, over(1, n), 1), n, over(1, n), x, [0, 0], lambda x, u: 1e-3 * ca.sumsqr(u), lambda x: x[6],
         x_bounds={3: (-1, 20), 4: (-0.6, 0.6), 5: (-5, 3), 6: (0.1, most)}, u_bounds={0: (-1, 1), 1: (-10, 10)},
         start=given([0] * 6), final=given([50, 20, 0, 0, 0, 0]),
     )
@@ -103,15 +113,15 @@ def tyres():
             u[0],
         )
 
-    n = 40
+    n = grid(40)
     x = line([0, 0, 0, 20, 0, 0, 0], [80, 0, 0, 20, 0, 0, 0], n)
     o = ocp(
-        rk4(f, 7, 2, 4 / n, 2), n, 4 / n, x, [0, 0], lambda x, u: u[0] ** 2 + 0.01 * u[1] ** 2 + 0.1 * x[5] ** 2,
+        rk4(f, 7, 2, over(4, n), 2), n, over(4, n), x, [0, 0], lambda x, u: u[0] ** 2 + 0.01 * u[1] ** 2 + 0.1 * x[5] ** 2,
         x_bounds={1: (-4, 4), 2: (-1.5, 1.5), 3: (3, 40), 6: (-0.5, 0.5)}, u_bounds={0: (-1, 1), 1: (-8, 4)},
         start=given([0, 0, 0, 20, 0, 0, 0]), final={0: (70, inf), 1: 0, 2: 0},
     )
-    o.x_lower[15:22, 1] = 2.5
-    o.x_lower[28:n, 1], o.x_upper[28:n, 1] = -0.5, 0.5
+    o.x_lower[3 * n // 8 : 11 * n // 20, 1] = 2.5
+    o.x_lower[7 * n // 10 : n, 1], o.x_upper[7 * n // 10 : n, 1] = -0.5, 0.5
     return o
 
 
@@ -120,20 +130,20 @@ def unicycle(x, u):
 
 
 def obstacles():
-    n = 40
+    n = grid(40)
     discs = [(3.0, 0.3, 1.0), (6.0, -0.5, 1.2), (8.0, 1.0, 0.8)]
     outside = lambda x, u: ca.vertcat(*[(x[0] - a) ** 2 + (x[1] - b) ** 2 - r**2 for a, b, r in discs])
     return ocp(
-        rk4(unicycle, 4, 2, 10 / n, 1), n, 10 / n, line([0, 0, 0, 1], [10, 0, 0, 1], n), [0, 0],
+        rk4(unicycle, 4, 2, over(10, n), 1), n, over(10, n), line([0, 0, 0, 1], [10, 0, 0, 1], n), [0, 0],
         lambda x, u: ca.sumsqr(u) / 2, path=outside, u_bounds={0: (-2, 2), 1: (-1, 1)},
         start=given([0, 0, 0, 1]), final=given([10, 0, 0, 1]),
     )
 
 
 def walls():
-    n = 40
+    n = grid(40)
     o = ocp(
-        rk4(unicycle, 4, 2, 10 / n, 1), n, 10 / n, line([0, 0, 0, 1], [10, 0, 0, 1], n), [0, 0],
+        rk4(unicycle, 4, 2, over(10, n), 1), n, over(10, n), line([0, 0, 0, 1], [10, 0, 0, 1], n), [0, 0],
         lambda x, u: ca.sumsqr(u) / 2, x_bounds={3: (0, 2)}, u_bounds={0: (-2, 2), 1: (-1, 1)},
         start=given([0, 0, 0, 1]), final={0: 10, 1: 0},
     )
@@ -153,14 +163,14 @@ def quadrotor():
         spin = (torque - ca.cross(rates, inertia * rates)) / inertia
         return time * ca.vertcat(v, turn, axis * ca.sum1(u) - ca.vertcat(0, 0, 9.81), spin, 0)
 
-    n = 30
+    n = grid(30)
     rest = [0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0]
     x = line([0, 0, 1, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 3], [6, 0, 1, 1, 0, 0, 0, 2, 0, 0, 0, 0, 0, 3], n)
     end = given([6] + rest)
     del end[3]
     outside = lambda x, u: ca.vertcat((x[0] - 2) ** 2 + (x[1] - 0.2) ** 2 - 0.64, (x[0] - 4) ** 2 + (x[1] + 0.3) ** 2 - 0.64)
     return ocp(
-        rk4(f, 14, 4, 1 / n, 1), n, 1 / n, x, [hover] * 4,
+        rk4(f, 14, 4, over(1, n), 1), n, over(1, n), x, [hover] * 4,
         lambda x, u: 1e-2 * (ca.sumsqr(u - hover) + ca.sumsqr(x[10:13])), lambda x: x[13], path=outside, soft=100.0,
         x_bounds={1: (-1.5, 1.5), 13: (0.3, 20)}, u_bounds=given([(0, 6)] * 4), start=given([0] + rest), final=end,
     )
@@ -172,9 +182,9 @@ def landing():
         thrust = ca.vertcat(-ca.sin(a), ca.cos(a)) * u[0] / x[6] - ca.vertcat(0, 9.81)
         return x[7] * ca.vertcat(x[3:6], thrust, -u[0] * ca.sin(u[1]) * 2 / (3 * x[6]), -u[0] / 300, 0)
 
-    n, start = 40, [20, 100, 0.3, -5, -15, 0, 10]
+    n, start = grid(40), [20, 100, 0.3, -5, -15, 0, 10]
     return ocp(
-        rk4(f, 8, 2, 1 / n, 1), n, 1 / n, line(start + [8], [0, 0, 0, 0, 0, 0, 9, 8], n), [100, 0], end=lambda x: -x[6],
+        rk4(f, 8, 2, over(1, n), 1), n, over(1, n), line(start + [8], [0, 0, 0, 0, 0, 0, 9, 8], n), [100, 0], end=lambda x: -x[6],
         x_bounds={1: (0, inf), 2: (-1, 1), 5: (-1, 1), 6: (1, 10), 7: (1, 30)}, u_bounds={0: (30, 200), 1: (-0.2, 0.2)},
         start=given(start), final=given([0] * 6),
     )
@@ -186,9 +196,9 @@ def goddard():
         drag = 310 * v**2 * ca.exp(-500 * (h - 1))
         return time * ca.vertcat(v, (u - drag) / mass - 1 / h**2, -2 * u, 0)
 
-    n = 50
+    n = grid(50)
     return ocp(
-        rk4(f, 4, 1, 1 / n, 1), n, 1 / n, line([1, 0, 1, 0.2], [1.01, 0, 0.6, 0.2], n), [1.75], end=lambda x: -x[0],
+        rk4(f, 4, 1, over(1, n), 1), n, over(1, n), line([1, 0, 1, 0.2], [1.01, 0, 0.6, 0.2], n), [1.75], end=lambda x: -x[0],
         x_bounds={0: (1, inf), 1: (0, inf), 2: (0.6, 1), 3: (0.01, 1)}, u_bounds={0: (0, 3.5)},
         start=given([1, 0, 1]), final={2: 0.6},
     )
@@ -204,9 +214,9 @@ def cart_pole():
         pole = (-m * length * c * s * rate**2 + u * c + (M + m) * g * s) / (length * d)
         return ca.vertcat(x[2], rate, cart, pole)
 
-    n = 40
+    n = grid(40)
     return ocp(
-        rk4(f, 4, 1, 2 / n, 2), n, 2 / n, line([0, np.pi, 0, 0], [0] * 4, n), [0],
+        rk4(f, 4, 1, over(2, n), 2), n, over(2, n), line([0, np.pi, 0, 0], [0] * 4, n), [0],
         lambda x, u: 5e-3 * (ca.sumsqr(x) + u**2), x_bounds={0: (-2, 2)}, u_bounds={0: (-20, 20)},
         start=given([0, np.pi, 0, 0]), final=given([0] * 4),
     )
@@ -218,9 +228,9 @@ def crane():
         swing = -(u[0] * ca.cos(angle) + 9.81 * ca.sin(angle) + 2 * growth * rate) / length
         return time * ca.vertcat(v, u[0], rate, swing, growth, u[1], 0)
 
-    n, start, end = 40, [0, 0, 0, 0, 5, 0], [10, 0, 0, 0, 3, 0]
+    n, start, end = grid(40), [0, 0, 0, 0, 5, 0], [10, 0, 0, 0, 3, 0]
     return ocp(
-        rk4(f, 7, 2, 1 / n, 1), n, 1 / n, line(start + [6], end + [6], n), [0, 0], lambda x, u: 1e-3 * ca.sumsqr(u),
+        rk4(f, 7, 2, over(1, n), 1), n, over(1, n), line(start + [6], end + [6], n), [0, 0], lambda x, u: 1e-3 * ca.sumsqr(u),
         lambda x: x[6], x_bounds={1: (-4, 4), 2: (-0.5, 0.5), 4: (1, 10), 5: (-2, 2), 6: (0.5, 30)},
         u_bounds={0: (-2, 2), 1: (-1, 1)}, start=given(start), final=given(end),
     )
@@ -233,17 +243,17 @@ def arm():
         torque = u + s / 2 * ca.vertcat(2 * x[2] * x[3] + x[3] ** 2, -x[2] ** 2)
         return x[4] * ca.vertcat(x[2:4], ca.solve(inertia, torque), 0)
 
-    n = 40
+    n = grid(40)
     return ocp(
-        rk4(f, 5, 2, 1 / n, 1), n, 1 / n, line([0, 0, 0, 0, 2], [2, 1.5, 0, 0, 2], n), [0, 0], end=lambda x: x[4],
+        rk4(f, 5, 2, over(1, n), 1), n, over(1, n), line([0, 0, 0, 0, 2], [2, 1.5, 0, 0, 2], n), [0, 0], end=lambda x: x[4],
         x_bounds={4: (0.1, 20)}, u_bounds={0: (-5, 5), 1: (-3, 3)}, start=given([0] * 4), final=given([2, 1.5, 0, 0]),
     )
 
 
 def pendulum():
-    n = 50
+    n = grid(50)
     return ocp(
-        rk4(lambda x, u: ca.vertcat(x[1], u - 9.81 * ca.sin(x[0])), 2, 1, 4 / n, 2), n, 4 / n,
+        rk4(lambda x, u: ca.vertcat(x[1], u - 9.81 * ca.sin(x[0])), 2, 1, over(4, n), 2), n, over(4, n),
         line([0, 0], [np.pi, 0], n), [0], lambda x, u: u**2 / 2, u_bounds={0: (-3, 3)},
         start=given([0, 0]), final=given([np.pi, 0]),
     )
@@ -254,9 +264,9 @@ def robot():
         force = u[0] - u[1] + u[2] - u[3]
         return ca.vertcat(x[3:6], force * ca.cos(x[2]), force * ca.sin(x[2]), 0.2 * (u[0] - u[1] - u[2] + u[3]))
 
-    n, start = 40, [-10, -10, np.pi / 2, 0, 0, 0]
+    n, start = grid(40), [-10, -10, np.pi / 2, 0, 0, 0]
     return ocp(
-        rk4(f, 6, 4, 12 / n, 1), n, 12 / n, line(start, [0] * 6, n), [0] * 4, lambda x, u: ca.sum1(u),
+        rk4(f, 6, 4, over(12, n), 1), n, over(12, n), line(start, [0] * 6, n), [0] * 4, lambda x, u: ca.sum1(u),
         u_bounds=given([(0, 1)] * 4), start=given(start), final=given([0] * 6),
     )
 
@@ -265,42 +275,42 @@ def motor():
     def f(k, x, z, u):
         return ca.vertcat(k[0] - x[1], k[1] + ca.sin(x[0]) + 0.1 * x[1] - z, z + 0.2 * z**3 + 0.5 * x[1] - u)
 
-    n = 30
+    n = grid(30)
     return ocp(
-        gauss(f, 2, 1, 1, 3 / n), n, 3 / n, line([0, 0], [np.pi, 0], n), [0], lambda x, u: u**2,
+        gauss(f, 2, 1, 1, over(3, n)), n, over(3, n), line([0, 0], [np.pi, 0], n), [0], lambda x, u: u**2,
         x_bounds={1: (-2, 2)}, u_bounds={0: (-4, 4)}, start=given([0, 0]), final=given([np.pi, 0]),
     )
 
 
 def bang_bang():
-    n = 30
+    n = grid(30)
     return ocp(
-        rk4(lambda x, u: x[2] * ca.vertcat(x[1], u, 0), 3, 1, 1 / n, 1), n, 1 / n, [2, 1, 5], [0], end=lambda x: x[2],
+        rk4(lambda x, u: x[2] * ca.vertcat(x[1], u, 0), 3, 1, over(1, n), 1), n, over(1, n), [2, 1, 5], [0], end=lambda x: x[2],
         x_bounds={2: (0.1, 20)}, u_bounds={0: (-1, 1)}, start=given([0, 0]), final=given([4, 0]),
     )
 
 
 def van_der_pol():
-    n = 40
+    n = grid(40)
     return ocp(
-        rk4(lambda x, u: ca.vertcat((1 - x[1] ** 2) * x[0] - x[1] + u, x[0]), 2, 1, 10 / n, 1), n, 10 / n, [0, 0], [0],
+        rk4(lambda x, u: ca.vertcat((1 - x[1] ** 2) * x[0] - x[1] + u, x[0]), 2, 1, over(10, n), 1), n, over(10, n), [0, 0], [0],
         lambda x, u: ca.sumsqr(x) + u**2, x_bounds={0: (-0.25, inf)}, u_bounds={0: (-1, 1)}, start=given([0, 1]),
     )
 
 
 def bryson_denham():
-    n = 50
+    n = grid(50)
     return ocp(
-        rk4(lambda x, u: ca.vertcat(x[1], u), 2, 1, 1 / n, 1), n, 1 / n, line([0, 1], [0, -1], n), [0],
+        rk4(lambda x, u: ca.vertcat(x[1], u), 2, 1, over(1, n), 1), n, over(1, n), line([0, 1], [0, -1], n), [0],
         lambda x, u: u**2 / 2, x_bounds={0: (-inf, 1 / 9)}, start=given([0, 1]), final=given([0, -1]),
     )
 
 
 def rayleigh():
     f = lambda x, u: ca.vertcat(x[1], -x[0] + x[1] * (1.4 - 0.14 * x[1] ** 2) + 4 * u)
-    n = 45
+    n = grid(45)
     return ocp(
-        rk4(f, 2, 1, 4.5 / n, 1), n, 4.5 / n, [-5, -5], [0], lambda x, u: u**2 + x[0] ** 2,
+        rk4(f, 2, 1, over(4.5, n), 1), n, over(4.5, n), [-5, -5], [0], lambda x, u: u**2 + x[0] ** 2,
         path=(lambda x, u: u + x[0] / 6, -1.0, 0.0), start=given([-5, -5]),
     )
 
@@ -309,17 +319,17 @@ def zermelo():
     def f(x, u):
         return x[2] * ca.vertcat(ca.cos(u) + 0.5 * ca.sin(np.pi * x[1]), ca.sin(u) - 0.3 * x[0], 0)
 
-    n = 40
+    n = grid(40)
     return ocp(
-        rk4(f, 3, 1, 1 / n, 1), n, 1 / n, line([0, 0, 3], [3, 1, 3], n), [0], end=lambda x: x[2],
+        rk4(f, 3, 1, over(1, n), 1), n, over(1, n), line([0, 0, 3], [3, 1, 3], n), [0], end=lambda x: x[2],
         x_bounds={2: (0.1, 20)}, start=given([0, 0]), final=given([3, 1]),
     )
 
 
 def hanging_chain():
-    n = 50
+    n = grid(50)
     return ocp(
-        rk4(lambda x, u: ca.vertcat(u, x[0] * ca.sqrt(1 + u**2), ca.sqrt(1 + u**2)), 3, 1, 1 / n, 1), n, 1 / n,
+        rk4(lambda x, u: ca.vertcat(u, x[0] * ca.sqrt(1 + u**2), ca.sqrt(1 + u**2)), 3, 1, over(1, n), 1), n, over(1, n),
         line([1, 0, 0], [3, 6, 4], n), [2], end=lambda x: x[1], start=given([1, 0, 0]), final={0: 3, 2: 4},
     )
 
@@ -329,9 +339,9 @@ def batch_reactor():
         first, second = 4000 * ca.exp(-2500 / u) * x[0] ** 2, 620000 * ca.exp(-5000 / u) * x[1]
         return ca.vertcat(-first, first - second)
 
-    n = 40
+    n = grid(40)
     return ocp(
-        rk4(f, 2, 1, 1 / n, 1), n, 1 / n, [1, 0], [350], end=lambda x: -x[1], u_bounds={0: (298, 398)}, start=given([1, 0])
+        rk4(f, 2, 1, over(1, n), 1), n, over(1, n), [1, 0], [350], end=lambda x: -x[1], u_bounds={0: (298, 398)}, start=given([1, 0])
     )
 
 
@@ -340,9 +350,9 @@ def fishing():
         eaten = x[0] * x[1]
         return ca.vertcat(x[0] - eaten - 0.4 * x[0] * u, -x[1] + eaten - 0.2 * x[1] * u)
 
-    n = 60
+    n = grid(60)
     return ocp(
-        rk4(f, 2, 1, 12 / n, 1), n, 12 / n, [0.5, 0.7], [0.5], lambda x, u: ca.sumsqr(x - 1), u_bounds={0: (0, 1)},
+        rk4(f, 2, 1, over(12, n), 1), n, over(12, n), [0.5, 0.7], [0.5], lambda x, u: ca.sumsqr(x - 1), u_bounds={0: (0, 1)},
         start=given([0.5, 0.7]),
     )
 

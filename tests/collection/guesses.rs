@@ -34,7 +34,7 @@ fn converges<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(ocp: &mut HeapOcp<
 #[test]
 fn disturbed_swing_ups() -> Test {
     for (part, seed) in [(0.1, 1.0), (0.1, 2.0), (0.3, 3.0), (0.3, 4.0)] {
-        let mut ocp = ocps::mechanics::pendulum()?;
+        let mut ocp = ocps::mechanics::pendulum(ocps::GIVEN)?;
         disturb(&mut ocp, part, seed)?;
         converges(&mut ocp)?;
     }
@@ -44,7 +44,7 @@ fn disturbed_swing_ups() -> Test {
 /// The same point at all nodes.
 #[test]
 fn a_chain_from_a_point() -> Test {
-    let mut ocp = ocps::textbook::hanging_chain()?;
+    let mut ocp = ocps::textbook::hanging_chain(ocps::GIVEN)?;
     ocp.guess(&[1.0, 0.0, 0.0], &[2.0])?;
     converges(&mut ocp)
 }
@@ -53,7 +53,7 @@ fn a_chain_from_a_point() -> Test {
 #[test]
 fn a_guess_without_values() -> Test {
     for seed in [3.0, 4.0] {
-        let mut ocp = ocps::flight::goddard()?;
+        let mut ocp = ocps::flight::goddard(ocps::GIVEN)?;
         disturb(&mut ocp, 0.3, seed)?;
         assert!(ocp.linearise(casados::ocp::Exact::default()).is_err());
         converges(&mut ocp)?;

@@ -1,6 +1,7 @@
 //! Options and limits.
 
 use crate::Test;
+use crate::ocps::GIVEN;
 use crate::ocps::vehicles::car_within;
 use casados::ocp::{HeapSqp, OcpError, SqpOptions, Status};
 
@@ -9,7 +10,7 @@ use casados::ocp::{HeapSqp, OcpError, SqpOptions, Status};
 fn limits_of_iterations_are_no_infeasibility() -> Test {
     for most in [50.0, 1.0] {
         for limit in [0, 1, 2] {
-            let mut ocp = car_within(most)?;
+            let mut ocp = car_within(most, GIVEN)?;
             let mut sqp = HeapSqp::new(&ocp)?;
             sqp.options.max_iterations = limit;
             let status = sqp.solve(&mut ocp)?.status;
@@ -30,7 +31,7 @@ fn options_are_validated() -> Test {
         ("elastic_penalty", |o, v| o.elastic_penalty = v, &[f64::NAN, -1.0, 0.0, f64::INFINITY]),
         ("shortest_step", |o, v| o.shortest_step = v, &[f64::NAN, -1.0, 0.0, 1.5]),
     ];
-    let mut ocp = car_within(50.0)?;
+    let mut ocp = car_within(50.0, GIVEN)?;
     for (expected, change, values) in bad {
         for &wrong in values {
             let mut sqp = HeapSqp::new(&ocp)?;
@@ -50,7 +51,7 @@ fn options_are_validated() -> Test {
 /// The log grows with what happens, not with what may.
 #[test]
 fn any_number_of_iterations_is_a_limit() -> Test {
-    let mut ocp = car_within(50.0)?;
+    let mut ocp = car_within(50.0, GIVEN)?;
     let mut sqp = HeapSqp::new(&ocp)?;
     sqp.options.max_iterations = usize::MAX;
     assert!(sqp.solve(&mut ocp)?.is_converged());

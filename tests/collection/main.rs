@@ -75,7 +75,7 @@ macro_rules! all_are_solved {
     ($($theme:ident::$name:ident),* $(,)?) => {$(
         #[test]
         fn $name() -> Test {
-            solved(stringify!($name), &mut ocps::$theme::$name()?).map(drop)
+            solved(stringify!($name), &mut ocps::$theme::$name(ocps::GIVEN)?).map(drop)
         }
     )*};
 }
@@ -88,7 +88,7 @@ fn iterations_in_sum() -> Test {
     let (mut mine, mut theirs) = (0, 0.0);
     macro_rules! count {
         ($($theme:ident::$name:ident),* $(,)?) => {$(
-            mine += solve(&mut ocps::$theme::$name()?)?.0.iterations;
+            mine += solve(&mut ocps::$theme::$name(ocps::GIVEN)?)?.0.iterations;
             theirs += record.record(stringify!($name))?.number("iterations")?;
         )*};
     }
@@ -100,7 +100,10 @@ fn iterations_in_sum() -> Test {
 /// The last step needs no regularisation, and leaves less than a hundredth of the residuals.
 #[test]
 fn convergence_is_quadratic() -> Test {
-    for log in [solve(&mut ocps::flight::quadrotor()?)?.1, solve(&mut ocps::vehicles::car()?)?.1] {
+    for log in [
+        solve(&mut ocps::flight::quadrotor(ocps::GIVEN)?)?.1,
+        solve(&mut ocps::vehicles::car(ocps::GIVEN)?)?.1,
+    ] {
         assert!(log.len() <= 41);
         let [.., before, last] = &*log else { return Err("too short".into()) };
         assert!(last.regularisation == 0.0);
@@ -113,7 +116,7 @@ fn convergence_is_quadratic() -> Test {
 /// the iterate that is handed back.
 #[test]
 fn car_without_time() -> Test {
-    let mut ocp = ocps::vehicles::car_within(1.0)?;
+    let mut ocp = ocps::vehicles::car_within(1.0, ocps::GIVEN)?;
     let (outcome, _) = solve(&mut ocp)?;
     let Status::Infeasible { constraint, violation } = outcome.status else {
         return Err(outcome.to_string().into());
@@ -131,7 +134,7 @@ fn car_without_time() -> Test {
 /// Walls on opposite sides, three stages or 0.75 s apart: 3 m at a speed of 2 m/s at most.
 #[test]
 fn walls_on_opposite_sides() -> Test {
-    let (outcome, _) = solve(&mut ocps::vehicles::walls()?)?;
+    let (outcome, _) = solve(&mut ocps::vehicles::walls(ocps::GIVEN)?)?;
     let Status::Infeasible { violation, .. } = outcome.status else {
         return Err(outcome.to_string().into());
     };

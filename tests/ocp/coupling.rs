@@ -7,7 +7,7 @@ use casados::ocp::{
     LeastSquaresCost, Map, OcpError, Outcome, Problem, SecondOrder, Status,
 };
 use casados::prelude::*;
-use casados::qp::residuals;
+use casados::qp::{Condensing, HeapInteriorPoint, QpError, residuals};
 use nalgebra::{DMatrix, DVector};
 
 /// Who solves.
@@ -98,6 +98,19 @@ fn couplings_of_linear_systems_are_those_of_one_linear_system() -> Test {
                     // The condition of the system is below 1e5; compliances leave 1e-9.
                     let error = (value - solution[5 * k + i]).abs();
                     assert!(error < 1e-8, "{periodic:?} {shared:?} {by:?} {k} {i} {error:e}");
+                }
+            }
+            if !fixed {
+                continue;
+            }
+            // One step in real time, from another point, is the solution of a linear system.
+            ocp.guess(&[0.3, 0.9], &[0.2, -0.1, 0.4])?;
+            let mut real_time = HeapRealTime::new(ocp)?;
+            real_time.prepare()?.feedback(&[0.4, -0.2])?;
+            for (k, stage) in real_time.ocp().iterate().stages().enumerate() {
+                for (i, value) in stage.x.iter().chain(stage.u).enumerate() {
+                    let error = (value - solution[5 * k + i]).abs();
+                    assert!(error < 1e-7, "in real time: {periodic:?} {shared:?} {k} {i} {error:e}");
                 }
             }
         }
@@ -294,8 +307,10 @@ fn mistakes_are_named() -> Test {
     let mut ocp = problem.on(Horizon::uniform(3, 1.0))?;
     assert!(matches!(ocp.periodic("u[0]"), Err(OcpError::UnknownName { .. })));
     assert!(matches!(ocp.shared("x[0]"), Err(OcpError::UnknownName { .. })));
-    ocp.fix_initial_state(&[0.0; 2])?.shared("u[1]")?;
-    let mut real_time = HeapRealTime::new(ocp)?;
-    assert!(matches!(real_time.prepare(), Err(OcpError::Coupled)));
+    // What condenses stages cannot couple them.
+    ocp.fix_initial_state(&[0.0; 2])?.shared("u[1]")?.guess(&[1.0; 2], &[0.5; 3])?;
+    let condensing = Condensing::new(2, HeapInteriorPoint::new());
+    let outcome = HeapSqp::with_solver(&ocp, condensing)?.solve(&mut ocp)?;
+    assert_eq!(outcome.status, Status::QpFailed(QpError::Coupled));
     Ok(())
 }

@@ -2,10 +2,11 @@
 
 use crate::Test;
 use casados::ocp::{
-    Formulation, GeneralCost, HeapOcp, HeapSqp, Horizon, KeptJacobians, LeastSquaresCost, OcpError, Outcome,
-    Problem, SecondOrder,
+    Adjoints, Formulation, GaussNewton, GeneralCost, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, OcpError,
+    Outcome, Problem, SecondOrder, Shooting,
 };
 use casados::prelude::*;
+use casados::qp::residuals;
 
 type Solution = (Outcome, Vec<f64>);
 
@@ -66,34 +67,46 @@ fn irk() -> Result<Irk<Cart, Gauss<2>>, casados::Error> {
     Irk::<Cart, Gauss<2>>::new(Options::default())
 }
 
-/// Adjoints in place of Jacobians: the solution of full Jacobians, with fewer of these.
+/// With kept Jacobians: the solution, and how often Jacobians and adjoints were computed.
+fn kept<P: Formulation<f64, Dynamics: Adjoints<f64>>>(
+    mut ocp: HeapOcp<P>,
+    contraction: f64,
+) -> Result<(Solution, usize, usize), Box<dyn std::error::Error>> {
+    let mut sqp = HeapSqp::new(&ocp)?.keep_jacobians();
+    sqp.curvature.contraction = contraction;
+    (sqp.options.tolerance, sqp.options.max_iterations) = (TOLERANCE, 200);
+    let outcome = sqp.solve(&mut ocp)?;
+    println!("{}{outcome}", sqp.log());
+    assert!(outcome.is_converged(), "{outcome}");
+    let counts = (sqp.curvature.jacobians(), sqp.curvature.adjoints());
+    // The conditions of optimality with all Jacobians, element by element.
+    ocp.linearise(GaussNewton::default())?;
+    let (judged, _) = residuals(ocp.qp(), ocp.iterate());
+    assert!(judged.largest() <= 1.1 * TOLERANCE, "{judged}");
+    Ok(((outcome, variables(&ocp)), counts.0, counts.1))
+}
+
+/// Adjoints in place of Jacobians: the solution of full Jacobians, with fewer of these; from single
+/// intervals and from a batch.
 #[test]
 fn kept_jacobians_have_the_same_solution() -> Test {
-    let full = |contraction: f64| -> Result<_, Box<dyn std::error::Error>> {
-        let mut kept = KeptJacobians::new(irk()?);
-        kept.contraction = contraction;
-        let mut ocp = balance!(kept);
-        let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
-        (sqp.options.tolerance, sqp.options.max_iterations) = (TOLERANCE, 200);
-        let outcome = sqp.solve(&mut ocp)?;
-        assert!(outcome.is_converged(), "{}{outcome}", sqp.log());
-        let solution = (outcome, variables(&ocp));
-        let dynamics = &ocp.problem().dynamics;
-        Ok((solution, dynamics.jacobians(), dynamics.adjoints()))
-    };
     let reference = exact(balance!(irk()?))?;
-    let (always, jacobians, adjoints) = full(0.0)?;
+    let (always, jacobians, adjoints) = kept(balance!(irk()?), 0.0)?;
     // All of them are computed in each iteration.
     assert_eq!(adjoints, 0);
     close(&reference, &always, 1e-4);
     for contraction in [0.5, 0.8] {
-        let (kept, fewer, adjoints) = full(contraction)?;
+        let (found, fewer, adjoints) = kept(balance!(irk()?), contraction)?;
         println!(
             "{} {jacobians}; {contraction} {} {fewer} {adjoints}",
-            always.0.iterations, kept.0.iterations
+            always.0.iterations, found.0.iterations
         );
-        close(&reference, &kept, 1e-4);
+        close(&reference, &found, 1e-4);
         assert!(fewer < jacobians && adjoints > 0, "{fewer} {jacobians} {adjoints}");
+        let batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+        let (of_batch, jacobians, same) = kept(balance!(Shooting::new(batch)), contraction)?;
+        close(&found, &of_batch, 1e-6);
+        assert_eq!((jacobians, same), (fewer, adjoints));
     }
     Ok(())
 }
@@ -111,8 +124,10 @@ fn of_z(_x: [f64; 1], z: [f64; 1], _u: [f64; 1]) -> f64 {
 #[test]
 fn kept_jacobians_refuse_costs_of_algebraic_states() -> Test {
     let irk = Irk::<Algebraic, Gauss<2>>::new(Options::default())?;
-    let problem = Problem::new(KeptJacobians::new(irk)).stage_cost(GeneralCost::<OfZ>::new());
-    let refused = problem.on(Horizon::uniform(2, 0.1));
+    let problem = Problem::new(irk).stage_cost(GeneralCost::<OfZ>::new());
+    let mut ocp = problem.on(Horizon::uniform(2, 0.1))?;
+    ocp.fix_initial_state(&[0.5])?.guess(&[0.5], &[0.0])?;
+    let refused = HeapSqp::new(&ocp)?.keep_jacobians().solve(&mut ocp);
     assert!(matches!(refused, Err(OcpError::NotThere { function: "OfZ", .. })));
     Ok(())
 }

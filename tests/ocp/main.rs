@@ -30,6 +30,7 @@ mod lifted;
 mod options;
 mod random;
 mod real_time;
+mod secant;
 mod sensitivities;
 mod smoothing;
 mod solution_derivatives;

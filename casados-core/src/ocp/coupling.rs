@@ -98,6 +98,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::Coupled`]
+    #[cfg(feature = "alloc")]
     pub(super) fn is_uncoupled(&self) -> Result<(), OcpError> {
         if self.qp().is_coupled() { Err(OcpError::Coupled) } else { Ok(()) }
     }

@@ -3,10 +3,11 @@
 use super::algebraic::{self, Extended};
 use super::arrival;
 use super::constraint::Constraints;
-use super::convexify::{Convexification, convexify};
+use super::convexify::convexify;
 use super::cost::{At, Cost};
+use super::curvature::Curvature;
 use super::data::{Node, inputs, split};
-use super::dynamics::{Dynamics, IntegralTerms, Nodes, SecondOrder, Sink, Step, add_stages, larger};
+use super::dynamics::{Dynamics, IntegralTerms, Nodes, Step, add_stages, larger};
 use super::error::OcpError;
 use super::instance::{Ocp, nodes};
 use super::point::{Terms, add_blocks, read};
@@ -16,63 +17,6 @@ use crate::qp::{Arrays, Residuals, Solution, StageDims, add_symmetric, assign, p
 use crate::scalar::Real;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
-
-/// What the Hessian of the QP is: [`GaussNewton`] or [`Exact`].
-pub trait Curvature<D, T: Real>: Copy {
-    /// Whether second derivatives of everything are in it.
-    const EXACT: bool;
-    /// How a stage is made convex.
-    fn convexification(&self) -> Convexification;
-    /// Linearises the dynamics.
-    ///
-    /// # Errors
-    /// [`OcpError::Integration`]
-    #[doc(hidden)]
-    fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
-}
-
-/// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have
-/// none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct GaussNewton {
-    /// What is done where a general cost is not convex.
-    pub convexification: Convexification,
-}
-
-/// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all
-/// intervals are simulated first: what second derivatives of these states are multiplied by depends
-/// on them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Exact {
-    /// What is done where it is not convex. Default [`Convexification::Reduced`].
-    pub convexification: Convexification,
-}
-
-impl Default for Exact {
-    fn default() -> Self {
-        Self { convexification: Convexification::Reduced }
-    }
-}
-
-impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
-    const EXACT: bool = false;
-    fn convexification(&self) -> Convexification {
-        self.convexification
-    }
-    fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        dynamics.linearise(nodes, sink)
-    }
-}
-
-impl<D: SecondOrder<T>, T: Real> Curvature<D, T> for Exact {
-    const EXACT: bool = true;
-    fn convexification(&self) -> Convexification {
-        self.convexification
-    }
-    fn run(dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
-        dynamics.second_order(nodes, sink)
-    }
-}
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Writes the QP at the iterate: its solution is the full step of sequential quadratic
@@ -115,12 +59,17 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         // Whether intervals add to costs: all of them do, or none. Then these are cleared where
         // those at nodes are added.
         let mut adding = false;
-        C::run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
+        curvature.run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
             algebraic::keep::<P::Shape, T>(data.algebraic, k, step);
             let (columns, point) = ([step.dx, step.du], part(v, k * ld, ld));
-            Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
+            let keeps = C::KEEPS && step.dx.is_empty();
+            if keeps {
+                shift_kept(matrix, ld, offset, step.x, part(point, 0, n));
+            } else {
+                Transfer { columns, next: step.x, point, matrix, ld, offset }.run();
+            }
             watch(k, step);
             if P::Dynamics::LIFTED {
                 of_stages = add_stages(of_stages, step.stages);
@@ -140,6 +89,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             add_blocks(&mut terms, nx, blocks);
             add_blocks(&mut terms, nx, step.hessian);
+            if keeps {
+                let of_interval = part(multipliers, k * pad::<T>(nx), nx);
+                correct_kept(gradient, matrix, ld, of_interval);
+            }
         })?;
         drop(stages);
 
@@ -350,6 +303,21 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
         let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
+    }
+}
+
+/// The offset of dynamics that end at `next`, with the columns that there are.
+fn shift_kept<T: Real>(matrix: &[T], ld: usize, offset: &mut [T], next: &[T], point: &[T]) {
+    let columns = matrix.chunks_exact(ld.max(1));
+    for ((offset, &x), column) in offset.iter_mut().zip(next).zip(columns) {
+        *offset = x - dot(column, point);
+    }
+}
+
+/// Takes the products of kept columns with multipliers from a gradient.
+fn correct_kept<T: Real>(gradient: &mut [T], matrix: &[T], ld: usize, multipliers: &[T]) {
+    for (column, &pi) in matrix.chunks_exact(ld.max(1)).zip(multipliers) {
+        gradient.iter_mut().zip(column).for_each(|(g, &a)| *g = *g - a * pi);
     }
 }
 

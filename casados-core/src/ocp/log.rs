@@ -71,7 +71,28 @@ pub enum Status {
     /// The time was over.
     OutOfTime,
     /// Variables grow without end at points that satisfy all constraints: something is missing that
-    /// bounds the objective.
+    /// bounds the objective. [`Ipm`](super::Ipm) says so.
+    ///
+    /// ```
+    /// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Map, Problem, Status};
+    /// use casados::prelude::*;
+    ///
+    /// #[function]
+    /// fn push(x: f64, u: f64) -> f64 { x + u }
+    /// #[function]
+    /// fn gain(_x: f64, u: f64) -> f64 { -u }
+    ///
+    /// let mut ocp = Problem::new(Map::<Push, f64>::new())
+    ///     .stage_cost(GeneralCost::<Gain>::new())
+    ///     .on(Horizon::uniform(5, 1.0))?;
+    /// ocp.fix_initial_state(&[0.0])?.guess(&[0.0], &[0.0])?;
+    /// let mut ipm = HeapIpm::new(&ocp)?;
+    /// assert_eq!(ipm.solve(&mut ocp)?.status, Status::Unbounded);
+    /// // With a bound there is a solution.
+    /// ocp.bound("u", .., -1.0, 1.0)?.guess(&[0.0], &[0.0])?;
+    /// assert!(ipm.solve(&mut ocp)?.is_converged());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     Unbounded,
     /// Locally infeasible: gaps are less than violations, and no step makes the sum of both smaller
     /// by a thousandth, to first order. Elsewhere there may be points that satisfy all constraints.

@@ -28,7 +28,8 @@
 //! `Sensitivities` are derivatives of solutions by initial states and parameters, and feedback
 //! gains; `SolutionFactors` has adjoint ones, and gradient and Hessian of the optimal value.
 //!
-//! `KeptJacobians` wraps an integrator, keeps its Jacobians, and asks for adjoints in their place.
+//! [`Sqp::keep_jacobians`] asks integrators for adjoints while steps contract, [`Sqp::secant`]
+//! learns Hessians from first derivatives.
 //!
 //! Algebraic states `z_k` are those at the start of interval `k`, as its integrator continues its
 //! stages to there (`z0` of its results), with their exact first derivatives; those of second
@@ -61,15 +62,16 @@ mod convex;
 mod convexify;
 mod cost;
 mod coupling;
+mod curvature;
 mod data;
 mod dynamics;
 mod elastic;
 mod error;
 mod filter;
+mod guess;
 mod horizon;
 mod instance;
 mod ipm;
-#[cfg(feature = "alloc")]
 mod kept_jacobians;
 mod kkt;
 mod labels;
@@ -100,6 +102,7 @@ pub use constraint::{Constraint, Constraints};
 pub use convex::{Convex, ConvexCost, Huber, PseudoHuber};
 pub use convexify::Convexification;
 pub use cost::{Cost, GeneralCost};
+pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};
 pub use dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step};
 pub use error::{ConstraintName, OcpError, Part, Text};
 pub use horizon::Horizon;
@@ -109,10 +112,8 @@ pub use instance::Ocp;
 #[cfg(feature = "alloc")]
 pub use ipm::HeapIpm;
 pub use ipm::{Barrier, Ipm, IpmOptions};
-#[cfg(feature = "alloc")]
 pub use kept_jacobians::{Adjoints, KeptJacobians};
 pub use least_squares::LeastSquaresCost;
-pub use linearise::{Curvature, Exact, GaussNewton};
 pub use log::{Iteration, Log, Outcome, Status, Times};
 pub use map::Map;
 pub use names::Names;

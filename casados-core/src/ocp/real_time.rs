@@ -10,9 +10,9 @@
 
 #[cfg(feature = "alloc")]
 use super::HeapOcp;
+use super::curvature::{Curvature, GaussNewton};
 use super::error::OcpError;
 use super::instance::Ocp;
-use super::linearise::{Curvature, GaussNewton};
 use super::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
@@ -69,6 +69,9 @@ use alloc::vec::Vec;
 ///
 /// Between two samples the plan may be followed with the gains of its QP, `gains` (feature `alloc`)
 /// of [`RealTime::ocp`]: `u_k + K_k (x − x_k)`.
+///
+/// Shared controls are found anew in each sample, and periodic states end where the state of the
+/// sample is.
 ///
 /// What a sample takes is bounded by the options of the solver of QPs: `max_iterations`, and
 /// `locate` switched off. After any error the plan is as it was before the call.
@@ -160,7 +163,8 @@ where
     /// # Errors
     /// [`OcpError::Missing`], [`OcpError::NonFiniteFunction`], [`OcpError::Integration`]
     pub fn prepare(&mut self) -> Result<Prepared<'_, P, S, T, D, M>, OcpError> {
-        self.ocp.is_uncoupled()?;
+        self.ocp.join_controls();
+        self.ocp.join_states();
         self.ocp.linearise(self.curvature)?;
         let Self { qp_solver, ocp, solution, warm, .. } = self;
         Ok(Prepared { qp_solver, ocp, solution, warm })

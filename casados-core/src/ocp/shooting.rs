@@ -2,14 +2,15 @@
 
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
+use super::kept_jacobians::{Adjoints, step};
 use super::names::Names;
 use super::pattern::Origin;
 use super::single::{names, origin};
 use crate::batch::{BatchError, Integrator, Intervals};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
-use crate::result::{Forward, Hessian, Nominal};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::Shape;
+use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
 
 /// All intervals of a horizon at once: lanes of registers, and threads (feature `parallel`).
@@ -25,6 +26,7 @@ pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
     nominal: Vec<Nominal<M, T>>,
     forward: Vec<Forward<M, T>>,
     hessian: Vec<Hessian<M, T>>,
+    adjoint: Vec<Adjoint<M, T>>,
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
@@ -43,6 +45,7 @@ impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
             nominal: Vec::new(),
             forward: Vec::new(),
             hessian: Vec::new(),
+            adjoint: Vec::new(),
         }
     }
 
@@ -138,6 +141,20 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
         batch.forward(&Intervals { x0: x, u, p, h, t0: t }, forward).map_err(failed)?;
         for (k, result) in forward.iter().enumerate() {
             sink(k, &result.into());
+        }
+        Ok(())
+    }
+}
+
+impl<M: Dae, B, const S: usize, T: Real> Adjoints<T> for Shooting<M, B, S, T> {
+    fn adjoints(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        self.take(nodes, true)?;
+        places(&mut self.adjoint, nodes.len())?;
+        let Self { batch, x, u, p, h, t, lambda, adjoint, .. } = self;
+        batch.adjoint(&Intervals { x0: x, u, p, h, t0: t }, lambda, adjoint).map_err(failed)?;
+        for (k, result) in adjoint.iter().enumerate() {
+            let gradients = [result.grad_x0.as_slice(), result.grad_u.as_slice()];
+            sink(k, &step(result.x.as_slice(), gradients));
         }
         Ok(())
     }

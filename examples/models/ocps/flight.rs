@@ -1,7 +1,7 @@
 //! Rotors and rockets.
 
-use super::{Failure, fix, line, rk4};
-use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
+use super::{Failure, Grid, fix, line, rk4};
+use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Problem, SecondOrder};
 use casados::{function, ode};
 
 const FREE: f64 = f64::INFINITY;
@@ -52,13 +52,13 @@ fn cylinders(x: [f64; 14], _u: [f64; 4]) -> [f64; 2] {
 }
 
 /// Six metres ahead between two soft cylinders in the shortest time.
-pub fn quadrotor() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 30;
+pub fn quadrotor(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(30);
     let mut ocp = Problem::new(rk4::<QuaternionQuadrotor>(1)?)
         .running_cost(GeneralCost::<QuadrotorEffort>::new())
         .terminal_cost(GeneralCost::<QuadrotorTime>::new())
         .path_constraints(Constraint::<Cylinders>::new([0.0; 2], [FREE; 2]).soft(100.0, 0.0))
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+        .on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[1]", .., -1.5, 1.5)?.bound("x[13]", .., 0.3, 20.0)?.bound("u", .., 0.0, 6.0)?;
     let start = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -97,11 +97,10 @@ fn spent(x: [f64; 8], _u: [f64; 2]) -> f64 {
 }
 
 /// From 100 m down to rest with as little fuel as possible.
-pub fn landing() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
-    let mut ocp = Problem::new(rk4::<Rocket>(1)?)
-        .terminal_cost(GeneralCost::<Spent>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+pub fn landing(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
+    let mut ocp =
+        Problem::new(rk4::<Rocket>(1)?).terminal_cost(GeneralCost::<Spent>::new()).on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[1]", .., 0.0, FREE)?.bound("x[2]", .., -1.0, 1.0)?.bound("x[5]", .., -1.0, 1.0)?;
     ocp.bound("x[6]", .., 1.0, 10.0)?.bound("x[7]", .., 1.0, 30.0)?;
@@ -130,11 +129,11 @@ fn depth(x: [f64; 4], _u: [f64; 1]) -> f64 {
 }
 
 /// As high as possible.
-pub fn goddard() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 50;
+pub fn goddard(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(50);
     let mut ocp = Problem::new(rk4::<GoddardRocket>(1)?)
         .terminal_cost(GeneralCost::<Depth>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+        .on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[0]", .., 1.0, FREE)?.bound("x[1]", .., 0.0, FREE)?.bound("x[2]", .., 0.6, 1.0)?;
     ocp.bound("x[3]", .., 0.01, 1.0)?.bound("u", .., 0.0, 3.5)?;

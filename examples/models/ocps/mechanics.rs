@@ -1,7 +1,7 @@
 //! Cranes, arms, pendulums, a motor.
 
-use super::{Failure, fix, line, rk4};
-use casados::ocp::{Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
+use super::{Failure, Grid, fix, line, rk4};
+use casados::ocp::{Formulation, GeneralCost, HeapOcp, Problem, SecondOrder};
 use casados::{Gauss, Irk, Options, dae, function, ode};
 use core::f64::consts::PI;
 
@@ -30,11 +30,11 @@ fn swing(x: [f64; 4], u: [f64; 1]) -> f64 {
 }
 
 /// Swinging up in two seconds.
-pub fn cart_pole() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn cart_pole(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<CartAndPole>(2)?)
         .running_cost(GeneralCost::<Swing>::new())
-        .on(Horizon::uniform(n, 2.0 / n as f64))?;
+        .on(grid.over(n, 2.0))?;
     ocp.fix_initial_state(&[0.0, PI, 0.0, 0.0])?;
     ocp.bound("x[0]", .., -2.0, 2.0)?.bound("u", .., -20.0, 20.0)?;
     fix(&mut ocp, n, &[0.0; 4])?;
@@ -70,12 +70,12 @@ fn crane_effort(_x: [f64; 7], u: [f64; 2]) -> f64 {
 }
 
 /// Ten metres from rest to rest, lifting by two, in the shortest time.
-pub fn crane() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn crane(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<OverheadCrane>(1)?)
         .running_cost(GeneralCost::<CraneEffort>::new())
         .terminal_cost(GeneralCost::<CraneTime>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+        .on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[1]", .., -4.0, 4.0)?.bound("x[2]", .., -0.5, 0.5)?.bound("x[4]", .., 1.0, 10.0)?;
     ocp.bound("x[5]", .., -2.0, 2.0)?.bound("x[6]", .., 0.5, 30.0)?;
@@ -106,11 +106,10 @@ fn arm_time(x: [f64; 5], _u: [f64; 2]) -> f64 {
 }
 
 /// From rest to rest in the shortest time.
-pub fn arm() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
-    let mut ocp = Problem::new(rk4::<TwoBars>(1)?)
-        .terminal_cost(GeneralCost::<ArmTime>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+pub fn arm(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
+    let mut ocp =
+        Problem::new(rk4::<TwoBars>(1)?).terminal_cost(GeneralCost::<ArmTime>::new()).on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[4]", .., 0.1, 20.0)?.bound("u[0]", .., -5.0, 5.0)?.bound("u[1]", .., -3.0, 3.0)?;
     fix(&mut ocp, 0, &[0.0; 4])?;
@@ -131,11 +130,11 @@ fn pendulum_effort(_x: [f64; 2], u: [f64; 1]) -> f64 {
 }
 
 /// Swinging up in four seconds by less than a third of what would hold it.
-pub fn pendulum() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 50;
+pub fn pendulum(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(50);
     let mut ocp = Problem::new(rk4::<DrivenPendulum>(2)?)
         .running_cost(GeneralCost::<PendulumEffort>::new())
-        .on(Horizon::uniform(n, 4.0 / n as f64))?;
+        .on(grid.over(n, 4.0))?;
     ocp.fix_initial_state(&[0.0, 0.0])?.bound("u", .., -3.0, 3.0)?;
     fix(&mut ocp, n, &[PI, 0.0])?;
     line(&mut ocp, &[0.0, 0.0], &[PI, 0.0], &[0.0])?;
@@ -158,11 +157,11 @@ fn fuel(_x: [f64; 6], u: [f64; 4]) -> f64 {
 }
 
 /// From rest to rest in twelve seconds with as little fuel as possible.
-pub fn robot() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn robot(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<FloatingRobot>(1)?)
         .running_cost(GeneralCost::<Fuel>::new())
-        .on(Horizon::uniform(n, 12.0 / n as f64))?;
+        .on(grid.over(n, 12.0))?;
     let start = [-10.0, -10.0, PI / 2.0, 0.0, 0.0, 0.0];
     ocp.fix_initial_state(&start)?.bound("u", .., 0.0, 1.0)?;
     fix(&mut ocp, n, &[0.0; 6])?;
@@ -183,11 +182,11 @@ fn voltage(_x: [f64; 2], _z: [f64; 1], u: [f64; 1]) -> f64 {
 }
 
 /// Half a turn upwards in three seconds.
-pub fn motor() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 30;
+pub fn motor(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(30);
     let mut ocp = Problem::new(Irk::<LiftingMotor, Gauss<2>>::new(Options::default())?)
         .running_cost(GeneralCost::<Voltage>::new())
-        .on(Horizon::uniform(n, 3.0 / n as f64))?;
+        .on(grid.over(n, 3.0))?;
     ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[1]", .., -2.0, 2.0)?.bound("u", .., -4.0, 4.0)?;
     fix(&mut ocp, n, &[PI, 0.0])?;
     line(&mut ocp, &[0.0, 0.0], &[PI, 0.0], &[0.0])?;

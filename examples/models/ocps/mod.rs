@@ -10,8 +10,29 @@ pub mod processes;
 pub mod textbook;
 pub mod vehicles;
 
-use casados::ocp::{Formulation, HeapOcp, OcpError};
+use casados::ocp::{Formulation, HeapOcp, Horizon, OcpError};
 use casados::{Erk, Error, Ode, Options, Rk4};
+
+/// Intervals and length of a horizon, as parts of those that a problem is given with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    pub intervals: f64,
+    pub length: f64,
+}
+
+/// The grids that problems are given with.
+pub const GIVEN: Grid = Grid { intervals: 1.0, length: 1.0 };
+
+impl Grid {
+    /// So many intervals of so many.
+    pub fn intervals(self, given: usize) -> usize {
+        (self.intervals * given as f64).round() as usize
+    }
+    /// As many uniform intervals as there are, over a horizon of that length if nothing is varied.
+    pub fn over(self, intervals: usize, length: f64) -> Horizon<'static, f64> {
+        Horizon::uniform(intervals, self.length * length / intervals as f64)
+    }
+}
 
 /// What may go wrong while a problem is put together.
 pub type Failure = Box<dyn std::error::Error>;

@@ -1,7 +1,7 @@
 //! A reactor, and fish.
 
-use super::{Failure, rk4};
-use casados::ocp::{Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
+use super::{Failure, Grid, rk4};
+use casados::ocp::{Formulation, GeneralCost, HeapOcp, Problem, SecondOrder};
 use casados::{function, ode};
 
 /// Consecutive reactions `A → B → C` at a temperature in K.
@@ -18,11 +18,12 @@ fn waste(x: [f64; 2], _u: [f64; 1]) -> f64 {
 }
 
 /// As much of `B` as possible. W. H. Ray, "Advanced Process Control", 1981.
-pub fn batch_reactor() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
-    let mut ocp = Problem::new(rk4::<Reactions>(1)?)
-        .terminal_cost(GeneralCost::<Waste>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+pub fn batch_reactor(
+    grid: Grid,
+) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
+    let mut ocp =
+        Problem::new(rk4::<Reactions>(1)?).terminal_cost(GeneralCost::<Waste>::new()).on(grid.over(n, 1.0))?;
     ocp.fix_initial_state(&[1.0, 0.0])?.bound("u", .., 298.0, 398.0)?.guess(&[1.0, 0.0], &[350.0])?;
     Ok(ocp)
 }
@@ -40,11 +41,10 @@ fn imbalance(x: [f64; 2], _u: [f64; 1]) -> f64 {
 
 /// To the steady state. S. Sager, "Numerical methods for mixed-integer optimal control problems",
 /// 2005, relaxed.
-pub fn fishing() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 60;
-    let mut ocp = Problem::new(rk4::<Fish>(1)?)
-        .running_cost(GeneralCost::<Imbalance>::new())
-        .on(Horizon::uniform(n, 12.0 / n as f64))?;
+pub fn fishing(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(60);
+    let mut ocp =
+        Problem::new(rk4::<Fish>(1)?).running_cost(GeneralCost::<Imbalance>::new()).on(grid.over(n, 12.0))?;
     ocp.fix_initial_state(&[0.5, 0.7])?.bound("u", .., 0.0, 1.0)?.guess(&[0.5, 0.7], &[0.5])?;
     Ok(ocp)
 }

@@ -1,7 +1,7 @@
 //! Problems of textbooks and collections.
 
-use super::{Failure, fix, line, rk4};
-use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
+use super::{Failure, Grid, fix, line, rk4};
+use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Problem, SecondOrder};
 use casados::{function, ode};
 use core::f64::consts::PI;
 
@@ -19,11 +19,11 @@ fn duration(x: [f64; 3], _u: [f64; 1]) -> f64 {
 }
 
 /// From rest to rest over a distance of four with `|u| ≤ 1`: the shortest time is four.
-pub fn bang_bang() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 30;
+pub fn bang_bang(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(30);
     let mut ocp = Problem::new(rk4::<HurriedMass>(1)?)
         .terminal_cost(GeneralCost::<Duration>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+        .on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[2]", .., 0.1, 20.0)?.bound("u", .., -1.0, 1.0)?;
     fix(&mut ocp, 0, &[0.0, 0.0])?;
@@ -44,11 +44,13 @@ fn squares(x: [f64; 2], u: [f64; 1]) -> f64 {
 }
 
 /// To rest, with a bound on the velocity.
-pub fn van_der_pol() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn van_der_pol(
+    grid: Grid,
+) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<Oscillator>(1)?)
         .running_cost(GeneralCost::<Squares>::new())
-        .on(Horizon::uniform(n, 10.0 / n as f64))?;
+        .on(grid.over(n, 10.0))?;
     ocp.fix_initial_state(&[0.0, 1.0])?;
     ocp.bound("x[0]", .., -0.25, FREE)?.bound("u", .., -1.0, 1.0)?;
     ocp.guess(&[0.0, 0.0], &[0.0])?;
@@ -68,11 +70,12 @@ fn energy(_x: [f64; 2], u: [f64; 1]) -> f64 {
 
 /// Bryson and Denham's: thrown back below a ceiling. A. E. Bryson, W. F. Denham, S. E. Dreyfus,
 /// "Optimal programming problems with inequality constraints I", AIAA J. 1 (1963).
-pub fn bryson_denham() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 50;
-    let mut ocp = Problem::new(rk4::<Mass>(1)?)
-        .running_cost(GeneralCost::<Energy>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+pub fn bryson_denham(
+    grid: Grid,
+) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(50);
+    let mut ocp =
+        Problem::new(rk4::<Mass>(1)?).running_cost(GeneralCost::<Energy>::new()).on(grid.over(n, 1.0))?;
     ocp.fix_initial_state(&[0.0, 1.0])?.bound("x[0]", .., -FREE, 1.0 / 9.0)?;
     fix(&mut ocp, n, &[0.0, -1.0])?;
     line(&mut ocp, &[0.0, 1.0], &[0.0, -1.0], &[0.0])?;
@@ -97,12 +100,12 @@ fn mixed(x: [f64; 2], u: [f64; 1]) -> f64 {
 }
 
 /// To rest with a constraint of states and controls together.
-pub fn rayleigh() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 45;
+pub fn rayleigh(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(45);
     let mut ocp = Problem::new(rk4::<Generator>(1)?)
         .running_cost(GeneralCost::<Deviation>::new())
         .path_constraints(Constraint::<Mixed>::new([-1.0], [0.0]))
-        .on(Horizon::uniform(n, 4.5 / n as f64))?;
+        .on(grid.over(n, 4.5))?;
     ocp.fix_initial_state(&[-5.0, -5.0])?;
     ocp.guess(&[-5.0, -5.0], &[0.0])?;
     Ok(ocp)
@@ -116,11 +119,10 @@ pub fn boat(x: [f64; 3], u: [f64; 1]) -> [f64; 3] {
 }
 
 /// Zermelo's: across in the shortest time.
-pub fn zermelo() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
-    let mut ocp = Problem::new(rk4::<Boat>(1)?)
-        .terminal_cost(GeneralCost::<Duration>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+pub fn zermelo(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
+    let mut ocp =
+        Problem::new(rk4::<Boat>(1)?).terminal_cost(GeneralCost::<Duration>::new()).on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[2]", .., 0.1, 20.0)?;
     fix(&mut ocp, 0, &[0.0, 0.0])?;
@@ -143,11 +145,13 @@ fn potential(x: [f64; 3], _u: [f64; 1]) -> f64 {
 
 /// The hanging chain of COPS 3.0 (Dolan, Moré, Munson 2004): of length four between heights of one
 /// and three.
-pub fn hanging_chain() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 50;
+pub fn hanging_chain(
+    grid: Grid,
+) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(50);
     let mut ocp = Problem::new(rk4::<Suspended>(1)?)
         .terminal_cost(GeneralCost::<Potential>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+        .on(grid.over(n, 1.0))?;
     ocp.fix_initial_state(&[1.0, 0.0, 0.0])?;
     ocp.bound("x[0]", n..=n, 3.0, 3.0)?.bound("x[2]", n..=n, 4.0, 4.0)?;
     line(&mut ocp, &[1.0, 0.0, 0.0], &[3.0, 6.0, 4.0], &[2.0])?;

@@ -1,7 +1,7 @@
 //! Cars: against time, at the limits of tyres, between obstacles.
 
-use super::{Failure, fix, line, rk4};
-use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
+use super::{Failure, Grid, fix, line, rk4};
+use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Problem, SecondOrder};
 use casados::{function, ode};
 
 const FREE: f64 = f64::INFINITY;
@@ -35,17 +35,20 @@ fn car_effort(_x: [f64; 7], u: [f64; 2]) -> f64 {
 }
 
 /// From rest to rest, 50 m ahead and 20 m to the left.
-pub fn car() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    car_within(50.0)
+pub fn car(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    car_within(50.0, grid)
 }
 
 /// [`car`] in not more than some time.
-pub fn car_within(most: f64) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn car_within(
+    most: f64,
+    grid: Grid,
+) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<KinematicCar>(1)?)
         .running_cost(GeneralCost::<CarEffort>::new())
         .terminal_cost(GeneralCost::<CarTime>::new())
-        .on(Horizon::uniform(n, 1.0 / n as f64))?;
+        .on(grid.over(n, 1.0))?;
     ocp.free_initial_state();
     ocp.bound("x[3]", .., -1.0, 20.0)?.bound("x[4]", .., -0.6, 0.6)?.bound("x[5]", .., -5.0, 3.0)?;
     ocp.bound("x[6]", .., 0.1, most)?;
@@ -94,13 +97,18 @@ fn handling(x: [f64; 7], u: [f64; 2]) -> f64 {
 }
 
 /// A double lane change in four seconds at 20 m/s.
-pub fn tyres() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn tyres(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<SingleTrack>(2)?)
         .running_cost(GeneralCost::<Handling>::new())
-        .on(Horizon::uniform(n, 4.0 / n as f64))?;
+        .on(grid.over(n, 4.0))?;
     ocp.fix_initial_state(&[0.0, 0.0, 0.0, 20.0, 0.0, 0.0, 0.0])?;
-    ocp.bound("x[1]", .., -4.0, 4.0)?.bound("x[1]", 15..22, 2.5, 4.0)?.bound("x[1]", 28.., -0.5, 0.5)?;
+    ocp.bound("x[1]", .., -4.0, 4.0)?.bound("x[1]", 3 * n / 8..11 * n / 20, 2.5, 4.0)?.bound(
+        "x[1]",
+        7 * n / 10..,
+        -0.5,
+        0.5,
+    )?;
     ocp.bound("x[2]", .., -1.5, 1.5)?.bound("x[3]", .., 3.0, 40.0)?.bound("x[6]", .., -0.5, 0.5)?;
     ocp.bound("x[0]", n..=n, 70.0, FREE)?.bound("x[1]", n..=n, 0.0, 0.0)?.bound("x[2]", n..=n, 0.0, 0.0)?;
     ocp.bound("u[0]", .., -1.0, 1.0)?.bound("u[1]", .., -8.0, 4.0)?;
@@ -128,12 +136,12 @@ fn discs(x: [f64; 4], _u: [f64; 2]) -> [f64; 3] {
 }
 
 /// Ten metres ahead in ten seconds between three discs, of which the line goes through two.
-pub fn obstacles() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn obstacles(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<Unicycle>(1)?)
         .running_cost(GeneralCost::<UnicycleEffort>::new())
         .path_constraints(Constraint::<Discs>::new([0.0; 3], [FREE; 3]))
-        .on(Horizon::uniform(n, 10.0 / n as f64))?;
+        .on(grid.over(n, 10.0))?;
     let (start, end) = ([0.0, 0.0, 0.0, 1.0], [10.0, 0.0, 0.0, 1.0]);
     ocp.fix_initial_state(&start)?.bound("u[0]", .., -2.0, 2.0)?.bound("u[1]", .., -1.0, 1.0)?;
     fix(&mut ocp, n, &end)?;
@@ -142,14 +150,14 @@ pub fn obstacles() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder
 }
 
 /// Walls on opposite sides, three stages or 0.75 s apart: 3 m at a speed of 2 m/s at most.
-pub fn walls() -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
-    let n = 40;
+pub fn walls(grid: Grid) -> Result<HeapOcp<impl Formulation<f64, Dynamics: SecondOrder<f64>>>, Failure> {
+    let n = grid.intervals(40);
     let mut ocp = Problem::new(rk4::<Unicycle>(1)?)
         .running_cost(GeneralCost::<UnicycleEffort>::new())
-        .on(Horizon::uniform(n, 10.0 / n as f64))?;
+        .on(grid.over(n, 10.0))?;
     ocp.fix_initial_state(&[0.0, 0.0, 0.0, 1.0])?;
     ocp.bound("x[3]", .., 0.0, 2.0)?.bound("u[0]", .., -2.0, 2.0)?.bound("u[1]", .., -1.0, 1.0)?;
-    ocp.bound("x[1]", 20..=20, 1.5, 1e2)?.bound("x[1]", 23..=23, -1e2, -1.5)?;
+    ocp.bound("x[1]", n / 2..=n / 2, 1.5, 1e2)?.bound("x[1]", n / 2 + 3..=n / 2 + 3, -1e2, -1.5)?;
     ocp.bound("x[0]", n..=n, 10.0, 10.0)?.bound("x[1]", n..=n, 0.0, 0.0)?;
     line(&mut ocp, &[0.0, 0.0, 0.0, 1.0], &[10.0, 0.0, 0.0, 1.0], &[0.0; 2])?;
     Ok(ocp)

@@ -155,7 +155,7 @@ pub fn quadrotor() -> Result<Program, Failure> {
     let source = format!(
         "#![allow(dead_code)]\nmod flight {{\n{flight}\n}}\n{tools}
 fn main() -> Result<(), Failure> {{
-    let mut ocp = flight::quadrotor()?;
+    let mut ocp = flight::quadrotor(GIVEN)?;
     let outcome = casados::ocp::HeapSqp::new(&ocp)?.solve(&mut ocp)?;
     println!(\"{{outcome}}\");\n    Ok(())\n}}\n"
     );

@@ -2,8 +2,8 @@
 
 use super::IpmOptions;
 use super::direction::Regularisation;
-use super::newton::Lengths;
-use super::run::State;
+use super::lengths::Lengths;
+use super::state::State;
 use crate::ocp::elastic::Worst;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Status;

@@ -1,26 +1,25 @@
 //! One iteration: residuals and barrier parameter, search direction, line search, step.
 
 use super::barrier::{self, Barrier};
+use super::lengths::Lengths;
 use super::line_search::{Accepted, Expected, Found, Room, longest};
 use super::measure;
-use super::newton::{Lengths, attach, dynamics_after, evaluate};
-use super::run::State;
+use super::newton::{attach, dynamics_after, evaluate};
+use super::state::{MARGIN, State};
 use super::work::Work;
 use super::{Ipm, IpmOptions, elastic};
 use crate::ocp::convexify::Convexification;
+use crate::ocp::curvature::Exact;
 use crate::ocp::dynamics::{Dynamics, SecondOrder, StageAction};
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::{Filter, Measure};
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Exact;
 use crate::ocp::log::{Iteration, Status, Watch};
 use crate::ocp::problem::Formulation;
 use crate::qp::interior::{Iterate, Sides, set};
 use crate::qp::{QpError, Residuals, StageDims, Store};
 use crate::scalar::Real;
 
-/// `γ_φ`
-pub(super) const MARGIN: f64 = 1e-8;
 /// `κ_Σ`: multipliers stay within this factor of `μ / s`.
 const MULTIPLIERS: f64 = 1e10;
 /// Variables that are larger have no end.

@@ -1,8 +1,9 @@
 //! How far a step goes: the filter line search with second-order corrections.
 
+use super::lengths::Lengths;
 use super::measure;
-use super::newton::{Lengths, attach, evaluate_values};
-use super::run::State;
+use super::newton::{attach, evaluate_values};
+use super::state::State;
 use super::work::Work;
 use crate::ocp::dynamics::Dynamics;
 use crate::ocp::error::OcpError;
@@ -47,7 +48,7 @@ impl Expected {
         let Measure { violation, .. } = self.here;
         let mut least: f64 = MARGIN;
         if self.slope < 0.0 {
-            least = least.min(super::iteration::MARGIN * violation / -self.slope);
+            least = least.min(super::state::MARGIN * violation / -self.slope);
             if violation <= self.small_violation {
                 let powers =
                     (Scalar::powf(violation, POWER_VIOLATION), Scalar::powf(-self.slope, POWER_OBJECTIVE));

@@ -1,6 +1,6 @@
 //! In memory that is given.
 
-use super::newton::all_soft;
+use super::lengths::all_soft;
 use super::work::Work;
 use super::{Ipm, IpmOptions};
 use crate::ocp::error::{OcpError, Part};

@@ -12,7 +12,7 @@
 //! | `measure`, `line_search` | how far a step goes, by the filter of `ocp::filter` |
 //! | `barrier` | how `μ` shrinks |
 //! | `elastic` | penalties where no step makes progress |
-//! | `stages` | stages that are variables go with the iterate |
+//! | `lifted` | stages that are variables go with the iterate |
 //!
 //! The algorithm is that of Wächter and Biegler, Math. Program. 106 (2006). Inertia is what the
 //! Riccati recursion says: the reduced Hessian is positive definite where `M_uu` of every stage has
@@ -24,6 +24,8 @@ mod elastic;
 #[cfg(feature = "alloc")]
 mod heap;
 mod iteration;
+mod lengths;
+mod lifted;
 mod line_search;
 mod measure;
 mod memory;
@@ -31,8 +33,8 @@ mod multipliers;
 mod newton;
 mod options;
 mod run;
-mod stages;
 mod start;
+mod state;
 mod work;
 
 pub use barrier::Barrier;

@@ -1,9 +1,10 @@
 //! Multipliers: the first ones, and those that the Hessian has.
 
 use super::Ipm;
-use super::newton::{Lengths, attach, evaluate_values, least_squares};
-use super::run::State;
+use super::lengths::Lengths;
+use super::newton::{attach, evaluate_values, least_squares};
 use super::start::begin_sides;
+use super::state::State;
 use super::work::Work;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;

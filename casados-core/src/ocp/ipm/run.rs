@@ -3,16 +3,16 @@
 use super::Ipm;
 use super::barrier::Progress;
 use super::direction::Regularisation;
-use super::iteration::MARGIN;
-use super::newton::Lengths;
+use super::lengths::Lengths;
 use super::start::push_inside;
+use super::state::{MARGIN, State};
 use super::work::Work;
 use crate::ocp::convexify::Convexification;
+use crate::ocp::curvature::Exact;
 use crate::ocp::dynamics::SecondOrder;
 use crate::ocp::error::OcpError;
 use crate::ocp::filter::Filter;
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Exact;
 #[cfg(feature = "alloc")]
 use crate::ocp::log::reserve;
 use crate::ocp::log::{Iteration, Outcome, Status};
@@ -20,37 +20,6 @@ use crate::ocp::problem::Formulation;
 use crate::qp::{Field, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
-
-/// What a run remembers from one iteration to the next.
-pub(super) struct State<'c> {
-    /// Whether the time is over.
-    pub over: &'c mut dyn FnMut() -> bool,
-    pub lengths: Lengths,
-    /// The barrier parameter.
-    pub mu: f64,
-    /// What an adaptive one remembers.
-    pub progress: Progress,
-    pub filter: Filter,
-    /// `θ_min`: below this violation the barrier function may decide.
-    pub small_violation: f64,
-    pub regularisation: Regularisation,
-    /// `δ_w` of the step.
-    pub delta: f64,
-    /// The penalty, if bounds are soft.
-    pub elastic: Option<f64>,
-    /// The violation that the last penalty left.
-    pub stationary_violation: f64,
-    /// Iterations one after the other whose residuals are acceptable.
-    pub acceptable: usize,
-    /// Whether slacks and multipliers are those of the bounds as they are, hard or soft.
-    pub has_slacks: bool,
-    /// Whether the filter has the bound of violations that belongs to these slacks.
-    pub has_filter: bool,
-    /// The largest residual of the best iterate.
-    pub best_residual: f64,
-    /// That iterate.
-    pub best_iteration: Iteration,
-}
 
 impl<T, D, M, I> Ipm<T, D, M, I>
 where
@@ -139,7 +108,7 @@ where
         self.options.check()?;
         ocp.begin_stages(self.options.warm_start)?;
         // Bounds of constraints are in the QP once it is written.
-        ocp.linearise(Exact { convexification: Convexification::None })?;
+        ocp.linearise_guess(Exact { convexification: Convexification::None }, &mut self.trial)?;
         let (lengths, capacity) = self.prepare(ocp)?;
         let mut state = State {
             over,

@@ -2,7 +2,7 @@
 
 use super::IpmOptions;
 use crate::qp::interior::{Iterate, at, set};
-use crate::qp::{Bounds, Places, QpView, SolutionView, StageDims, part_mut};
+use crate::qp::{Bounds, Places, QpView, SolutionView, part_mut};
 use crate::scalar::Real;
 
 /// Moves states and controls that have hard bounds away from these by `κ max(1, |bound|)`, and by
@@ -87,15 +87,4 @@ pub(super) fn begin_sides<T: Real>(
         set(sides.slack, count + j, violation);
         set(sides.multiplier, count + j, force - multiplier);
     }
-}
-
-/// How many numbers the largest stage takes.
-pub(super) const fn scratch<T>(dims: &[StageDims]) -> usize {
-    let (mut largest, mut rest) = (0, dims);
-    while let Some((first, others)) = rest.split_first() {
-        let ld = crate::qp::pad::<T>(first.nx + first.nu);
-        largest = if ld > largest { ld } else { largest };
-        rest = others;
-    }
-    largest
 }

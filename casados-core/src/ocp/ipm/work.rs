@@ -1,7 +1,6 @@
 //! Memory of a run beside that of Newton's equations.
 
-use super::newton::Lengths;
-use super::start::scratch;
+use super::lengths::Lengths;
 use crate::ocp::elastic;
 use crate::qp::interior::Counts;
 use crate::qp::{StageDims, end, take_mut};
@@ -55,4 +54,15 @@ impl<'a, T: Real> Work<'a, T> {
             penalties: take_mut(rest, elastic::memory(dims)),
         }
     }
+}
+
+/// How many numbers the largest stage takes.
+const fn scratch<T>(dims: &[StageDims]) -> usize {
+    let (mut largest, mut rest) = (0, dims);
+    while let Some((first, others)) = rest.split_first() {
+        let ld = crate::qp::pad::<T>(first.nx + first.nu);
+        largest = if ld > largest { ld } else { largest };
+        rest = others;
+    }
+    largest
 }

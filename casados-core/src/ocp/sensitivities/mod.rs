@@ -13,10 +13,11 @@ mod recursion;
 
 pub use factors::{SolutionAdjoint, SolutionFactors, ValueHessian};
 
+use super::curvature::Curvature;
 use super::data::get;
 use super::error::OcpError;
 use super::instance::Ocp;
-use super::linearise::{Curvature, dot};
+use super::linearise::dot;
 use super::problem::Formulation;
 use crate::linalg::axpy;
 use crate::qp::{StageDims, assign, part, part_mut};

@@ -4,10 +4,10 @@
 use super::Sqp;
 use super::state::State;
 use crate::ocp::convexify::Convexification;
+use crate::ocp::curvature::Curvature;
 use crate::ocp::elastic::Worst;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Curvature;
 use crate::ocp::log::Iteration;
 use crate::ocp::problem::Formulation;
 use crate::qp::{QpError, QpSolver, StageDims, Start, Statistics};
@@ -115,7 +115,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 return Ok(Err(error));
             }
             (state.nearest, row.regularisation) = (true, 0.0);
-            ocp.linearise(self.curvature)?;
+            self.linearise(ocp)?;
             return Ok(Ok(Direction::Step));
         }
         let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
@@ -149,7 +149,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 return Ok(Ok(Direction::Infeasible(worst)));
             }
             (state.nearest, row.regularisation) = (true, 0.0);
-            ocp.linearise(self.curvature)?;
+            self.linearise(ocp)?;
             return Ok(Ok(Direction::Step));
         }
         // Gaps are to be closed first, whatever that leaves of bounds.

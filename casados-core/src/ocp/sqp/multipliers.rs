@@ -9,9 +9,9 @@
 //! program: its Hessian would know nothing of the dynamics, and its solution is far away.
 
 use super::Sqp;
+use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Curvature;
 use crate::ocp::problem::Formulation;
 use crate::qp::{Arrays, QpSolver, StageDims, Start, add_symmetric, part};
 use crate::scalar::Real;

@@ -4,11 +4,12 @@ use super::Sqp;
 use super::acceptance::Search;
 use super::direction::Direction;
 use super::options::Globalisation;
+use super::secant::Take;
 use super::state::{State, Taken};
 use crate::ocp::convexify::Convexification;
+use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Curvature;
 #[cfg(feature = "alloc")]
 use crate::ocp::log::reserve;
 use crate::ocp::log::{Iteration, Outcome, Status, Watch};
@@ -70,8 +71,13 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             elastic_steps: 0,
             best_residual: f64::INFINITY,
             best_iteration: Iteration::default(),
+            reach: f64::INFINITY,
             number: PhantomData,
         };
+        if C::KEEPS {
+            ocp.check_without_algebraic()?;
+            self.curvature.follow(f64::INFINITY);
+        }
         // Steps are to solutions of QPs: what is one stays so.
         ocp.join_controls();
         ocp.join_states();
@@ -137,7 +143,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         row.times.linearise = match state.search.linearised.take() {
             Some(seconds) => seconds,
             None if row.iteration == 0 => {
-                self.begin(ocp)?;
+                ocp.linearise_guess(self.curvature, &mut self.trial)?;
                 watch.lap()
             }
             None => {
@@ -146,6 +152,15 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         };
         self.leave_elastic(ocp, state);
+        if let Some(update) = self.curvature.update() {
+            let take = match (row.iteration, state.elastic_steps) {
+                (0, _) => Take::First,
+                (_, 0) => Take::Updated(update),
+                // Forces of penalties are no multipliers.
+                _ => Take::Moved,
+            };
+            self.take_hessians(ocp, take);
+        }
         if row.iteration == 0 && C::EXACT {
             self.first_multipliers(ocp)?;
         }
@@ -178,6 +193,19 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.weights.multipliers_mut().fill(T::ZERO);
         }
         Ok(None)
+    }
+
+    /// Compares the length of the full step with that of the one before.
+    fn follow<P: Formulation<T>>(&mut self, ocp: &Ocp<P, T, D, M>, state: &mut State<T>)
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        if C::KEEPS {
+            let steps = ocp.iterate.vectors().0.iter().zip(self.solution.vectors().0);
+            let reach = steps.fold(0.0_f64, |reach, (&a, &b)| reach.max((b - a).abs().to_f64()));
+            // What follows new Jacobians is kept.
+            state.reach = if self.curvature.follow(reach / state.reach) { reach } else { f64::INFINITY };
+        }
     }
 
     /// The full step, or one that a line search finds.
@@ -216,7 +244,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                     // The curvature that multipliers have is no help.
                     ocp.iterate.multipliers_mut().fill(T::ZERO);
                 }
-                ocp.linearise(self.curvature)?;
+                state.reach = f64::INFINITY;
+                self.curvature.follow(f64::INFINITY);
+                self.linearise(ocp)?;
                 self.leave_elastic(ocp, state);
                 (row.regularisation, state.damping) = (0.0, damping);
             }
@@ -225,6 +255,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             failure = direction.as_ref().err().copied();
             match direction {
                 Ok(Direction::Step) => {
+                    self.follow(ocp, state);
                     let taken = self.go(ocp, state, row)?;
                     row.times.search += watch.lap() - state.search.linearised.unwrap_or(0.0);
                     if let Some(taken) = taken {

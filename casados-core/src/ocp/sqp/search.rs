@@ -4,9 +4,9 @@ use super::Sqp;
 use super::acceptance::Line;
 use super::options::Globalisation;
 use super::state::{State, Taken};
+use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Curvature;
 use crate::ocp::log::{Iteration, Watch};
 use crate::ocp::problem::Formulation;
 use crate::qp::{QpSolver, Solution, StageDims, Start};
@@ -45,6 +45,9 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             written = false;
         }
         state.search.full = false;
+        if !written {
+            self.curvature.follow(f64::INFINITY);
+        }
         let mut length = 1.0;
         while length >= self.options.shortest_step {
             let Self { options, solution, trial, work, weights, .. } = self;
@@ -59,7 +62,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             if length == 1.0 && there.is_some_and(|m| (m.objective + m.violation).is_finite()) {
                 if !written {
-                    ocp.linearise(self.curvature)?;
+                    self.linearise(ocp)?;
                     ocp.regularise(T::from_f64(row.regularisation));
                 }
                 if self.corrected(ocp, state, &line, row) {

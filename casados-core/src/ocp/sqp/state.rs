@@ -23,6 +23,8 @@ pub(super) struct State<T> {
     pub best_residual: f64,
     /// That iterate.
     pub best_iteration: Iteration,
+    /// The largest change of a variable by the last full step; infinite at first.
+    pub reach: f64,
     pub number: PhantomData<T>,
 }
 

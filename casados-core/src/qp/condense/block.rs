@@ -91,132 +91,195 @@ impl<T: Real> Condense<'_, T> {
     /// One block.
     #[inline(always)]
     fn block<E: Packed<T>>(&mut self, block: core::ops::Range<usize>, to: &Place, rows: &[Origin]) {
-        let Work { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = &mut self.work;
-        let (ld_z, origins) = (*ld_z, &mut *self.origins);
-        let target = part_mut(self.target, to.data, to.data_len());
+        let Self { qp, work, target, origins, .. } = self;
+        let target = part_mut(target, to.data, to.data_len());
         part_mut(target, 0, to.matrix()).fill(T::ZERO);
         origins.clear();
         let mut controls = 0;
-        let mut first = true;
-        let stages = Places::<T>::new(self.qp.dims).skip(block.start).take(block.len());
-        for place in stages.rev() {
-            let Place { nx, nu, n, ld, next, ld_next, stage, .. } = place;
-            let data = part(self.qp.data, place.data, place.data_len());
-            let matrix = Columns { data: part(data, 0, place.matrix()), ld };
-            let negative = part_mut(minus, 0, ld * next);
-            for (negative, &element) in negative.iter_mut().zip(matrix.data) {
-                *negative = -element;
-            }
-            let negative = Columns { data: &*negative, ld };
-            let linear = part(data, place.gradient(), ld);
-            let b = part(data, place.offset(), next);
-            g_next.iter_mut().zip(linear).for_each(|(g, &linear)| *g = linear);
-            let old = origins.len();
-            if first {
-                // x at the end of the block is A x + B u + b, and costs nothing here.
-                for i in 0..next {
-                    origins.push(Origin { kind: Kind::State, stage: stage + 1, index: i });
-                    for (j, &element) in part(matrix.data, i * ld, n).iter().enumerate() {
-                        set(z_next, j * ld_z + i, element);
-                    }
-                    set(constant, i, b.get(i).copied().unwrap_or(T::ZERO));
-                }
-                let hessian = part(data, place.matrix(), place.hessian());
-                assign(part_mut(m, 0, hessian.len()), hessian);
-            } else {
-                // g + V b, and constants + Z b
-                for (offset, &b) in offset.iter_mut().zip(b) {
-                    *offset = -b;
-                }
-                subtract::<T, E>(g, Columns { data: v, ld: ld_next }, offset, next, next);
-                subtract::<T, E>(constant, Columns { data: z, ld: ld_z }, offset, old, next);
-                subtract::<T, E>(g_next, negative, g, n, next);
-                let y = Columns { data: v, ld: ld_next };
-                product::<T, E>(w, ld, Source::Zero, matrix, y, (n, 0..next, next), Part::Full);
-                let hessian =
-                    Source::Matrix(Columns { data: part(data, place.matrix(), place.hessian()), ld });
-                let y = Columns { data: w, ld };
-                product::<T, E>(m, ld, hessian, matrix, y, (n, 0..n, next), Part::Lower);
-                let x = Columns { data: z, ld: ld_z };
-                product::<T, E>(z_next, ld_z, Source::Zero, x, negative, (old, 0..n, next), Part::Full);
-            }
-            first = false;
-            // What belongs to the controls of this stage is done.
-            for i in 0..nu {
-                let column = part(z_next, (nx + i) * ld_z, origins.len());
-                for (origin, &element) in origins.iter().zip(column) {
-                    set(target, at(to, origin, to.nx + controls + i), element);
-                }
-                for j in i..nu {
-                    let element = get(m, (nx + i) * ld + nx + j);
-                    let (row, column) = (to.nx + controls + j, to.nx + controls + i);
-                    set(target, to.matrix() + column * to.ld + row, element);
-                }
-                for (vector, value) in limits(data, &place, nx + i).into_iter().enumerate() {
-                    set(target, to.row_data(Row::Lower) + vector * to.rows + to.nx + controls + i, value);
-                }
-            }
-            // Its rows of Z: mixed derivatives with respect to its controls, and its constraints.
-            for i in 0..nu {
-                let row = origins.len();
-                origins.push(Origin { kind: Kind::Control, stage, index: controls + i });
-                for j in 0..nx {
-                    set(z_next, j * ld_z + row, get(m, j * ld + nx + i));
-                }
-                set(constant, row, get(g_next, nx + i));
-            }
-            controls += nu;
-            for (index, origin) in rows.iter().enumerate().filter(|(_, origin)| origin.stage == stage) {
-                let row = origins.len();
-                origins.push(Origin { index, ..*origin });
-                let general = origin.index.checked_sub(ld);
-                for j in 0..n {
-                    let element = match general {
-                        Some(general) => get(matrix.data, (next + general) * ld + j),
-                        None if origin.index == j => T::ONE,
-                        None => T::ZERO,
-                    };
-                    if j < nx {
-                        set(z_next, j * ld_z + row, element);
-                    } else {
-                        let column = to.nx + controls - nu + j - nx;
-                        set(target, (to.next + index) * to.ld + column, element);
-                    }
-                }
-                set(constant, row, T::ZERO);
-                for (vector, value) in limits(data, &place, origin.index).into_iter().enumerate() {
-                    set(target, to.row_data(Row::Lower) + vector * to.rows + to.ld + index, value);
-                }
-            }
-            // What is left is a function of this stage's state.
-            core::mem::swap(z, z_next);
-            let ld_x = pad::<T>(nx);
-            for j in 0..nx {
-                for i in j..nx {
-                    let element = get(m, j * ld + i);
-                    set(v, j * ld_x + i, element);
-                    set(v, i * ld_x + j, element);
-                }
-            }
-            assign(part_mut(g, 0, nx), part(g_next, 0, nx));
-            part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
-            if stage == block.start {
-                for j in 0..nx {
-                    for i in j..nx {
-                        set(target, to.matrix() + j * to.ld + i, get(m, j * ld + i));
-                    }
-                    for (row, origin) in origins.iter().enumerate() {
-                        set(target, at(to, origin, j), get(z, j * ld_z + row));
-                    }
-                    set(target, to.gradient() + j, get(g, j));
-                    for (vector, value) in limits(data, &place, j).into_iter().enumerate() {
-                        set(target, to.row_data(Row::Lower) + vector * to.rows + j, value);
-                    }
-                }
+        let stages = Places::<T>::new(qp.dims).skip(block.start).take(block.len());
+        for (count, place) in stages.rev().enumerate() {
+            let stage = Stage { place, data: part(qp.data, place.data, place.data_len()), controls };
+            work.recur::<E>(&stage, origins, count == 0);
+            work.write_controls(&stage, to, origins, target);
+            work.add_rows_of_controls(&stage, origins);
+            work.add_rows_of_constraints(&stage, rows, to, origins, target);
+            work.pass_on(place.n, place.nx);
+            controls += place.nu;
+            if place.stage == block.start {
+                work.write_first_state(&stage, to, origins, target);
             }
         }
+        work.write_constants(to, origins, target);
+    }
+}
+
+/// A stage of a block.
+struct Stage<'s, T> {
+    place: Place,
+    data: &'s [T],
+    /// How many controls of later stages there are in the block.
+    controls: usize,
+}
+
+impl<T: Real> Work<'_, T> {
+    /// `M`, `Z` and their gradients over the variables of a stage, from those over the state behind
+    /// it; or, at the end of a block, from nothing.
+    #[inline(always)]
+    fn recur<E: Packed<T>>(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>, first: bool) {
+        let Self { z, z_next, v, m, minus, w, constant, g, g_next, offset, ld_z } = self;
+        let (Stage { data, place, .. }, ld_z) = (stage, *ld_z);
+        let &Place { n, ld, next, ld_next, stage, .. } = place;
+        let matrix = Columns { data: part(data, 0, place.matrix()), ld };
+        let negative = part_mut(minus, 0, ld * next);
+        for (negative, &element) in negative.iter_mut().zip(matrix.data) {
+            *negative = -element;
+        }
+        let negative = Columns { data: &*negative, ld };
+        let linear = part(data, place.gradient(), ld);
+        let b = part(data, place.offset(), next);
+        g_next.iter_mut().zip(linear).for_each(|(g, &linear)| *g = linear);
+        let hessian = part(data, place.matrix(), place.hessian());
+        if first {
+            // x at the end of the block is A x + B u + b, and costs nothing here.
+            for i in 0..next {
+                origins.push(Origin { kind: Kind::State, stage: stage + 1, index: i });
+                for (j, &element) in part(matrix.data, i * ld, n).iter().enumerate() {
+                    set(z_next, j * ld_z + i, element);
+                }
+                set(constant, i, b.get(i).copied().unwrap_or(T::ZERO));
+            }
+            assign(part_mut(m, 0, hessian.len()), hessian);
+            return;
+        }
+        // g + V b, and constants + Z b
+        let old = origins.len();
+        for (offset, &b) in offset.iter_mut().zip(b) {
+            *offset = -b;
+        }
+        subtract::<T, E>(g, Columns { data: v, ld: ld_next }, offset, next, next);
+        subtract::<T, E>(constant, Columns { data: z, ld: ld_z }, offset, old, next);
+        subtract::<T, E>(g_next, negative, g, n, next);
+        let y = Columns { data: v, ld: ld_next };
+        product::<T, E>(w, ld, Source::Zero, matrix, y, (n, 0..next, next), Part::Full);
+        let y = Columns { data: w, ld };
+        let hessian = Source::Matrix(Columns { data: hessian, ld });
+        product::<T, E>(m, ld, hessian, matrix, y, (n, 0..n, next), Part::Lower);
+        let x = Columns { data: z, ld: ld_z };
+        product::<T, E>(z_next, ld_z, Source::Zero, x, negative, (old, 0..n, next), Part::Full);
+    }
+
+    /// Writes what belongs to the controls of a stage, which is done: columns of rows, `R` and
+    /// bounds.
+    #[inline(always)]
+    fn write_controls(&self, stage: &Stage<'_, T>, to: &Place, origins: &[Origin], target: &mut [T]) {
+        let Place { nx, nu, ld, .. } = stage.place;
+        for i in 0..nu {
+            let (here, column) =
+                (to.nx + stage.controls + i, part(self.z_next, (nx + i) * self.ld_z, origins.len()));
+            for (origin, &element) in origins.iter().zip(column) {
+                set(target, at(to, origin, here), element);
+            }
+            for j in i..nu {
+                let element = get(self.m, (nx + i) * ld + nx + j);
+                set(target, to.matrix() + here * to.ld + here - i + j, element);
+            }
+            for (vector, value) in limits(stage.data, &stage.place, nx + i).into_iter().enumerate() {
+                set(target, to.row_data(Row::Lower) + vector * to.rows + here, value);
+            }
+        }
+    }
+
+    /// Rows of `Z`: mixed derivatives with respect to the controls of a stage.
+    #[inline(always)]
+    fn add_rows_of_controls(&mut self, stage: &Stage<'_, T>, origins: &mut Vec<Origin>) {
+        let Place { nx, nu, ld, stage: number, .. } = stage.place;
+        for i in 0..nu {
+            let row = origins.len();
+            origins.push(Origin { kind: Kind::Control, stage: number, index: stage.controls + i });
+            for j in 0..nx {
+                set(self.z_next, j * self.ld_z + row, get(self.m, j * ld + nx + i));
+            }
+            set(self.constant, row, get(self.g_next, nx + i));
+        }
+    }
+
+    /// Rows of `Z`: those of the `rows` of a block that are constraints of a stage, with their
+    /// bounds.
+    #[inline(always)]
+    fn add_rows_of_constraints(
+        &mut self,
+        stage: &Stage<'_, T>,
+        rows: &[Origin],
+        to: &Place,
+        origins: &mut Vec<Origin>,
+        target: &mut [T],
+    ) {
+        let Place { nx, n, ld, next, stage: number, .. } = stage.place;
+        for (index, origin) in rows.iter().enumerate().filter(|(_, origin)| origin.stage == number) {
+            let row = origins.len();
+            origins.push(Origin { index, ..*origin });
+            let general = origin.index.checked_sub(ld);
+            for j in 0..n {
+                let element = match general {
+                    // After `[A B]ᵀ`.
+                    Some(general) => get(stage.data, (next + general) * ld + j),
+                    None if origin.index == j => T::ONE,
+                    None => T::ZERO,
+                };
+                if j < nx {
+                    set(self.z_next, j * self.ld_z + row, element);
+                } else {
+                    let column = to.nx + stage.controls + j - nx;
+                    set(target, (to.next + index) * to.ld + column, element);
+                }
+            }
+            set(self.constant, row, T::ZERO);
+            for (vector, value) in limits(stage.data, &stage.place, origin.index).into_iter().enumerate() {
+                set(target, to.row_data(Row::Lower) + vector * to.rows + to.ld + index, value);
+            }
+        }
+    }
+
+    /// What is left is a function of the state of the stage.
+    #[inline(always)]
+    fn pass_on(&mut self, n: usize, nx: usize) {
+        let Self { z, z_next, v, m, g, g_next, .. } = self;
+        core::mem::swap(z, z_next);
+        let (ld, ld_x) = (pad::<T>(n), pad::<T>(nx));
+        for j in 0..nx {
+            for i in j..nx {
+                let element = get(m, j * ld + i);
+                set(v, j * ld_x + i, element);
+                set(v, i * ld_x + j, element);
+            }
+        }
+        assign(part_mut(g, 0, nx), part(g_next, 0, nx));
+        part_mut(g, nx, g.len() - nx.min(g.len())).fill(T::ZERO);
+    }
+
+    /// Writes what belongs to the first state of a block.
+    #[inline(always)]
+    fn write_first_state(&self, stage: &Stage<'_, T>, to: &Place, origins: &[Origin], target: &mut [T]) {
+        let Place { nx, ld, .. } = stage.place;
+        for j in 0..nx {
+            for i in j..nx {
+                set(target, to.matrix() + j * to.ld + i, get(self.m, j * ld + i));
+            }
+            for (row, origin) in origins.iter().enumerate() {
+                set(target, at(to, origin, j), get(self.z, j * self.ld_z + row));
+            }
+            set(target, to.gradient() + j, get(self.g, j));
+            for (vector, value) in limits(stage.data, &stage.place, j).into_iter().enumerate() {
+                set(target, to.row_data(Row::Lower) + vector * to.rows + j, value);
+            }
+        }
+    }
+
+    /// Writes what is constant in the rows of a block.
+    #[inline(always)]
+    fn write_constants(&self, to: &Place, origins: &[Origin], target: &mut [T]) {
         for (row, origin) in origins.iter().enumerate() {
-            let constant = get(constant, row);
+            let constant = get(self.constant, row);
             match origin.kind {
                 Kind::State => set(target, to.offset() + origin.index, constant),
                 Kind::Control => set(target, to.gradient() + to.nx + origin.index, constant),

@@ -1,38 +1,36 @@
 //! Where a run begins.
 
-use super::Sqp;
-use crate::ocp::error::OcpError;
-use crate::ocp::instance::Ocp;
-use crate::ocp::linearise::Curvature;
-use crate::ocp::problem::Formulation;
-use crate::qp::{Bounds, QpSolver, StageDims};
+use super::curvature::Curvature;
+use super::error::OcpError;
+use super::instance::Ocp;
+use super::problem::Formulation;
+use crate::qp::{Bounds, Solution, StageDims};
 use crate::scalar::Real;
 
-impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Sqp<S, C, T, D, M> {
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Linearises at the guess; where something has no value there, at the point nearest to it that
-    /// satisfies the bounds of states and controls.
+    /// satisfies the bounds of states and controls. The guess is remembered in `copy` for a while.
     ///
     /// # Errors
     /// That at the guess, if there is none at that point either.
-    pub(super) fn begin<P: Formulation<T>>(&mut self, ocp: &mut Ocp<P, T, D, M>) -> Result<(), OcpError>
-    where
-        C: Curvature<P::Dynamics, T>,
-    {
-        let Err(error) = ocp.linearise(self.curvature) else { return Ok(()) };
+    pub(super) fn linearise_guess<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        copy: &mut Solution<T, D, M>,
+    ) -> Result<(), OcpError> {
+        let Err(error) = self.linearise(curvature) else { return Ok(()) };
         if !matches!(error, OcpError::Integration { .. } | OcpError::NonFiniteFunction { .. }) {
             return Err(error);
         }
-        self.trial.copy_from(&ocp.iterate);
-        ocp.clip();
-        let result = ocp.linearise(self.curvature);
+        copy.copy_from(&self.iterate);
+        self.clip();
+        let result = self.linearise(curvature);
         if result.is_err() {
-            ocp.iterate.copy_from(&self.trial);
+            self.iterate.copy_from(copy);
         }
         result.map_err(|_| error)
     }
-}
 
-impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Moves states and controls of the iterate into their bounds.
     fn clip(&mut self) {
         let Self { qp, iterate, .. } = self;

@@ -2,7 +2,7 @@
 
 use super::Ipm;
 use super::newton::attach;
-use super::run::State;
+use super::state::State;
 use crate::ocp::data::split;
 use crate::ocp::dynamics::{Dynamics, Nodes, StageAction};
 use crate::ocp::error::OcpError;

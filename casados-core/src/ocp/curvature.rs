@@ -1,0 +1,106 @@
+//! What the Hessian of the QP is.
+
+use super::convexify::Convexification;
+use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink};
+use super::error::OcpError;
+use crate::scalar::Real;
+
+/// What the Hessian of the QP is: [`Exact`], [`GaussNewton`], [`Secant`].
+pub trait Curvature<D, T: Real>: Copy {
+    /// Whether second derivatives of everything are in it.
+    const EXACT: bool;
+    /// Whether Jacobians may stay those that the QP has.
+    #[doc(hidden)]
+    const KEEPS: bool = false;
+    /// How a stage is made convex.
+    fn convexification(&self) -> Convexification;
+    /// How it learns from differences of gradients, if it does.
+    #[doc(hidden)]
+    fn update(&self) -> Option<Update> {
+        None
+    }
+    /// Linearises the dynamics.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    #[doc(hidden)]
+    fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+    /// Says how long the next step is, as a part of the one before; whether Jacobians are kept.
+    #[doc(hidden)]
+    fn follow(&mut self, _ratio: f64) -> bool {
+        false
+    }
+}
+
+/// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have
+/// none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GaussNewton {
+    /// What is done where a general cost is not convex.
+    pub convexification: Convexification,
+}
+
+/// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all
+/// intervals are simulated first: what second derivatives of these states are multiplied by depends
+/// on them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exact {
+    /// What is done where it is not convex. Default [`Convexification::Reduced`].
+    pub convexification: Convexification,
+}
+
+impl Default for Exact {
+    fn default() -> Self {
+        Self { convexification: Convexification::Reduced }
+    }
+}
+
+impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
+    const EXACT: bool = false;
+    fn convexification(&self) -> Convexification {
+        self.convexification
+    }
+    fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        dynamics.linearise(nodes, sink)
+    }
+}
+
+/// How a Hessian learns from a step `s` and the difference `y` of gradients.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Update {
+    /// `B ← B − B s sᵀB / sᵀB s + r rᵀ / sᵀr`, where `r` is a mean of `y` and `B s` with `sᵀr ≥ 0.2
+    /// sᵀB s`: positive definite whatever `y` is.
+    #[default]
+    DampedBfgs,
+    /// `B ← B + r rᵀ / sᵀr` with `r = y − B s`: as indefinite as the Hessian itself is. QPs that
+    /// are not convex are regularised, as those of [`Exact`].
+    RankOne,
+}
+
+/// The Hessian of the Lagrangian, learned from its gradients
+/// ([`Sqp::secant`](super::Sqp::secant)).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Secant(pub(super) Update);
+
+impl<D: Dynamics<T>, T: Real> Curvature<D, T> for Secant {
+    const EXACT: bool = false;
+    fn convexification(&self) -> Convexification {
+        Convexification::Reduced
+    }
+    fn update(&self) -> Option<Update> {
+        Some(self.0)
+    }
+    fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        dynamics.linearise(nodes, sink)
+    }
+}
+
+impl<D: SecondOrder<T>, T: Real> Curvature<D, T> for Exact {
+    const EXACT: bool = true;
+    fn convexification(&self) -> Convexification {
+        self.convexification
+    }
+    fn run(self, dynamics: &mut D, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
+        dynamics.second_order(nodes, sink)
+    }
+}

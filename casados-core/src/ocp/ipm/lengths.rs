@@ -1,0 +1,41 @@
+//! How much memory Newton's equations take.
+
+use crate::qp::interior::{Counts, Iterate, Penalties, Reading, count, is_first_fixed};
+use crate::qp::{InteriorPointOptions, QpView};
+use crate::scalar::Real;
+
+/// What is known about the sides of a problem before any memory is touched.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lengths {
+    pub counts: Counts,
+    pub fixed: bool,
+    pub numbers: usize,
+}
+
+impl Lengths {
+    /// Of a problem with its penalties as they are.
+    pub fn of<T: Real>(qp: QpView<'_, T>) -> Self {
+        let reading = reading(qp);
+        let counts = count(qp, &reading);
+        Self { counts, fixed: reading.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
+    }
+
+    /// Of the same problem with every bound soft, equations too.
+    pub fn all_soft<T: Real>(&self, qp: QpView<'_, T>) -> Self {
+        let counts = all_soft(&self.counts);
+        Self { counts, fixed: self.fixed, numbers: Iterate::<T>::memory_of(qp, &counts) }
+    }
+}
+
+/// Every bound soft, equations too.
+pub(super) const fn all_soft(counts: &Counts) -> Counts {
+    let Counts { lower, upper, equations, .. } = *counts;
+    let (lower, upper) = (lower + equations, upper + equations);
+    Counts { lower, upper, soft: lower + upper, equations }
+}
+
+/// How the constraints of a problem are read.
+pub(super) fn reading<T: Real>(qp: QpView<'_, T>) -> Reading<T> {
+    let no_bound = T::from_f64(InteriorPointOptions::new::<T>().no_bound);
+    Reading { fixed: is_first_fixed(qp), penalties: Penalties::Given, no_bound }
+}
