@@ -139,8 +139,8 @@ impl<S, C, T: Real, D, M> Sqp<S, C, T, D, M> {
         self.with(GaussNewton::default())
     }
 
-    /// The same with the Hessian of Gauss and Newton, and with Jacobians of dynamics that stay while
-    /// steps contract: adjoints of integrators ([`Adjoints`](super::Adjoints)) correct them.
+    /// The same with the Hessian of Gauss and Newton, and with Jacobians of dynamics that stay
+    /// while steps contract: adjoints of integrators ([`Adjoints`](super::Adjoints)) correct them.
     ///
     /// # Example
     /// ```
