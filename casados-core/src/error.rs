@@ -196,6 +196,15 @@ pub enum Error {
     NoInterpolation,
     /// A question about the last successful call, and there was none.
     NoResult,
+    /// The end of an interval could not be projected onto the invariants of the model.
+    NotProjected {
+        /// The equation of the invariant that is violated most.
+        equation: u32,
+        /// Which derivative of it the invariant is.
+        derivative: u32,
+        /// By how much.
+        residual: f64,
+    },
     /// The memory of a mode could not be allocated.
     OutOfMemory {
         /// Its size; the largest number if that is not even a number.

@@ -68,7 +68,7 @@ pub use adaptive::{
 };
 #[cfg(feature = "alloc")]
 pub use batch::{Batch, BatchError, BatchStatistics, Intervals};
-pub use constrained::{Consistent, Constrained, Inconsistent};
+pub use constrained::{Consistent, Constrained, Inconsistent, Projectable, Projected};
 pub use erk::Erk;
 pub use error::Error;
 pub use function::{Function, GraphFunction};

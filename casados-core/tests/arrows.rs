@@ -23,9 +23,12 @@ const ARROWS: &[(&str, &str)] = &[
     ("linalg", "shape tableau memory scalar model"),
     ("result", "shape model"),
     ("finite", "error scalar linalg"),
-    ("constrained", "error shape scalar function model finite"),
     ("quadrature", "error shape scalar function model linalg result finite"),
     ("integrator", "error statistics memory scalar model result quadrature"),
+    (
+        "constrained",
+        "error shape statistics memory scalar function model result finite quadrature integrator",
+    ),
     ("erk", "error shape statistics tableau memory options scalar model linalg result quadrature integrator"),
     (
         "irk",

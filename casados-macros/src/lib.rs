@@ -34,7 +34,7 @@ const STACK: usize = 1 << 29;
 ///
 /// `#[dae(index_reduction)]` differentiates constraints in time until the model has index 1, and
 /// makes its invariants a function; `#[dae(index_reduction(baumgarte = [2.0, 1.0]))]` lets what
-/// constraints are off by decay.
+/// constraints are off by decay, `#[dae(index_reduction(projection))]` is for `casados::Projected`.
 #[proc_macro_attribute]
 pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Dae, attribute.into(), item.into()).into()

@@ -6,3 +6,4 @@ mod consistent;
 mod double_pendulum;
 mod mechanisms;
 mod pendulum;
+mod projected;

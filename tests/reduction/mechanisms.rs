@@ -95,4 +95,11 @@ fn what_is_differentiated_is_told() {
     told::<LoopOfCapacitors>(&[(2, 1)]);
     assert_eq!(Damped::STRUCTURE.reduction.map(|reduction| reduction.rates), Some(&[3.0, 2.0][..]));
     assert!(ByHand::STRUCTURE.reduction.is_none());
+    let text = Damped::describe().to_string();
+    assert!(
+        text.contains("equation 4 differentiated twice") && text.contains("with the rates 3 2"),
+        "{text}"
+    );
+    let text = Pendulum::describe().to_string();
+    assert!(text.contains("no: errors of a constraint grow with time"), "{text}");
 }

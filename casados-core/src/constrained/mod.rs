@@ -2,11 +2,14 @@
 
 mod consistent;
 mod error;
+mod kkt;
+mod projected;
 
 use crate::function::Function;
 use crate::model::Dae;
 pub use consistent::Consistent;
 pub use error::Inconsistent;
+pub use projected::Projected;
 
 /// A model that was written with constraints `g(x, p, t) = 0`, of which `#[dae(index_reduction)]`
 /// made equations of index 1; what it did is in
@@ -21,4 +24,16 @@ pub use error::Inconsistent;
 pub trait Constrained: Dae {
     /// Constraints and their lower derivatives `y(x, p, t)`, zero on every solution.
     type Invariants: Function<Shape = Self::Shape>;
+}
+
+/// A model of `#[dae(index_reduction(projection))]`: the macro wrote the equations of the
+/// projection onto its invariants, for [`Projected`].
+#[diagnostic::on_unimplemented(
+    message = "the equations of the projection of `{Self}` are not known",
+    note = "`#[dae(index_reduction(projection))]` writes them"
+)]
+pub trait Projectable: Constrained {
+    /// `(x − x̂ + Gᵀν, y)` of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`: a function with `ν` in the
+    /// place of `z` and `x̂` in that of `u`.
+    type Projection: Function;
 }

@@ -169,6 +169,12 @@ impl fmt::Display for Error {
                 "the tableau is not that of a collocation method: there is no polynomial through its stages",
             ),
             Error::NoResult => f.write_str("there is no result yet: no call has succeeded"),
+            Error::NotProjected { equation, derivative, residual } => write!(
+                f,
+                "the end of the interval cannot be projected: derivative {derivative} of the constraint of equation \
+                 {equation} is violated by {residual:e}, and there are no states near that satisfy all constraints, or \
+                 these depend on each other there; take shorter steps"
+            ),
             Error::OutOfMemory { bytes } => write!(f, "{bytes} bytes of memory could not be allocated"),
         }
     }

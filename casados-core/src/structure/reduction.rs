@@ -16,6 +16,8 @@ pub struct Reduction {
     /// The rates `r_m` of Baumgarte's stabilisation, in 1 over the unit of time: the equations are
     /// `Π_m (d/dt + r_m) g = 0`. None without stabilisation.
     pub rates: &'static [f64],
+    /// Whether the equations of the projection onto the invariants are known.
+    pub projection: bool,
     /// At how many sample points the matrix `∂f/∂(ẋ, z)` is singular, and how many there are.
     pub singular: [u32; 2],
 }
@@ -56,6 +58,7 @@ impl Display for Reduction {
         writeln!(f, "{}: what was differentiated, and its lower derivatives", self.invariants())?;
         title(f, "  stabilised")?;
         match self.rates {
+            [] if self.projection => writeln!(f, "by the projection of `Projected`")?,
             [] => writeln!(f, "no: errors of a constraint grow with time")?,
             rates => {
                 write!(f, "errors decay with the rates")?;

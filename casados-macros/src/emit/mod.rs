@@ -31,15 +31,15 @@ pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Resu
     let mut implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
     let documentation = documentation::of_type(&original, models);
     let Model { name, visibility, instance, krate, .. } = &first.model;
-    let invariants = models.iter().filter_map(model::invariants);
     let mut types = vec![Type { name, visibility, documentation, instance }];
-    let invariants: Vec<&FunctionAnalysis> = invariants.collect();
-    if let Some(first) = invariants.first() {
-        implementations.extend(model::constrained(models));
-        for function in &invariants {
+    implementations.extend(models.iter().filter_map(model::constrained));
+    for of in [model::invariants, model::projection] {
+        let functions: Vec<&FunctionAnalysis> = models.iter().filter_map(of).collect();
+        let Some(first) = functions.first() else { continue };
+        for function in &functions {
             implementations.extend(function::write(function)?);
         }
-        let documentation = documentation::of_function(invariants.iter().copied());
+        let documentation = documentation::of_function(functions.iter().copied());
         types.push(Type { name: &first.model.name, visibility, documentation, instance });
     }
     let item = with_elementary_functions(item, krate);

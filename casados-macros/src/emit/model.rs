@@ -126,17 +126,29 @@ pub fn invariants(analysis: &Analysis) -> Option<&FunctionAnalysis> {
     analysis.reduction.as_ref().map(|reduction| &reduction.invariants)
 }
 
-/// What connects models with the functions of their invariants.
-pub fn constrained(models: &[Analysis]) -> TokenStream {
-    let constrained = |analysis: &Analysis| {
-        let (model, function) = (ty(&analysis.model), ty(&invariants(analysis)?.model));
-        let krate = &analysis.model.krate;
-        Some(quote! {
+/// The equations of the projection onto them.
+pub fn projection(analysis: &Analysis) -> Option<&FunctionAnalysis> {
+    analysis.reduction.as_ref().and_then(|reduction| reduction.projection.as_ref())
+}
+
+/// What connects a model with the functions of its invariants.
+pub fn constrained(analysis: &Analysis) -> Option<TokenStream> {
+    let (model, invariants) = (ty(&analysis.model), ty(&invariants(analysis)?.model));
+    let krate = &analysis.model.krate;
+    let projectable = projection(analysis).map(|projection| {
+        let projection = ty(&projection.model);
+        quote! {
             #[automatically_derived]
-            impl #krate::Constrained for #model {
-                type Invariants = #function;
+            impl #krate::Projectable for #model {
+                type Projection = #projection;
             }
-        })
-    };
-    models.iter().filter_map(constrained).collect()
+        }
+    });
+    Some(quote! {
+        #[automatically_derived]
+        impl #krate::Constrained for #model {
+            type Invariants = #invariants;
+        }
+        #projectable
+    })
 }

@@ -67,7 +67,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
 
 /// What was differentiated.
 fn reduction(krate: &syn::Path, reduction: Option<&Reduction>) -> TokenStream {
-    let Some(Reduction { differentiated, rates, singular, .. }) = reduction else {
+    let Some(Reduction { differentiated, rates, singular, projection, .. }) = reduction else {
         return quote!(::core::option::Option::None);
     };
     let differentiated = differentiated.iter().map(|&(equation, times)| {
@@ -75,10 +75,12 @@ fn reduction(krate: &syn::Path, reduction: Option<&Reduction>) -> TokenStream {
         quote!((#equation, #times))
     });
     let singular = singular.map(Literal::u32_unsuffixed);
+    let projection = projection.is_some();
     quote! {
         ::core::option::Option::Some(&#krate::model::Reduction {
             differentiated: &[#(#differentiated),*],
             rates: &[#(#rates),*],
+            projection: #projection,
             singular: [#(#singular),*],
         })
     }

@@ -2,6 +2,7 @@
 //! time, and how what they say is held.
 //!
 //! - `index_reduction`: the constraints' highest derivatives take their place;
+//! - `index_reduction(projection)`: the equations of the projection onto them are written, too;
 //! - `index_reduction(baumgarte = 2.0)`, `index_reduction(baumgarte = [2.0, 1.0])`: what the
 //!   constraints are off by decays with these rates.
 
@@ -13,7 +14,7 @@ use syn::{Error, Expr, Result, Token};
 
 /// What the brackets of `index_reduction` can say.
 const POSSIBLE: &str = "`index_reduction` takes `baumgarte = [2.0, 1.0]`, the rates at which what a constraint \
-    and its derivatives are off by decays, or `baumgarte = 2.0` for one rate";
+    and its derivatives are off by decays, or `baumgarte = 2.0` for one rate; or `projection`";
 
 /// How the index of a model is reduced.
 #[derive(Clone, Debug)]
@@ -22,6 +23,8 @@ pub struct Reduction {
     pub span: Span,
     /// Rates of decay of errors of the constraints; none without stabilisation.
     pub rates: Rates,
+    /// Whether states are to be projected.
+    pub projection: bool,
 }
 
 /// Rates of decay of Baumgarte's stabilisation.
@@ -39,11 +42,14 @@ impl Reduction {
     /// Reads what follows the word.
     pub fn read(span: Span, input: ParseStream) -> Result<Self> {
         if !input.peek(syn::token::Paren) {
-            return Ok(Self { span, rates: Rates::None });
+            return Ok(Self { span, rates: Rates::None, projection: false });
         }
         let content;
         syn::parenthesized!(content in input);
         let word: Ident = content.parse().map_err(|error| Error::new(error.span(), POSSIBLE))?;
+        if word == "projection" && content.is_empty() {
+            return Ok(Self { span, rates: Rates::None, projection: true });
+        }
         if word != "baumgarte" {
             return Err(Error::new(word.span(), POSSIBLE));
         }
@@ -57,7 +63,7 @@ impl Reduction {
         if !content.is_empty() {
             return Err(Error::new(content.span(), POSSIBLE));
         }
-        Ok(Self { span, rates })
+        Ok(Self { span, rates, projection: false })
     }
 }
 

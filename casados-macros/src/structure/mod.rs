@@ -82,6 +82,8 @@ pub struct Reduction {
     pub singular: [u32; 2],
     /// The function of the invariants.
     pub invariants: FunctionAnalysis,
+    /// The equations of the projection onto them.
+    pub projection: Option<FunctionAnalysis>,
 }
 
 /// The order in which the Newton matrix is eliminated.
@@ -110,10 +112,11 @@ pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     check_length(&model)?;
     let reduced = reduction::reduce(&mut model)?;
     let mut analysis = analyse_index_one(model)?;
-    if let Some(reduction::Reduced { differentiated, rates, invariants }) = reduced {
+    if let Some(reduction::Reduced { differentiated, rates, invariants, projection }) = reduced {
         let singular = reduction::rank::check(&analysis)?;
         let invariants = analyse_function(invariants);
-        analysis.reduction = Some(Reduction { differentiated, rates, singular, invariants });
+        let projection = projection.map(analyse_function);
+        analysis.reduction = Some(Reduction { differentiated, rates, singular, invariants, projection });
     }
     Ok(analysis)
 }

@@ -11,6 +11,7 @@
 //! dynamical systems, 1972).
 
 mod constraints;
+mod projection;
 pub mod rank;
 mod rules;
 mod signature;
@@ -30,6 +31,8 @@ pub struct Reduced {
     /// Constraints and their lower derivatives, equation by equation, as a function of the model's
     /// variables.
     pub invariants: Model,
+    /// The equations of the projection onto them, if they are wanted.
+    pub projection: Option<Model>,
 }
 
 /// Reduces the index if that is asked for and there is something to differentiate.
@@ -68,7 +71,9 @@ pub fn reduce(model: &mut Model) -> syn::Result<Option<Reduced>> {
         .iter()
         .map(|constraint| (constraint.equation as u32, constraint.times() as u32))
         .collect();
-    Ok(Some(Reduced { differentiated, rates, invariants: invariants(model, &constraints) }))
+    let invariants = invariants(model, &constraints);
+    let projection = reduction.projection.then(|| projection::of(&invariants));
+    Ok(Some(Reduced { differentiated, rates, invariants, projection }))
 }
 
 /// `once`, `twice`, `3 times`

@@ -1,0 +1,244 @@
+//! The projection of a state onto the invariants, and its derivatives.
+//!
+//! The state nearest to `x̂` on which the invariants `y` vanish, with multipliers `ν`:
+//!
+//! ```text
+//! F(x, ν; x̂, p, t) = (x − x̂ + Gᵀν, y) = 0        G = ∂y/∂x        K = ∂F/∂(x, ν)
+//! ```
+//!
+//! Directions: `K d(x, ν) = dx̂ − F_p dp`. Adjoint: `Kᵀμ = (λ, 0)`, then `λ_x̂` are the first elements
+//! of `μ` and `λ_p = −F_pᵀμ`. Second order: `−Dᵀ ∇²(μᵀF) D` with `D = d(x, ν, x̂, p)/dw`. The macro
+//! writes `F` and its derivatives.
+
+use super::Projectable;
+use crate::error::Error;
+use crate::finite::not_finite;
+use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
+use crate::model::{VectorP, VectorX};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Outputs, Shape};
+use bytemuck::Zeroable;
+
+/// Iterations of Newton's method after which the projection is given up.
+const ITERATIONS: usize = 30;
+
+/// `F`
+pub(super) type Equations<M> = <M as Projectable>::Projection;
+/// How many equations `F` has.
+pub(super) const fn rows<M: Projectable>() -> usize {
+    <Equations<M> as Function>::Outputs::NY
+}
+/// Where `x̂` begins among the variables `(ẋ, x, ν, x̂, p, t)` of `F`.
+const fn given<M: Projectable>() -> usize {
+    M::Shape::NX + rows::<M>()
+}
+/// Where `p` begins.
+const fn parameters<M: Projectable>() -> usize {
+    given::<M>() + M::Shape::NX
+}
+
+/// The projection at a state.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+pub(super) struct Kkt<M: Projectable, T: Real> {
+    v: ArrayV<Equations<M>, T>,
+    f: ArrayY<Equations<M>, T>,
+    jacobian: <Equations<M> as Function>::Jacobian<T>,
+    /// `K`, and then its factors: `L` with a diagonal of ones, and `U`.
+    factors: MatrixYY<Equations<M>, T>,
+    /// The row that was exchanged with each.
+    exchanged: ArrayY<Equations<M>, usize>,
+}
+
+impl<M: Projectable, T: Real> Kkt<M, T> {
+    /// Projects `x`, which becomes the nearest state with vanishing invariants, and factorises `K`
+    /// there.
+    ///
+    /// # Errors
+    /// [`Error::NotProjected`]
+    pub fn project(&mut self, x: &mut VectorX<M, T>, p: &VectorP<M, T>, t: T) -> Result<(), Error> {
+        let nx = M::Shape::NX;
+        let v = self.v.as_mut();
+        v.fill(T::ZERO);
+        v[nx..2 * nx].copy_from_slice(x.as_slice());
+        v[given::<M>()..][..nx].copy_from_slice(x.as_slice());
+        v[parameters::<M>()..][..M::Shape::NP].copy_from_slice(p.as_slice());
+        v[parameters::<M>() + M::Shape::NP] = t;
+        <Equations<M> as Function>::jacobian_constants::<T>(&mut self.jacobian);
+        let mut last = f64::INFINITY;
+        for _ in 0..ITERATIONS {
+            self.linearise()?;
+            let mut step = self.f;
+            self.solve(&mut step);
+            let (mut moved, mut size) = (0.0f64, 0.0f64);
+            for (index, step) in step.as_ref().iter().enumerate() {
+                let value = self.v[nx + index] - *step;
+                self.v[nx + index] = value;
+                if index < nx {
+                    (moved, size) = (moved.max(step.to_f64().abs()), size.max(value.to_f64().abs()));
+                }
+            }
+            let relative = if size > 0.0 { moved / size } else { moved };
+            // Once it is at rounding, it does not shrink any more.
+            if relative <= 4.0 * T::EPSILON || (relative < 1e3 * T::EPSILON && relative > 0.25 * last) {
+                self.linearise()?;
+                x.as_mut_slice().copy_from_slice(&self.v.as_ref()[nx..2 * nx]);
+                return Ok(());
+            }
+            last = relative;
+        }
+        Err(self.refusal())
+    }
+
+    /// `F`, and `K` with its factors.
+    fn linearise(&mut self) -> Result<(), Error> {
+        let (nx, count) = (M::Shape::NX, rows::<M>());
+        <Equations<M> as Function>::value_jacobian::<T>(&self.v, &mut self.f, &mut self.jacobian);
+        self.factors.as_mut_slice().fill(T::ZERO);
+        let pattern = &<Equations<M> as Function>::STRUCTURE.jacobian;
+        for ((row, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
+            let column = variable.wrapping_sub(nx);
+            if column < count {
+                self.factors[(row, column)] = value;
+            }
+        }
+        if not_finite(self.f.as_ref()).is_some() || !self.factorise() { Err(self.refusal()) } else { Ok(()) }
+    }
+
+    /// What is violated most.
+    fn refusal(&self) -> Error {
+        let (mut worst, mut residual) = (0, 0.0f64);
+        for (output, value) in self.f.as_ref()[M::Shape::NX..].iter().enumerate() {
+            let value = value.to_f64();
+            if value.is_nan() || value.abs() > residual.abs() {
+                (worst, residual) = (output, value);
+            }
+        }
+        let reduction = M::STRUCTURE.reduction;
+        let (equation, derivative) =
+            reduction.and_then(|reduction| reduction.invariant(worst)).unwrap_or((0, 0));
+        Error::NotProjected { equation, derivative, residual }
+    }
+
+    /// Gaussian elimination with partial pivoting; whether the matrix is regular.
+    fn factorise(&mut self) -> bool {
+        let count = rows::<M>();
+        for step in 0..count {
+            let mut pivot = step;
+            for row in step + 1..count {
+                if self.factors[(row, step)].abs() > self.factors[(pivot, step)].abs() {
+                    pivot = row;
+                }
+            }
+            self.exchanged[step] = pivot;
+            for column in 0..count {
+                let (a, b) = (self.factors[(step, column)], self.factors[(pivot, column)]);
+                (self.factors[(step, column)], self.factors[(pivot, column)]) = (b, a);
+            }
+            let diagonal = self.factors[(step, step)];
+            if diagonal == T::ZERO || !diagonal.is_finite() {
+                return false;
+            }
+            for row in step + 1..count {
+                let factor = self.factors[(row, step)] / diagonal;
+                self.factors[(row, step)] = factor;
+                if factor != T::ZERO {
+                    for column in step + 1..count {
+                        let product = factor * self.factors[(step, column)];
+                        self.factors[(row, column)] = self.factors[(row, column)] - product;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// `b = K⁻¹ b`
+    pub fn solve(&self, b: &mut ArrayY<Equations<M>, T>) {
+        let count = rows::<M>();
+        for step in 0..count {
+            b.as_mut().swap(step, self.exchanged[step]);
+        }
+        for row in 0..count {
+            for column in 0..row {
+                b[row] = b[row] - self.factors[(row, column)] * b[column];
+            }
+        }
+        for row in (0..count).rev() {
+            for column in row + 1..count {
+                b[row] = b[row] - self.factors[(row, column)] * b[column];
+            }
+            b[row] = b[row] / self.factors[(row, row)];
+        }
+    }
+
+    /// `b = K⁻ᵀ b`
+    fn solve_transposed(&self, b: &mut ArrayY<Equations<M>, T>) {
+        let count = rows::<M>();
+        for row in 0..count {
+            for column in 0..row {
+                b[row] = b[row] - self.factors[(column, row)] * b[column];
+            }
+            b[row] = b[row] / self.factors[(row, row)];
+        }
+        for row in (0..count).rev() {
+            for column in row + 1..count {
+                b[row] = b[row] - self.factors[(column, row)] * b[column];
+            }
+        }
+        for step in (0..count).rev() {
+            b.as_mut().swap(step, self.exchanged[step]);
+        }
+    }
+
+    /// `d(x, ν)` where the given state changes by `change` and the parameters by `dp`.
+    pub fn direction(&self, change: impl Fn(usize) -> T, dp: impl Fn(usize) -> T) -> ArrayY<Equations<M>, T> {
+        let mut b =
+            ArrayY::<Equations<M>, T>::from_fn(|row| if row < M::Shape::NX { change(row) } else { T::ZERO });
+        self.by_parameters(|row, parameter, value| b[row] = b[row] - value * dp(parameter));
+        self.solve(&mut b);
+        b
+    }
+
+    /// `μ` with `Kᵀμ = (λ, 0)`.
+    pub fn multipliers(&self, lambda: &VectorX<M, T>) -> ArrayY<Equations<M>, T> {
+        let lambda = lambda.as_slice();
+        let mut mu = ArrayY::<Equations<M>, T>::from_fn(|row| lambda.get(row).copied().unwrap_or(T::ZERO));
+        self.solve_transposed(&mut mu);
+        mu
+    }
+
+    /// Visits the entries of `F_p`: row, parameter, value.
+    pub fn by_parameters(&self, mut visit: impl FnMut(usize, usize, T)) {
+        let pattern = &<Equations<M> as Function>::STRUCTURE.jacobian;
+        for ((row, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
+            if let Some(parameter) = variable.checked_sub(parameters::<M>()) {
+                visit(row, parameter, value);
+            }
+        }
+    }
+
+    /// The entries of the lower triangle of `∇²(μᵀF)` in the order of its pattern.
+    pub fn hessian(
+        &self,
+        mu: &ArrayY<Equations<M>, T>,
+        hessian: &mut <Equations<M> as Function>::Hessian<T>,
+    ) {
+        <Equations<M> as Function>::hessian::<T>(&self.v, mu, hessian);
+    }
+}
+
+/// A variable of `F` that a second derivative is taken by: an element of `(x, ν)`, or a parameter.
+/// `F` is linear in `x̂`.
+pub(super) enum Variable {
+    Unknown(usize),
+    Parameter(usize),
+}
+
+/// Which variable an index of the pattern of `∇²(μᵀF)` is.
+pub(super) fn variable<M: Projectable>(index: usize) -> Variable {
+    match index.checked_sub(parameters::<M>()) {
+        Some(parameter) => Variable::Parameter(parameter),
+        None => Variable::Unknown(index.saturating_sub(M::Shape::NX)),
+    }
+}

@@ -1,0 +1,317 @@
+//! An integrator whose results satisfy the invariants.
+
+use super::Projectable;
+use super::kkt::{Equations, Kkt, Variable, variable};
+use crate::error::Error;
+use crate::function::{ArrayY, Function};
+use crate::integrator::Integrator;
+use crate::memory::{Family, Memory, WithAdjoint, WithForward, WithHessian};
+use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
+use crate::quadrature::Along;
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::{Array, Matrix, Outputs, Plain, Shape};
+use crate::statistics::Statistics;
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// An integrator with the projection onto the invariants of its model at the end of every call:
+///
+/// ```text
+/// x₊ = argmin ½ |x − x̂(x₀, u, p)|²    with  y(x, p, t + h) = 0
+/// ```
+///
+/// where `x̂` is what the integrator returns. Derivatives of first and second order are those of
+/// both maps together, and exact. For a projection after every step the integrator takes one step
+/// a call. `adjoint` and `hessian` integrate once more, since the projection has to be known first.
+/// Algebraic states are those of the integrator, and integrals too.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::{Integrator, Projected};
+/// use nalgebra::vector;
+///
+/// /// A pendulum on a circle of radius one.
+/// #[dae(index_reduction(projection))]
+/// fn pendulum(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+///     let circle = x[0] * x[0] + x[1] * x[1] - 1.0;
+///     [xdot[0] - x[2], xdot[1] - x[3], xdot[2] + z * x[0], xdot[3] + z * x[1] + 9.81, circle]
+/// }
+///
+/// let mut irk = Projected::new(Irk::<Pendulum, RadauIIA<2>>::new(Options::default())?);
+/// let mut x = vector![1.0, 0.0, 0.0, 0.0];
+/// for _ in 0..1000 {
+///     x = irk.solve(&x, &vector![], 0.02)?.x;
+/// }
+/// assert!((x[0].hypot(x[1]) - 1.0).abs() < 1e-15);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub struct Projected<I: Integrator<Model: Projectable>> {
+    integrator: I,
+    parameters: VectorP<I::Model, I::Number>,
+    time: I::Number,
+    nominal: Place<I, NominalMemory<I::Model, I::Number>>,
+    forward: <I::Memory as Memory>::Forward<Forward<I::Model, I::Number>>,
+    adjoint: <I::Memory as Memory>::Adjoint<Adjoints<I::Model, I::Number>>,
+    hessian: <I::Memory as Memory>::Hessian<HessianMemory<I::Model, I::Number>>,
+}
+
+type Place<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
+
+/// What every call needs.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct NominalMemory<M: Projectable, T: Real> {
+    result: Nominal<M, T>,
+    kkt: Kkt<M, T>,
+}
+
+/// Results of `adjoint`.
+struct Adjoints<M, T>(PhantomData<fn() -> (M, T)>);
+
+impl<M: Dae, T: Plain> Family for Adjoints<M, T> {
+    type Of<const C: usize> = Adjoint<M, T, C>;
+}
+
+/// Results of `hessian`, and what they are made of.
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct HessianMemory<M: Projectable, T: Real> {
+    result: Hessian<M, T>,
+    /// `d(x, ν)/dw`: columns by `x₀`, `u` and `p`.
+    by_x: <<Equations<M> as Function>::Outputs as Outputs>::MatrixYX<M::Shape, T>,
+    by_u: <<Equations<M> as Function>::Outputs as Outputs>::MatrixYU<M::Shape, T>,
+    by_p: <<Equations<M> as Function>::Outputs as Outputs>::MatrixYP<M::Shape, T>,
+    second: <Equations<M> as Function>::Hessian<T>,
+}
+
+/// `A + B` element by element.
+fn add<T: Real>(to: &mut [T], from: &[T]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to = *to + *from);
+}
+
+impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Projected<I> {
+    /// The integrator with a projection. Parameters and the time of the integrator are those that
+    /// are set here, or zero.
+    pub fn new(integrator: I) -> Self {
+        Self {
+            integrator,
+            parameters: VectorP::<M, T>::zeroed(),
+            time: T::ZERO,
+            nominal: Default::default(),
+            forward: Default::default(),
+            adjoint: Default::default(),
+            hessian: Default::default(),
+        }
+    }
+
+    /// The integrator itself.
+    pub fn integrator(&mut self) -> &mut I {
+        &mut self.integrator
+    }
+
+    /// Projects `x̂`, the end of a call.
+    fn project(&mut self, end: &Nominal<M, T>, h: T) -> Result<&mut NominalMemory<M, T>, Error> {
+        let memory = I::Memory::nominal(&mut self.nominal)?;
+        memory.result = *end;
+        memory.kkt.project(&mut memory.result.x, &self.parameters, self.time + h)?;
+        Ok(memory)
+    }
+}
+
+/// `V ← dx₊/dw` of one block of columns; `of(row, column)` receives the rows of `d(x, ν)/dw`.
+fn directions<M: Projectable, T: Real, V: Matrix<T>>(
+    kkt: &Kkt<M, T>,
+    block: &mut V,
+    parameters: bool,
+    mut keep: impl FnMut(usize, usize, T),
+) {
+    for column in 0..V::COLUMNS {
+        let one = |parameter| if parameters && parameter == column { T::ONE } else { T::ZERO };
+        let change = kkt.direction(|row| block[(row, column)], one);
+        for (row, value) in change.as_ref().iter().enumerate() {
+            if row < V::ROWS {
+                block[(row, column)] = *value;
+            }
+            keep(row, column, *value);
+        }
+    }
+}
+
+impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator for Projected<I> {
+    type Model = M;
+    type Number = T;
+    type Memory = I::Memory;
+
+    fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        self.integrator.set_parameters(p)?;
+        self.parameters = *p;
+        Ok(())
+    }
+
+    fn set_time(&mut self, t: T) -> Result<(), Error> {
+        self.integrator.set_time(t)?;
+        self.time = t;
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.integrator.reset();
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.integrator.statistics()
+    }
+
+    fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        let end = *self.integrator.solve_along(x0, u, h, along)?;
+        Ok(&self.project(&end, h)?.result)
+    }
+
+    fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        I::Memory: WithForward,
+    {
+        let forward = self.integrator.forward_along(x0, u, h, along)?;
+        let result = I::Memory::forward(&mut self.forward)?;
+        result.clone_from(forward);
+        let memory = I::Memory::nominal(&mut self.nominal)?;
+        memory.kkt.project(&mut result.nominal.x, &self.parameters, self.time + h)?;
+        directions(&memory.kkt, &mut result.dx_dx0, false, |_, _, _| {});
+        directions(&memory.kkt, &mut result.dx_du, false, |_, _, _| {});
+        directions(&memory.kkt, &mut result.dx_dp, true, |_, _, _| {});
+        Ok(result)
+    }
+
+    fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error>
+    where
+        I::Memory: WithAdjoint<1>,
+    {
+        crate::finite::check_input(crate::error::Argument::Lambda, lambda.as_slice())?;
+        let end = *self.integrator.solve(x0, u, h)?;
+        let memory = self.project(&end, h)?;
+        let mu = memory.kkt.multipliers(lambda);
+        let mut of_integrator = VectorX::<M, T>::zeroed();
+        of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
+        let x = memory.result.x;
+        let adjoint = self.integrator.adjoint_along(x0, u, h, &of_integrator, along)?;
+        let result = I::Memory::adjoint(&mut self.adjoint)?;
+        result.clone_from(adjoint);
+        result.nominal.x = x;
+        let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
+        let gradient = result.grad_p.as_mut_slice();
+        kkt.by_parameters(|row, parameter, value| {
+            if let Some(gradient) = gradient.get_mut(parameter) {
+                *gradient = *gradient - value * mu[row];
+            }
+        });
+        Ok(result)
+    }
+
+    fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        I::Memory: WithHessian,
+    {
+        crate::finite::check_input(crate::error::Argument::Lambda, lambda.as_slice())?;
+        let end = *self.integrator.solve(x0, u, h)?;
+        let memory = self.project(&end, h)?;
+        let mu = memory.kkt.multipliers(lambda);
+        let mut of_integrator = VectorX::<M, T>::zeroed();
+        of_integrator.as_mut_slice().copy_from_slice(&mu.as_ref()[..M::Shape::NX]);
+        let x = memory.result.x;
+        let hessian = self.integrator.hessian_along(x0, u, h, &of_integrator, along)?;
+        let memory = I::Memory::hessian(&mut self.hessian)?;
+        memory.result.clone_from(hessian);
+        let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
+        memory.finish(kkt, &mu, x);
+        Ok(&memory.result)
+    }
+}
+
+impl<M: Projectable, T: Real> HessianMemory<M, T> {
+    /// What the projection does to derivatives.
+    fn finish(&mut self, kkt: &Kkt<M, T>, mu: &ArrayY<Equations<M>, T>, x: VectorX<M, T>) {
+        let Self { result, by_x, by_u, by_p, second } = self;
+        let first = &mut result.first;
+        first.forward.nominal.x = x;
+        directions(kkt, &mut first.forward.dx_dx0, false, |row, column, value| by_x[(row, column)] = value);
+        directions(kkt, &mut first.forward.dx_du, false, |row, column, value| by_u[(row, column)] = value);
+        directions(kkt, &mut first.forward.dx_dp, true, |row, column, value| by_p[(row, column)] = value);
+        let mut gradient = VectorP::<M, T>::zeroed();
+        kkt.by_parameters(|row, parameter, value| {
+            let gradient = &mut gradient.as_mut_slice()[parameter];
+            *gradient = *gradient - value * mu[row];
+        });
+        add(first.grad_p.as_mut_slice(), gradient.as_slice());
+        kkt.hessian(mu, second);
+        let row_of = |index: usize| {
+            let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+            ArrayW::<M, T>::from_fn(|w| match (variable::<M>(index), w.checked_sub(nx + nu)) {
+                (Variable::Parameter(parameter), p) => {
+                    if p == Some(parameter) {
+                        T::ONE
+                    } else {
+                        T::ZERO
+                    }
+                }
+                (Variable::Unknown(row), Some(p)) => by_p[(row, p)],
+                (Variable::Unknown(row), None) => match w.checked_sub(nx) {
+                    Some(u) => by_u[(row, u)],
+                    None => by_x[(row, w)],
+                },
+            })
+        };
+        let pattern = &<Equations<M> as Function>::STRUCTURE.hessian;
+        for ((i, j), &value) in pattern.iter().zip(second.as_ref()) {
+            let (a, b) = (row_of(i), row_of(j));
+            subtract(result, &a, &b, if i == j { value * T::from_f64(0.5) } else { value });
+        }
+    }
+}
+
+/// `H −= value (a bᵀ + b aᵀ)`
+fn subtract<M: Dae, T: Real>(result: &mut Hessian<M, T>, a: &ArrayW<M, T>, b: &ArrayW<M, T>, value: T) {
+    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    let term = |i: usize, j: usize| value * (a[i] * b[j] + b[i] * a[j]);
+    let block = |matrix: &mut dyn FnMut(usize, usize, T), rows: (usize, usize), columns: (usize, usize)| {
+        for j in 0..columns.1 {
+            for i in 0..rows.1 {
+                matrix(i, j, term(rows.0 + i, columns.0 + j));
+            }
+        }
+    };
+    let Hessian { h_xx, h_xu, h_uu, h_xp, h_up, h_pp, .. } = result;
+    let (x, u, p) = ((0, nx), (nx, nu), (nx + nu, M::Shape::NP));
+    block(&mut |i, j, term| h_xx[(i, j)] = h_xx[(i, j)] - term, x, x);
+    block(&mut |i, j, term| h_xu[(i, j)] = h_xu[(i, j)] - term, x, u);
+    block(&mut |i, j, term| h_uu[(i, j)] = h_uu[(i, j)] - term, u, u);
+    block(&mut |i, j, term| h_xp[(i, j)] = h_xp[(i, j)] - term, x, p);
+    block(&mut |i, j, term| h_up[(i, j)] = h_up[(i, j)] - term, u, p);
+    block(&mut |i, j, term| h_pp[(i, j)] = h_pp[(i, j)] - term, p, p);
+}

@@ -1,0 +1,112 @@
+//! Projection onto the invariants at the end of every step: they hold to rounding, and derivatives
+//! of first and second order are those of the projected map.
+
+use casados::prelude::*;
+use casados::testing::check_sensitivities;
+use casados::{Error, Integrator, Projected};
+use nalgebra::{Vector4, vector};
+
+/// A pendulum of length `p`.
+#[dae(index_reduction(projection))]
+fn circle(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] + z * x[0],
+        xdot[3] + z * x[1] + 9.81,
+        x[0] * x[0] + x[1] * x[1] - p * p,
+    ]
+}
+
+/// A bead on the wire `y = sin(a x) + 0.1 sin t` that a force pushes: no derivative of the
+/// constraint vanishes, and it depends on the time and a parameter.
+#[dae(index_reduction(projection))]
+fn bead(xdot: [f64; 4], x: [f64; 4], u: f64, z: f64, p: f64, t: f64) -> [f64; 5] {
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] - z * p * (p * x[0]).cos() - u,
+        xdot[3] + z + 9.81,
+        x[1] - (p * x[0]).sin() - 0.1 * t.sin(),
+    ]
+}
+
+/// What the constraint of the circle and its derivative are off by.
+fn off(x: &Vector4<f64>, length: f64) -> [f64; 2] {
+    [x[0] * x[0] + x[1] * x[1] - length * length, x[0] * x[2] + x[1] * x[3]]
+}
+
+/// A hundred thousand steps of order three, with errors of 1e-5 each that the projection takes.
+#[test]
+fn invariants_are_at_rounding_after_many_steps() {
+    let length = 0.7;
+    let mut irk = Projected::new(Irk::<Circle, RadauIIA<2>>::new(Options::default()).unwrap());
+    irk.set_parameters(&vector![length]).unwrap();
+    let mut x = vector![length, 0.0, 0.0, 0.0];
+    for step in 0..100_000 {
+        x = irk.solve(&x, &vector![], 0.02).unwrap().x;
+        // Squares of lengths and products with velocities of up to four.
+        assert!(off(&x, length).iter().all(|off| off.abs() < 16.0 * f64::EPSILON), "{step}: {x}");
+    }
+    let mut plain = Irk::<Circle, RadauIIA<2>>::new(Options::default()).unwrap();
+    plain.set_parameters(&vector![length]).unwrap();
+    let mut x = vector![length, 0.0, 0.0, 0.0];
+    for _ in 0..1000 {
+        x = plain.solve(&x, &vector![], 0.02).unwrap().x;
+    }
+    assert!(off(&x, length).iter().any(|off| off.abs() > 1e-4), "without it they drift: {x}");
+}
+
+/// The projected state is the nearest: what it was moved by is in the row space of `G`.
+#[test]
+fn the_projection_is_orthogonal() {
+    let (x0, length) = (vector![0.42, -0.56, 1.2, 0.9], 0.7);
+    let mut plain = Irk::<Circle, RadauIIA<1>>::new(Options::default()).unwrap();
+    plain.set_parameters(&vector![length]).unwrap();
+    let given = plain.solve(&x0, &vector![], 0.1).unwrap().x;
+    let mut projected = Projected::new(plain);
+    projected.set_parameters(&vector![length]).unwrap();
+    let x = projected.solve(&x0, &vector![], 0.1).unwrap().x;
+    let moved = x - given;
+    assert!(moved.norm() > 1e-3 && off(&x, length).iter().all(|off| off.abs() < 1e-15));
+    let (first, second) = (vector![x[0], x[1], 0.0, 0.0], vector![x[2], x[3], x[0], x[1]]);
+    // Tangents of the constraints: orthogonal to both rows.
+    for tangent in [vector![-x[1], x[0], 0.0, 0.0], vector![0.0, 0.0, -x[1], x[0]]] {
+        let mut tangent: Vector4<f64> = tangent;
+        let basis =
+            [first.normalize(), (second - first * (first.dot(&second) / first.norm_squared())).normalize()];
+        for row in basis {
+            tangent -= row * row.dot(&tangent);
+        }
+        assert!(moved.dot(&tangent).abs() < 1e-15 * 8.0, "{moved} {tangent}");
+    }
+}
+
+/// Differences of high order of states and gradients; steps are coarse, so that the projection
+/// moves by percents.
+#[test]
+fn derivatives_are_those_of_the_projected_map() {
+    let mut coarse = Projected::new(Irk::<Bead, RadauIIA<1>>::new(Options::default()).unwrap());
+    coarse.set_time(0.3).unwrap();
+    let x0 = vector![0.4, (1.3f64 * 0.4).sin() + 0.1 * 0.3f64.sin(), 0.8, 0.7];
+    let report = check_sensitivities(&mut coarse, &x0, &vector![0.6], &vector![1.3], 0.25).unwrap();
+    report.assert();
+    let mut gauss =
+        Projected::new(Irk::<Circle, Gauss<2>>::new(Options { steps: 2, ..Default::default() }).unwrap());
+    let x0 = vector![0.5, -0.5, 0.8, 0.7];
+    let report = check_sensitivities(&mut gauss, &x0, &vector![], &vector![0.7], 0.3).unwrap();
+    report.assert();
+}
+
+#[test]
+fn what_cannot_be_projected_is_an_error() {
+    let mut irk = Projected::new(Irk::<Circle, RadauIIA<1>>::new(Options::default()).unwrap());
+    irk.set_parameters(&vector![0.0]).unwrap();
+    // A circle of radius zero has no derivative at its centre.
+    let error = irk.solve(&vector![0.3, -0.1, 0.2, 0.4], &vector![], 0.01).unwrap_err();
+    assert!(matches!(error, Error::NotProjected { equation: 4, .. }), "{error}");
+    assert!(error.to_string().contains("the constraint of equation 4"), "{error}");
+    // It is usable after that.
+    irk.set_parameters(&vector![0.7]).unwrap();
+    assert!(irk.solve(&vector![0.7, 0.0, 0.0, 0.0], &vector![], 0.01).is_ok());
+}
