@@ -6,8 +6,8 @@
 //! F(x, ν; x̂, p, t) = (x − x̂ + Gᵀν, y) = 0        G = ∂y/∂x        K = ∂F/∂(x, ν)
 //! ```
 //!
-//! Directions: `K d(x, ν) = dx̂ − F_p dp`. Adjoint: `Kᵀμ = (λ, 0)`, then `λ_x̂` are the first elements
-//! of `μ` and `λ_p = −F_pᵀμ`. Second order: `−Dᵀ ∇²(μᵀF) D` with `D = d(x, ν, x̂, p)/dw`. The macro
+//! Directions: `K d(x, ν) = dx̂ − F_p dp`. Adjoint: `Kᵀμ = (λ, 0)`, then `λ_x̂` are the first
+//! elements of `μ` and `λ_p = −F_pᵀμ`. Second order: `−Dᵀ ∇²(μᵀF) D` with `D = d(x, ν, x̂, p)/dw`. The macro
 //! writes `F` and its derivatives.
 
 use super::Projectable;

@@ -1,7 +1,7 @@
 //! The equations of the projection onto invariants `y(x, p, t)`.
 //!
-//! `F = (x − x̂ + Gᵀν, y)` as a function of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`: `ν` has the place of
-//! `z` and `x̂` that of `u`.
+//! `F = (x − x̂ + Gᵀν, y)` as a function of `(x, ν, x̂, p, t)`, with `G = ∂y/∂x`: `ν` has the place
+//! of `z` and `x̂` that of `u`.
 
 use crate::graph::{Binary, Node, gradient};
 use crate::language::{Model, Variables};
