@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Directions: `K d(x, ν) = dx̂ − F_p dp`. Adjoint: `Kᵀμ = (λ, 0)`, then `λ_x̂` are the first
-//! elements of `μ` and `λ_p = −F_pᵀμ`. Second order: `−Dᵀ ∇²(μᵀF) D` with `D = d(x, ν, x̂, p)/dw`. The macro
-//! writes `F` and its derivatives.
+//! elements of `μ` and `λ_p = −F_pᵀμ`. Second order: `−Dᵀ ∇²(μᵀF) D` with `D = d(x, ν, p)/dw`. The
+//! macro writes `F` and its derivatives.
 
 use super::Projectable;
 use crate::error::Error;
