@@ -18,6 +18,7 @@ mod chain;
 mod closed_form;
 mod collocation;
 mod convex;
+mod coupled_derivatives;
 mod coupling;
 mod curvature;
 mod degenerate;

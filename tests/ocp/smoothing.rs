@@ -125,7 +125,8 @@ fn refusals() -> Test {
     let result = factors.adjoint(&seed);
     assert!(matches!(result, Err(OcpError::InvalidValue { stage: 2, index: 1, .. })));
     ocp.shared("u")?;
-    assert!(matches!(ocp.factorise(EXACT, &mut factors), Err(OcpError::Coupled)));
+    let mut gains = Sensitivities::new(&ocp)?;
+    assert!(matches!(ocp.gains(&mut gains), Err(OcpError::Coupled)));
     let mut ipm = HeapIpm::new(&ocp)?;
     for mu in [-1.0, 0.2, f64::NAN] {
         ipm.options.final_mu = mu;

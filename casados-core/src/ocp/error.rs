@@ -251,8 +251,8 @@ pub enum OcpError {
         /// Why.
         error: Error,
     },
-    /// States are periodic or controls shared, and this solver has no such conditions:
-    /// [`Ipm`](super::Ipm) and [`Sqp`](super::Sqp) have.
+    /// States are periodic or controls shared: the gains of a feedback would hold these as they
+    /// are. [`Ocp::differentiate`](super::Ocp::differentiate) has `du/dx₀`, in which they follow.
     Coupled,
     /// An option of the solver is out of its range.
     InvalidOption {

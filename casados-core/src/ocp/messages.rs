@@ -152,7 +152,8 @@ impl fmt::Display for OcpError {
             }
             Self::Integration { interval, error } => write!(f, "interval {interval}: {error}"),
             Self::Coupled => f.write_str(
-                "states are periodic or controls shared: `Ipm` and `Sqp` solve such problems, this solver does not",
+                "states are periodic or controls shared, and gains hold these as they are: \
+                 `Ocp::differentiate` has `du/dx₀`, in which they follow",
             ),
             Self::InvalidOption { name, value, allowed } => {
                 write!(f, "the option `{name}` is {value}: it has to be {allowed}")

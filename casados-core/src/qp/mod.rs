@@ -82,6 +82,8 @@ pub use condense::Condensing;
 pub use error::{Field, QpError, Side};
 #[cfg(feature = "alloc")]
 pub use interior::HeapInteriorPoint;
+#[cfg(feature = "alloc")]
+pub(crate) use interior::Symmetric;
 pub use interior::{InteriorPoint, InteriorPointOptions, Store};
 pub use layout::StageDims;
 #[cfg(feature = "alloc")]

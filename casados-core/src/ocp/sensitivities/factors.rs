@@ -1,9 +1,10 @@
 //! The conditions of optimality at a solution, factorised once for any number of derivatives.
 
 use super::active::Springs;
+use super::border::Border;
+use super::column::{self, Column};
 use super::parameters::Parameters;
-use super::recursion::{self, Column};
-use super::{block, zeros};
+use super::{block, recursion, zeros};
 use crate::ocp::HeapOcp;
 use crate::ocp::curvature::Curvature;
 use crate::ocp::error::{OcpError, Part};
@@ -28,6 +29,9 @@ use alloc::vec::Vec;
 /// `O(N (NX + NU) (NX + NU + NP))`, however many parameters there are; the Hessian of the value one
 /// such solve for each parameter. The gradient of the value is that of the Lagrangian (envelope
 /// theorem), and costs nothing more.
+///
+/// A free initial state, periodic states and shared controls are unknowns beside the recursion.
+/// There are no derivatives by a free initial state.
 ///
 /// Where bounds are active the derivatives are those along which the active set stays. At a bound
 /// that is active without a force solutions have two derivatives, one for each side. Then the bound
@@ -76,17 +80,21 @@ pub struct SolutionFactors<T> {
     /// `NX`, `NU`, `NP`
     pub(super) dims: [usize; 3],
     pub(super) intervals: usize,
-    /// `K`, and Cholesky's factors of `M_uu`, of every interval.
+    /// `K`, and factors of `M_uu`, of every interval.
     pub(super) gains: Vec<T>,
     pub(super) controls: Vec<T>,
     /// `P` of every stage.
     pub(super) costs_to_go: Vec<T>,
     /// The rows of `[A B]` of every interval.
     pub(super) dynamics: Vec<T>,
+    /// How many pivots of controls are negative.
+    pub(super) negative: usize,
+    pub(super) border: Border<T>,
     pub(super) problem: Parameters<T>,
     pub(super) column: Column<T>,
-    /// `∂V/∂x₀`, and the Hessian of the value as far as parameters are concerned.
+    /// `∂V/∂x₀`, and the Hessian of the value.
     gradient: Vec<T>,
+    of_start: Vec<T>,
     cross: Vec<T>,
     square: Vec<T>,
     adjoint: Vec<T>,
@@ -97,13 +105,14 @@ pub struct SolutionFactors<T> {
 /// `λᵀ dw/dx₀` and `λᵀ dw/dp`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolutionAdjoint<'a, T> {
-    /// By the initial state, `NX`.
+    /// By the initial state, `NX`; empty where it is free.
     pub x0: &'a [T],
     /// By the parameters, `NP`.
     pub p: &'a [T],
 }
 
-/// The Hessian of the optimal value; matrices column after column.
+/// The Hessian of the optimal value; matrices column after column. Where the initial state is free
+/// there is nothing but `∂²V/∂p²`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValueHessian<'a, T> {
     /// `∂²V/∂x₀²`, `NX × NX`.
@@ -130,9 +139,12 @@ impl<T: Real> SolutionFactors<T> {
             controls: zeros(n * nu * nu)?,
             costs_to_go: zeros((n + 1) * nx * nx)?,
             dynamics: zeros(n * nx * (nx + nu))?,
+            negative: 0,
+            border: Border::default(),
             problem: Parameters::new::<P>(n)?,
             column: Column::new(dims, n)?,
             gradient: zeros(nx)?,
+            of_start: zeros(nx * nx)?,
             cross: zeros(nx * np)?,
             square: zeros(np * np)?,
             adjoint: zeros(np)?,
@@ -157,10 +169,10 @@ impl<T: Real> SolutionFactors<T> {
         self.weak
     }
 
-    /// `∂V/∂x₀`, `NX`.
+    /// `∂V/∂x₀`, `NX`; empty where the initial state is free.
     #[must_use]
     pub fn value_gradient_x0(&self) -> &[T] {
-        &self.gradient
+        part(&self.gradient, 0, self.given())
     }
 
     /// `∂V/∂p`, `NP`.
@@ -171,18 +183,26 @@ impl<T: Real> SolutionFactors<T> {
 
     /// The Hessian of the optimal value.
     pub fn value_hessian(&mut self) -> ValueHessian<'_, T> {
-        let [nx, _, np] = self.dims;
+        let ([nx, _, np], given) = (self.dims, self.given());
+        let mut column = core::mem::take(&mut self.column);
+        for i in 0..given {
+            column::solve_start(self, i, &mut column);
+            assign(part_mut(&mut self.of_start, i * nx, nx), column.multipliers(0));
+        }
         for p in 0..np {
-            let mut column = core::mem::take(&mut self.column);
-            recursion::solve_parameter(self, p, &mut column);
+            column::solve_parameter(self, p, &mut column);
             assign(part_mut(&mut self.cross, p * nx, nx), column.multipliers(0));
             for q in 0..np {
                 let value = super::get(&self.problem.square, p * np + q) + self.change(q, &column);
                 super::set(&mut self.square, p * np + q, value);
             }
-            self.column = column;
         }
-        ValueHessian { xx: part(&self.costs_to_go, 0, nx * nx), xp: &self.cross, pp: &self.square }
+        self.column = column;
+        ValueHessian {
+            xx: part(&self.of_start, 0, given * nx),
+            xp: part(&self.cross, 0, given * np),
+            pp: &self.square,
+        }
     }
 
     /// `λᵀ dw/dx₀` and `λᵀ dw/dp`, where states and controls of `seed` are `λ`; its multipliers are
@@ -197,13 +217,33 @@ impl<T: Real> SolutionFactors<T> {
     ) -> Result<SolutionAdjoint<'_, T>, OcpError> {
         self.check_seed(seed)?;
         let mut column = core::mem::take(&mut self.column);
-        recursion::solve_seed(self, seed, &mut column);
+        column::solve_seed(self, seed, &mut column);
         for p in 0..self.dims[2] {
             let value = self.change(p, &column);
             super::set(&mut self.adjoint, p, value);
         }
         self.column = column;
-        Ok(SolutionAdjoint { x0: self.column.multipliers(0), p: &self.adjoint })
+        Ok(SolutionAdjoint { x0: part(self.column.multipliers(0), 0, self.given()), p: &self.adjoint })
+    }
+
+    /// How many elements of the first state are given: all, or none.
+    pub(super) fn given(&self) -> usize {
+        if self.border.is_free() { 0 } else { self.dims[0] }
+    }
+    /// Columns of `P` of a stage.
+    pub(super) fn cost_to_go(&self, k: usize) -> impl Iterator<Item = &[T]> {
+        let [nx, _, _] = self.dims;
+        part(&self.costs_to_go, k * nx * nx, nx * nx).chunks_exact(nx.max(1))
+    }
+    /// Rows of `[A B]` of an interval.
+    pub(super) fn rows(&self, k: usize) -> impl Iterator<Item = &[T]> {
+        let [nx, nu, _] = self.dims;
+        part(&self.dynamics, k * nx * (nx + nu), nx * (nx + nu)).chunks_exact((nx + nu).max(1))
+    }
+    /// A column of `K` of an interval.
+    pub(super) fn gains(&self, k: usize, state: usize) -> &[T] {
+        let [nx, nu, _] = self.dims;
+        part(&self.gains, (k * nx + state) * nu, nu)
     }
 
     /// The product of a solution of the conditions of optimality with what a parameter changes of
@@ -264,30 +304,32 @@ impl<T: Real> SolutionFactors<T> {
         let mut springs = Springs::new(largest, self.smoothing);
         recursion::factorise(self, qp, iterate, &mut springs, parameters)?;
         self.weak = springs.weak;
+        let mut column = core::mem::take(&mut self.column);
+        let result = Border::factorise(self, &mut column);
+        self.column = column;
         recursion::gradient(qp, iterate, &mut self.gradient);
-        Ok(())
+        result
     }
 }
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
     /// Factorises the conditions of optimality at the iterate, for derivatives of the solution and
-    /// of its value: the iterate must be a solution, with a fixed initial state.
+    /// of its value: the iterate must be a solution.
     ///
     /// With [`Exact`](crate::ocp::Exact) Hessians that are not made convex these are derivatives of
     /// the solution; with those of Gauss and Newton approximations, but for the gradient of the
     /// value, which has no Hessian in it.
     ///
     /// # Errors
-    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if the initial state is not fixed;
-    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::Coupled`] where there
-    /// are periodic states or shared controls; [`OcpError::InvalidOption`] of the smoothing;
-    /// [`OcpError::Qp`] if the reduced Hessian is not positive definite.
+    /// Those of [`Ocp::linearise`]; [`OcpError::Missing`] if nothing was said of the initial state;
+    /// [`OcpError::Length`] if the memory is of another problem; [`OcpError::InvalidOption`] of the
+    /// smoothing; [`OcpError::Qp`] if the reduced Hessian is not positive definite.
     pub fn factorise<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
         factors: &mut SolutionFactors<T>,
     ) -> Result<(), OcpError> {
-        self.check_factors(factors)?;
+        self.prepare_factors(factors)?;
         let problem = &mut factors.problem;
         problem.begin();
         self.linearise_watched(curvature, |k, step| problem.take(k, step))?;
@@ -295,9 +337,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         factors.fill(self.qp.view(), &self.iterate, true)
     }
 
-    pub(super) fn check_factors(&self, factors: &SolutionFactors<T>) -> Result<(), OcpError> {
-        self.is_uncoupled()?;
-        if self.initial != Initial::Fixed {
+    /// Checks memory and options, and what has to be found beside the recursion.
+    ///
+    /// # Errors
+    /// [`OcpError::Missing`], [`OcpError::Length`], [`OcpError::InvalidOption`]
+    pub(super) fn prepare_factors(&self, factors: &mut SolutionFactors<T>) -> Result<(), OcpError> {
+        if self.initial == Initial::Unknown {
             return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
         }
         let value = factors.smoothing.to_f64();
@@ -316,6 +361,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 return Err(OcpError::Length { part, stage, expected, found });
             }
         }
-        Ok(())
+        factors.border.prepare(self.qp.view(), self.initial == Initial::Free, [nx, nu, self.intervals()])
     }
 }

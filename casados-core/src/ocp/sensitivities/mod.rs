@@ -4,9 +4,12 @@
 //! | --- | --- |
 //! | `factors` | the conditions of optimality, factorised: adjoints, derivatives of the value |
 //! | `recursion`, `active` | the Riccati recursion, and bounds as springs in it |
+//! | `column`, `border` | solutions by its factors, and what couples stages |
 //! | `parameters` | what parameters change of the conditions |
 
 mod active;
+mod border;
+mod column;
 mod factors;
 mod parameters;
 mod recursion;
@@ -15,12 +18,10 @@ pub use factors::{SolutionAdjoint, SolutionFactors, ValueHessian};
 
 use super::curvature::Curvature;
 use super::data::get;
-use super::error::OcpError;
-use super::instance::Ocp;
-use super::linearise::dot;
+use super::error::{OcpError, Part};
+use super::instance::{Initial, Ocp};
 use super::problem::Formulation;
-use crate::linalg::axpy;
-use crate::qp::{StageDims, assign, part, part_mut};
+use crate::qp::{StageDims, assign, part_mut};
 use crate::scalar::Real;
 use alloc::vec::Vec;
 
@@ -68,13 +69,13 @@ impl<T: Real> Sensitivities<T> {
     pub fn gain(&self, stage: usize) -> &[T] {
         self.factors.gain(stage)
     }
-    /// `dx_k/dx₀`, `NX × NX`, column after column.
+    /// `dx_k/dx₀`, `NX × NX`, column after column; zero where the initial state is free.
     #[must_use]
     pub fn dx(&self, stage: usize) -> &[T] {
         let [nx, _, _] = self.factors.dims;
         block(&self.x, stage, nx * nx)
     }
-    /// `du_k/dx₀`, `NU × NX`, column after column.
+    /// `du_k/dx₀`, `NU × NX`, column after column; zero where the initial state is free.
     #[must_use]
     pub fn du(&self, stage: usize) -> &[T] {
         let [nx, nu, _] = self.factors.dims;
@@ -93,28 +94,20 @@ impl<T: Real> Sensitivities<T> {
         block(&self.u_p, stage, nu * np)
     }
 
-    /// `dx_{k+1} = A dx_k + B du_k`, `du_k = K dx_k`.
     fn by_initial_state(&mut self) {
         let Self { factors, x, u, .. } = self;
         let ([nx, nu, _], n) = (factors.dims, factors.intervals);
-        let size = nx + nu;
+        let mut column = core::mem::take(&mut factors.column);
         x.fill(T::ZERO);
         u.fill(T::ZERO);
-        (0..nx).for_each(|i| set(x, i * nx + i, T::ONE));
-        for k in 0..n {
-            let (before, after) = x.split_at_mut_checked((k + 1) * nx * nx).unwrap_or_default();
-            for direction in 0..nx {
-                let du = part_mut(u, (k * nx + direction) * nu, nu);
-                let dx = part(before, (k * nx + direction) * nx, nx);
-                for (gain, &dx) in factors.gain(k).chunks_exact(nu.max(1)).zip(dx) {
-                    axpy(dx, gain, du);
-                }
-                let rows = part(&factors.dynamics, k * nx * size, nx * size).chunks_exact(size.max(1));
-                for (next, row) in part_mut(after, direction * nx, nx).iter_mut().zip(rows) {
-                    *next = dot(part(row, 0, nx), dx) + dot(part(row, nx, nu), du);
-                }
+        for i in 0..factors.given() {
+            column::solve_start(factors, i, &mut column);
+            for k in 0..=n {
+                assign(part_mut(x, (k * nx + i) * nx, nx), column.state(k));
+                assign(part_mut(u, (k * nx + i) * nu, nu), column.control(k));
             }
         }
+        factors.column = column;
     }
 
     fn by_parameters(&mut self) {
@@ -122,7 +115,7 @@ impl<T: Real> Sensitivities<T> {
         let ([nx, nu, np], n) = (factors.dims, factors.intervals);
         let mut column = core::mem::take(&mut factors.column);
         for p in 0..np {
-            recursion::solve_parameter(factors, p, &mut column);
+            column::solve_parameter(factors, p, &mut column);
             for k in 0..=n {
                 assign(part_mut(x_p, (k * np + p) * nx, nx), column.state(k));
                 assign(part_mut(u_p, (k * np + p) * nu, nu), column.control(k));
@@ -178,7 +171,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// is of another problem; [`OcpError::Coupled`]; [`OcpError::Qp`] if the reduced Hessian is not
     /// positive definite.
     pub fn gains(&self, result: &mut Sensitivities<T>) -> Result<(), OcpError> {
-        self.check_factors(&result.factors)?;
+        self.is_uncoupled()?;
+        if self.initial == Initial::Free {
+            return Err(OcpError::Missing { part: Part::InitialState, stage: 0 });
+        }
+        self.prepare_factors(&mut result.factors)?;
         result.factors.fill(self.qp.view(), &self.iterate, false)?;
         let Sensitivities { x, u, x_p, u_p, .. } = result;
         for derivatives in [x, u, x_p, u_p] {

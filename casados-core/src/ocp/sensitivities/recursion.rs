@@ -1,14 +1,14 @@
-//! The Riccati recursion of derivatives, and solutions by its factors.
+//! The Riccati recursion of derivatives.
 
 use super::active::Springs;
+use super::column::solve;
 use super::factors::SolutionFactors;
-use super::{add, get, set, zeros};
+use super::{add, get, set};
 use crate::linalg::axpy;
 use crate::ocp::error::OcpError;
 use crate::ocp::linearise::dot;
-use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, part, part_mut};
+use crate::qp::{QpError, QpView, Solution, SolutionStage, Stage, StageDims, assign, marked, part, part_mut};
 use crate::scalar::Real;
-use alloc::vec::Vec;
 
 /// How many numbers `P [A B]`, `M`, a gradient and a state take.
 pub(super) const fn work(nx: usize, nu: usize) -> usize {
@@ -16,60 +16,39 @@ pub(super) const fn work(nx: usize, nu: usize) -> usize {
     nx * size + size * size + size + nx
 }
 
-/// A direction: changes of states and controls, and those of the multipliers of the dynamics.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Column<T> {
-    nx: usize,
-    nu: usize,
-    x: Vec<T>,
-    u: Vec<T>,
-    pi: Vec<T>,
-    work: Vec<T>,
-}
-
-impl<T: Real> Column<T> {
-    pub fn new([nx, nu, _]: [usize; 3], n: usize) -> Result<Self, OcpError> {
-        Ok(Self {
-            nx,
-            nu,
-            x: zeros((n + 1) * nx)?,
-            u: zeros(n * nu)?,
-            pi: zeros((n + 1) * nx)?,
-            work: zeros(2 * nx + nu)?,
-        })
-    }
-    pub fn state(&self, k: usize) -> &[T] {
-        part(&self.x, k * self.nx, self.nx)
-    }
-    pub fn control(&self, k: usize) -> &[T] {
-        part(&self.u, k * self.nu, self.nu)
-    }
-    /// Of what makes `x_k`.
-    pub fn multipliers(&self, k: usize) -> &[T] {
-        part(&self.pi, k * self.nx, self.nx)
-    }
-}
-
-/// `∂L/∂x₀`, without the multipliers of the initial state.
+/// `∂V/∂x₀`: the derivative of the Lagrangian by the first state, without the multipliers that it
+/// has because it is given. Periodic states are those of the last stage, too.
 pub(super) fn gradient<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     iterate: &Solution<T, D, M>,
     result: &mut [T],
 ) {
-    let (Some(stage), Some(point)) = (qp.stages().next(), iterate.stages().next()) else { return };
-    let view = stage.arrays();
-    let (all, _) = iterate.vectors();
-    let v = part(all, 0, view.n);
+    let mut stages = qp.stages().zip(iterate.stages());
+    let Some((stage, point)) = stages.next() else { return };
     for (i, slope) in result.iter_mut().enumerate() {
-        let curved = v.iter().enumerate().fold(get(view.gradient, i), |sum, (j, &v)| {
-            sum + get(view.hessian, i.min(j) * view.ld + i.max(j)) * v
-        });
-        let mu = point.g_upper.iter().zip(point.g_lower).map(|(&upper, &lower)| upper - lower);
-        let rows = view.matrix.chunks_exact(view.ld.max(1));
-        *slope = rows
-            .zip(point.dynamics.iter().copied().chain(mu))
-            .fold(curved, |sum, (row, multiplier)| sum + get(row, i) * multiplier);
+        *slope = slope_of(&stage, &point, i);
     }
+    let (Some((stage, point)), Some(before)) = (stages.next_back(), iterate.stages().rev().nth(1)) else {
+        return;
+    };
+    for i in marked(qp.periodic()) {
+        let bounds = get(point.x_upper, i) - get(point.x_lower, i);
+        add(result, i, slope_of(&stage, &point, i) + bounds - get(before.dynamics, i));
+    }
+}
+
+/// The derivative by a variable of a stage of its cost, and of its constraints and the next state
+/// times their multipliers.
+fn slope_of<T: Real>(stage: &Stage<'_, T>, point: &SolutionStage<'_, T>, i: usize) -> T {
+    let view = stage.arrays();
+    let v = point.x.iter().chain(point.u);
+    let curved = v.enumerate().fold(get(view.gradient, i), |sum, (j, &v)| {
+        sum + get(view.hessian, i.min(j) * view.ld + i.max(j)) * v
+    });
+    let mu = point.g_upper.iter().zip(point.g_lower).map(|(&upper, &lower)| upper - lower);
+    let rows = view.matrix.chunks_exact(view.ld.max(1));
+    rows.zip(point.dynamics.iter().copied().chain(mu))
+        .fold(curved, |sum, (row, multiplier)| sum + get(row, i) * multiplier)
 }
 
 /// `P_k`, `K_k` and the factors of `M_uu`, backwards. With `parameters`, what these change is
@@ -87,6 +66,7 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     let [nx, nu, _] = factors.dims;
     let (size, n) = (nx + nu, factors.intervals);
     let mut memory = core::mem::take(&mut factors.work);
+    factors.negative = 0;
     let (product, rest) = memory.split_at_mut_checked(nx * size).unwrap_or_default();
     let m = part_mut(rest, 0, size * size);
     let mut result = Ok(());
@@ -101,10 +81,15 @@ pub(super) fn factorise<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let next = part(&factors.costs_to_go, (k + 1) * nx * nx, nx * nx);
             let dynamics = part(&factors.dynamics, k * nx * size, nx * size);
             add_quadratic(m, product, next, dynamics, [nx, size]);
+            factors.border.take_rows(k, m);
             let controls = part_mut(&mut factors.controls, k * nu * nu, nu * nu);
-            if let Err((index, pivot)) = cholesky(m, size, [nx, nu], controls) {
-                result = Err(OcpError::Qp(QpError::NotConvex { stage: k, index, pivot }));
-                break;
+            let allowed = factors.border.conditions() - factors.negative;
+            match eliminate(m, size, [nx, nu], controls, allowed) {
+                Ok(negative) => factors.negative += negative,
+                Err((index, pivot)) => {
+                    result = Err(OcpError::Qp(QpError::NotConvex { stage: k, index, pivot }));
+                    break;
+                }
             }
             let gain = part_mut(&mut factors.gains, k * nu * nx, nu * nx);
             for (state, gain) in gain.chunks_exact_mut(nu.max(1)).enumerate() {
@@ -144,7 +129,7 @@ fn begin_stage<T: Real>(
         }
     }
     // The state that is given does not move in this way.
-    let states = if k == 0 { &[] } else { point.x };
+    let states = if k == 0 && !factors.border.is_free() { &[] } else { point.x };
     for (i, &x) in states.iter().enumerate() {
         let multipliers = [get(point.x_lower, i), get(point.x_upper, i)];
         add(m, i * size + i, springs.both(&stage.x_bounds(), i, x, multipliers));
@@ -190,82 +175,17 @@ fn add_quadratic<T: Real>(m: &mut [T], product: &mut [T], p: &[T], dynamics: &[T
     }
 }
 
-/// What a parameter changes.
-pub(super) fn solve_parameter<T: Real>(factors: &SolutionFactors<T>, p: usize, column: &mut Column<T>) {
-    let [nx, nu, _] = factors.dims;
-    let problem = &factors.problem;
-    let gradient = |k: usize, q: &mut [T]| assign(q, part(problem.gradient(k), p * (nx + nu), nx + nu));
-    solve_column(factors, gradient, |k| part(problem.end(k), p * nx, nx), column);
-}
-
-/// What a gradient over states and controls changes.
-pub(super) fn solve_seed<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
-    factors: &SolutionFactors<T>,
-    seed: &Solution<T, D, M>,
-    column: &mut Column<T>,
-) {
-    let gradient = |k: usize, q: &mut [T]| {
-        let Some(stage) = seed.stage(k) else { return };
-        q.iter_mut().zip(stage.x.iter().chain(stage.u)).for_each(|(q, &value)| *q = value);
-    };
-    solve_column(factors, gradient, |_| &[], column);
-}
-
-/// The solution for a gradient `q_k` over `(x, u)` and constants `e_k` of the dynamics: with
-/// `t = s_{k+1} + P_{k+1} e_k` backwards `q += [A B]ᵀ t`, `κ = −M_uu⁻¹ q_u`, `s_k = q_x + Kᵀ q_u`;
-/// then forwards `u = K x + κ`, `x₊ = A x + B u + e`, `π = P x + s`.
-fn solve_column<'e, T: Real>(
-    factors: &SolutionFactors<T>,
-    gradient: impl Fn(usize, &mut [T]),
-    end: impl Fn(usize) -> &'e [T],
-    column: &mut Column<T>,
-) {
-    let [nx, nu, _] = factors.dims;
-    let (size, n) = (nx + nu, factors.intervals);
-    let Column { x, u, pi, work, .. } = column;
-    let (q, t) = work.split_at_mut_checked(size).unwrap_or_default();
-    let p = |k: usize| part(&factors.costs_to_go, k * nx * nx, nx * nx).chunks_exact(nx.max(1));
-    let rows = |k: usize| part(&factors.dynamics, k * nx * size, nx * size).chunks_exact(size.max(1));
-    let gains = |k: usize| part(&factors.gains, k * nu * nx, nu * nx);
-    for k in (0..=n).rev() {
-        q.fill(T::ZERO);
-        gradient(k, q);
-        if k < n {
-            assign(t, part(pi, (k + 1) * nx, nx));
-            p(k + 1).zip(end(k)).for_each(|(column, &end)| axpy(end, column, t));
-            rows(k).zip(&*t).for_each(|(row, &t)| axpy(t, row, q));
-            let controls = part(&factors.controls, k * nu * nu, nu * nu);
-            solve(controls, part(q, nx, nu), part_mut(u, k * nu, nu));
-        }
-        for (j, s) in part_mut(pi, k * nx, nx).iter_mut().enumerate() {
-            let of_controls = if k < n { dot(part(gains(k), j * nu, nu), part(q, nx, nu)) } else { T::ZERO };
-            *s = get(q, j) + of_controls;
-        }
-    }
-    part_mut(x, 0, nx).fill(T::ZERO);
-    for k in 0..n {
-        let (before, after) = x.split_at_mut_checked((k + 1) * nx).unwrap_or_default();
-        let (here, next) = (part(before, k * nx, nx), part_mut(after, 0, nx));
-        let control = part_mut(u, k * nu, nu);
-        for (gain, &x) in gains(k).chunks_exact(nu.max(1)).zip(here) {
-            axpy(x, gain, control);
-        }
-        for (i, (next, row)) in next.iter_mut().zip(rows(k)).enumerate() {
-            *next = dot(part(row, 0, nx), here) + dot(part(row, nx, nu), control) + get(end(k), i);
-        }
-        let multipliers = part_mut(pi, (k + 1) * nx, nx);
-        p(k + 1).zip(&*next).for_each(|(column, &x)| axpy(x, column, multipliers));
-    }
-}
-
-/// Cholesky's factors without roots of `M_uu`; the pivot that is not positive, if there is one.
-fn cholesky<T: Real>(
+/// Factors `L D Lᵀ` of `M_uu` and how many pivots are negative; the pivot that vanishes or is
+/// negative beyond those that are allowed, if there is one.
+fn eliminate<T: Real>(
     m: &[T],
     size: usize,
     [nx, nu]: [usize; 2],
     factors: &mut [T],
-) -> Result<(), (usize, f64)> {
+    allowed: usize,
+) -> Result<usize, (usize, f64)> {
     let at = |i: usize, j: usize| j * nu + i;
+    let mut negative = 0;
     for j in 0..nu {
         for i in j..nu {
             set(factors, at(i, j), get(m, (nx + j) * size + nx + i));
@@ -273,8 +193,9 @@ fn cholesky<T: Real>(
     }
     for j in 0..nu {
         let pivot = get(factors, at(j, j));
-        let is_positive = pivot > T::ZERO;
-        if !is_positive {
+        negative += usize::from(pivot < T::ZERO);
+        let is_allowed = pivot > T::ZERO || (pivot < T::ZERO && negative <= allowed);
+        if !is_allowed {
             return Err((j, pivot.to_f64()));
         }
         for i in j + 1..nu {
@@ -287,27 +208,5 @@ fn cholesky<T: Real>(
             set(factors, at(i, j), get(factors, at(i, j)) / pivot);
         }
     }
-    Ok(())
-}
-
-/// `x = −M_uu⁻¹ b`
-fn solve<T: Real>(factors: &[T], b: &[T], x: &mut [T]) {
-    let nu = x.len();
-    let at = |i: usize, j: usize| j * nu + i;
-    for (x, &b) in x.iter_mut().zip(b) {
-        *x = -b;
-    }
-    for j in 0..nu {
-        for i in j + 1..nu {
-            let product = get(factors, at(i, j)) * get(x, j);
-            add(x, i, -product);
-        }
-    }
-    for j in (0..nu).rev() {
-        let mut value = get(x, j) / get(factors, at(j, j));
-        for i in j + 1..nu {
-            value = value - get(factors, at(i, j)) * get(x, i);
-        }
-        set(x, j, value);
-    }
+    Ok(negative)
 }

@@ -194,17 +194,14 @@ impl<T: Real> Coupling<'_, T> {
             set(self.right, nx + c, -(linear + gap));
         }
         let noise = T::from_f64(T::EPSILON);
-        let factors = if factor {
-            Symmetric::factor(self.matrix, n, self.exchanged, noise)
-        } else {
-            Symmetric::factored(self.matrix, n, self.exchanged)
-        };
-        let negative = factors.negative + riccati.negative;
-        let enough = negative + factors.vanished >= self.conditions;
-        if factor && (negative > self.conditions || !enough) {
-            return Err(QpError::NotConvex { stage: 0, index: 0, pivot: -1.0 });
+        if factor {
+            let inertia = Symmetric::factor(self.matrix, n, self.exchanged, noise);
+            let negative = inertia.negative + riccati.negative;
+            if negative > self.conditions || negative + inertia.vanished < self.conditions {
+                return Err(QpError::NotConvex { stage: 0, index: 0, pivot: -1.0 });
+            }
         }
-        factors.solve(part_mut(self.right, 0, n));
+        Symmetric::new(self.matrix, n, self.exchanged).solve(part_mut(self.right, 0, n));
         assign(self.step, self.right.get(nx..).unwrap_or_default());
         Ok(())
     }

@@ -33,6 +33,8 @@ pub use options::InteriorPointOptions;
 pub(crate) use riccati::First;
 pub(crate) use sides::{Counts, Penalties, Reading, Sides, count, is_first_fixed, set};
 pub use store::Store;
+#[cfg(feature = "alloc")]
+pub(crate) use symmetric::Symmetric;
 pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;

@@ -9,45 +9,68 @@ use crate::scalar::Real;
 /// `(1 + √17) / 8`
 const ALPHA: f64 = 0.640_388_203_202_207_6;
 
-/// A factorisation in the memory of the matrix, whose lower triangle lies column after column.
-pub struct Symmetric<'a, T> {
-    a: &'a mut [T],
-    n: usize,
-    /// For every pivot the row that it was exchanged with, counted from one; of pairs with the sign
-    /// minus.
-    exchanged: &'a mut [T],
-    /// Negative eigenvalues.
+/// The signs of the eigenvalues.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inertia {
+    /// Negative ones.
     pub negative: usize,
     /// Pivots that vanished, whose unknowns stay zero.
     pub vanished: usize,
 }
 
-impl<'a, T: Real> Symmetric<'a, T> {
-    /// Factorises. Pivots below `noise` times the largest element vanish.
-    pub fn factor(a: &'a mut [T], n: usize, exchanged: &'a mut [T], noise: T) -> Self {
-        let mut factors = Self { a, n, exchanged, negative: 0, vanished: 0 };
+/// Factors, in the memory of the matrix, whose lower triangle lies column after column.
+#[derive(Clone, Copy, Debug)]
+pub struct Symmetric<'a, T> {
+    a: &'a [T],
+    n: usize,
+    /// For every pivot the row that it was exchanged with, counted from one; of pairs with the sign
+    /// minus.
+    exchanged: &'a [T],
+}
+
+/// A factorisation on its way.
+struct Elimination<'a, T> {
+    a: &'a mut [T],
+    n: usize,
+    exchanged: &'a mut [T],
+    inertia: Inertia,
+}
+
+/// An element of the matrix.
+fn element<T: Real>(a: &[T], n: usize, row: usize, column: usize) -> T {
+    let (row, column) = if row < column { (column, row) } else { (row, column) };
+    a.get(column * n + row).copied().unwrap_or(T::ZERO)
+}
+
+/// The inverse of a block of two pivots times a vector.
+fn of_pair<T: Real>(a: &[T], n: usize, k: usize, [x, y]: [T; 2]) -> [T; 2] {
+    let at = |i, j| element(a, n, i, j);
+    let (a, b, c) = (at(k, k), at(k + 1, k), at(k + 1, k + 1));
+    // Divided by `b` first: its square may not be a number.
+    let (a, c) = (a / b, c / b);
+    let determinant = b * (a * c - T::ONE);
+    [(c * x - y) / determinant, (a * y - x) / determinant]
+}
+
+impl<T: Real> Elimination<'_, T> {
+    /// Pivots below `noise` times the largest element vanish.
+    fn run(&mut self, noise: T) {
+        let n = self.n;
         let mut largest = T::ZERO;
         for j in 0..n {
             for i in j..n {
-                largest = factors.get(i, j).abs().max(largest);
+                largest = self.get(i, j).abs().max(largest);
             }
         }
         let small = noise * largest;
         let mut k = 0;
         while k < n {
-            k += factors.eliminate(k, small);
+            k += self.eliminate(k, small);
         }
-        factors
-    }
-
-    /// What [`Symmetric::factor`] has left in its memory, to solve again.
-    pub fn factored(a: &'a mut [T], n: usize, exchanged: &'a mut [T]) -> Self {
-        Self { a, n, exchanged, negative: 0, vanished: 0 }
     }
 
     fn get(&self, row: usize, column: usize) -> T {
-        let (row, column) = if row < column { (column, row) } else { (row, column) };
-        self.a.get(column * self.n + row).copied().unwrap_or(T::ZERO)
+        element(self.a, self.n, row, column)
     }
 
     fn set(&mut self, row: usize, column: usize, value: T) {
@@ -73,7 +96,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
         let (row, below) = self.largest(k, k + 1);
         let size = self.get(k, k).abs();
         if size.max(below) <= small {
-            self.vanished += 1;
+            self.inertia.vanished += 1;
             self.single(k, k, true);
             return 1;
         }
@@ -126,7 +149,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
             return;
         }
         let pivot = self.get(k, k);
-        self.negative += usize::from(pivot < T::ZERO);
+        self.inertia.negative += usize::from(pivot < T::ZERO);
         for j in k + 1..self.n {
             let factor = self.get(j, k) / pivot;
             for i in j..self.n {
@@ -146,28 +169,37 @@ impl<'a, T: Real> Symmetric<'a, T> {
         super::set(self.exchanged, k, -T::from_whole(k + 1));
         super::set(self.exchanged, k + 1, -T::from_whole(row + 1));
         // Its determinant is negative: one eigenvalue of each sign.
-        self.negative += 1;
+        self.inertia.negative += 1;
         for j in k + 2..self.n {
-            let [first, second] = self.of_pair(k, [self.get(j, k), self.get(j, k + 1)]);
+            let [first, second] = of_pair(self.a, self.n, k, [self.get(j, k), self.get(j, k + 1)]);
             for i in j..self.n {
                 let value = self.get(i, j) - first * self.get(i, k) - second * self.get(i, k + 1);
                 self.set(i, j, value);
             }
         }
         for i in k + 2..self.n {
-            let [first, second] = self.of_pair(k, [self.get(i, k), self.get(i, k + 1)]);
+            let [first, second] = of_pair(self.a, self.n, k, [self.get(i, k), self.get(i, k + 1)]);
             self.set(i, k, first);
             self.set(i, k + 1, second);
         }
     }
+}
 
-    /// The inverse of a block of two pivots times a vector.
-    fn of_pair(&self, k: usize, [x, y]: [T; 2]) -> [T; 2] {
-        let (a, b, c) = (self.get(k, k), self.get(k + 1, k), self.get(k + 1, k + 1));
-        // Divided by `b` first: its square may not be a number.
-        let (a, c) = (a / b, c / b);
-        let determinant = b * (a * c - T::ONE);
-        [(c * x - y) / determinant, (a * y - x) / determinant]
+impl<'a, T: Real> Symmetric<'a, T> {
+    /// Factorises a matrix. Pivots below `noise` times the largest element vanish.
+    pub fn factor(a: &mut [T], n: usize, exchanged: &mut [T], noise: T) -> Inertia {
+        let mut elimination = Elimination { a, n, exchanged, inertia: Inertia::default() };
+        elimination.run(noise);
+        elimination.inertia
+    }
+
+    /// What [`Symmetric::factor`] has left in its memory.
+    pub fn new(a: &'a [T], n: usize, exchanged: &'a [T]) -> Self {
+        Self { a, n, exchanged }
+    }
+
+    fn get(&self, row: usize, column: usize) -> T {
+        element(self.a, self.n, row, column)
     }
 
     /// Whether a pivot is one of two.
@@ -205,7 +237,7 @@ impl<'a, T: Real> Symmetric<'a, T> {
         while k < n {
             let at = |i: usize| x.get(i).copied().unwrap_or(T::ZERO);
             if self.is_pair(k) {
-                let [first, second] = self.of_pair(k, [at(k), at(k + 1)]);
+                let [first, second] = of_pair(self.a, n, k, [at(k), at(k + 1)]);
                 super::set(x, k, first);
                 super::set(x, k + 1, second);
                 k += 2;
@@ -264,12 +296,12 @@ mod tests {
                 let b = DVector::<f64>::from_fn(n, |_, _| random());
                 let mut memory: Vec<f64> = a.as_slice().to_vec();
                 let mut exchanged = alloc::vec![0.0; n];
-                let factors = Symmetric::factor(&mut memory, n, &mut exchanged, 1e-14);
-                assert_eq!(factors.vanished, 0);
+                let inertia = Symmetric::factor(&mut memory, n, &mut exchanged, 1e-14);
+                assert_eq!(inertia.vanished, 0);
                 let negative = a.symmetric_eigenvalues().iter().filter(|&&l| l < 0.0).count();
-                assert_eq!(factors.negative, negative, "{n} {case}");
+                assert_eq!(inertia.negative, negative, "{n} {case}");
                 let mut x = b.clone();
-                factors.solve(x.as_mut_slice());
+                Symmetric::new(&memory, n, &exchanged).solve(x.as_mut_slice());
                 // Backward stable: growth is at most 2.57^(n-1), in practice a few units.
                 let residual = (&a * &x - &b).amax() / (a.amax() * x.amax() * n as f64);
                 assert!(residual < 1e-13, "{n} {case} {residual:e}");
