@@ -15,16 +15,21 @@
 
 use super::cholesky::eliminate;
 use super::coupling::Coupling;
-use super::kernels::{Columns, subtract};
+use super::kernels::{Columns, Part, Source, product};
 use super::riccati::{Equations, Riccati};
 use super::set;
 use super::shared::Shared;
 use super::symmetric::Symmetric;
+use crate::linalg::axpy;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
 use crate::qp::{QpView, marked};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
+use core::ops::Range;
+
+/// How many parameters go side by side: the columns of the widest tile of a product.
+pub(super) const SIDE: usize = 6;
 
 /// Solves Newton's equations with the parameters; see [`Riccati::solve`].
 ///
@@ -68,9 +73,12 @@ impl<T: Real, E: Packed<T>> Piece for Solve<'_, '_, '_, T, E> {
         assign(coupling.first, riccati.g);
         if factor {
             coupling.schur.fill(T::ZERO);
-            for parameter in 0..coupling.count {
-                coupling.eliminate::<E>(qp, riccati, dynamics, parameter);
+            coupling.offset.fill(T::ZERO);
+            for begin in (0..coupling.count).step_by(SIDE) {
+                let end = (begin + SIDE).min(coupling.count);
+                coupling.eliminate::<E>(qp, riccati, dynamics, begin..end);
             }
+            coupling.complement(qp, riccati);
         }
         coupling.gather(qp, riccati);
         *result = coupling.solve_border(riccati, factor);
@@ -102,64 +110,109 @@ fn add<T: Real>(slice: &mut [T], index: usize, value: T) {
 }
 
 impl<T: Real> Coupling<'_, T> {
-    /// The right-hand side of one parameter on its way back: its columns of `Γ` and `S`, and what
-    /// residuals of the dynamics add to `s`.
+    /// The right-hand sides of some parameters on their way back, side by side: their columns of `Γ`
+    /// and `S`, and what residuals of the dynamics add to `s`.
     #[inline(always)]
     fn eliminate<E: Packed<T>>(
         &mut self,
         qp: QpView<'_, T>,
         riccati: &mut Riccati<'_, T>,
         dynamics: &[T],
-        c: usize,
+        parameters: Range<usize>,
     ) {
-        let (end, count, nx0) = (riccati.end, self.count, self.first.len());
+        let nx0 = self.first.len();
         let last = qp.dims.len().saturating_sub(1);
-        let state = marked(self.periodic).nth(c);
-        let columns = match c.checked_sub(self.conditions) {
-            Some(control) => part(self.columns, control * end.v, end.v),
-            None => &[],
-        };
-        let mut offset = T::ZERO;
-        riccati.minus.fill(T::ZERO);
-        for place in Places::<T>::ending(qp.dims, end).rev() {
-            let Place { nx, nu, n, ld, next, .. } = place;
-            let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
-            let g = part_mut(riccati.g, 0, ld);
-            g.fill(T::ZERO);
-            assign(g, part(columns, place.v, ld));
-            if let Some(state) = state.filter(|_| place.stage == last) {
-                set(g, state, -T::ONE);
+        self.minus.fill(T::ZERO);
+        for place in Places::<T>::ending(qp.dims, riccati.end).rev() {
+            let Place { nx, n, ld, next, .. } = place;
+            for (g, c) in self.group.chunks_exact_mut(ld.max(1)).zip(parameters.clone()) {
+                g.fill(T::ZERO);
+                match c.checked_sub(self.conditions) {
+                    Some(control) => assign(g, part(self.columns, control * riccati.end.v + place.v, ld)),
+                    None if place.stage == last => {
+                        marked(self.periodic).nth(c).into_iter().for_each(|state| set(g, state, -T::ONE));
+                    }
+                    None => {}
+                }
             }
-            subtract::<T, E>(g, matrix, riccati.minus, n, next);
+            let matrix = Columns { data: part(qp.data, place.data, place.matrix()), ld };
+            let minus = Columns { data: &*self.minus, ld: SIDE };
+            let size = (n, 0..parameters.len(), next);
+            product::<T, E>(self.group, ld, Source::Target, matrix, minus, size, Part::Full);
             // `γ₊ᵀ r`
             let r = part(dynamics, place.dynamics, next);
-            offset = riccati.minus.iter().zip(r).fold(offset, |sum, (&minus, &r)| sum - minus * r);
-            let panel = part(riccati.panels, place.factor, ld * place.pivots);
-            let inverse = part(riccati.inverse, place.v + nx, nu);
-            let (before, here) = self.eliminated.split_at_mut_checked(c * end.v).unwrap_or_default();
-            let y = part_mut(here, place.v + nx, nu);
-            eliminate::<T, E>(g, panel, ld, inverse, y, nx);
-            // Rows of shared controls were passed by: they belong to `S`, whose other half comes
-            // with the other column. What `M` has of both counts once.
-            for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
-                let (other, value) = (self.conditions + w, y.get(j).copied().unwrap_or(T::ZERO));
-                let of_both = columns.get(place.v + nx + j).copied().unwrap_or(T::ZERO);
-                let value = if c < other { value - of_both } else { value };
-                let value = if c == other { value + value - of_both } else { value };
-                add(self.schur, c.min(other) * count + c.max(other), value);
-                set(y, j, T::ZERO);
+            for (minus, &r) in self.minus.as_chunks::<SIDE>().0.iter().zip(r) {
+                let offsets = self.offset.get_mut(parameters.clone()).unwrap_or_default();
+                offsets.iter_mut().zip(minus).for_each(|(offset, &minus)| *offset = *offset - minus * r);
             }
-            for b in 0..c {
-                let other = part(before, b * end.v + place.v + nx, nu);
-                add(self.schur, b * count + c, -signed(y, other, inverse));
+            for (index, c) in parameters.clone().enumerate() {
+                self.eliminate_controls::<E>(&place, riccati, c, index);
+                let g = part(self.group, index * ld, nx);
+                for (minus, &g) in self.minus.as_chunks_mut::<SIDE>().0.iter_mut().zip(g) {
+                    set(minus, index, -g);
+                }
             }
-            add(self.schur, c * count + c, -signed(y, y, inverse));
-            for (minus, &g) in riccati.minus.iter_mut().zip(&*g).take(nx) {
-                *minus = -g;
+            if place.stage == 0 {
+                for (index, c) in parameters.clone().enumerate() {
+                    assign(part_mut(self.gamma, c * nx0, nx0), part(self.group, index * ld, nx0));
+                }
             }
         }
-        assign(part_mut(self.gamma, c * nx0, nx0), riccati.g);
-        set(self.offset, c, offset);
+    }
+
+    /// Eliminates the controls of a stage from the gradient of a parameter, and adds what belongs to
+    /// shared controls to `S`.
+    #[inline(always)]
+    fn eliminate_controls<E: Packed<T>>(
+        &mut self,
+        place: &Place,
+        riccati: &Riccati<'_, T>,
+        c: usize,
+        index: usize,
+    ) {
+        let (Place { nx, nu, ld, .. }, length, count) = (*place, riccati.end.v, self.count);
+        let begin = place.v + nx;
+        let panel = part(riccati.panels, place.factor, ld * place.pivots);
+        let inverse = part(riccati.inverse, begin, nu);
+        let y = part_mut(self.eliminated, c * length + begin, nu);
+        let g = part_mut(self.group, index * ld, ld);
+        eliminate::<T, E>(g, panel, ld, inverse, y, nx);
+        // Rows of shared controls were passed by: they belong to `S`, whose other half comes with
+        // the other column. What `M` has of both counts once.
+        let columns = match c.checked_sub(self.conditions) {
+            Some(control) => part(self.columns, control * length + begin, nu),
+            None => &[],
+        };
+        for (w, j) in marked(self.shared).enumerate().take_while(|(_, j)| *j < nu) {
+            let (other, value) = (self.conditions + w, y.get(j).copied().unwrap_or(T::ZERO));
+            let of_both = columns.get(j).copied().unwrap_or(T::ZERO);
+            let value = if c < other { value - of_both } else { value };
+            let value = if c == other { value + value - of_both } else { value };
+            add(self.schur, c.min(other) * count + c.max(other), value);
+            set(y, j, T::ZERO);
+        }
+    }
+
+    /// Subtracts from `S` what the elimination of all controls leaves.
+    #[inline(always)]
+    fn complement(&mut self, qp: QpView<'_, T>, riccati: &Riccati<'_, T>) {
+        let (length, count) = (riccati.end.v, self.count);
+        for place in Places::<T>::new(qp.dims) {
+            let begin = place.v + place.nx;
+            for (i, &inverse) in part(riccati.inverse, begin, place.nu).iter().enumerate() {
+                let own = part_mut(self.right, 0, count);
+                let elements = self.eliminated.chunks_exact(length.max(1));
+                for (own, y) in own.iter_mut().zip(elements) {
+                    *own = y.get(begin + i).copied().unwrap_or(T::ZERO);
+                }
+                for (b, column) in self.schur.chunks_exact_mut(count.max(1)).enumerate() {
+                    let Some((&factor, _)) = own.get(b..).and_then(<[T]>::split_first) else { break };
+                    let factor = if inverse < T::ZERO { factor } else { -factor };
+                    let (own, column) = (part(own, b, count - b), part_mut(column, b, count - b));
+                    axpy(factor, own, column);
+                }
+            }
+        }
     }
 
     /// `s`, from what the way back has left.

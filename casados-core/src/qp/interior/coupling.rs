@@ -3,7 +3,8 @@
 //! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
-use super::riccati::First;
+use super::border::SIDE;
+use super::riccati::{First, Riccati};
 use super::vector::{add_scaled, shrink};
 use crate::qp::layout::{Place, Places, end, take_mut};
 use crate::qp::{QpView, StageDims, marked};
@@ -49,6 +50,9 @@ pub struct Coupling<'a, T> {
     pub schur: &'a mut [T],
     /// `s`
     pub linear: &'a mut [T],
+    /// Gradients of the parameters at work, and their `−γ₊`, side by side.
+    pub group: &'a mut [T],
+    pub minus: &'a mut [T],
     /// `Σ γ₊ᵀ r`, the part of `s` that residuals of the dynamics have.
     pub offset: &'a mut [T],
     /// `L⁻¹ M_u·` of every parameter, over the variables of all stages.
@@ -68,7 +72,16 @@ impl<'a, T: Real> Coupling<'a, T> {
         let (v, nx) = (end::<T>(dims).v, first_nx(dims));
         let count = conditions + shared;
         let n = nx + count;
-        2 * conditions + 3 * count + shared * v + nx * count + count * count + count * v + nx + n * (n + 2)
+        let group = SIDE * Riccati::<T>::widest(dims);
+        2 * group
+            + 2 * conditions
+            + 3 * count
+            + shared * v
+            + nx * count
+            + count * count
+            + count * v
+            + nx
+            + n * (n + 2)
     }
 
     /// That of a QP.
@@ -105,6 +118,8 @@ impl<'a, T: Real> Coupling<'a, T> {
             gamma: take_mut(memory, nx * count),
             schur: take_mut(memory, count * count),
             linear: take_mut(memory, count),
+            group: take_mut(memory, SIDE * Riccati::<T>::widest(qp.dims)),
+            minus: take_mut(memory, SIDE * Riccati::<T>::widest(qp.dims)),
             offset: take_mut(memory, count),
             eliminated: take_mut(memory, count * v),
             first: take_mut(memory, nx),

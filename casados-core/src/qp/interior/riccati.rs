@@ -94,6 +94,10 @@ const fn max(a: usize, b: usize) -> usize {
 }
 
 impl<'a, T: Real> Riccati<'a, T> {
+    /// The longest column of a stage.
+    pub const fn widest(dims: &[StageDims]) -> usize {
+        Largest::of::<T>(dims).ld
+    }
     /// How many numbers it takes.
     pub const fn memory(dims: &[StageDims]) -> usize {
         let (largest, end) = (Largest::of::<T>(dims), end::<T>(dims));

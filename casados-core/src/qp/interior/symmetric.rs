@@ -4,6 +4,8 @@
 //! Bunch and Kaufman, "Some stable methods for calculating inertia and solving symmetric linear
 //! systems", Math. Comp. 31 (1977).
 
+use crate::linalg::axpy;
+use crate::qp::layout::{part, part_mut};
 use crate::scalar::Real;
 
 /// `(1 + √17) / 8`
@@ -150,12 +152,14 @@ impl<T: Real> Elimination<'_, T> {
         }
         let pivot = self.get(k, k);
         self.inertia.negative += usize::from(pivot < T::ZERO);
-        for j in k + 1..self.n {
-            let factor = self.get(j, k) / pivot;
-            for i in j..self.n {
-                let value = self.get(i, j) - factor * self.get(i, k);
-                self.set(i, j, value);
-            }
+        let n = self.n;
+        let (before, rest) = self.a.split_at_mut_checked((k + 1) * n).unwrap_or_default();
+        let own = part(before, k * n, n);
+        for (j, column) in rest.chunks_exact_mut(n.max(1)).enumerate().map(|(j, column)| (k + 1 + j, column))
+        {
+            let (own, column) = (part(own, j, n - j), part_mut(column, j, n - j));
+            let Some(&first) = own.first() else { break };
+            axpy(-(first / pivot), own, column);
         }
         for i in k + 1..self.n {
             let value = self.get(i, k) / pivot;
@@ -170,12 +174,13 @@ impl<T: Real> Elimination<'_, T> {
         super::set(self.exchanged, k + 1, -T::from_whole(row + 1));
         // Its determinant is negative: one eigenvalue of each sign.
         self.inertia.negative += 1;
-        for j in k + 2..self.n {
-            let [first, second] = of_pair(self.a, self.n, k, [self.get(j, k), self.get(j, k + 1)]);
-            for i in j..self.n {
-                let value = self.get(i, j) - first * self.get(i, k) - second * self.get(i, k + 1);
-                self.set(i, j, value);
-            }
+        let n = self.n;
+        for j in k + 2..n {
+            let [first, second] = of_pair(self.a, n, k, [self.get(j, k), self.get(j, k + 1)]);
+            let (before, rest) = self.a.split_at_mut_checked(j * n).unwrap_or_default();
+            let column = part_mut(rest, j, n - j);
+            axpy(-first, part(before, k * n + j, n - j), column);
+            axpy(-second, part(before, (k + 1) * n + j, n - j), column);
         }
         for i in k + 2..self.n {
             let [first, second] = of_pair(self.a, self.n, k, [self.get(i, k), self.get(i, k + 1)]);
