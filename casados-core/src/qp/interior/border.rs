@@ -13,7 +13,6 @@
 //! where pivots of controls and of the border together have as many negative signs as there are
 //! conditions.
 
-use super::cholesky::eliminate;
 use super::coupling::Coupling;
 use super::kernels::{Columns, Part, Source, product};
 use super::riccati::{Equations, Riccati};
@@ -146,9 +145,14 @@ impl<T: Real> Coupling<'_, T> {
                 offsets.iter_mut().zip(minus).for_each(|(offset, &minus)| *offset = *offset - minus * r);
             }
             for (index, c) in parameters.clone().enumerate() {
-                self.eliminate_controls::<E>(&place, riccati, c, index);
-                let g = part(self.group, index * ld, nx);
-                for (minus, &g) in self.minus.as_chunks_mut::<SIDE>().0.iter_mut().zip(g) {
+                self.eliminate_controls(&place, riccati, c, index);
+            }
+            let panel = Columns { data: part(riccati.panels, place.factor, ld * place.nu), ld };
+            let signed = Columns { data: &*self.minus, ld: SIDE };
+            let size = (nx, 0..parameters.len(), place.nu);
+            product::<T, E>(self.group, ld, Source::Target, panel, signed, size, Part::Full);
+            for (index, g) in self.group.chunks_exact(ld.max(1)).take(parameters.len()).enumerate() {
+                for (minus, &g) in self.minus.as_chunks_mut::<SIDE>().0.iter_mut().zip(part(g, 0, nx)) {
                     set(minus, index, -g);
                 }
             }
@@ -160,23 +164,24 @@ impl<T: Real> Coupling<'_, T> {
         }
     }
 
-    /// Eliminates the controls of a stage from the gradient of a parameter, and adds what belongs to
-    /// shared controls to `S`.
+    /// `y = L⁻¹ g_u` of a parameter and a stage, which is left with the signs of pivots where `−γ₊`
+    /// was, and adds what belongs to shared controls to `S`.
     #[inline(always)]
-    fn eliminate_controls<E: Packed<T>>(
-        &mut self,
-        place: &Place,
-        riccati: &Riccati<'_, T>,
-        c: usize,
-        index: usize,
-    ) {
+    fn eliminate_controls(&mut self, place: &Place, riccati: &Riccati<'_, T>, c: usize, index: usize) {
         let (Place { nx, nu, ld, .. }, length, count) = (*place, riccati.end.v, self.count);
         let begin = place.v + nx;
-        let panel = part(riccati.panels, place.factor, ld * place.pivots);
-        let inverse = part(riccati.inverse, begin, nu);
+        let panel = part(riccati.panels, place.factor, ld * nu);
+        let g = part(self.group, index * ld + nx, nu);
         let y = part_mut(self.eliminated, c * length + begin, nu);
-        let g = part_mut(self.group, index * ld, ld);
-        eliminate::<T, E>(g, panel, ld, inverse, y, nx);
+        assign(y, g);
+        for (i, &inverse) in part(riccati.inverse, begin, nu).iter().enumerate() {
+            let (own, below) = y.split_at_mut_checked(i + 1).unwrap_or_default();
+            let Some(own) = own.last_mut() else { break };
+            let signed = *own * inverse;
+            *own = if inverse < T::ZERO { -signed } else { signed };
+            axpy(-signed, part(panel, i * ld + nx + i + 1, below.len()), below);
+            set(self.minus, i * SIDE + index, signed);
+        }
         // Rows of shared controls were passed by: they belong to `S`, whose other half comes with
         // the other column. What `M` has of both counts once.
         let columns = match c.checked_sub(self.conditions) {
