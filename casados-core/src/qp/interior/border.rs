@@ -109,8 +109,8 @@ fn add<T: Real>(slice: &mut [T], index: usize, value: T) {
 }
 
 impl<T: Real> Coupling<'_, T> {
-    /// The right-hand sides of some parameters on their way back, side by side: their columns of `Γ`
-    /// and `S`, and what residuals of the dynamics add to `s`.
+    /// The right-hand sides of some parameters on their way back, side by side: their columns of
+    /// `Γ`, and what residuals of the dynamics add to `s`.
     #[inline(always)]
     fn eliminate<E: Packed<T>>(
         &mut self,
