@@ -32,33 +32,40 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     pub(crate) fn linearise_watched<C: Curvature<P::Dynamics, T>>(
         &mut self,
         curvature: C,
-        mut watch: impl FnMut(usize, &Step<'_, T>),
+        watch: impl FnMut(usize, &Step<'_, T>),
     ) -> Result<(), OcpError> {
         self.check()?;
         if C::EXACT {
             self.weigh()?;
         }
+        let intervals = self.linearise_intervals(curvature, watch)?;
+        let costs = self.linearise_functions::<C>(&intervals)?;
+        self.complete_gradients(curvature, &intervals);
+        let data = split::<P, T>(self.data.as_mut(), self.qp.dims().len().saturating_sub(1));
+        arrival::add(data.arrival, &mut self.qp);
+        self.objective = intervals.objective + costs + arrival::cost(data.arrival, &self.iterate);
+        self.stages = intervals.stages;
+        Ok(())
+    }
+
+    /// Dynamics and integral costs, all intervals in one call.
+    fn linearise_intervals<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        curvature: C,
+        mut watch: impl FnMut(usize, &Step<'_, T>),
+    ) -> Result<Intervals<T>, OcpError> {
         let intervals = self.intervals();
-        let nx = P::Shape::NX;
-        let n = inputs::<P::Shape>();
-        let ld = pad::<T>(n);
+        let (nx, n) = (P::Shape::NX, inputs::<P::Shape>());
         let Self { problem, qp, iterate, data, along, .. } = self;
         let data = split::<P, T>(data.as_mut(), intervals);
-        let Problem { dynamics, stage_cost, terminal_cost, path, terminal, running } = problem.parts();
         let (v, multipliers) = iterate.vectors();
-
-        // Dynamics, all intervals in one call.
-        let mut objective = T::ZERO;
-        // Whether Hessians are those of costs at nodes alone.
-        let mut plain = !C::EXACT;
+        let mut result =
+            Intervals { objective: T::ZERO, plain: !C::EXACT, adding: false, stages: [T::ZERO; 2] };
         let mut stages = qp.stages_mut();
         let weights = if C::EXACT { &*data.weights } else { &[] };
         let nodes = nodes::<P::Shape, T>(v, multipliers, weights, data.p, data.times);
         let nodes = Nodes { along: *along, ..nodes };
-        let mut of_stages = [T::ZERO; 2];
-        // Whether intervals add to costs: all of them do, or none. Then these are cleared where
-        // those at nodes are added.
-        let mut adding = false;
+        let Problem { dynamics, .. } = problem.parts();
         curvature.run(dynamics, &nodes, &mut |k, step: &Step<'_, T>| {
             let Some(mut stage) = stages.next() else { return };
             let Arrays { ld, matrix, hessian, gradient, offset, .. } = stage.arrays();
@@ -72,15 +79,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
             watch(k, step);
             if P::Dynamics::LIFTED {
-                of_stages = add_stages(of_stages, step.stages);
+                result.stages = add_stages(result.stages, step.stages);
             }
             let IntegralTerms { value, x, u, hessian: blocks, .. } = step.cost;
-            objective = objective + value;
-            plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
-            if plain && x.is_empty() && u.is_empty() {
+            result.objective = result.objective + value;
+            result.plain &= blocks.iter().chain(&step.hessian).all(|block| block.is_empty());
+            if result.plain && x.is_empty() && u.is_empty() {
                 return;
             }
-            adding = true;
+            result.adding = true;
             hessian.fill(T::ZERO);
             gradient.fill(T::ZERO);
             let mut terms = Terms { gradient, hessian, ld };
@@ -94,17 +101,24 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 correct_kept(gradient, matrix, ld, of_interval);
             }
         })?;
-        drop(stages);
+        Ok(result)
+    }
 
-        // Costs and constraints, stage by stage.
-        let is_direct = |k: usize, z: &[T]| {
-            let convex = if k < intervals { P::StageCost::CONVEX } else { P::TerminalCost::CONVEX };
-            plain && convex && z.is_empty()
-        };
+    /// Costs and constraints at nodes, stage by stage; the costs.
+    fn linearise_functions<C: Curvature<P::Dynamics, T>>(
+        &mut self,
+        of: &Intervals<T>,
+    ) -> Result<T, OcpError> {
+        let intervals = self.intervals();
+        let Self { problem, qp, iterate, data, .. } = self;
+        let data = split::<P, T>(data.as_mut(), intervals);
+        let Problem { stage_cost, terminal_cost, path, terminal, running, .. } = problem.parts();
+        let (v, _) = iterate.vectors();
+        let mut objective = T::ZERO;
         let mut point = <P::Shape as Shape>::ArrayV::<T>::zeroed();
         for (k, (mut stage, at)) in qp.stages_mut().zip(iterate.stages()).enumerate() {
             let Arrays { n, ld, next, rows, matrix, hessian, gradient, limits, .. } = stage.arrays();
-            if !adding || k == intervals {
+            if !of.adding || k == intervals {
                 hessian.fill(T::ZERO);
                 gradient.fill(T::ZERO);
             }
@@ -114,7 +128,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let mut direct = Terms { gradient, hessian, ld };
             let columns = matrix.get_mut(next * ld..).unwrap_or_default();
             let here = part(v, k * ld_of::<P::Shape, T>(), n);
-            let from = if is_direct(k, z) { here } else { &[] };
+            let from = if of.is_direct::<P>(k == intervals, z) { here } else { &[] };
             // Where there are algebraic states, over them too.
             let is_extended = !z.is_empty();
             let mut room = Extended::new::<P::Shape>(if is_extended { &mut *data.extended } else { &mut [] });
@@ -127,46 +141,47 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             // Values lie where the lower bounds are written afterwards.
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
             let values = lower.get_mut(ld..).unwrap_or_default();
-            let first = k * P::Path::ROWS;
             let count = if k < intervals { P::Path::ROWS } else { P::Terminal::ROWS };
             let values = part_mut(values, 0, count);
             let place = At { stage: k, factor: node.factor, exact: C::EXACT, from };
+            // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
+            let mu = part_mut(rest, ld, if C::EXACT { count } else { 0 });
+            for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
+                *mu = upper - lower;
+            }
             if k < intervals {
                 objective = objective + stage_cost.add(&point, node.reference, place, terms)?;
                 path.linearise(&point, values, slopes, ld_slopes, k)?;
+                if !mu.is_empty() {
+                    path.curve(&point, mu, terms);
+                }
             } else {
                 objective = objective + terminal_cost.add(&point, node.reference, place, terms)?;
                 terminal.linearise(&point, values, slopes, ld_slopes, k)?;
-            }
-            if C::EXACT && count > 0 {
-                // `μ = λ_upper − λ_lower`, where the upper bounds are written afterwards.
-                let mu = part_mut(rest, ld, count);
-                for ((mu, &upper), &lower) in mu.iter_mut().zip(at.g_upper).zip(at.g_lower) {
-                    *mu = upper - lower;
-                }
-                if k < intervals {
-                    path.curve(&point, mu, terms);
-                } else {
+                if !mu.is_empty() {
                     terminal.curve(&point, mu, terms);
                 }
             }
             if is_extended {
                 room.fold::<P::Shape>(dz, &mut direct, part_mut(columns, 0, count * ld), ld);
             }
-            // Bounds of what is linear: `lg − g + [C D] v`.
-            let upper = part_mut(rest, ld, count);
-            for (row, (value, upper)) in values.iter_mut().zip(upper).enumerate() {
-                let column = part(columns, row * ld, n);
-                let shift = dot(column, here) - *value;
-                *value = data.lower.get(first + row).copied().unwrap_or(T::ZERO) + shift;
-                *upper = data.upper.get(first + row).copied().unwrap_or(T::ZERO) + shift;
-            }
+            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, k * P::Path::ROWS, count));
+            shift_limits(columns, [n, ld], here, [values, part_mut(rest, ld, count)], given);
         }
+        Ok(objective)
+    }
 
-        // Gradients of what is quadratic: `∇f − H v`, of the other stages.
+    /// Gradients of what is quadratic, `∇f − H v`, and convex Hessians, of the stages that are not
+    /// complete.
+    fn complete_gradients<C: Curvature<P::Dynamics, T>>(&mut self, curvature: C, of: &Intervals<T>) {
+        let intervals = self.intervals();
+        let Self { qp, iterate, data, .. } = self;
+        let data = split::<P, T>(data.as_mut(), intervals);
+        let (v, _) = iterate.vectors();
+        let ld = ld_of::<P::Shape, T>();
         for (k, mut stage) in qp.stages_mut().enumerate() {
             let (z, _) = algebraic::at::<P::Shape, T>(data.algebraic, k);
-            if is_direct(k, z) {
+            if of.is_direct::<P>(k == intervals, z) {
                 continue;
             }
             let Arrays { n, ld: stage_ld, hessian, gradient, .. } = stage.arrays();
@@ -182,10 +197,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
                 *gradient = *gradient - product;
             }
         }
-        arrival::add(data.arrival, qp);
-        self.objective = objective + arrival::cost(data.arrival, iterate);
-        self.stages = of_stages;
-        Ok(())
     }
 
     /// Adds `½ δ ‖v − v̄‖²` to the objective of the QP at the iterate `v̄`.
@@ -286,13 +297,10 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let first = k * path;
             let count = if k < intervals { path } else { P::Terminal::ROWS };
             let (lower, rest) = limits.split_at_mut_checked(rows).unwrap_or_default();
-            let sides = part_mut(lower, ld, count).iter_mut().zip(part_mut(rest, ld, count));
-            for (row, (lower, upper)) in sides.enumerate() {
-                let value = values.get(first + row).copied().unwrap_or(T::ZERO);
-                let shift = dot(part(columns, row * ld, n), here) - value;
-                *lower = data.lower.get(first + row).copied().unwrap_or(T::ZERO) + shift;
-                *upper = data.upper.get(first + row).copied().unwrap_or(T::ZERO) + shift;
-            }
+            let (lower, upper) = (part_mut(lower, ld, count), part_mut(rest, ld, count));
+            assign(lower, part(values, first, count));
+            let given = [&*data.lower, &*data.upper].map(|limits| part(limits, first, count));
+            shift_limits(columns, [n, ld], here, [lower, upper], given);
         }
     }
 
@@ -303,6 +311,42 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let references = intervals * P::StageCost::REFERENCES + P::TerminalCost::REFERENCES;
         let begin = (intervals + 1) * (1 + P::Shape::NP) + references + stage * P::Path::ROWS + row;
         [begin, begin + rows].map(|i| self.data.as_ref().get(i).copied().unwrap_or(T::ZERO))
+    }
+}
+
+/// What intervals have left.
+struct Intervals<T> {
+    /// Their costs.
+    objective: T,
+    /// Whether Hessians are those of costs at nodes alone.
+    plain: bool,
+    /// Whether they add to costs: all of them do, or none. Then these are cleared where those at
+    /// nodes are added.
+    adding: bool,
+    /// What is left of the equations of lifted stages.
+    stages: [T; 2],
+}
+
+impl<T: Real> Intervals<T> {
+    /// Whether costs at a node write the gradient of the QP themselves.
+    fn is_direct<P: Formulation<T>>(&self, is_last: bool, z: &[T]) -> bool {
+        let convex = if is_last { P::TerminalCost::CONVEX } else { P::StageCost::CONVEX };
+        self.plain && convex && z.is_empty()
+    }
+}
+
+/// Bounds of what is linear, `lg − g + [C D] v`, where the values `g` are.
+fn shift_limits<T: Real>(
+    columns: &[T],
+    [n, ld]: [usize; 2],
+    v: &[T],
+    [lower, upper]: [&mut [T]; 2],
+    [given_lower, given_upper]: [&[T]; 2],
+) {
+    let sides = lower.iter_mut().zip(upper).zip(given_lower.iter().zip(given_upper));
+    for (((lower, upper), (&low, &high)), column) in sides.zip(columns.chunks(ld.max(1))) {
+        let shift = dot(part(column, 0, n), v) - *lower;
+        (*lower, *upper) = (low + shift, high + shift);
     }
 }
 

@@ -55,6 +55,13 @@ pub(super) fn compare<M: Dae>(
             .map(|row| (row, Entry { value: there[row], expected: here[row], tolerance: 0.0 }));
         report.compare("autonomous", "another time", number, 0.0, found, |row| format!("equation {row}"));
     }
+    patterns::<M>(report, number);
+}
+
+/// Compares what is declared with the declared patterns.
+fn patterns<M: Dae>(report: &mut Report, number: usize) {
+    let structure = &M::STRUCTURE;
+    let (nx, nz, time) = (M::Shape::NX, M::Shape::NZ, M::Shape::NV - 1);
     let mut sorted: Vec<usize> = (structure.blocks[1]..structure.blocks[5]).collect();
     sorted.sort_by_key(|&e| structure.jacobian.at(e).1);
     let found = sorted.iter().enumerate().map(|(i, &e)| {

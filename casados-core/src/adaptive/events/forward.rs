@@ -57,11 +57,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
                     integrand.prolong(sign, &time, at)
                 })?;
             }
-            let mut gradient =
-                TimeGradient::<M, T> { x0: Zeroable::zeroed(), u: Zeroable::zeroed(), p: Zeroable::zeroed() };
-            gradient.x0.as_mut_slice().copy_from_slice(&time.as_ref()[..nx]);
-            gradient.u.as_mut_slice().copy_from_slice(&time.as_ref()[nx..nx + nu]);
-            gradient.p.as_mut_slice().copy_from_slice(&time.as_ref()[nx + nu..]);
+            let gradient = time_gradient(time.as_ref());
             times.try_reserve(1).map_err(|_| Error::OutOfMemory { bytes: size_of_val(&gradient) })?;
             times.push(gradient);
             let moment = (event, moment);
@@ -88,6 +84,17 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         fill(&mut result.dx_dp, |r, c| v[r * nw + nx + nu + c]);
         Ok((result, moments))
     }
+}
+
+/// The parts of a row over `(x₀, u, p)`.
+fn time_gradient<M: Dae, T: Real>(row: &[T]) -> TimeGradient<M, T> {
+    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
+    let mut gradient =
+        TimeGradient::<M, T> { x0: Zeroable::zeroed(), u: Zeroable::zeroed(), p: Zeroable::zeroed() };
+    gradient.x0.as_mut_slice().copy_from_slice(&row[..nx]);
+    gradient.u.as_mut_slice().copy_from_slice(&row[nx..nx + nu]);
+    gradient.p.as_mut_slice().copy_from_slice(&row[nx + nu..]);
+    gradient
 }
 
 /// `V⁺ = ∂x⁺/∂x V + ∂x⁺/∂w` over a segment.

@@ -114,9 +114,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if self.nearest(ocp, state, row, before).is_err() {
                 return Ok(Err(error));
             }
-            (state.nearest, row.regularisation) = (true, 0.0);
-            self.linearise(ocp)?;
-            return Ok(Ok(Direction::Step));
+            return self.go_near(ocp, state, row).map(Ok);
         }
         let Some(worst) = worst.filter(|worst| worst.violation > self.options.tolerance) else {
             return Ok(Ok(Direction::Step));
@@ -148,9 +146,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             if self.violation_of_solution(ocp) >= STAYS * before {
                 return Ok(Ok(Direction::Infeasible(worst)));
             }
-            (state.nearest, row.regularisation) = (true, 0.0);
-            self.linearise(ocp)?;
-            return Ok(Ok(Direction::Step));
+            return self.go_near(ocp, state, row).map(Ok);
         }
         // Gaps are to be closed first, whatever that leaves of bounds.
         if stays && gaps <= bounds {
@@ -160,6 +156,21 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.set_elastic(ocp, state, self.options.elastic_penalty);
         core::mem::swap(&mut self.solution, &mut self.trial);
         Ok(Ok(Direction::Step))
+    }
+
+    /// The step to the nearest point.
+    fn go_near<P: Formulation<T>>(
+        &mut self,
+        ocp: &mut Ocp<P, T, D, M>,
+        state: &mut State<T>,
+        row: &mut Iteration,
+    ) -> Result<Direction, OcpError>
+    where
+        C: Curvature<P::Dynamics, T>,
+    {
+        (state.nearest, row.regularisation) = (true, 0.0);
+        self.linearise(ocp)?;
+        Ok(Direction::Step)
     }
 
     /// The point that violates the linearisation least, near the iterate:

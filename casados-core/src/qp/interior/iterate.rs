@@ -182,11 +182,10 @@ impl<'a, T: Real> Iterate<'a, T> {
         objective
     }
 
-    /// The multipliers `π`, the gradient in `u`, and the objective.
+    /// Forces of the constraints, by rows.
     #[inline(always)]
-    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates) -> T {
+    fn write_forces(&mut self, controlled: bool) {
         let sides = &mut self.sides;
-        // Forces of the constraints, by rows.
         let forces = &mut *self.gradient;
         forces.fill(T::ZERO);
         let (lower, upper) = sides.rows.split_at_checked(sides.counts.lower).unwrap_or_default();
@@ -194,7 +193,6 @@ impl<'a, T: Real> Iterate<'a, T> {
         scatter(forces, lower, of_lower, |force, &multiplier| force - multiplier);
         scatter(forces, upper, of_upper, |force, &multiplier| force + multiplier);
         scatter(forces, sides.equations, sides.free, |force, &multiplier| force - multiplier);
-        let controlled = matches!(costates, Costates::Controlled);
         if controlled {
             // What keeps variables near where they are belongs to the step, not to the problem.
             for place in Places::<T>::new(self.qp.dims) {
@@ -207,9 +205,16 @@ impl<'a, T: Real> Iterate<'a, T> {
         if let Some(coupling) = &self.coupling {
             coupling.push(self.qp, controlled, forces);
         }
+    }
+
+    /// The multipliers `π`, the gradient in `u`, and the objective.
+    #[inline(always)]
+    fn gradient<E: Packed<T>>(&mut self, multipliers: &mut [T], costates: Costates) -> T {
+        let controlled = matches!(costates, Costates::Controlled);
+        self.write_forces(controlled);
         let mut objective = T::ZERO;
         let mut largest = T::ZERO;
-        largest = larger::<T, E>(largest, forces);
+        largest = larger::<T, E>(largest, self.gradient);
         for place in Places::<T>::ending(self.qp.dims, self.riccati.end).rev() {
             let Place { nx, n, ng, ld, next, .. } = place;
             let data = part(self.qp.data, place.data, place.data_len());

@@ -228,24 +228,7 @@ impl<T: Real> Iterate<'_, T> {
             self.newton::<E>(true)?;
             statistics.factorisations += 1;
             statistics.regularised += self.riccati.regularised;
-            let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
-            let distance = self.mu.max(least);
-            let keep = if distance < boundary { distance } else { boundary };
-            let mut alpha = self.sides.longest::<E>(keep);
-            if !refine && self.mu > T::ZERO {
-                let after = self.sides.mu_after::<E>(alpha, self.mu);
-                let ratio = after / self.mu;
-                self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
-                self.newton::<E>(false)?;
-                alpha = self.sides.longest::<E>(keep);
-                if alpha < T::from_f64(SHORT) || idle > CYCLE {
-                    // Products are too different for the corrector to be right: first they are made
-                    // equal.
-                    self.sides.aim(self.mu * T::from_f64(SHORT));
-                    self.newton::<E>(false)?;
-                    alpha = self.sides.longest::<E>(keep);
-                }
-            }
+            let alpha = self.correct::<E>(refine, floor, idle > CYCLE)?;
             statistics.iterations += 1;
             short = if alpha < T::from_f64(1e-3) { short + 1 } else { 0 };
             if !(alpha > T::ZERO && largest_size::<T, E>(self.step).is_finite()) || short > 4 {
@@ -254,8 +237,48 @@ impl<T: Real> Iterate<'_, T> {
             self.advance::<E>(alpha);
             refine = false;
         };
-        // The multipliers of the dynamics, and what is said of it, belong to the point that is
-        // left, which may be better than what was known of it.
+        self.judge_end::<E>(statistics, limits, [out_of_time, stalled], solution)
+    }
+
+    /// Corrects the step for what products change by, and by how much of it slacks and multipliers
+    /// stay positive.
+    ///
+    /// # Errors
+    /// [`QpError::NotConvex`]
+    #[inline(always)]
+    fn correct<E: Packed<T>>(&mut self, refine: bool, floor: T, is_cycling: bool) -> Result<T, QpError> {
+        let (least, boundary) = (T::from_f64(T::EPSILON).sqrt(), T::from_f64(BOUNDARY));
+        let distance = self.mu.max(least);
+        let keep = if distance < boundary { distance } else { boundary };
+        let mut alpha = self.sides.longest::<E>(keep);
+        let has_products = self.mu > T::ZERO;
+        if refine || !has_products {
+            return Ok(alpha);
+        }
+        let after = self.sides.mu_after::<E>(alpha, self.mu);
+        let ratio = after / self.mu;
+        self.sides.correct((self.mu * ratio * ratio * ratio).max(floor));
+        self.newton::<E>(false)?;
+        alpha = self.sides.longest::<E>(keep);
+        if alpha < T::from_f64(SHORT) || is_cycling {
+            // Products are too different for the corrector to be right: first they are made equal.
+            self.sides.aim(self.mu * T::from_f64(SHORT));
+            self.newton::<E>(false)?;
+            alpha = self.sides.longest::<E>(keep);
+        }
+        Ok(alpha)
+    }
+
+    /// What is said of the point that is left, which may be better than what was known of it: so
+    /// are the multipliers of the dynamics.
+    #[inline(always)]
+    fn judge_end<E: Packed<T>>(
+        &mut self,
+        mut statistics: Statistics,
+        limits: &Limits<T>,
+        [out_of_time, stalled]: [bool; 2],
+        solution: &mut SolutionView<'_, T>,
+    ) -> Result<Statistics, QpError> {
         let objective = self.evaluate::<E>(solution.dynamics);
         let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
         let residuals = judged.into();
