@@ -302,6 +302,9 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
         // What the method misses is how far the derivative of its polynomial, extrapolated to the
         // start of the step, is from the solution there.
         let error = self.estimate(start, at_end, residuals)?;
+        if at_end && error < 1.0 {
+            return self.larger_at_start(start, error, residuals);
+        }
         if at_end || !(again && error >= 1.0) {
             return Ok(error);
         }

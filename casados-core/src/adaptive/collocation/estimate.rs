@@ -50,6 +50,35 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         )
     }
 
+    /// The larger one of an estimate at the end of a step and the same at its start: of what ends
+    /// between the start and the first stage, as a force that jumps there, neither the stages nor
+    /// the end know. What the polynomial has for `ẋ` at the start tells at no cost where that is
+    /// nothing new: no filter makes more of what is neither stiff nor turns.
+    pub(super) fn larger_at_start(
+        &mut self,
+        start: &Start<'_, M, T>,
+        error: f64,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure> {
+        let (nx, mut changes) = (M::Shape::NX, ArrayK::<M, T>::zeroed());
+        self.memory.point = *start.point;
+        let Memory { point, y, .. } = &mut *self.memory;
+        for (index, (y, change)) in y.as_ref().iter().zip(changes.as_mut()).enumerate() {
+            let slope = dot(&self.lagrange, y.as_flattened().first_chunk().unwrap_or(&[T::ZERO; S]));
+            let old = &mut point[if index < nx { index } else { index + nx }];
+            *change = slope - *old;
+            *old = slope;
+        }
+        let unfiltered = self.basis.values().scaled(start.h).get(0).0.to_f64().abs()
+            * norm(&changes.as_ref()[..nx], start.scale.as_ref());
+        if unfiltered <= 2.0 * error.max(UNDOUBTED) {
+            return Ok(error);
+        }
+        self.defect(start.h, residuals)?;
+        let first = norm(&self.memory.error.as_ref()[..nx], start.scale.as_ref());
+        Ok(self.second(first, start).max(error))
+    }
+
     /// The residual at the point that is there.
     fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
         let Memory { point, f_point, .. } = &mut *self.memory;
