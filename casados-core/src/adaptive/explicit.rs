@@ -166,7 +166,8 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
         }
         run.check_step(t, h, refusal)?;
         tried += 1;
-        let error = attempt::<M, B, T, S>(step, run, &x, t, h);
+        let steps = ((span.end - span.start) / h).to_f64();
+        let error = attempt::<M, B, T, S>(step, run, &x, t, h, steps);
         if !error.is_finite() {
             run.statistics.failed += 1;
             refusal = Refusal::NotFinite;
@@ -214,18 +215,19 @@ fn walk<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     }
 }
 
-/// Takes a step from `x`: its error relative to what is tolerated, of derivatives too if they take
-/// part; NaN if there is none.
+/// Takes a step from `x`, where the interval has so many: its error relative to what is tolerated,
+/// of derivatives too if they take part; NaN if there is none.
 fn attempt<M: Ode, B: Pair<S>, T: Real, const S: usize>(
     step: &mut dyn Take<M, T>,
     run: &mut Run<'_, M, T>,
     x: &VectorX<M, T>,
     t: T,
     h: T,
+    steps: f64,
 ) -> f64 {
     let error = step.take(t, h).and_then(|()| {
         let (rtol, atol) = (run.base.rtol.as_ref(), run.base.atol.as_ref());
-        step.error(t, h, rtol, atol)
+        step.error(t, h, steps, rtol, atol)
     });
     let error = error.unwrap_or(f64::NAN);
     match &mut run.sensitivities {

@@ -47,12 +47,12 @@ pub trait Take<M: Dae, T: Real> {
     /// # Errors
     /// A value that is not finite.
     fn arrive(&mut self, t: T, h: T) -> Result<(), Error>;
-    /// The estimated error relative to what is tolerated; the derivative at the end is there if
-    /// that is at most one.
+    /// The estimated error relative to what is tolerated, where the interval has so many steps; the
+    /// derivative at the end is there if that is at most one.
     ///
     /// # Errors
     /// A value that is not finite.
-    fn error(&mut self, t: T, h: T, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error>;
     /// The state at the end.
     fn end(&self) -> &[T];
     /// The end is the next start.
@@ -98,10 +98,15 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
 }
 
 impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
-    /// How often an error counts: once where the Jacobian takes it back, as where it is damped,
-    /// and [`Pair::PERSISTENCE`] times where it turns it or lets it grow. The last stage `Y` is at
-    /// the end, as the step is; of the difference `d` of the two and `J d` the cosine is asked.
-    fn persistence(&mut self) -> f64 {
+    /// How often an error counts in an interval of so many steps: once where the Jacobian takes it
+    /// back, as where it is damped, and by [`Pair::PERSISTENCE`] where it turns it or lets it grow.
+    /// The last stage `Y` is at the end, as the step is; of the difference `d` of the two and `J d`
+    /// the cosine is asked.
+    fn persistence(&mut self, steps: f64) -> f64 {
+        let count = B::PERSISTENCE.count(steps);
+        if count <= 1.0 {
+            return 1.0;
+        }
         let Memory { record, end_slope, difference, scale, .. } = &mut *self.memory;
         let Some(last) = record.k.last() else { return 1.0 };
         difference.as_mut().fill(T::ZERO);
@@ -116,11 +121,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Stepper<M, B, T, S> {
         }
         let (along, lengths) = (along.to_f64(), distances.to_f64() * changes.to_f64());
         let damped = if along < 0.0 && lengths > 0.0 { along * along / lengths } else { 0.0 };
-        if damped.is_nan() {
-            B::PERSISTENCE
-        } else {
-            B::PERSISTENCE + (1.0 - B::PERSISTENCE) * damped.min(1.0)
-        }
+        if damped.is_nan() { count } else { count + (1.0 - count) * damped.min(1.0) }
     }
 }
 
@@ -167,7 +168,7 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         Self::evaluate(&self.scheme, point, end.as_ref(), t + h, end_slope)
     }
 
-    fn error(&mut self, t: T, h: T, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
+    fn error(&mut self, t: T, h: T, steps: f64, rtol: &[T], atol: &[T]) -> Result<f64, Error> {
         let (stages, last) = B::DIFFERENCE;
         if last != 0.0 {
             self.arrive(t, h)?;
@@ -191,11 +192,13 @@ impl<M: Ode, B: Pair<S>, T: Real, const S: usize> Take<M, T> for Stepper<M, B, T
         let coarse = B::COARSE.as_ref().map(difference_of);
         let error = B::combined(fine, coarse);
         // Written so that NaN stays.
-        if last != 0.0 || error > 1.0 {
+        if error > 1.0 {
             return Ok(error);
         }
-        self.arrive(t, h)?;
-        Ok(if B::PERSISTENCE > 1.0 { error * self.persistence() } else { error })
+        if last == 0.0 {
+            self.arrive(t, h)?;
+        }
+        Ok(error * self.persistence(steps))
     }
 
     fn end(&self) -> &[T] {

@@ -16,9 +16,8 @@ pub trait Pair<const S: usize>: Method<S> {
     /// The difference to a third one of low order: the estimate is then that of higher order, as
     /// far as the two agree.
     const COARSE: Option<[f64; S]>;
-    /// How often the error counts of what is not damped: it stays, and adds up with those of
-    /// other steps. One where nobody asks whether it is damped.
-    const PERSISTENCE: f64;
+    /// How often the error counts of what is not damped.
+    const PERSISTENCE: Persistence;
     /// `b` less the coefficients of the last stage, which is at the end of the step.
     const LAST: [f64; S] = {
         let mut last = *Self::TABLEAU.b();
@@ -46,6 +45,23 @@ pub trait Pair<const S: usize>: Method<S> {
     }
 }
 
+/// How often the error of a step counts that nothing damps: it is there at the end, together with
+/// those of all other steps.
+#[derive(Clone, Copy, Debug)]
+pub struct Persistence {
+    /// Once for so many steps of this length as the interval has,
+    pub steps: f64,
+    /// but no more often than this.
+    pub most: f64,
+}
+
+impl Persistence {
+    /// In an interval of so many steps; once at least.
+    pub fn count(&self, steps: f64) -> f64 {
+        (steps / self.steps).min(self.most).max(1.0)
+    }
+}
+
 /// A stage for dense output.
 pub struct More<const S: usize> {
     /// `c`
@@ -64,7 +80,7 @@ impl Pair<6> for DormandPrince5 {
         -1.0 / 40.0,
     );
     const COARSE: Option<[f64; 6]> = None;
-    const PERSISTENCE: f64 = 1.0;
+    const PERSISTENCE: Persistence = Persistence { steps: 180.0, most: 16.0 };
     const CONTROL: Control =
         Control { order: 5.0, memory: 0.04, before: 1e-4, safety: 0.9, predicts: false, range: (0.2, 10.0) };
     const MORE: &'static [More<6>] = &[];
@@ -107,7 +123,7 @@ impl Pair<12> for DormandPrince8 {
         coarse[11] -= 0.022058823529411766;
         Some(coarse)
     };
-    const PERSISTENCE: f64 = 6.0;
+    const PERSISTENCE: Persistence = Persistence { steps: 10.0, most: 40.0 };
     // Where a step is as long as the one before, its error is `0.965^(1/0.0375) = 0.39`.
     const CONTROL: Control = Control {
         order: 8.0,
