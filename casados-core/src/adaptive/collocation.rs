@@ -10,7 +10,7 @@
 mod estimate;
 mod points;
 
-use super::defect_filter::DefectFilter;
+use super::defect_filter::{DefectFilter, LENIENT};
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
 use super::stages::{

@@ -4,6 +4,7 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
+use super::defect_filter::LENIENT;
 use crate::scalar::Scalar;
 
 /// What the controller may do, of one method.
@@ -47,6 +48,39 @@ impl Predictive {
     /// Forgets the last step: the next one is of another method.
     pub fn forget(&mut self) {
         self.last = None;
+    }
+}
+
+/// Where steps are refused by much again and again the solution is not smooth: methods have no
+/// higher order than their estimates there.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Refusals {
+    /// Those by much count twice, and accepted steps take one away.
+    count: usize,
+}
+
+impl Refusals {
+    /// An error that is refused by much.
+    const MUCH: f64 = 8.0;
+    /// Where so much is left, as after refusals of two steps one after the other, the solution is
+    /// not smooth.
+    const NOT_SMOOTH: usize = 3;
+
+    /// How often an estimate counts that is asked for this much less than the solution.
+    pub fn weight(&self, finer: f64) -> f64 {
+        if self.count >= Self::NOT_SMOOTH { (finer / LENIENT).max(1.0) } else { 1.0 }
+    }
+
+    /// A step with this error was refused.
+    pub fn refused(&mut self, error: f64) {
+        if error >= Self::MUCH {
+            self.count = (self.count + 2).min(2 * Self::NOT_SMOOTH);
+        }
+    }
+
+    /// A step was accepted.
+    pub fn accepted(&mut self) {
+        self.count = self.count.saturating_sub(1);
     }
 }
 

@@ -53,7 +53,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
     /// The larger one of an estimate at the end of a step and the same at its start: of what ends
     /// between the start and the first stage, as a force that jumps there, neither the stages nor
     /// the end know. What the polynomial has for `ẋ` at the start tells at no cost where that is
-    /// nothing new: no filter makes more of what is neither stiff nor turns.
+    /// nothing new: no filter makes more of what is neither stiff nor turns, and where the estimate
+    /// is held against the tolerance that was asked for it counts `finer / LENIENT` times at most.
     pub(super) fn larger_at_start(
         &mut self,
         start: &Start<'_, M, T>,
@@ -71,7 +72,8 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         }
         let unfiltered = self.basis.values().scaled(start.h).get(0).0.to_f64().abs()
             * norm(&changes.as_ref()[..nx], start.scale.as_ref());
-        if unfiltered <= 2.0 * error.max(UNDOUBTED) {
+        let undoubted = UNDOUBTED * (LENIENT / start.finer).min(1.0);
+        if unfiltered <= 2.0 * error.max(undoubted) {
             return Ok(error);
         }
         self.defect(start.h, residuals)?;

@@ -1,0 +1,184 @@
+//! The parts of a step: its stages, its matrix, its attempt, and what follows when it is accepted.
+
+use super::*;
+use crate::adaptive::stages::Convergence;
+
+impl<M: Dae, T: Real> Run<'_, M, T> {
+    /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
+    /// of the iteration.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub(super) fn choose_stages<B: Family>(
+        &mut self,
+        levels: &mut Levels<M, T>,
+        walk: &mut Walk<T>,
+    ) -> Result<(), Error> {
+        let ratio = walk.accepted.map(|before| (walk.h / before).to_f64());
+        if walk.need >= Need::Factors {
+            let level = walk.order.level;
+            let next = walk.order.next(&walk.convergence, ratio.unwrap_or(1.0), B::LEVELS);
+            if next != level {
+                levels.change::<B>(level, next)?;
+                walk.order.change(next);
+                walk.controller.forget();
+                self.tighten::<B>(levels.get::<B>(next)?.count());
+            }
+        }
+        let stages = levels.get::<B>(walk.order.level)?;
+        match ratio {
+            Some(ratio) => stages.continue_from_last(ratio),
+            None => stages.begin(&self.base.point),
+        }
+        Ok(())
+    }
+
+    /// The factors of the matrix of a step as far as they are needed; whether the step can be
+    /// tried.
+    ///
+    /// # Errors
+    /// A Jacobian that is not finite; matrices that stay singular.
+    pub(super) fn factor<B: Family>(
+        &mut self,
+        stages: &mut dyn Stages<M, T>,
+        walk: &mut Walk<T>,
+    ) -> Result<bool, Error> {
+        if walk.need == Need::Jacobian {
+            self.linearise(stages, walk)?;
+        }
+        if walk.need < Need::Factors {
+            return Ok(!walk.keeps_matrix(B::LEVELS));
+        }
+        stages.set_pivoted(walk.pivoted);
+        self.statistics.factorizations += 1;
+        match stages.factor(&self.base.jacobian, walk.h) {
+            Ok(planned) => {
+                walk.singular = 0;
+                self.statistics.dense += usize::from(!planned);
+                Ok(true)
+            }
+            Err(unknown) => {
+                walk.singular += 1;
+                if walk.singular >= SINGULAR {
+                    let at = Place { step: walk.tried, stage: 0, iteration: 0 };
+                    return Err(Error::Singular { unknown: crate::irk::unknown_name::<M>(unknown), at });
+                }
+                self.statistics.failed += 1;
+                walk.refusal = Refusal::Singular;
+                walk.order.unexpected = true;
+                walk.again(0.5);
+                self.check_step(walk.t, walk.h, walk.refusal)?;
+                Ok(false)
+            }
+        }
+    }
+
+    /// The Jacobian in the middle of the step, as far as that is foreseen: nearer to all stages
+    /// than the start is. Where the step fails, at the start.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    fn linearise(&mut self, stages: &mut dyn Stages<M, T>, walk: &mut Walk<T>) -> Result<(), Error> {
+        walk.current = walk.is_careful();
+        if !walk.current {
+            let Base { point, scale, asked, finer, middle, .. } = &mut *self.base;
+            let start =
+                Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
+            stages.predict(&start, middle);
+            walk.current = self.evaluate_jacobian(true, walk.tried).is_err();
+        }
+        if walk.current {
+            self.evaluate_jacobian(false, walk.tried)?;
+        }
+        Ok(())
+    }
+
+    /// Solves the stages: the estimated error relative to what is tolerated, of derivatives too if
+    /// they take part.
+    ///
+    /// # Errors
+    /// [`Failure`]
+    pub(super) fn attempt(
+        &mut self,
+        stages: &mut dyn Stages<M, T>,
+        walk: &mut Walk<T>,
+    ) -> Result<f64, Failure> {
+        let Base { point, scale, asked, finer, u, parameters, tight, rtol, atol, .. } = &*self.base;
+        let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
+        let residuals = &mut self.statistics.residuals;
+        let solved = stages.solve(&start, self.base.newton_tolerance, &mut walk.convergence, residuals);
+        self.statistics.iterations += walk.convergence.iterations;
+        solved?;
+        let again = walk.is_careful();
+        let error = stages.error(&start, again, residuals)?;
+        if !error.is_finite() {
+            return Err(Failure::Diverges);
+        }
+        match &mut self.sensitivities {
+            Some(sensitivities) if error < 1.0 => {
+                let mut x = VectorX::<M, T>::zeroed();
+                x.as_mut_slice().copy_from_slice(&point.as_ref()[M::Shape::NX..2 * M::Shape::NX]);
+                let (at, level) = (At { x: &x, u, p: parameters, t: walk.t }, walk.order.level);
+                let tolerances = Tolerances { tight, rtol, atol };
+                let other = sensitivities.implicit(stages, at, level, &start, &tolerances, again)?;
+                Ok(error.max(other))
+            }
+            _ => Ok(error),
+        }
+    }
+
+    /// Goes to the end of a step; whether the run is over. `factor` is that of the next step size.
+    ///
+    /// # Errors
+    /// What `after` has; no consistent `(ẋ, z)` at the end.
+    pub(super) fn accept(
+        &mut self,
+        stages: &mut dyn Stages<M, T>,
+        walk: &mut Walk<T>,
+        factor: f64,
+        after: After<'_, M, T>,
+    ) -> Result<bool, Error> {
+        let (t, h, nx) = (walk.t, walk.h, M::Shape::NX);
+        self.statistics.steps += 1;
+        (walk.troubles, walk.pivoted) = (0, false);
+        walk.refusals.accepted();
+        stages.accept();
+        if let Some(sensitivities) = &mut self.sensitivities {
+            sensitivities.accept();
+        }
+        if self.record {
+            let x = &self.base.point.as_ref()[nx..2 * nx];
+            self.tape.push(t, h, walk.order.level, x, stages.accepted())?;
+        }
+        let end = walk.end();
+        let Base { point, dense, .. } = &mut *self.base;
+        let x = &point.as_ref()[nx..2 * nx];
+        let mut evaluate = |time: T, dense: &mut Dense<M, T>| {
+            interpolate(&*stages, x, stages.accepted(), time - t, h, dense);
+            Ok(())
+        };
+        let mut accepted = Accepted { evaluate: &mut evaluate, end, stop: false };
+        after(&mut accepted, dense)?;
+        if accepted.stop {
+            return Ok(true);
+        }
+        let on_stage = stages.end(h, &mut self.base.point);
+        if let Some(time) = self.base.point.as_mut().last_mut() {
+            *time = end;
+        }
+        if !on_stage {
+            self.settle(end)?;
+        }
+        if walk.starting {
+            // How fast a short step converged says nothing of one that is much longer.
+            walk.convergence.factor = Convergence::UNKNOWN;
+        }
+        if walk.last {
+            self.finish();
+            return Ok(true);
+        }
+        self.measure();
+        walk.advance(end, factor, walk.convergence.rate <= FAST);
+        Ok(false)
+    }
+}

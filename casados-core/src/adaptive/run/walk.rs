@@ -1,0 +1,237 @@
+//! Where a run is, and what its steps have told it.
+
+use super::*;
+use crate::adaptive::control::{IMPLICIT, Predictive, Refusals};
+use crate::adaptive::stages::Convergence;
+
+/// The number of stages grows where Newton's method converges at this rate or faster,
+const EASY: f64 = 0.01;
+/// and falls where it converges at this rate or slower,
+const HARD: f64 = 0.8;
+/// but grows only if the step size hardly changes,
+const STEADY: (f64, f64) = (0.8, 1.2);
+/// and not before so many steps have been taken with it.
+const SETTLED: usize = 5;
+/// A step is not made longer by less than this: the factors of its matrix are worth more.
+const WORTHWHILE: f64 = 1.2;
+/// A run still looks for its step size while each step is longer than the last by this factor.
+const LONGER: f64 = 2.0;
+/// After so many iterations in a row that did not converge the planned elimination may be to blame.
+const TROUBLES: usize = 3;
+
+/// What has to be done before a step can be tried.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+pub(super) enum Need {
+    Nothing,
+    Factors,
+    Jacobian,
+}
+
+/// The number of stages, and what speaks for another one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Order {
+    pub level: usize,
+    /// How fast Newton's method converged.
+    rate: f64,
+    /// How many steps were taken with it.
+    settled: usize,
+    /// Whether an iteration did not converge, or a matrix was singular,
+    pub unexpected: bool,
+    /// or converged only with a much shorter step.
+    much_shorter: bool,
+}
+
+impl Order {
+    /// The level for the next matrix, for a step that is `ratio` times as long as the last one.
+    pub fn next(&mut self, convergence: &Convergence, ratio: f64, levels: usize) -> usize {
+        self.settled += 1;
+        self.rate = convergence.rate.max(0.5 * self.rate).min(10.0);
+        let steady = ratio > STEADY.0 && ratio < STEADY.1;
+        let easy = convergence.iterations > 1 && self.rate <= EASY;
+        let hard = self.rate >= HARD || self.unexpected || self.much_shorter;
+        (self.unexpected, self.much_shorter) = (false, false);
+        if hard {
+            self.level.saturating_sub(1)
+        } else if easy && steady && self.settled > SETTLED {
+            (self.level + 1).min(levels - 1)
+        } else {
+            self.level
+        }
+    }
+
+    pub fn change(&mut self, level: usize) {
+        (self.level, self.settled) = (level, 1);
+    }
+}
+
+/// A run on its way.
+pub(super) struct Walk<T> {
+    span: Span<T>,
+    direction: f64,
+    /// The longest step.
+    pub longest: f64,
+    /// The time that was reached, and the length of the step that is tried from there.
+    pub t: T,
+    pub h: T,
+    /// Whether this step ends the interval.
+    pub last: bool,
+    /// The length of the last accepted step.
+    pub accepted: Option<T>,
+    /// Whether the run still looks for its step size.
+    pub starting: bool,
+    pub need: Need,
+    /// Whether the Jacobian is that of the start of the step.
+    pub current: bool,
+    /// Whether a step from here was tried in vain.
+    rejected: bool,
+    /// Whether the step is as long as the last one, so that the matrix is the same.
+    same_matrix: bool,
+    pub order: Order,
+    pub convergence: Convergence,
+    pub controller: Predictive,
+    pub refusals: Refusals,
+    /// Why the last step was tried in vain.
+    pub refusal: Refusal,
+    /// How many steps were tried.
+    pub tried: usize,
+    /// How many matrices in a row were singular,
+    pub singular: usize,
+    /// and how many iterations did not converge,
+    pub troubles: usize,
+    /// so that every matrix is pivoted as a whole.
+    pub pivoted: bool,
+}
+
+impl<T: Real> Walk<T> {
+    pub fn new(span: Span<T>, max_step: f64) -> Self {
+        let length = span.end - span.start;
+        Self {
+            span,
+            direction: if length < T::ZERO { -1.0 } else { 1.0 },
+            longest: length.to_f64().abs().min(max_step),
+            t: span.start,
+            h: length,
+            last: false,
+            accepted: None,
+            starting: true,
+            need: Need::Jacobian,
+            current: false,
+            rejected: false,
+            same_matrix: false,
+            order: Order::default(),
+            convergence: Convergence::default(),
+            controller: Predictive::default(),
+            refusals: Refusals::default(),
+            refusal: Refusal::Error,
+            tried: 0,
+            singular: 0,
+            troubles: 0,
+            pivoted: false,
+        }
+    }
+
+    /// With the first step of this length.
+    pub fn begin(&mut self, first: f64) {
+        self.h = T::from_f64(self.direction * first);
+        if self.beyond(self.h * T::from_f64(1.0001)) >= 0.0 {
+            (self.h, self.last) = (self.span.end - self.t, true);
+        }
+    }
+
+    /// How far a step leads beyond the end of the interval.
+    fn beyond(&self, h: T) -> f64 {
+        ((self.t + h - self.span.end) * T::from_f64(self.direction)).to_f64()
+    }
+
+    /// Whether a second look is worth its work: at the first step, and after one that was tried in
+    /// vain.
+    pub fn is_careful(&self) -> bool {
+        self.accepted.is_none() || self.rejected
+    }
+
+    /// The end of the step.
+    pub fn end(&self) -> T {
+        if self.last { self.span.end } else { self.t + self.h }
+    }
+
+    /// Counts a step with the matrix of the last one; whether the number of stages is worth a new
+    /// matrix instead.
+    pub fn keeps_matrix(&mut self, levels: usize) -> bool {
+        if !core::mem::take(&mut self.same_matrix) {
+            return false;
+        }
+        self.order.settled += 1;
+        let grows = self.order.settled >= SETTLED && self.order.level + 1 < levels;
+        if grows {
+            self.need = Need::Factors;
+        }
+        grows
+    }
+
+    /// The step is tried again, with another length.
+    pub fn again(&mut self, factor: f64) {
+        self.h = self.h * T::from_f64(factor);
+        (self.rejected, self.last) = (true, false);
+        self.need = if self.current { Need::Factors } else { Need::Jacobian };
+    }
+
+    /// The stages were not solved.
+    pub fn fail(&mut self, failure: Failure) {
+        self.refusal = match failure {
+            Failure::NotFinite => Refusal::NotFinite,
+            Failure::Slow(_) | Failure::Diverges => Refusal::NotConverged,
+        };
+        let factor = match failure {
+            Failure::Slow(factor) => {
+                self.order.much_shorter = factor <= 0.5;
+                factor
+            }
+            Failure::Diverges | Failure::NotFinite => {
+                self.troubles += 1;
+                self.order.unexpected = true;
+                0.5
+            }
+        };
+        self.pivoted = self.troubles >= TROUBLES;
+        self.again(factor);
+    }
+
+    /// The factor for the step size after a step with this error.
+    pub fn factor(&mut self, error: f64, stages: usize) -> f64 {
+        let order = stages as f64 + 1.0;
+        let most = 2.0 * self.convergence.most as f64;
+        let effort = (1.0 + most) / (self.convergence.iterations as f64 + most);
+        self.controller.factor(self.h.to_f64(), error, 1.0 / order, effort, &IMPLICIT)
+    }
+
+    /// The error is too large.
+    pub fn refuse(&mut self, error: f64, factor: f64) {
+        self.refusal = Refusal::Error;
+        self.refusals.refused(error);
+        self.again(if self.accepted.is_none() { 0.1 } else { factor });
+    }
+
+    /// Chooses the next step after one that was accepted, whose iteration may have been so fast
+    /// that its Jacobian is kept.
+    pub fn advance(&mut self, end: T, factor: f64, fast: bool) {
+        let size = self.h.to_f64().abs();
+        self.starting = self.starting && factor > LONGER;
+        self.accepted = Some(self.h);
+        (self.t, self.current) = (end, false);
+        let mut next = (size * factor).min(self.longest);
+        if core::mem::take(&mut self.rejected) {
+            next = next.min(size);
+        }
+        let next_h = T::from_f64(self.direction * next);
+        // What rounding leaves of the interval is no step.
+        let slack = 16.0 * T::EPSILON.to_f64() * end.abs().max(self.span.end.abs()).to_f64();
+        self.need = if fast { Need::Factors } else { Need::Jacobian };
+        if self.beyond(next_h) >= -slack {
+            (self.h, self.last) = (self.span.end - end, true);
+        } else if fast && (1.0..=WORTHWHILE).contains(&(next / size)) {
+            (self.need, self.same_matrix) = (Need::Nothing, true);
+        } else {
+            self.h = next_h;
+        }
+    }
+}
