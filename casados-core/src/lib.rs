@@ -72,7 +72,7 @@ pub use constrained::{Consistent, Constrained, Inconsistent, Projectable, Projec
 pub use erk::Erk;
 pub use error::Error;
 pub use function::{Function, GraphFunction};
-pub use integrator::Integrator;
+pub use integrator::{Divided, Integrator};
 pub use irk::Irk;
 #[cfg(feature = "alloc")]
 pub use memory::Heap;

@@ -24,7 +24,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("result", "shape model"),
     ("finite", "error scalar linalg"),
     ("quadrature", "error shape scalar function model linalg result finite"),
-    ("integrator", "error statistics memory scalar model result quadrature"),
+    ("integrator", "error shape statistics memory scalar model linalg result finite quadrature"),
     (
         "constrained",
         "error shape statistics memory scalar function model result finite quadrature integrator",
@@ -44,7 +44,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("testing", "error shape memory scalar model result integrator"),
     (
         "ocp",
-        "error shape structure memory scalar function model qp linalg result quadrature integrator irk batch",
+        "error shape structure memory scalar function model qp linalg result quadrature integrator constrained irk batch",
     ),
     (
         "casadi",

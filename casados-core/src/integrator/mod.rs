@@ -1,7 +1,9 @@
 //! What integrators have in common: the calls of one interval.
 
+mod divided;
 mod with;
 
+pub use divided::Divided;
 pub use with::With;
 
 use crate::error::Error;

@@ -186,11 +186,13 @@ pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
 /// What happens between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.
 ///
 /// Integrators of single intervals are dynamics, implicit and explicit ones, with static memory or
-/// on the heap; [`Along`](super::Along) is one with an integral cost, [`Map`](super::Map) a
-/// function that is `φ` itself, and `Shooting` a batch that takes all intervals at once.
+/// on the heap, and those that wrap them ([`Projected`](crate::Projected),
+/// [`Divided`](crate::Divided)); [`Along`](super::Along) is one with an integral cost,
+/// [`Map`](super::Map) a function that is `φ` itself, and `Shooting` a batch that takes all
+/// intervals at once.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not say what happens between two nodes of a horizon",
-    note = "`Irk`, `Erk`, `Shooting` (over a `Batch`), `Along` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
+    note = "`Irk`, `Erk`, `Projected`, `Divided`, `Shooting` (over a `Batch`), `Along` and `Map` do; an integrator with `Inline` memory needs `mode::Forward` or `mode::Hessian`"
 )]
 pub trait Dynamics<T: Real> {
     /// Dimensions.

@@ -95,6 +95,7 @@ mod single;
 mod sqp;
 mod transfer;
 mod weights;
+mod wrapped;
 
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;

@@ -27,12 +27,10 @@ mod integral;
 mod least_squares;
 mod memory;
 mod product;
-#[cfg(feature = "alloc")]
 mod wrapped;
 
 pub use integral::Quadrature;
 pub use least_squares::LeastSquares;
-#[cfg(feature = "alloc")]
 pub(crate) use wrapped::{Backwards, Chained};
 
 use crate::error::{Error, Place};

@@ -1,0 +1,173 @@
+//! The calls of an integrator whose intervals are divided.
+
+use super::{Divided, HessianMemory, Integrator, blocks, dynamic};
+use crate::error::{Argument, Error};
+use crate::finite::{check_input, check_output};
+use crate::linalg::axpy;
+use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
+use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
+use crate::quadrature::{Along, Backwards, begin, finish};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::scalar::Real;
+use crate::shape::Matrix;
+use crate::statistics::Statistics;
+use bytemuck::Zeroable;
+
+impl<M: Dae, T: Real, I: Integrator<Model = M, Number = T>, const N: usize> Integrator for Divided<I, N> {
+    type Model = M;
+    type Number = T;
+    type Memory = I::Memory;
+
+    fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
+        self.integrator.set_parameters(p)
+    }
+
+    fn set_time(&mut self, t: T) -> Result<(), Error> {
+        self.integrator.set_time(t)?;
+        self.time = t;
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.integrator.reset();
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.statistics
+    }
+
+    fn solve_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Nominal<M, T>, Error> {
+        self.begin(h)?;
+        begin(&mut along);
+        self.nominal(x0, u, h, &mut along)?;
+        finish(&mut along)?;
+        Ok(&I::Memory::nominal(&mut self.nominal)?.result)
+    }
+
+    fn forward_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Forward<M, T>, Error>
+    where
+        I::Memory: WithForward,
+    {
+        self.begin(h)?;
+        begin(&mut along);
+        self.sweep(x0, u, h, false, &mut along, |_, _, _| Ok(()))?;
+        finish(&mut along)?;
+        Ok(&I::Memory::forward(&mut self.forward)?.result)
+    }
+
+    fn adjoint_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Adjoint<M, T>, Error>
+    where
+        I::Memory: WithAdjoint<1>,
+    {
+        check_input(Argument::Lambda, lambda.as_slice())?;
+        self.begin(h)?;
+        begin(&mut along);
+        self.nominal(x0, u, h, &mut along)?;
+        finish(&mut along)?;
+        *I::Memory::adjoint(&mut self.adjoint)? = Adjoint::zeroed();
+        let mut now = *lambda;
+        for k in (0..N).rev() {
+            let length = self.part(k, h)?;
+            let Self { integrator, nominal, adjoint, .. } = self;
+            let memory = I::Memory::nominal(nominal)?;
+            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            let part = integrator.adjoint_along(&memory.states[k], u, length, &now, dynamic(&mut backwards));
+            let part = part.and_then(|part| {
+                let result = I::Memory::adjoint(adjoint)?;
+                now.as_mut_slice().copy_from_slice(part.grad_x0.as_slice());
+                axpy(T::ONE, part.grad_u.as_slice(), result.grad_u.as_mut_slice());
+                axpy(T::ONE, part.grad_p.as_slice(), result.grad_p.as_mut_slice());
+                Ok(())
+            });
+            self.count();
+            part?;
+        }
+        let result = I::Memory::adjoint(&mut self.adjoint)?;
+        result.nominal = I::Memory::nominal(&mut self.nominal)?.result;
+        result.grad_x0.as_mut_slice().copy_from_slice(now.as_slice());
+        check_output(now.as_slice(), 0)?;
+        check_output(result.grad_u.as_slice(), 0)?;
+        check_output(result.grad_p.as_slice(), 0)?;
+        Ok(result)
+    }
+
+    fn hessian_along(
+        &mut self,
+        x0: &VectorX<M, T>,
+        u: &VectorU<M, T>,
+        h: T,
+        lambda: &VectorX<M, T>,
+        mut along: Along<'_, '_, M, T>,
+    ) -> Result<&Hessian<M, T>, Error>
+    where
+        I::Memory: WithHessian,
+    {
+        check_input(Argument::Lambda, lambda.as_slice())?;
+        self.begin(h)?;
+        begin(&mut along);
+        self.sweep(x0, u, h, true, &mut along, |this, k, x| {
+            I::Memory::nominal(&mut this.nominal)?.states[k] = *x;
+            let v = &I::Memory::forward(&mut this.forward)?.v[0];
+            I::Memory::hessian(&mut this.hessian)?.history[k].clone_from(v);
+            Ok(())
+        })?;
+        finish(&mut along)?;
+        let result = &mut I::Memory::hessian(&mut self.hessian)?.result;
+        result.first.forward.clone_from(&I::Memory::forward(&mut self.forward)?.result);
+        result.first.grad_u = VectorU::<M, T>::zeroed();
+        result.first.grad_p = VectorP::<M, T>::zeroed();
+        let mut now = *lambda;
+        for row in I::Memory::hessian(&mut self.hessian)?.sum.as_mut() {
+            *row = ArrayW::<M, T>::zeroed();
+        }
+        for k in (0..N).rev() {
+            let length = self.part(k, h)?;
+            let Self { integrator, nominal, hessian, .. } = self;
+            let x = I::Memory::nominal(nominal)?.states[k];
+            let mut backwards = along.as_mut().map(|integrand| Backwards(&mut **integrand));
+            let part = integrator.hessian_along(&x, u, length, &now, dynamic(&mut backwards));
+            let part = part.and_then(|part| {
+                let HessianMemory { result, history, product, sum } = I::Memory::hessian(hessian)?;
+                now = part.first.grad_x0;
+                axpy(T::ONE, part.first.grad_u.as_slice(), result.first.grad_u.as_mut_slice());
+                axpy(T::ONE, part.first.grad_p.as_slice(), result.first.grad_p.as_mut_slice());
+                blocks::add(part, &history[k], [product, sum]);
+                Ok(())
+            });
+            self.count();
+            part?;
+        }
+        let HessianMemory { result, sum, .. } = I::Memory::hessian(&mut self.hessian)?;
+        result.first.grad_x0 = now;
+        if let Some(second) = along.as_ref().and_then(|integrand| integrand.second()) {
+            for (sum, second) in sum.as_mut().iter_mut().zip(second) {
+                axpy(T::ONE, second.as_ref(), sum.as_mut());
+            }
+        }
+        blocks::split(sum, result);
+        for row in sum.as_ref() {
+            check_output(row.as_ref(), 0)?;
+        }
+        check_output(now.as_slice(), 0)?;
+        Ok(result)
+    }
+}

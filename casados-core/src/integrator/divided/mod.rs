@@ -1,0 +1,236 @@
+//! An integrator whose intervals are divided: several calls are one.
+//!
+//! With `V_k = dx_k/dw` at the start of part `k`, its derivatives `(A, B)` by `x_k` and by
+//! `(u, p)`, its adjoint `λ_k`, and `D_k = d(x_k, u, p)/dw`:
+//!
+//! ```text
+//! V_{k+1} = A V_k + (0, B)        λ_k = Aᵀ λ_{k+1}        d²(λᵀx_N)/dw² = Σ_k D_kᵀ ∇²(λ_{k+1}ᵀ x_{k+1}) D_k
+//! ```
+
+mod blocks;
+mod calls;
+
+use super::{Integrator, U, X};
+use crate::error::{Argument, Error};
+use crate::finite::check_input;
+use crate::memory::{Family, Memory, WithForward};
+use crate::model::{ArrayW, ArrayX, Dae, VectorX};
+use crate::quadrature::{Along, Chained, Integrand};
+use crate::result::{Adjoint, Forward, Hessian, Nominal};
+use crate::scalar::{Field, Real};
+use crate::shape::{Array, Plain};
+use crate::statistics::Statistics;
+use blocks::{advance, of_end};
+use bytemuck::Zeroable;
+use core::marker::PhantomData;
+
+/// An integrator each of whose intervals is divided into `N` parts of the same length, one call
+/// after the other. What comes out, with its derivatives of first and second order and with
+/// integrals, is that of the whole interval.
+///
+/// It is for what an integrator does once a call, as [`Projected`](crate::Projected) does: with one
+/// step for each part the projection is that of every step. `adjoint` and `hessian` integrate
+/// twice. Steps in errors are counted from the start of a part.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::{Divided, Integrator, Projected};
+/// use nalgebra::vector;
+///
+/// /// A pendulum on a circle of radius one.
+/// #[dae(index_reduction(projection))]
+/// fn pendulum(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+///     let circle = x[0] * x[0] + x[1] * x[1] - 1.0;
+///     [xdot[0] - x[2], xdot[1] - x[3], xdot[2] + z * x[0], xdot[3] + z * x[1] + 9.81, circle]
+/// }
+///
+/// let irk = Projected::new(Irk::<Pendulum, RadauIIA<2>>::new(Options::default())?);
+/// let mut irk = Divided::<_, 10>::new(irk);
+/// let end = irk.forward(&vector![1.0, 0.0, 0.0, 0.0], &vector![], 0.2)?;
+/// assert!((end.x[0].hypot(end.x[1]) - 1.0).abs() < 1e-15);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub struct Divided<I: Integrator, const N: usize> {
+    integrator: I,
+    time: I::Number,
+    statistics: Statistics,
+    nominal: Place<I, NominalMemory<I::Model, I::Number, N>>,
+    forward: <I::Memory as Memory>::Forward<ForwardMemory<I::Model, I::Number>>,
+    adjoint: <I::Memory as Memory>::Adjoint<Adjoints<I::Model, I::Number>>,
+    hessian: <I::Memory as Memory>::Hessian<HessianMemory<I::Model, I::Number, N>>,
+}
+
+type Place<I, V> = <<I as Integrator>::Memory as Memory>::Nominal<V>;
+/// `dx/dw`, row by row.
+type Rows<M, T> = ArrayX<M, ArrayW<M, T>>;
+
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct NominalMemory<M: Dae, T: Real, const N: usize> {
+    result: Nominal<M, T>,
+    /// The state at the start of each part.
+    states: [VectorX<M, T>; N],
+}
+
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct ForwardMemory<M: Dae, T: Real> {
+    result: Forward<M, T>,
+    /// `V` at the start of a part, and at its end.
+    v: [Rows<M, T>; 2],
+}
+
+/// Results of `adjoint`.
+struct Adjoints<M, T>(PhantomData<fn() -> (M, T)>);
+
+impl<M: Dae, T: Plain> Family for Adjoints<M, T> {
+    type Of<const C: usize> = Adjoint<M, T, C>;
+}
+
+#[derive(Zeroable)]
+#[zeroable(bound = "")]
+struct HessianMemory<M: Dae, T: Real, const N: usize> {
+    result: Hessian<M, T>,
+    /// `V` at the start of each part.
+    history: [Rows<M, T>; N],
+    /// `∇²(λᵀx)` of a part times `D`, and the sum of all parts.
+    product: ArrayW<M, ArrayW<M, T>>,
+    sum: ArrayW<M, ArrayW<M, T>>,
+}
+
+impl<I: Integrator, const N: usize> Divided<I, N> {
+    /// Divides the intervals of an integrator. The time is the one that is set here, or zero.
+    pub fn new(integrator: I) -> Self {
+        const { assert!(N > 0, "an interval has at least one part") }
+        Self {
+            integrator,
+            time: I::Number::ZERO,
+            statistics: Statistics::default(),
+            nominal: Default::default(),
+            forward: Default::default(),
+            adjoint: Default::default(),
+            hessian: Default::default(),
+        }
+    }
+
+    /// The integrator of the parts.
+    pub fn integrator(&mut self) -> &mut I {
+        &mut self.integrator
+    }
+
+    /// Before a call.
+    fn begin(&mut self, h: I::Number) -> Result<(), Error> {
+        self.statistics = Statistics::default();
+        check_input(Argument::H, &[h])
+    }
+
+    /// Before a part: its time, and its length.
+    fn part(&mut self, part: usize, h: I::Number) -> Result<I::Number, Error> {
+        let count = I::Number::from_f64(N as f64);
+        self.integrator.set_time(self.time + h * I::Number::from_f64(part as f64) / count)?;
+        Ok(h / count)
+    }
+
+    /// After a part.
+    fn count(&mut self) {
+        let part = self.integrator.statistics();
+        let sum = &mut self.statistics;
+        sum.steps += part.steps;
+        sum.iterations += part.iterations;
+        sum.residuals += part.residuals;
+        sum.jacobians += part.jacobians;
+        sum.factorizations += part.factorizations;
+        sum.dense += part.dense;
+    }
+
+    /// The solution, with the states where parts start.
+    fn nominal(
+        &mut self,
+        x0: &X<Self>,
+        u: &U<Self>,
+        h: I::Number,
+        along: &mut Along<'_, '_, I::Model, I::Number>,
+    ) -> Result<(), Error> {
+        let (mut x, mut z0) = (*x0, None);
+        for k in 0..N {
+            let length = self.part(k, h)?;
+            let mut chained = chain(along, None, false);
+            let part = self.integrator.solve_along(&x, u, length, dynamic(&mut chained));
+            let part = part.copied();
+            self.count();
+            let part = part?;
+            let memory = I::Memory::nominal(&mut self.nominal)?;
+            memory.states[k] = x;
+            x = part.x;
+            memory.result = part;
+            memory.result.z0 = *z0.get_or_insert(part.z0);
+        }
+        Ok(())
+    }
+
+    /// The solution and its derivatives, with what `keep` wants to know where parts start.
+    fn sweep(
+        &mut self,
+        x0: &X<Self>,
+        u: &U<Self>,
+        h: I::Number,
+        second: bool,
+        along: &mut Along<'_, '_, I::Model, I::Number>,
+        mut keep: impl FnMut(&mut Self, usize, &X<Self>) -> Result<(), Error>,
+    ) -> Result<(), Error>
+    where
+        I::Memory: WithForward,
+    {
+        let mut x = *x0;
+        let ForwardMemory { v: [now, _], .. } = I::Memory::forward(&mut self.forward)?;
+        for (row, v) in now.as_mut().iter_mut().enumerate() {
+            *v = ArrayW::<I::Model, I::Number>::from_fn(|w| {
+                if w == row { I::Number::ONE } else { I::Number::ZERO }
+            });
+        }
+        for k in 0..N {
+            keep(self, k, &x)?;
+            let length = self.part(k, h)?;
+            let Self { integrator, forward, .. } = self;
+            let ForwardMemory { result, v: [now, next] } = I::Memory::forward(forward)?;
+            let mut chained = chain(along, (k > 0).then_some(&*now), second);
+            let part = integrator.forward_along(&x, u, length, dynamic(&mut chained));
+            let part = part.map(|part| {
+                advance(part, now, next);
+                if k == 0 {
+                    result.clone_from(part);
+                } else {
+                    let first = (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp);
+                    result.nominal = part.nominal;
+                    (result.nominal.z0, result.dz0_dx0, result.dz0_du, result.dz0_dp) = first;
+                }
+                if k + 1 == N {
+                    of_end(part, now, next, result);
+                }
+                core::mem::swap(now, next);
+                x = part.nominal.x;
+            });
+            self.count();
+            part?;
+        }
+        Ok(())
+    }
+}
+
+/// The integrand of a part.
+fn chain<'a, M: Dae, T: Real>(
+    along: &'a mut Along<'_, '_, M, T>,
+    v: Option<&'a Rows<M, T>>,
+    second: bool,
+) -> Option<Chained<'a, M, T>> {
+    along.as_mut().map(|inner| Chained { inner: &mut **inner, v, second })
+}
+
+fn dynamic<'a, M: Dae, T: Real, Q: Integrand<M, T> + 'a>(
+    integrand: &'a mut Option<Q>,
+) -> Along<'a, 'a, M, T> {
+    match integrand {
+        Some(integrand) => Some(integrand),
+        None => None,
+    }
+}
