@@ -84,6 +84,10 @@ fn what_cannot_be_satisfied_is_named() {
     // The velocities alone cannot correct the position.
     let held = solve(all.hold("x[0]").unwrap().hold("x[1]").unwrap(), near, LENGTH).unwrap_err();
     assert!(held.to_string().contains("the constraint of equation 4"), "{held}");
+    // Unless the position has nothing to correct.
+    let on_circle = vector![0.0, -LENGTH, 1.0, 0.3];
+    let held = all.hold("x[0]").unwrap().hold("x[1]").unwrap();
+    assert_eq!(solve(held, on_circle, LENGTH).unwrap(), vector![0.0, -LENGTH, 1.0, 0.0]);
     // A pendulum that is shorter than the position that is held.
     let short = solve(all.hold("x[0]").unwrap(), near, 0.3).unwrap_err();
     assert!(

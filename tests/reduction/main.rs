@@ -3,7 +3,13 @@
 mod car_axis;
 mod circuit;
 mod consistent;
+mod divided;
 mod double_pendulum;
+mod everywhere;
 mod mechanisms;
+mod ocp;
 mod pendulum;
 mod projected;
+mod singular;
+mod slider_crank;
+mod wheelset;

@@ -6,7 +6,8 @@
 //!
 //! by Gauss and Newton: with `G = ∂y/∂x` in the columns that are free,
 //! `x ← x̂ + G⁺ (G (x − x̂) − y)`. `G = L Q` by Gram and Schmidt, twice, shows which invariant
-//! depends on those before it.
+//! depends on those before it. One of states that are held alone is nobody's concern if they
+//! satisfy it.
 
 use super::{Constrained, Inconsistent};
 use crate::error::Argument;
@@ -20,6 +21,8 @@ use core::marker::PhantomData;
 
 /// Iterations after which the values are given up.
 const ITERATIONS: usize = 200;
+/// The size of a state that is zero.
+const TINY: f64 = 1e-30;
 
 /// States that satisfy the invariants of a model, nearest to given ones.
 ///
@@ -67,6 +70,8 @@ struct Work<M: Constrained, T: Real> {
     rows: MatrixYX<Invariants<M>, T>,
     /// `L`
     lower: MatrixYY<Invariants<M>, T>,
+    /// `Σ |G_ij| |x_j|` over the states that are held; zero if there are none.
+    held: ArrayY<Invariants<M>, T>,
     step: ArrayX<M, T>,
 }
 
@@ -151,6 +156,7 @@ impl<M: Constrained, T: Real> Work<M, T> {
         self.v.as_mut()[nx..2 * nx].copy_from_slice(x.as_slice());
         <Invariants<M> as Function>::value_jacobian::<T>(&self.v, &mut self.y, &mut self.jacobian);
         self.rows.as_mut_slice().fill(T::ZERO);
+        self.held.as_mut().fill(T::ZERO);
         let pattern = &<Invariants<M> as Function>::STRUCTURE.jacobian;
         let mut bad = not_finite(self.y.as_ref());
         for ((output, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
@@ -158,8 +164,13 @@ impl<M: Constrained, T: Real> Work<M, T> {
                 bad = bad.or(Some((output, value.to_f64())));
             }
             let state = variable.wrapping_sub(nx);
-            if held.as_ref().get(state) == Some(&false) {
-                self.rows[(output, state)] = value;
+            match held.as_ref().get(state) {
+                Some(false) => self.rows[(output, state)] = value,
+                Some(true) => {
+                    let size = x.as_slice()[state].abs() + T::from_f64(TINY);
+                    self.held[output] = self.held[output] + value.abs() * size;
+                }
+                None => {}
             }
         }
         let Some((output, value)) = bad else { return Ok(()) };
@@ -176,6 +187,12 @@ impl<M: Constrained, T: Real> Work<M, T> {
                 (0..nx).fold(T::ZERO, |sum, state| sum + rows[(i, state)] * rows[(i, state)]).sqrt()
             };
             let whole = norm(&self.rows);
+            let rounding = T::from_f64(16.0 * T::EPSILON) * self.held[i];
+            if whole == T::ZERO && self.held[i] > T::ZERO && self.y[i].abs() <= rounding {
+                self.y[i] = T::ZERO;
+                self.lower[(i, i)] = T::ONE;
+                continue;
+            }
             for _ in 0..2 {
                 for j in 0..i {
                     let product = (0..nx)

@@ -1,6 +1,6 @@
 //! What rustdoc says about a model.
 
-use crate::structure::{Analysis, Derivatives, FunctionAnalysis};
+use crate::structure::{Analysis, Derivatives, FunctionAnalysis, times};
 use proc_macro2::TokenStream;
 use quote::quote;
 
@@ -42,12 +42,36 @@ pub fn of_type(original: &syn::Ident, models: &[Analysis]) -> TokenStream {
         let instance = model.instance.iter().map(|instance| instance.value.to_string());
         lines.push(row(&instance.chain(numbers.map(|n| n.to_string())).collect::<Vec<_>>()));
     }
+    if let Some(text) = of_reduction(first) {
+        lines.extend([String::new(), text]);
+    }
     let lines = lines.into_iter().map(|line| if line.is_empty() { line } else { format!(" {line}") });
     quote! {
         #(#documentation)*
         #separator
         #(#[doc = #lines])*
     }
+}
+
+/// What was differentiated, and where the result is singular.
+fn of_reduction(analysis: &Analysis) -> Option<String> {
+    let reduction = analysis.reduction.as_ref()?;
+    let list = reduction.differentiated.iter();
+    let list: Vec<String> =
+        list.map(|&(equation, count)| format!("equation {equation} {}", times(count as usize))).collect();
+    let invariants = reduction.differentiated.iter().map(|entry| entry.1).sum::<u32>();
+    let mut text = format!(
+        "Index reduction differentiated {}; the {invariants} invariants are [`{}`].",
+        list.join(", "),
+        reduction.invariants.model.name
+    );
+    let [singular, points] = reduction.singular;
+    if singular > 0 {
+        text += &format!(
+            " Constraints lose rank: the matrix `∂f/∂(ẋ, z)` is singular at {singular} of {points} sample points."
+        );
+    }
+    Some(text)
 }
 
 /// The user's text, then what is known about the function.

@@ -17,6 +17,7 @@ use crate::language::{Model, Sampling, Variables};
 pub use elimination::Plan;
 pub use facts::Facts;
 use kinematic::Kinematic;
+pub use reduction::times;
 use samples::Position;
 use std::collections::{BTreeSet, HashSet};
 use tables::Tables;
@@ -110,10 +111,11 @@ pub struct Operations {
 /// Reduces the index where that is asked for, and derives everything.
 pub fn analyse(mut model: Model) -> syn::Result<Analysis> {
     check_length(&model)?;
+    let asked = model.reduction.is_some();
     let reduced = reduction::reduce(&mut model)?;
     let mut analysis = analyse_index_one(model)?;
+    let singular = if asked { reduction::rank::check(&analysis, reduced.is_some())? } else { [0; 2] };
     if let Some(reduction::Reduced { differentiated, rates, invariants, projection }) = reduced {
-        let singular = reduction::rank::check(&analysis)?;
         let invariants = analyse_function(invariants);
         let projection = projection.map(analyse_function);
         analysis.reduction = Some(Reduction { differentiated, rates, singular, invariants, projection });

@@ -12,11 +12,12 @@ const ZERO: f64 = 1e-11;
 /// Elements of null vectors below this, relative to the largest, are zeros.
 const PRESENT: f64 = 1e-6;
 
-/// How many of the sample points have a singular matrix, and how many there are.
+/// How many of the sample points have a singular matrix, and how many there are; `differentiated`
+/// is whether any equation was.
 ///
 /// # Errors
 /// All have: names the equations that repeat each other, and the unknowns that they leave open.
-pub fn check(analysis: &Analysis) -> Result<[u32; 2]> {
+pub fn check(analysis: &Analysis, differentiated: bool) -> Result<[u32; 2]> {
     let model = &analysis.model;
     let (nx, count) = (model.variables.x.len() as u32, model.residual.len());
     let entries: Vec<(usize, usize, Node)> = analysis.derivatives.jacobian[..analysis.derivatives.blocks[3]]
@@ -53,9 +54,11 @@ pub fn check(analysis: &Analysis) -> Result<[u32; 2]> {
         variable(&model.variables, if unknown < nx { unknown } else { unknown + nx })
     };
     let message = format!(
-        "the index cannot be reduced: once differentiated, equations {} are dependent at every sample point, and leave \
-         {} open; remove constraints that follow from the others, or say where the model lives with `nominal(..)` and \
-         `range(..)` (equations are counted from 0)",
+        "the index cannot be reduced: {}equations {} are dependent at every sample point, and leave {} open; remove \
+         constraints that follow from the others, put a combination of these equations in which the unknowns cancel in \
+         the place of one of them, or say where the model lives with `nominal(..)` and `range(..)` (equations are \
+         counted from 0)",
+        if differentiated { "once differentiated, " } else { "" },
         equations.iter().map(number).collect::<Vec<_>>().join(", "),
         unknowns.iter().map(name).collect::<Vec<_>>().join(", "),
     );

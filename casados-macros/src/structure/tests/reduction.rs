@@ -69,6 +69,28 @@ fn constraints_that_repeat_each_other() {
     );
 }
 
+/// The currents into the diodes of a ring add up to zero, though every equation has unknowns of its
+/// own: structure shows index 1, and nothing would be differentiated.
+#[test]
+fn a_constraint_that_is_hidden_in_a_combination() {
+    let diodes = |last: &str| {
+        format!(
+            "fn f(xdot: [f64; 2], x: [f64; 2], z: [f64; 2]) -> [f64; 4] {{
+                let current = (z[0] - z[1]).exp();
+                [xdot[0] + x[0] - z[0], xdot[1] + x[1] - z[1], x[0] - current, {last}]
+            }}"
+        )
+    };
+    let error = refusal(&diodes("x[1] + current"));
+    assert!(
+        error.contains("equations 2, 3 are dependent at every sample point, and leave")
+            && error.contains("a combination of these equations in which the unknowns cancel"),
+        "{error}"
+    );
+    let combined = reduced(&diodes("x[0] + x[1]")).expect("the combination shows it");
+    assert_eq!(combined.reduction.map(|reduction| reduction.differentiated), Some(vec![(3, 1)]));
+}
+
 #[test]
 fn equations_that_determine_nothing() {
     let error = refusal("fn f(xdot: f64, x: f64, z: f64) -> [f64; 2] { [xdot - x, x - 1.0] }");
