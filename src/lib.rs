@@ -209,5 +209,8 @@ pub mod prelude {
 #[doc = include_str!("../docs/language.md")]
 mod language {}
 #[cfg(doctest)]
+#[doc = include_str!("../docs/mechanics.md")]
+mod mechanics {}
+#[cfg(doctest)]
 #[doc = include_str!("../docs/embedded.md")]
 mod embedded {}
