@@ -51,6 +51,8 @@ pub mod memory;
 pub mod model;
 pub mod ocp;
 pub mod options;
+#[cfg(feature = "plot")]
+pub mod plot;
 pub mod qp;
 pub mod quadrature;
 pub mod result;

@@ -46,6 +46,7 @@ const ARROWS: &[(&str, &str)] = &[
         "ocp",
         "error shape structure memory scalar function model qp linalg result quadrature integrator constrained irk batch",
     ),
+    ("plot", "structure scalar ocp qp"),
     (
         "casadi",
         "error shape structure tableau memory options function model qp result quadrature integrator adaptive batch \

@@ -9,10 +9,10 @@
 mod awe;
 #[path = "../../tests/data/mod.rs"]
 mod data;
-mod plot;
 
 use awe::Awe;
-use awe::awe::State;
+use awe::awe::{LENGTH, State, TETHER_SCALE, power};
+use casados::plot::{Figure, Panel, Space};
 use casados::prelude::*;
 use casados::result::Hessian;
 use data::Record;
@@ -53,6 +53,50 @@ struct Interval {
     hessian: SMatrix<f64, 27, 27>,
 }
 
+/// What is drawn. Times in seconds.
+#[derive(Default)]
+struct Orbit {
+    /// Time, state, and the multiplier of the tether.
+    curve: Vec<(f64, State, f64)>,
+    /// The state at the start of each interval.
+    wings: Vec<State>,
+    /// Errors of x, the Jacobian, the adjoint and the Hessian at the end of each interval.
+    errors: Vec<(f64, [f64; 4])>,
+}
+
+/// m
+const SPAN: f64 = 5.5;
+
+impl Orbit {
+    /// The orbit in space, with the wing at the start of each interval; what it yields; the errors.
+    fn figure(&self) -> Figure {
+        let curve = self.curve.iter().map(|(_, state, _)| (state.q.into(), power(state) / 1e3));
+        let wing = |state: &State| [-0.5, 0.5].map(|side| (state.q + side * SPAN * state.r.column(1)).into());
+        let orbit = Space::new("The orbit; the wind blows along x, the ground station is at zero")
+            .axes(["x, m", "y, m", "z, m"])
+            .seen_from(-150.0, 15.0)
+            .coloured("kW", curve);
+        let over =
+            |of: fn(&State, f64) -> f64| self.curve.iter().map(move |(t, state, z)| (*t, of(state, *z)));
+        let errors = Panel::new("Largest relative error after each interval").x("time, s").log_y();
+        let names = ["x", "Jacobian", "adjoint", "Hessian"];
+        let errors = names.iter().enumerate().fold(errors, |panel, (i, name)| {
+            panel.dots(*name, self.errors.iter().map(|(t, errors)| (*t, errors[i])))
+        });
+        Figure::new()
+            .size(1200, 660)
+            .with(self.wings.iter().fold(orbit, |orbit, state| orbit.outline(wing(state))))
+            .column(1.0)
+            .with(Panel::new("Power of the turbines").y("kW").line("", over(|state, _| power(state) / 1e3)))
+            .with(
+                Panel::new("Tension of the tether")
+                    .y("kN")
+                    .line("", over(|_, z| TETHER_SCALE * z * LENGTH / 1e3)),
+            )
+            .with(errors)
+    }
+}
+
 fn run(picture: &Path) -> Result<(), Box<dyn Error>> {
     let reference = Record::load("awe/intervals.json")?;
     let h = reference.number("T")?;
@@ -62,7 +106,7 @@ fn run(picture: &Path) -> Result<(), Box<dyn Error>> {
 
     let mut irk = Irk::<Awe, RadauIIA<4>>::new(Options { start: Start::Zero, ..Default::default() })?;
 
-    let mut orbit = plot::Orbit::default();
+    let mut orbit = Orbit::default();
     for (k, interval) in intervals.iter().enumerate() {
         let start = k as f64 * h;
         let step = irk.hessian(&interval.x0, &interval.u, h, &lambda)?;
@@ -96,7 +140,7 @@ fn run(picture: &Path) -> Result<(), Box<dyn Error>> {
     println!("\nErrors are relative to the largest element of the reference. Each time is that of one call");
     println!("from start values of zero: the Jacobian includes the simulation, the Hessian everything.");
 
-    orbit.draw(picture)?;
+    orbit.figure().save(picture)?;
     println!("The orbit is drawn in {}", picture.display());
     Ok(())
 }

@@ -20,16 +20,19 @@ mod conditions;
 #[path = "../../tests/data/mod.rs"]
 mod data;
 mod guess;
-mod plot;
+mod pictures;
 mod problem;
 
 use awe::Awe;
-use casados::ocp::{Collocation, Formulation, HeapIpm, HeapOcp, Iteration, Outcome, SecondOrder, Shooting};
+use casados::ocp::{
+    Collocation, Formulation, HeapIpm, HeapOcp, Iteration, Log, Outcome, SecondOrder, Shooting,
+};
+use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use conditions::Conditions;
 use data::Record;
 use guess::guess;
-use plot::{Convergence, Picture};
+use pictures::Picture;
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -89,12 +92,17 @@ fn run() -> Result<(), Failure> {
             if !is_good || checked.largest() > CHECKED {
                 return Err(format!("{name}, {method}: {outcome}\n{checked:?}").into());
             }
-            convergence.push(Convergence { name: format!("{name}, {method}"), residuals: residuals(&log) });
+            convergence.push((format!("{name}, {method}"), log));
         }
     }
     println!("reference   CasADi 3.8.2, IPOPT, direct collocation       15, 16, 32 {objective:15.9}");
     println!("the paper   collocation  2020 ms, shooting 4120 ms (functions 3940 ms), 10 and 20 iterations");
-    Picture::of(shooting.iterate(), h)?.draw(&folder, &convergence)?;
+    let picture = Picture::of(shooting.iterate(), h)?;
+    picture.orbit().save(folder.join("awe_orbit.svg"))?;
+    picture.over_time().save(folder.join("awe_orbit_time.svg"))?;
+    let runs = Panel::convergences(convergence.iter().map(|(name, rows)| (name, Log(rows))));
+    let title = "Largest residual of the conditions of optimality";
+    Figure::new().size(680, 440).with(runs.title(title)).save(folder.join("awe_orbit_convergence.svg"))?;
     println!("pictures: {}", folder.join("awe_orbit*.svg").display());
     Ok(())
 }
@@ -114,9 +122,4 @@ fn solve<P: Formulation<f64, Dynamics: SecondOrder<f64>>>(
         }
     }
     Ok((best.ok_or("no run")?, ipm.log().0.to_vec()))
-}
-
-/// The largest residual of each iteration.
-fn residuals(log: &[Iteration]) -> Vec<f64> {
-    log.iter().map(|iteration| iteration.residuals.largest()).collect()
 }

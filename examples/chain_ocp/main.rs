@@ -12,13 +12,12 @@ mod chain;
 mod chain_problem;
 #[path = "../../tests/data/mod.rs"]
 mod data;
-mod plot;
 
 use casados::ocp::{HeapSqp, Outcome, Shooting};
+use casados::plot::{Figure, Panel, Series};
 use casados::prelude::*;
 use chain::Chain;
 use data::Record;
-use plot::{Picture, Series};
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -37,7 +36,7 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    match run().and_then(|drawing| drawing.draw(&picture)) {
+    match run().and_then(|drawing| Ok(drawing.figure().save(&picture)?)) {
         Ok(()) => {
             println!("\n{}", picture.display());
             ExitCode::SUCCESS
@@ -47,6 +46,40 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// What is drawn.
+#[derive(Default)]
+struct Picture {
+    /// Milliseconds of an iteration by the number of masses, of each method.
+    times: Vec<(String, Vec<(f64, f64)>)>,
+    /// States at the nodes.
+    states: Vec<Vec<f64>>,
+    /// The iterations, which are printed.
+    log: String,
+}
+
+impl Picture {
+    /// The motion as seen from above, at every other node, and what an iteration costs.
+    fn figure(&self) -> Figure {
+        let motion = Panel::new("Five masses on their way to rest, from above")
+            .x("x, m")
+            .y("y, m")
+            .limit(-0.05)
+            .motion(self.states.iter().step_by(2).map(|state| masses(state)));
+        let times = Panel::new("Time of an iteration").x("masses").y("ms").log_y();
+        let times = self.times.iter().fold(times, |panel, (name, points)| {
+            panel.with(Series::line(name, points.iter().copied()).marked())
+        });
+        Figure::new().size(1100, 460).with(motion).column(1.0).with(times)
+    }
+}
+
+/// x and y of the wall and of all masses.
+fn masses(state: &[f64]) -> Vec<(f64, f64)> {
+    let free = state.len().saturating_sub(3) / 6;
+    let places = state.chunks_exact(3).take(free + 1).map(|place| (place[0], place[1]));
+    std::iter::once((0.0, 0.0)).chain(places).collect()
 }
 
 /// Solves the problem of a size, again and again; the fastest outcome, the iterations of the last
@@ -80,9 +113,9 @@ macro_rules! solve {
 /// Problems of all sizes with one method.
 macro_rules! sizes {
     ($picture:ident, $stages:literal x $steps:literal) => {{
-        let mut series = Series { name: format!("GL{}x{}", $stages, $steps), points: Vec::new() };
+        let mut series = (format!("GL{}x{}", $stages, $steps), Vec::new());
         sizes!(@ $picture, series, $stages, $steps, 9, 15, 21, 27, 33);
-        $picture.series.push(series);
+        $picture.times.push(series);
     }};
     (@ $picture:ident, $series:ident, $stages:literal, $steps:literal, $($nx:literal),*) => { $(
         let (outcome, log, states) = solve!($nx, $stages, $steps);
@@ -91,14 +124,14 @@ macro_rules! sizes {
         let each = |seconds: f64| 1e3 * seconds / iterations as f64;
         println!(
             "{masses:>6} {:>7} {iterations:>6} {:>16.8} {:>10.2} {:>10.3} {:>10.3} {:>10.3}",
-            $series.name,
+            $series.0,
             outcome.objective,
             1e3 * outcome.times.total(),
             each(outcome.times.total()),
             each(outcome.times.linearise),
             each(outcome.times.qp),
         );
-        $series.points.push((masses, each(outcome.times.total())));
+        $series.1.push((masses as f64, each(outcome.times.total())));
         if masses == 5 && $stages == 2 && $steps == 2 {
             $picture.log = log;
             $picture.states = states;

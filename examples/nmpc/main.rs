@@ -14,15 +14,14 @@ mod chain_problem;
 mod data;
 #[path = "../models/pendulum.rs"]
 mod pendulum;
-mod plot;
 
 use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Problem, Shooting};
+use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use chain::Chain;
 use data::Record;
 use nalgebra::{SVector, Vector1, Vector3, Vector4, vector};
 use pendulum::Pendulum;
-use plot::{Curve, Picture};
 use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -40,7 +39,7 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    match run().and_then(|drawing| drawing.draw(&picture)) {
+    match run().and_then(|drawing| Ok(drawing.figure().save(&picture)?)) {
         Ok(()) => {
             println!("\n{}", picture.display());
             ExitCode::SUCCESS
@@ -58,6 +57,34 @@ fn run() -> Result<Picture, Box<dyn Error>> {
     pendulum(&mut picture)?;
     chain(&mut picture)?;
     Ok(picture)
+}
+
+/// Something over time.
+type Curve = (&'static str, Vec<(f64, f64)>);
+
+/// What is drawn.
+#[derive(Default)]
+struct Picture {
+    pendulum: Vec<Curve>,
+    chain: Vec<Curve>,
+    /// Milliseconds of samples, by what they are of.
+    times: Vec<(String, Vec<f64>)>,
+}
+
+impl Picture {
+    fn figure(&self) -> Figure {
+        let over_time = |title: &str, curves: &[Curve]| {
+            let panel = Panel::new(title).x("time, s");
+            curves.iter().fold(panel, |panel, (name, points)| panel.line(*name, points.iter().copied()))
+        };
+        let times = Panel::histogram(self.times.iter().map(|(name, times)| (name, times.as_slice())));
+        Figure::new()
+            .size(1100, 640)
+            .with(over_time("A pendulum swings up, and is pushed every four seconds", &self.pendulum))
+            .with(over_time("A chain, disturbed every four seconds: metres from references", &self.chain))
+            .column(1.0)
+            .with(times.title("Time of a phase, shares of all samples").x("ms"))
+    }
 }
 
 /// Seconds of both phases, sample by sample.
@@ -130,7 +157,7 @@ fn pendulum(picture: &mut Picture) -> Result<(), Box<dyn Error>> {
     if x[1].abs() > 0.5 {
         return Err(format!("the pendulum is not upright: {x}").into());
     }
-    picture.pendulum = vec![Curve::new("angle, rad", angle), Curve::new("force / 80 N", force)];
+    picture.pendulum = vec![("angle, rad", angle), ("force / 80 N", force)];
     latency.report("pendulum, 20 intervals", picture);
     Ok(())
 }
@@ -181,7 +208,7 @@ fn chain(picture: &mut Picture) -> Result<(), Box<dyn Error>> {
         controller.shift();
     }
     let [mass, end] = distance;
-    picture.chain = vec![Curve::new("mass", mass), Curve::new("end", end)];
+    picture.chain = vec![("mass", mass), ("end", end)];
     latency.report("chain of 3, 40 intervals", picture);
     Ok(())
 }

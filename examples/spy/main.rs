@@ -13,8 +13,8 @@ mod awe;
 mod chain;
 #[path = "../models/pendulum.rs"]
 mod pendulum;
-mod plot;
 
+use casados::plot::{Figure, Sparsity};
 use casados::prelude::*;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -48,7 +48,8 @@ fn run(folder: &Path) -> Result<(), Box<dyn Error>> {
     for (file, structure) in models {
         println!("{structure}");
         let path = folder.join(format!("spy_{file}.svg"));
-        plot::draw(structure, &path)?;
+        let figure = Figure::new().size(1240, 420).with(Sparsity::jacobian(structure));
+        figure.column(0.5).with(Sparsity::factors(structure)).save(&path)?;
         println!("Drawn in {}\n", path.display());
     }
     Ok(())

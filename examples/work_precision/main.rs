@@ -14,11 +14,11 @@ mod data;
 #[path = "../models/ivp/mod.rs"]
 mod models;
 mod peers;
-mod plot;
 mod problems;
 mod record;
 mod report;
 
+use casados::plot::{Figure, Panel, Series};
 use cpu_time::ThreadTime;
 use peers::Peer;
 use problems::{Method, Problem};
@@ -66,6 +66,36 @@ struct Measured {
     /// Whether sensitivities were asked for.
     derivatives: bool,
     runs: Vec<Run>,
+}
+
+impl Measured {
+    /// Error over time. Of this library lines are solid and times warm, of others dashed and cold.
+    fn figure(&self) -> Figure {
+        let with = if self.derivatives { ", with sensitivities" } else { "" };
+        let mut panel = Panel::new(format!("{}{with}", self.title))
+            .x("largest relative error")
+            .y("ms")
+            .log_x()
+            .log_y()
+            .x_range(1e-14..1.0);
+        let mut drawn: Vec<(&str, bool)> = Vec::new();
+        for run in &self.runs {
+            let solver = (run.solver.as_str(), run.ours);
+            if drawn.contains(&solver) {
+                continue;
+            }
+            drawn.push(solver);
+            let runs = self.runs.iter().filter(|run| run.solver == solver.0);
+            let outcomes = runs.filter_map(|run| run.outcome.as_ref().ok()).filter(|o| o.error < 1.0);
+            let points: Vec<_> = outcomes.map(|o| (o.error.max(1e-14), 1e3 * o.time)).collect();
+            if !points.is_empty() {
+                let series =
+                    Series::line(solver.0, points).width(if solver.0 == "Radau" { 3.0 } else { 1.5 });
+                panel = panel.with(if run.ours { series.marked() } else { series.dashed().marked() });
+            }
+        }
+        Figure::new().size(760, 560).with(panel)
+    }
 }
 
 /// A method at an accuracy.
@@ -153,9 +183,9 @@ fn run() -> Result<(), Box<dyn Error>> {
     }
     let text = report::times(&all);
     println!("{text}\n{}", report::runs(&all));
-    std::fs::create_dir_all(&arguments.out)?;
     for measured in &all {
-        plot::draw(measured, &arguments.out)?;
+        let with = if measured.derivatives { "_sensitivities" } else { "" };
+        measured.figure().save(arguments.out.join(format!("{}{with}.svg", measured.name)))?;
     }
     eprintln!("plots are in {}", arguments.out.display());
     if let Some(file) = arguments.write {

@@ -14,7 +14,7 @@ use crate::shape::Shape;
 use core::ops::{Range, RangeBounds};
 
 /// Whether a name means a variable: `u` means `u[0]`, `u[1]`, and `cart` means `cart.position`.
-pub(super) fn means(name: &str, variable: &str) -> bool {
+pub(crate) fn means(name: &str, variable: &str) -> bool {
     variable.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with(['[', '.']))
 }
 

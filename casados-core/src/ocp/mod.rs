@@ -97,6 +97,8 @@ mod transfer;
 mod weights;
 mod wrapped;
 
+#[cfg(feature = "plot")]
+pub(crate) use bounds::means;
 #[cfg(feature = "alloc")]
 pub use collocation::Collocation;
 pub use constraint::{Constraint, Constraints};

@@ -1,0 +1,217 @@
+//! From numbers to pixels, and the numbers that stand at an axis.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// One of both axes of a panel.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Axis {
+    pub label: String,
+    pub is_log: bool,
+    /// What is drawn, if it does not follow from the data.
+    pub given: Option<(f64, f64)>,
+}
+
+/// An axis with its range and its pixels.
+#[derive(Clone, Debug)]
+pub(super) struct Scale {
+    pub is_log: bool,
+    /// Numbers; exponents of ten on a logarithmic axis.
+    pub low: f64,
+    pub high: f64,
+    /// Pixels of both.
+    pub from: f64,
+    pub to: f64,
+}
+
+impl Axis {
+    /// The scale over pixels `from..to`, of data.
+    pub fn scale(&self, data: impl Iterator<Item = f64>, pixels: Range<f64>, room: f64) -> Scale {
+        let place = |value: f64| if self.is_log { value.log10() } else { value };
+        let (low, high) = match self.given {
+            Some((low, high)) => (place(low), place(high)),
+            None => {
+                let (low, high) = data
+                    .map(place)
+                    .filter(|value| value.is_finite())
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+                (low - room * (high - low), high + room * (high - low))
+            }
+        };
+        let (low, high) = sensible(low, high);
+        Scale { is_log: self.is_log, low, high, from: pixels.start, to: pixels.end }
+    }
+}
+
+/// A range with a length, whatever is given.
+fn sensible(low: f64, high: f64) -> (f64, f64) {
+    if !(low.is_finite() && high.is_finite()) {
+        return (0.0, 1.0);
+    }
+    let (low, high) = (low.min(high), low.max(high));
+    let least = 1e-9 * low.abs().max(high.abs()).max(1e-300);
+    if high - low > least {
+        return (low, high);
+    }
+    let half = if low == 0.0 { 0.5 } else { 0.05 * low.abs() };
+    (low - half, high + half)
+}
+
+impl Scale {
+    /// The pixel of a number; not finite if it has none.
+    pub fn at(&self, value: f64) -> f64 {
+        let value = if self.is_log { value.log10() } else { value };
+        self.from + (value - self.low) / (self.high - self.low) * (self.to - self.from)
+    }
+
+    /// The number at a pixel.
+    pub fn value(&self, pixel: f64) -> f64 {
+        let value = self.low + (pixel - self.from) / (self.to - self.from) * (self.high - self.low);
+        if self.is_log { 10f64.powf(value) } else { value }
+    }
+
+    /// Whether a number is on the axis.
+    pub fn contains(&self, value: f64) -> bool {
+        let value = if self.is_log { value.log10() } else { value };
+        let room = 1e-9 * (self.high - self.low);
+        (self.low - room..=self.high + room).contains(&value)
+    }
+
+    /// Makes the range so long that a pixel is worth `unit`.
+    pub fn widen(&mut self, unit: f64) {
+        let (half, middle) = (0.5 * unit * (self.to - self.from).abs(), 0.5 * (self.low + self.high));
+        (self.low, self.high) = (middle - half, middle + half);
+    }
+
+    /// What a pixel is worth.
+    pub fn unit(&self) -> f64 {
+        (self.high - self.low) / (self.to - self.from).abs().max(1.0)
+    }
+
+    /// About `count` numbers to be written, with their texts.
+    pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
+        if !self.is_log {
+            return ticks(self.low, self.high, count);
+        }
+        let (first, last) = (self.low.ceil() as i32, self.high.floor() as i32);
+        let decades = last - first + 1;
+        if decades >= 3 {
+            let every = (decades as usize).div_ceil(count.max(2)) as i32;
+            let shown = (first..=last).filter(|exponent| exponent.rem_euclid(every) == 0);
+            return shown.map(|exponent| (10f64.powi(exponent), power(exponent))).collect();
+        }
+        let mut all = Vec::new();
+        for exponent in first - 1..=last + 1 {
+            for digit in [1.0, 2.0, 5.0] {
+                let value = digit * 10f64.powi(exponent);
+                if self.contains(value) {
+                    all.push((value, short(value)));
+                }
+            }
+        }
+        all
+    }
+}
+
+/// Multiples of 1, 2 or 5 times a power of ten.
+pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
+    let raw = (high - low) / count.max(1) as f64;
+    let decade = 10f64.powf(raw.log10().floor());
+    let factor = [1.0, 2.0, 5.0].into_iter().find(|factor| factor * decade >= 0.999 * raw).unwrap_or(10.0);
+    let step = factor * decade;
+    if !(step.is_finite() && step > 0.0) {
+        return Vec::new();
+    }
+    let digits = (-step.log10() - 1e-9).ceil().clamp(0.0, 17.0) as usize;
+    let largest = low.abs().max(high.abs());
+    let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
+    // Numbers whose neighbours are the same have no ticks of their own.
+    let all = (0..=(last - first).clamp(0.0, 100.0) as usize).map(|i| (first + i as f64) * step);
+    all.map(|value| {
+        let is_wide = largest >= 1e5 || step < 1e-3;
+        let text = if value == 0.0 {
+            "0".to_string()
+        } else if is_wide {
+            short(value)
+        } else {
+            format!("{value:.digits$}")
+        };
+        (value, text)
+    })
+    .collect()
+}
+
+/// With up to six digits.
+pub(super) fn short(value: f64) -> String {
+    let size = value.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+        let text = format!("{value:.3e}");
+        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+        let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+        return format!("{mantissa}e{exponent}");
+    }
+    let text = format!("{value:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+/// A power of ten.
+fn power(exponent: i32) -> String {
+    let raised = |c: char| match c {
+        '-' => '⁻',
+        '0' => '⁰',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '4' => '⁴',
+        '5' => '⁵',
+        '6' => '⁶',
+        '7' => '⁷',
+        '8' => '⁸',
+        _ => '⁹',
+    };
+    match exponent {
+        -2..=3 => short(10f64.powi(exponent)),
+        _ => format!("10{}", exponent.to_string().chars().map(raised).collect::<String>()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(low: f64, high: f64, count: usize) -> Vec<String> {
+        ticks(low, high, count).into_iter().map(|(_, text)| text).collect()
+    }
+
+    #[test]
+    fn round_numbers_stand_at_an_axis() {
+        assert_eq!(texts(-0.1, 1.05, 5), ["0", "0.5", "1.0"]);
+        assert_eq!(texts(0.0, 10.0, 5), ["0", "2", "4", "6", "8", "10"]);
+        assert_eq!(texts(1.7, 1.9, 4), ["1.70", "1.75", "1.80", "1.85", "1.90"]);
+        assert_eq!(texts(0.0, 4e6, 4), ["0", "1e6", "2e6", "3e6", "4e6"]);
+        assert_eq!(texts(0.0, 2e-5, 2), ["0", "1e-5", "2e-5"]);
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_powers_of_ten() {
+        let axis = Axis { is_log: true, ..Axis::default() };
+        let scale = axis.scale([1e-8, 1e2].into_iter(), 0.0..100.0, 0.0);
+        let ticks = scale.ticks(4);
+        assert_eq!(ticks.iter().map(|(_, text)| text.as_str()).collect::<Vec<_>>(), ["10⁻⁶", "10⁻³", "1"]);
+        assert!((scale.at(1e-3) - 50.0).abs() < 1e-9);
+        // Zero and negative numbers have no place, and do not move the range.
+        let scale = axis.scale([0.0, -1.0, 2.0, 6.0].into_iter(), 0.0..100.0, 0.0);
+        assert_eq!(scale.ticks(4).iter().map(|(value, _)| *value).collect::<Vec<_>>(), [2.0, 5.0]);
+        assert!(!scale.at(0.0).is_finite());
+    }
+
+    #[test]
+    fn a_range_has_a_length_whatever_the_data() {
+        for data in [&[][..], &[3.0], &[f64::NAN, f64::INFINITY], &[0.0, 0.0], &[-1e300, 1e300]] {
+            let scale = Axis::default().scale(data.iter().copied(), 0.0..100.0, 0.05);
+            assert!(scale.high > scale.low && scale.ticks(5).len() < 20, "{data:?}: {scale:?}");
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! Panels become shapes.
+
+use super::axis::{Scale, short};
+use super::panel::Panel;
+use super::series::Series;
+use super::svg::{Anchor, Canvas, Colour, LETTERS, Point, Stroke, width};
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// A rectangle of the canvas.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Area {
+    pub x: f64,
+    pub y: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+/// Pixels between two ticks, about.
+const APART: [f64; 2] = [85.0, 32.0];
+/// Pixels of a row of the legend, and of the scale of colours.
+const ROW: f64 = 18.0;
+const BAR: f64 = 84.0;
+const GAP: f64 = 8.0;
+/// Colours of a scale.
+const SHADES: usize = 32;
+
+impl Area {
+    fn inside(&self, left: f64, top: f64, right: f64, bottom: f64) -> Self {
+        Self {
+            x: self.x + left,
+            y: self.y + top,
+            width: (self.width - left - right).max(10.0),
+            height: (self.height - top - bottom).max(10.0),
+        }
+    }
+}
+
+/// Names and colours of a legend in rows that are not wider than `room`.
+fn legend(series: &[(&Series, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f64)>> {
+    let mut rows: Vec<Vec<(String, Stroke, f64)>> = Vec::new();
+    let mut right = f64::INFINITY;
+    for (series, colour) in series {
+        if series.name.is_empty() || !series.values.is_empty() {
+            continue;
+        }
+        let stroke = Stroke { colour: *colour, width: series.width, dashed: series.dashed };
+        let width = 32.0 + width(&series.name) + 12.0;
+        if right + width > room {
+            rows.push(Vec::new());
+            right = 0.0;
+        }
+        if let Some(row) = rows.last_mut() {
+            row.push((series.name.clone(), stroke, right));
+        }
+        right += width;
+    }
+    rows
+}
+
+/// The least and the largest of what decides about colours.
+pub(super) fn span<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
+    let finite = values.copied().filter(|value| value.is_finite());
+    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+}
+
+/// A line whose colour changes: pieces of the same shade.
+pub(super) fn gradient(
+    canvas: &mut Canvas,
+    points: &[Point],
+    values: &[f64],
+    (low, high): (f64, f64),
+    width: f64,
+) {
+    let shade = |value: f64| {
+        let share = (value - low) / (high - low).max(f64::MIN_POSITIVE);
+        (share.clamp(0.0, 1.0) * (SHADES - 1) as f64).round() as usize
+    };
+    let mut begin = 0;
+    for i in 1..=points.len().min(values.len()) {
+        let here = values.get(begin).copied().map_or(0, shade);
+        let is_same = values.get(i).is_some_and(|&value| shade(value) == here);
+        if !is_same {
+            let end = (i + 1).min(points.len());
+            let colour = Colour::mix(here as f64 / (SHADES - 1) as f64);
+            canvas.line(points.get(begin..end).unwrap_or_default(), Stroke::new(colour, width));
+            begin = i;
+        }
+    }
+}
+
+/// The scale of colours at the right of an area.
+pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, name: &str, (low, high): (f64, f64)) {
+    let (left, top, height) = (area.x + area.width + 14.0, area.y + 18.0, 0.7 * area.height);
+    canvas.group("scale", name, |canvas| {
+        canvas.words((left - 2.0, area.y + 6.0), name, Anchor::Start);
+        let step = height / SHADES as f64;
+        for i in 0..SHADES {
+            let colour = Colour::mix(1.0 - i as f64 / (SHADES - 1) as f64);
+            canvas.rectangle((left, top + step * i as f64), (10.0, step + 0.3), Some(colour), None);
+        }
+        for share in [0.0, 0.5, 1.0] {
+            let text = short(low + share * (high - low));
+            canvas.words((left + 15.0, top + height * (1.0 - share) + 0.35 * LETTERS), &text, Anchor::Start);
+        }
+    });
+}
+
+impl Panel {
+    pub(super) fn draw(&self, canvas: &mut Canvas, area: Area) {
+        canvas.group("panel", &self.title, |canvas| self.draw_all(canvas, area));
+    }
+
+    fn draw_all(&self, canvas: &mut Canvas, area: Area) {
+        let mut next = 0;
+        let coloured: Vec<(&Series, Colour)> = (self.series.iter())
+            .map(|series| {
+                let colour = series.colour.unwrap_or_else(|| {
+                    next += 1;
+                    Colour::of(next - 1)
+                });
+                (series, colour)
+            })
+            .collect();
+        let values = span(self.series.iter().flat_map(|series| &series.values));
+        let has_bar = values.0 <= values.1;
+        let rows = legend(&coloured, area.width - 40.0);
+        let top = if self.title.is_empty() { 10.0 } else { 28.0 } + ROW * rows.len() as f64 + 4.0;
+        let bottom = 24.0 + if self.x.label.is_empty() { 0.0 } else { 18.0 };
+        let right = if has_bar { BAR } else { 16.0 };
+        // How wide numbers at the left are follows from the vertical scale.
+        let inside = area.inside(0.0, top, right, bottom);
+        let y = self.y_scale(inside);
+        let numbers = y.ticks((inside.height / APART[1]) as usize);
+        let widest = numbers.iter().map(|(_, text)| width(text)).fold(0.0, f64::max);
+        let left = GAP + widest + 6.0 + if self.y.label.is_empty() { 0.0 } else { 20.0 };
+        let inside = area.inside(left, top, right, bottom);
+        let (x, y) = self.scales(inside, y);
+
+        canvas.heading((area.x + left, area.y + 18.0), &self.title);
+        draw_legend(canvas, (area.x + left, area.y + top - 4.0 - ROW * rows.len() as f64), &rows);
+        self.draw_axes(canvas, area, inside, [&x, &y]);
+        canvas.inside((inside.x, inside.y), (inside.width, inside.height), |canvas| {
+            self.draw_field(canvas, [&x, &y]);
+            for &limit in &self.limits {
+                let stroke = Stroke { colour: Colour::RED, width: 1.0, dashed: true };
+                let line = [(inside.x, y.at(limit)), (inside.x + inside.width, y.at(limit))];
+                canvas.group("limit", "", |canvas| canvas.line(&line, stroke));
+            }
+            for (series, colour) in &coloured {
+                canvas.group("series", &series.name, |canvas| series.draw(canvas, [&x, &y], *colour, values));
+            }
+            for (at, words) in &self.texts {
+                canvas.words((x.at(at.0) + 5.0, y.at(at.1) - 5.0), words, Anchor::Start);
+            }
+        });
+        if has_bar {
+            let name = self.series.iter().find(|series| !series.values.is_empty()).map_or("", |s| &s.name);
+            colour_bar(canvas, inside, name, values);
+        }
+    }
+
+    fn y_scale(&self, area: Area) -> Scale {
+        let all = self.series.iter().flat_map(|series| &series.points).map(|point| point.1);
+        self.y.scale(all.chain(self.limits.iter().copied()), area.y + area.height..area.y, 0.06)
+    }
+
+    fn scales(&self, area: Area, mut y: Scale) -> (Scale, Scale) {
+        let all = self.series.iter().flat_map(|series| &series.points).map(|point| point.0);
+        // Half of a dot at the border would be cut off.
+        let has_dots = self.series.iter().any(|series| series.radius > 0.0);
+        let room = if self.is_equal || has_dots { 0.03 } else { 0.0 };
+        let mut x = self.x.scale(all, area.x..area.x + area.width, room);
+        if self.is_equal {
+            let unit = x.unit().max(y.unit());
+            x.widen(unit);
+            y.widen(unit);
+        }
+        (x, y)
+    }
+
+    /// Frame, lines of the grid, numbers and what they are.
+    fn draw_axes(&self, canvas: &mut Canvas, area: Area, inside: Area, [x, y]: [&Scale; 2]) {
+        let (right, bottom) = (inside.x + inside.width, inside.y + inside.height);
+        let grid = Stroke::new(Colour::GRID, 1.0);
+        canvas.group("axes", "", |canvas| {
+            for (value, text) in x.ticks((inside.width / APART[0]) as usize) {
+                let at = x.at(value);
+                canvas.line(&[(at, inside.y), (at, bottom)], grid);
+                canvas.words((at, bottom + 16.0), &text, Anchor::Middle);
+            }
+            for (value, text) in y.ticks((inside.height / APART[1]) as usize) {
+                let at = y.at(value);
+                canvas.line(&[(inside.x, at), (right, at)], grid);
+                canvas.words((inside.x - 6.0, at + 0.35 * LETTERS), &text, Anchor::End);
+            }
+            let size = (inside.width, inside.height);
+            canvas.rectangle((inside.x, inside.y), size, None, Some(Colour::INK));
+            canvas.words((inside.x + 0.5 * inside.width, bottom + 35.0), &self.x.label, Anchor::Middle);
+            canvas.upright((area.x + LETTERS + 2.0, inside.y + 0.5 * inside.height), &self.y.label);
+        });
+    }
+
+    /// Strokes of one length, each from a dot on.
+    fn draw_field(&self, canvas: &mut Canvas, [x, y]: [&Scale; 2]) {
+        const EVERY: f64 = 22.0;
+        let Some(field) = self.field else { return };
+        let (wide, high) = ((x.to - x.from).abs(), (y.to - y.from).abs());
+        let mut strokes = Vec::new();
+        for i in 0..(wide / EVERY) as usize {
+            for j in 0..(high / EVERY) as usize {
+                let at = (x.from + EVERY * (i as f64 + 0.5), y.to + EVERY * (j as f64 + 0.5));
+                let [dx, dy] = field([x.value(at.0), y.value(at.1)]);
+                let (dx, dy) = (dx / x.unit(), -dy / y.unit());
+                let length = dx.hypot(dy);
+                if length > 0.0 && length.is_finite() {
+                    strokes.push([at, (at.0 + 14.0 * dx / length, at.1 + 14.0 * dy / length)]);
+                }
+            }
+        }
+        let colour = Colour(170, 175, 190);
+        canvas.group("field", "", |canvas| {
+            canvas.strokes(&strokes, Stroke::new(colour, 1.0));
+            let dots: Vec<[Point; 2]> = strokes.iter().map(|&[at, _]| [at, at]).collect();
+            canvas.strokes(&dots, Stroke::new(colour, 3.0));
+        });
+    }
+}
+
+fn draw_legend(canvas: &mut Canvas, at: Point, rows: &[Vec<(String, Stroke, f64)>]) {
+    for (i, row) in rows.iter().enumerate() {
+        let y = at.1 + ROW * (i as f64 + 0.5);
+        for (name, stroke, left) in row {
+            let from = at.0 + left;
+            if stroke.width > 0.0 {
+                canvas.line(&[(from, y), (from + 24.0, y)], *stroke);
+            } else {
+                canvas.dot((from + 14.0, y), 3.0, stroke.colour);
+            }
+            canvas.words((from + 30.0, y + 0.35 * LETTERS), name, Anchor::Start);
+        }
+    }
+}
+
+impl Series {
+    fn draw(&self, canvas: &mut Canvas, [x, y]: [&Scale; 2], colour: Colour, values: (f64, f64)) {
+        let points: Vec<Point> = self.points.iter().map(|point| (x.at(point.0), y.at(point.1))).collect();
+        if !self.values.is_empty() {
+            gradient(canvas, &points, &self.values, values, self.width);
+        } else if self.width > 0.0 {
+            canvas.line(&points, Stroke { colour, width: self.width, dashed: self.dashed });
+        }
+        if self.radius > 0.0 {
+            points.iter().for_each(|&point| canvas.dot(point, self.radius, colour));
+        }
+    }
+}

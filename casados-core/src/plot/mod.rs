@@ -1,0 +1,63 @@
+//! Pictures: trajectories with their bounds, convergence, histograms of times, phase portraits,
+//! curves in three dimensions, matrices (feature `plot`).
+//!
+//! A [`Figure`] is made of [`Panel`]s, and becomes the text of an SVG file without any other crate.
+//! Lines, dots and groups have titles, which a browser shows under the pointer.
+//!
+//! ```
+//! use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};
+//! use casados::plot::{Figure, Panel};
+//! use casados::prelude::*;
+//!
+//! /// A pendulum that is pushed: angle from below, rate.
+//! #[ode]
+//! fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] {
+//!     [x[1], u - 9.81 * x[0].sin()]
+//! }
+//! #[function]
+//! fn deviation(x: [f64; 2], u: f64) -> [f64; 3] {
+//!     [x[0], x[1], u]
+//! }
+//!
+//! let mut ocp = Problem::new(Irk::<Pendulum, Gauss<2>>::new(Options::default())?)
+//!     .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 0.1, 0.01]))
+//!     .on(Horizon::uniform(20, 0.1))?;
+//! ocp.fix_initial_state(&[1.0, 0.0])?.bound("u", .., -3.0, 3.0)?.guess(&[0.0; 2], &[0.0])?;
+//! let mut sqp = HeapSqp::new(&ocp)?;
+//! sqp.solve(&mut ocp)?;
+//!
+//! // All that can be drawn of a model with two states, in two columns.
+//! let stages = || ocp.iterate().stages();
+//! let phase = Panel::new("Phase portrait without a push")
+//!     .x("angle, rad")
+//!     .y("rate, rad/s")
+//!     .field(|x| pendulum(x, 0.0))
+//!     .line("solution", stages().map(|stage| (stage.x[0], stage.x[1])));
+//! let figure = Figure::new()
+//!     .with(Panel::trajectories(&ocp, "x")?)
+//!     .with(Panel::trajectories(&ocp, "u")?)
+//!     .column(0.8)
+//!     .with(phase)
+//!     .with(Panel::convergence(sqp.log()));
+//! assert!(figure.to_svg().starts_with("<svg"));
+//! // figure.save("plots/pendulum.svg")?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod axis;
+mod draw;
+mod figure;
+mod panel;
+mod run;
+mod series;
+mod space;
+mod sparsity;
+mod svg;
+mod trajectories;
+
+pub use figure::{Cell, Figure};
+pub use panel::Panel;
+pub use series::Series;
+pub use space::Space;
+pub use sparsity::Sparsity;
+pub use svg::Colour;

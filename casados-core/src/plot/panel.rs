@@ -1,0 +1,164 @@
+//! A panel: two axes, and what is drawn over them.
+
+use super::axis::Axis;
+use super::series::Series;
+use super::svg::Colour;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+/// Two axes, and what is drawn over them.
+///
+/// Ranges follow from the data unless they are given.
+#[derive(Clone, Debug, Default)]
+pub struct Panel {
+    pub(super) title: String,
+    pub(super) x: Axis,
+    pub(super) y: Axis,
+    pub(super) is_equal: bool,
+    pub(super) series: Vec<Series>,
+    /// Horizontal lines.
+    pub(super) limits: Vec<f64>,
+    pub(super) texts: Vec<((f64, f64), String)>,
+    /// A field of directions.
+    pub(super) field: Option<fn([f64; 2]) -> [f64; 2]>,
+}
+
+impl Panel {
+    /// A panel with a title and nothing else.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..Self::default() }
+    }
+
+    /// Another title.
+    #[must_use]
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// What stands below the horizontal axis.
+    #[must_use]
+    pub fn x(mut self, label: impl Into<String>) -> Self {
+        self.x.label = label.into();
+        self
+    }
+
+    /// What stands beside the vertical axis.
+    #[must_use]
+    pub fn y(mut self, label: impl Into<String>) -> Self {
+        self.y.label = label.into();
+        self
+    }
+
+    /// From where to where the horizontal axis goes; what is outside is cut off.
+    #[must_use]
+    pub fn x_range(mut self, range: Range<f64>) -> Self {
+        self.x.given = Some((range.start, range.end));
+        self
+    }
+
+    /// From where to where the vertical axis goes; what is outside is cut off.
+    #[must_use]
+    pub fn y_range(mut self, range: Range<f64>) -> Self {
+        self.y.given = Some((range.start, range.end));
+        self
+    }
+
+    /// A logarithmic horizontal axis. Numbers that are not positive are left out.
+    #[must_use]
+    pub fn log_x(mut self) -> Self {
+        self.x.is_log = true;
+        self
+    }
+
+    /// A logarithmic vertical axis. Numbers that are not positive are left out.
+    #[must_use]
+    pub fn log_y(mut self) -> Self {
+        self.y.is_log = true;
+        self
+    }
+
+    /// Both axes have the same scale: circles are round.
+    #[must_use]
+    pub fn equal(mut self) -> Self {
+        self.is_equal = true;
+        self
+    }
+
+    /// A series, behind which later ones are drawn.
+    #[must_use]
+    pub fn with(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// [`Series::line`]
+    #[must_use]
+    pub fn line(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        self.with(Series::line(name, points))
+    }
+
+    /// [`Series::steps`]
+    #[must_use]
+    pub fn steps(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        self.with(Series::steps(name, points))
+    }
+
+    /// [`Series::dots`]
+    #[must_use]
+    pub fn dots(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        self.with(Series::dots(name, points))
+    }
+
+    /// [`Series::coloured`]
+    #[must_use]
+    pub fn coloured(
+        self,
+        name: impl Into<String>,
+        points: impl IntoIterator<Item = (f64, f64, f64)>,
+    ) -> Self {
+        self.with(Series::coloured(name, points))
+    }
+
+    /// The outline of a thing in the colour of ink: wings, a wall, an obstacle.
+    #[must_use]
+    pub fn outline(self, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        self.with(Series::line("", points).colour(Colour::INK))
+    }
+
+    /// A thing that moves: its shape at one time after another, from light to dark.
+    #[must_use]
+    pub fn motion<S: IntoIterator<Item = (f64, f64)>>(mut self, shapes: impl IntoIterator<Item = S>) -> Self {
+        let shapes: Vec<S> = shapes.into_iter().collect();
+        let last = shapes.len().saturating_sub(1).max(1) as f64;
+        for (i, shape) in shapes.into_iter().enumerate() {
+            let series = Series::line("", shape).colour(Colour::shade(i as f64 / last)).width(1.0).marked();
+            self.series.push(Series { radius: 2.0, ..series });
+        }
+        self
+    }
+
+    /// A horizontal line: red and dashed.
+    #[must_use]
+    pub fn limit(mut self, value: f64) -> Self {
+        self.limits.push(value);
+        self
+    }
+
+    /// Words beside a point.
+    #[must_use]
+    pub fn text(mut self, at: (f64, f64), words: impl Into<String>) -> Self {
+        self.texts.push((at, words.into()));
+        self
+    }
+
+    /// The directions of a field, such as the right-hand side of a model with two states, as short
+    /// strokes behind all else: with solutions as lines, a phase portrait.
+    #[must_use]
+    pub fn field(mut self, field: fn([f64; 2]) -> [f64; 2]) -> Self {
+        self.field = Some(field);
+        self
+    }
+}

@@ -1,0 +1,262 @@
+//! Shapes as text: a canvas in pixels, from the top left corner on.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use core::fmt::{self, Write as _};
+
+/// A point of the canvas.
+pub(super) type Point = (f64, f64);
+
+/// A colour: red, green, blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Colour(pub u8, pub u8, pub u8);
+
+impl Colour {
+    /// Of frames, numbers and outlines.
+    pub const INK: Self = Self(40, 40, 40);
+    /// Of lines that help to read.
+    pub const GRID: Self = Self(225, 225, 225);
+    /// The first of the [palette](Self::of).
+    pub const BLUE: Self = Self(31, 95, 168);
+    /// The second of the palette.
+    pub const ORANGE: Self = Self(230, 145, 20);
+    /// The third of the palette.
+    pub const GREEN: Self = Self(60, 140, 70);
+    /// The fourth of the palette; of limits.
+    pub const RED: Self = Self(200, 62, 45);
+    /// The fifth of the palette.
+    pub const PURPLE: Self = Self(120, 80, 160);
+
+    const PALETTE: [Self; 8] = [
+        Self::BLUE,
+        Self::ORANGE,
+        Self::GREEN,
+        Self::RED,
+        Self::PURPLE,
+        Self(90, 170, 190),
+        Self(150, 100, 60),
+        Self(110, 110, 110),
+    ];
+
+    /// A colour of the palette, which begins again after eight.
+    #[must_use]
+    pub fn of(index: usize) -> Self {
+        Self::PALETTE[index % Self::PALETTE.len()]
+    }
+
+    /// From dark blue at 0 over green to yellow at 1.
+    #[must_use]
+    pub fn mix(share: f64) -> Self {
+        Self::between(&[Self(38, 60, 130), Self(60, 140, 140), Self(245, 200, 60)], share)
+    }
+
+    /// From light at 0 to dark at 1.
+    #[must_use]
+    pub fn shade(share: f64) -> Self {
+        Self::between(&[Self(205, 205, 215), Self(15, 15, 90)], share)
+    }
+
+    fn between(stops: &[Self], share: f64) -> Self {
+        let position = share.clamp(0.0, 1.0) * (stops.len().max(2) - 2 + 1) as f64;
+        let first = (position as usize).min(stops.len().saturating_sub(2));
+        let weight = position - first as f64;
+        match stops.get(first..) {
+            Some(&[from, to, ..]) => {
+                let channel =
+                    |a: u8, b: u8| (f64::from(a) + weight * (f64::from(b) - f64::from(a))).round() as u8;
+                Self(channel(from.0, to.0), channel(from.1, to.1), channel(from.2, to.2))
+            }
+            _ => Self::INK,
+        }
+    }
+}
+
+impl fmt::Display for Colour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
+    }
+}
+
+/// How a line is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stroke {
+    pub colour: Colour,
+    pub width: f64,
+    pub dashed: bool,
+}
+
+impl Stroke {
+    pub fn new(colour: Colour, width: f64) -> Self {
+        Self { colour, width, dashed: false }
+    }
+}
+
+/// Where a text stands: its point is at its begin, in its middle, at its end.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// The height of letters in pixels.
+pub(super) const LETTERS: f64 = 13.0;
+
+/// How wide a text is, about.
+pub(super) fn width(text: &str) -> f64 {
+    0.56 * LETTERS * text.chars().count() as f64
+}
+
+/// A picture as it is drawn.
+pub(super) struct Canvas {
+    text: String,
+}
+
+/// With a tenth of a pixel.
+fn number(value: f64) -> String {
+    let text = format!("{value:.1}");
+    let short = text.strip_suffix(".0").unwrap_or(&text);
+    if short == "-0" { "0".to_string() } else { short.to_string() }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+impl Canvas {
+    pub fn new(width: f64, height: f64) -> Self {
+        let (width, height) = (number(width), number(height));
+        let text = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"{LETTERS}\" \
+             fill=\"{}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
+            Colour::INK
+        );
+        Self { text }
+    }
+
+    pub fn finish(mut self) -> String {
+        self.text.push_str("</svg>\n");
+        self.text
+    }
+
+    fn push(&mut self, line: fmt::Arguments<'_>) {
+        // Text that grows does not fail.
+        let _ = self.text.write_fmt(line);
+        self.text.push('\n');
+    }
+
+    /// What belongs together, with a title that a browser shows under the pointer.
+    pub fn group(&mut self, class: &str, title: &str, draw: impl FnOnce(&mut Self)) {
+        self.push(format_args!("<g class=\"{class}\">"));
+        if !title.is_empty() {
+            self.push(format_args!("<title>{}</title>", escape(title)));
+        }
+        draw(self);
+        self.push(format_args!("</g>"));
+    }
+
+    /// A rectangle out of which nothing is drawn.
+    pub fn inside(&mut self, at: Point, size: Point, draw: impl FnOnce(&mut Self)) {
+        let (x, y, w, h) = (number(at.0), number(at.1), number(size.0), number(size.1));
+        self.push(format_args!(
+            "<svg x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" viewBox=\"{x} {y} {w} {h}\">"
+        ));
+        draw(self);
+        self.push(format_args!("</svg>"));
+    }
+
+    /// A line through points; what is not finite interrupts it.
+    pub fn line(&mut self, points: &[Point], stroke: Stroke) {
+        let is_finite = |point: &Point| point.0.is_finite() && point.1.is_finite();
+        for piece in points.split(|point| !is_finite(point)) {
+            self.piece(piece, stroke);
+        }
+    }
+
+    fn piece(&mut self, points: &[Point], stroke: Stroke) {
+        let mut drawn = String::new();
+        let mut last: Option<Point> = None;
+        for (i, &point) in points.iter().enumerate() {
+            let is_near = last.is_some_and(|l| (l.0 - point.0).abs() + (l.1 - point.1).abs() < 0.3);
+            if is_near && i + 1 < points.len() {
+                continue;
+            }
+            if last.is_some() {
+                drawn.push(' ');
+            }
+            drawn.push_str(&number(point.0));
+            drawn.push(',');
+            drawn.push_str(&number(point.1));
+            last = Some(point);
+        }
+        if points.len() < 2 {
+            return;
+        }
+        let dashes = if stroke.dashed { " stroke-dasharray=\"5 4\"" } else { "" };
+        self.push(format_args!(
+            "<polyline points=\"{drawn}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{}\" \
+             stroke-linejoin=\"round\"{dashes}/>",
+            stroke.colour,
+            number(stroke.width),
+        ));
+    }
+
+    /// Strokes of one look, with round ends: one of no length is a dot.
+    pub fn strokes(&mut self, strokes: &[[Point; 2]], stroke: Stroke) {
+        let mut path = String::new();
+        for [from, to] in strokes {
+            let [x, y, end_x, end_y] = [from.0, from.1, to.0, to.1].map(number);
+            let _ = write!(path, "M{x},{y}L{end_x},{end_y}");
+        }
+        let (colour, width) = (stroke.colour, number(stroke.width));
+        self.push(format_args!(
+            "<path d=\"{path}\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\"/>"
+        ));
+    }
+
+    pub fn dot(&mut self, at: Point, radius: f64, colour: Colour) {
+        if at.0.is_finite() && at.1.is_finite() {
+            let (x, y, r) = (number(at.0), number(at.1), number(radius));
+            self.push(format_args!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{colour}\"/>"));
+        }
+    }
+
+    pub fn rectangle(&mut self, at: Point, size: Point, fill: Option<Colour>, frame: Option<Colour>) {
+        let (x, y, w, h) = (number(at.0), number(at.1), number(size.0), number(size.1));
+        let none = || "none".to_string();
+        let fill = fill.map_or_else(none, |colour| colour.to_string());
+        let frame = frame.map_or_else(none, |colour| colour.to_string());
+        self.push(format_args!(
+            "<rect x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"{fill}\" stroke=\"{frame}\"/>"
+        ));
+    }
+
+    pub fn words(&mut self, at: Point, text: &str, anchor: Anchor) {
+        self.styled(at, text, anchor, "");
+    }
+
+    /// Of a panel.
+    pub fn heading(&mut self, at: Point, text: &str) {
+        self.styled(at, text, Anchor::Start, " font-size=\"15\" font-weight=\"bold\"");
+    }
+
+    /// Upwards.
+    pub fn upright(&mut self, at: Point, text: &str) {
+        let turn = format!(" transform=\"rotate(-90 {} {})\"", number(at.0), number(at.1));
+        self.styled(at, text, Anchor::Middle, &turn);
+    }
+
+    fn styled(&mut self, at: Point, text: &str, anchor: Anchor, more: &str) {
+        if text.is_empty() {
+            return;
+        }
+        let anchor = match anchor {
+            Anchor::Start => "",
+            Anchor::Middle => " text-anchor=\"middle\"",
+            Anchor::End => " text-anchor=\"end\"",
+        };
+        let (x, y) = (number(at.0), number(at.1));
+        self.push(format_args!("<text x=\"{x}\" y=\"{y}\"{anchor}{more}>{}</text>", escape(text)));
+    }
+}

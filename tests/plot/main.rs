@@ -1,0 +1,319 @@
+//! Pictures: they are parsed, and what they show is held against what was to be drawn.
+
+mod reader;
+
+use casados::ocp::{HeapOcp, HeapSqp, Horizon, Iteration, LeastSquaresCost, Log, OcpError, Problem};
+use casados::plot::{Colour, Figure, Panel, Series, Space, Sparsity};
+use casados::prelude::*;
+use casados::qp::Residuals;
+use reader::{axes, groups, lines, pixels, points};
+use roxmltree::Document;
+
+type Test = Result<(), Box<dyn std::error::Error>>;
+
+/// A pixel is drawn with a tenth, numbers are read with two of them.
+const PIXEL: f64 = 0.2;
+
+/// A cart that is pushed: position, velocity.
+#[ode]
+fn cart(x: [f64; 2], u: f64) -> [f64; 2] {
+    [x[1], u]
+}
+#[function]
+fn deviation(x: [f64; 2], u: f64) -> [f64; 3] {
+    [x[0], x[1], u]
+}
+
+type CartProblem = Problem<Irk<Cart, Gauss<2>>, LeastSquaresCost<Deviation>>;
+
+/// At rest beside its place, with a force within one.
+fn solved() -> Result<(HeapOcp<CartProblem>, HeapSqp), Box<dyn std::error::Error>> {
+    let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+        .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 1.0, 0.1]))
+        .on(Horizon::uniform(20, 0.2))?;
+    ocp.fix_initial_state(&[2.0, 0.0])?.bound("u", .., -1.0, 1.0)?.guess(&[0.0; 2], &[0.0])?;
+    let mut sqp = HeapSqp::new(&ocp)?;
+    assert!(sqp.solve(&mut ocp)?.is_converged());
+    Ok((ocp, sqp))
+}
+
+#[test]
+fn trajectories_are_those_of_the_iterate_with_bounds_and_active_parts() -> Test {
+    let (ocp, _) = solved()?;
+    let svg = Figure::new().with(Panel::trajectories(&ocp, "u")?).to_svg();
+    let document = Document::parse(&svg)?;
+    let panel = groups(&document, "panel", Some("Cart: u"))[0];
+    let [x, y] = axes(&panel)?;
+
+    // Stairs: the value of each interval at both of its ends.
+    let drawn = points(&panel, &groups(&document, "series", Some("u"))[0])?.concat();
+    let controls: Vec<f64> = ocp.iterate().stages().filter_map(|stage| stage.u.first().copied()).collect();
+    for (k, &u) in controls.iter().enumerate() {
+        for t in [0.2 * k as f64, 0.2 * (k + 1) as f64] {
+            let is_there = |point: &&[f64; 2]| {
+                (x.pixel(point[0]) - x.pixel(t)).abs() < PIXEL
+                    && (y.pixel(point[1]) - y.pixel(u)).abs() < PIXEL
+            };
+            assert!(drawn.iter().any(|point| is_there(&point)), "u = {u} at {t}: {drawn:?}");
+        }
+    }
+
+    let mut bounds = Vec::new();
+    let mut active = Vec::new();
+    for line in lines(&panel) {
+        let ends = pixels(&line)?;
+        let (first, last) = (ends[0], ends[ends.len() - 1]);
+        if line.attribute("stroke-dasharray").is_some() {
+            bounds.push(y.value(first[1]));
+            assert!((x.value(last[0]) - 4.0).abs() < 0.01 && (last[1] - first[1]).abs() < 0.01);
+        }
+        if line.attribute("stroke-width") == Some("6") {
+            let value = y.value(first[1]);
+            assert!((value.abs() - 1.0).abs() < 0.01, "{value} is no bound");
+            active.push([x.value(first[0]), x.value(last[0])]);
+        }
+    }
+    bounds.sort_by(f64::total_cmp);
+    assert!(
+        bounds.len() == 2 && (bounds[0] + 1.0).abs() < 0.01 && (bounds[1] - 1.0).abs() < 0.01,
+        "{bounds:?}"
+    );
+    // As many intervals as there are controls at a bound: at the start and on the way to rest.
+    let covered: f64 = active.iter().map(|[from, to]| to - from).sum();
+    let expected = 0.2 * controls.iter().filter(|u| (u.abs() - 1.0).abs() < 1e-6).count() as f64;
+    assert!(expected >= 0.4 && (covered - expected).abs() < 0.02, "{active:?}, but {controls:?}");
+    Ok(())
+}
+
+#[test]
+fn a_name_means_what_it_means_for_bounds() -> Test {
+    let (ocp, _) = solved()?;
+    let svg = Figure::new().with(Panel::trajectories(&ocp, "x")?).to_svg();
+    let document = Document::parse(&svg)?;
+    let panel = groups(&document, "panel", None)[0];
+    for (i, name) in ["x[0]", "x[1]"].into_iter().enumerate() {
+        let drawn = points(&panel, &groups(&document, "series", Some(name))[0])?.concat();
+        assert_eq!(drawn.len(), 21);
+        for (point, stage) in drawn.iter().zip(ocp.iterate().stages()) {
+            assert!((point[1] - stage.x[i]).abs() < 0.01, "{name}: {point:?}, but {}", stage.x[i]);
+        }
+    }
+    let unknown = Panel::trajectories(&ocp, "y").map(|_| ()).unwrap_err();
+    assert!(matches!(unknown, OcpError::UnknownName { .. }), "{unknown}");
+    Ok(())
+}
+
+#[test]
+fn convergence_is_the_log_on_a_logarithmic_axis() -> Test {
+    let row = |iteration, size: f64| Iteration {
+        iteration,
+        residuals: Residuals { stationarity: size, dynamics: 1e-3 * size, ..Residuals::default() },
+        ..Iteration::default()
+    };
+    let rows = [row(0, 1e2), row(1, 3.0), row(2, 1e-4), row(3, 1e-9)];
+    let figure = Figure::new()
+        .with(Panel::convergence(Log(&rows)))
+        .with(Panel::convergences([("one", Log(&rows)), ("none", Log(&[]))]));
+    let svg = figure.to_svg();
+    let document = Document::parse(&svg)?;
+    for (panel, name, factor) in [(0, "stationarity", 1.0), (0, "dynamics", 1e-3), (1, "one", 1.0)] {
+        let panel = groups(&document, "panel", None)[panel];
+        let drawn = points(&panel, &groups(&document, "series", Some(name))[0])?.concat();
+        assert_eq!(drawn.len(), 4, "{name}");
+        for (point, row) in drawn.iter().zip(&rows) {
+            let expected = factor * row.residuals.stationarity;
+            assert!((point[1] / expected - 1.0).abs() < 0.05, "{name}: {point:?}, but {expected}");
+            assert!((point[0] - row.iteration as f64).abs() < 0.01);
+        }
+    }
+    // A residual that is zero has no place on this axis.
+    let series = groups(&document, "series", Some("inequalities"))[0];
+    assert!(lines(&series).is_empty());
+    Ok(())
+}
+
+#[test]
+fn a_histogram_has_all_samples() -> Test {
+    // 90 of one time, nine of a longer one, and one far away.
+    let times: Vec<f64> = (0..100)
+        .map(|i| {
+            if i < 90 {
+                0.1
+            } else if i < 99 {
+                0.15
+            } else {
+                7.0
+            }
+        })
+        .collect();
+    let svg = Figure::new().with(Panel::histogram([("feedback", times.as_slice())]).x("ms")).to_svg();
+    let document = Document::parse(&svg)?;
+    let panel = groups(&document, "panel", None)[0];
+    let pieces = points(&panel, &groups(&document, "series", Some("feedback"))[0])?;
+    assert_eq!(pieces.len(), 3, "gaps are gaps");
+    for (piece, (time, share)) in pieces.iter().zip([(0.1, 0.9), (0.15, 0.09), (7.0, 0.01)]) {
+        let [from, to] = [piece[0], piece[1]];
+        assert!(from[0] < 1.001 * time && to[0] > 0.999 * time, "{piece:?} is not around {time}");
+        assert!((to[0] / from[0]).log10() - 1.0 / 12.0 < 0.01);
+        assert!((from[1] / share - 1.0).abs() < 0.03 && from[1] == to[1], "{piece:?}, but {share}");
+    }
+    Ok(())
+}
+
+/// A mass, whose spring force is an algebraic state.
+#[dae]
+fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64) -> [f64; 3] {
+    [xdot[0] - x[1], xdot[1] + z, z - p * x[0].sinh()]
+}
+
+#[test]
+fn matrices_have_a_square_for_each_entry() -> Test {
+    let structure = Spring::describe();
+    let figure =
+        Figure::new().with(Sparsity::jacobian(structure)).column(1.0).with(Sparsity::factors(structure));
+    let svg = figure.to_svg();
+    let document = Document::parse(&svg)?;
+    let of = |title: &str, colour: Colour| {
+        let group = groups(&document, "sparsity", None).into_iter().find(|group| {
+            group.descendants().any(|node| node.text().is_some_and(|text| text.starts_with(title)))
+        });
+        let squares = group.into_iter().flat_map(|group| group.descendants());
+        // One of them stands in the legend.
+        squares.filter(|node| node.attribute("fill") == Some(&colour.to_string())).count() - 1
+    };
+    // ẋ₀, ẋ₁, x₁, z twice; p, whose second derivative vanishes; x₀, whose does not.
+    assert_eq!(of("Spring: Jacobian, 7", Colour(150, 170, 195)), 5);
+    assert_eq!(of("Spring: Jacobian, 7", Colour::BLUE), 1);
+    assert_eq!(of("Spring: Jacobian, 7", Colour::RED), 1);
+    // The position is kinematic: two unknowns are left, of which each depends on the other.
+    assert_eq!(of("Spring: factors", Colour::GREEN) + of("Spring: factors", Colour::INK), 2);
+    assert_eq!((of("Spring: factors", Colour::BLUE), of("Spring: factors", Colour::ORANGE)), (2, 0));
+    Ok(())
+}
+
+#[test]
+fn space_is_seen_from_where_it_is_said() -> Test {
+    // A screw around the third axis: from above a circle, from the side as high as it is.
+    let turns = (0..=200).map(|i| f64::from(i) * std::f64::consts::PI / 50.0);
+    let screw: Vec<[f64; 3]> = turns.map(|t| [2.0 * t.cos(), 2.0 * t.sin(), 0.5 * t]).collect();
+    let seen = |azimuth, elevation| -> Result<Vec<[f64; 2]>, Box<dyn std::error::Error>> {
+        let space = Space::new("A screw").seen_from(azimuth, elevation).line("screw", screw.iter().copied());
+        let svg = Figure::new().size(900, 900).with(space).to_svg();
+        let document = Document::parse(&svg)?;
+        pixels(&lines(&groups(&document, "series", Some("screw"))[0])[0])
+    };
+    let extent = |points: &[[f64; 2]], i: usize| {
+        let values = || points.iter().map(|point| point[i]);
+        [values().fold(f64::MAX, f64::min), values().fold(f64::MIN, f64::max)]
+    };
+    let above = seen(-90.0, 90.0)?;
+    let centre = [0, 1].map(|i| extent(&above, i).iter().sum::<f64>() / 2.0);
+    let radius = above[0][0] - centre[0];
+    assert!(radius > 50.0, "the first axis points to the right");
+    for point in &above {
+        assert!(((point[0] - centre[0]).hypot(point[1] - centre[1]) - radius).abs() < 0.3);
+    }
+    // A quarter of a turn later it is at the end of the second axis, which points upwards.
+    assert!((above[25][1] - (centre[1] - radius)).abs() < PIXEL);
+    let side = seen(-90.0, 0.0)?;
+    let [[left, right], [top, bottom]] = [0, 1].map(|i| extent(&side, i));
+    assert!(((bottom - top) / (right - left) - std::f64::consts::TAU / 4.0).abs() < 0.01);
+    assert!((side[0][1] - bottom).abs() < PIXEL, "the third axis points upwards");
+    Ok(())
+}
+
+#[test]
+fn a_line_that_changes_its_colour_has_no_gaps() -> Test {
+    let points = (0..=50).map(|i| f64::from(i) / 50.0).map(|t| (t, t * t, (6.0 * t).sin()));
+    let svg = Figure::new().with(Panel::new("").coloured("power", points)).to_svg();
+    let document = Document::parse(&svg)?;
+    let series = groups(&document, "series", Some("power"))[0];
+    let pieces = lines(&series).iter().map(pixels).collect::<Result<Vec<_>, _>>()?;
+    assert!(pieces.len() > 20);
+    for pair in pieces.windows(2) {
+        assert_eq!(pair[0].last(), pair[1].first());
+    }
+    let colours: std::collections::BTreeSet<_> =
+        lines(&series).iter().filter_map(|line| line.attribute("stroke").map(String::from)).collect();
+    assert!(
+        colours.contains(&Colour::mix(0.0).to_string()) && colours.contains(&Colour::mix(1.0).to_string())
+    );
+    Ok(())
+}
+
+#[test]
+fn directions_of_a_field_are_those_of_the_model() -> Test {
+    let rotation = |x: [f64; 2]| [-x[1], x[0]];
+    let panel = Panel::new("").field(rotation).x_range(-1.0..1.0).y_range(-1.0..1.0).equal().line("", []);
+    let svg = Figure::new().with(panel).to_svg();
+    let document = Document::parse(&svg)?;
+    let panel = groups(&document, "panel", None)[0];
+    let [of_x, of_y] = axes(&panel)?;
+    let field = groups(&document, "field", None)[0];
+    let path = field.children().find_map(|node| node.attribute("d")).ok_or("no strokes")?;
+    let strokes: Vec<&str> = path.split('M').skip(1).collect();
+    assert!(strokes.len() > 100);
+    for stroke in strokes {
+        let numbers = stroke.split(['L', ',']).map(str::parse).collect::<Result<Vec<f64>, _>>()?;
+        let [x, y, tip_x, tip_y] = numbers[..] else { return Err(stroke.into()) };
+        let ([x, tip_x], [y, tip_y]) = ([x, tip_x].map(|p| of_x.value(p)), [y, tip_y].map(|p| of_y.value(p)));
+        let (dx, dy) = (tip_x - x, tip_y - y);
+        let cosine = (dx * -y + dy * x) / (dx.hypot(dy) * x.hypot(y));
+        assert!(cosine > 0.99, "{stroke:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn whatever_is_drawn_the_file_is_well_formed() -> Test {
+    let hostile = "a < b & \"c\" > d";
+    let strange =
+        [(0.0, f64::NAN), (f64::INFINITY, 1.0), (1.0, -f64::INFINITY), (2.0, f64::MAX), (3.0, f64::MIN)];
+    let figures = [
+        Figure::new(),
+        Figure::new().column(f64::NAN),
+        Figure::new().size(0, 0).with(Panel::new(hostile)),
+        Figure::new()
+            .with(Panel::new(hostile).x(hostile).y(hostile).line(hostile, strange).text((0.0, 0.0), hostile)),
+        Figure::new().with(Panel::default().log_x().log_y().dots("", strange).limit(-1.0)),
+        Figure::new().with(Panel::default().x_range(1.0..1.0).y_range(f64::NAN..0.0).steps("", strange)),
+        Figure::new().with(Panel::histogram([(hostile, &[0.0, f64::NAN, -1.0][..]), ("", &[])])),
+        Figure::new()
+            .with(Space::new(hostile).seen_from(f64::NAN, 400.0).line(hostile, [[f64::NAN, 0.0, 1.0]])),
+        Figure::new().with(Space::new("").coloured("", [([1.0; 3], f64::NAN)])),
+        Figure::new().with(Panel::new("").motion([vec![(0.0, 1.0)], vec![]]).outline([])),
+    ];
+    for figure in figures {
+        let svg = figure.to_svg();
+        let document = Document::parse(&svg)?;
+        assert_eq!(document.root_element().tag_name().name(), "svg");
+        let numbers = ["x", "y", "width", "height", "cx", "cy", "points"];
+        for attribute in document.descendants().flat_map(|node| node.attributes()) {
+            let is_number = numbers.contains(&attribute.name());
+            assert!(!is_number || !attribute.value().contains(['N', 'i']), "{attribute:?}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_series_looks_as_it_is_told() -> Test {
+    let series = Series::line("limit", [(0.0, 0.0), (1.0, 1.0)]).colour(Colour::RED).width(1.0).dashed();
+    let folder = std::env::temp_dir().join(format!("casados_plot_{}", std::process::id()));
+    let path = folder.join("inside/figure.svg");
+    Figure::new().with(Panel::new("").with(series).dots("dots", [(0.5, 0.5)])).save(&path)?;
+    let svg = std::fs::read_to_string(&path)?;
+    std::fs::remove_dir_all(&folder)?;
+    let document = Document::parse(&svg)?;
+    let line = lines(&groups(&document, "series", Some("limit"))[0])[0];
+    assert_eq!(line.attribute("stroke"), Some("#c83e2d"));
+    assert_eq!(
+        (line.attribute("stroke-width"), line.attribute("stroke-dasharray")),
+        (Some("1"), Some("5 4"))
+    );
+    let dots = groups(&document, "series", Some("dots"))[0];
+    assert_eq!(dots.descendants().filter(|node| node.tag_name().name() == "circle").count(), 1);
+    let error = Figure::new().save(std::env::temp_dir()).unwrap_err();
+    assert!(error.to_string().starts_with("cannot write"), "{error}");
+    Ok(())
+}
