@@ -18,23 +18,42 @@ use proc_macro::TokenStream;
 /// parser takes up to 23 kB for a level, and [`language::tokens::check`] bounds the levels.
 const STACK: usize = 1 << 29;
 
-/// A differential-algebraic model `f(ẋ, x, u, z, p, t) = 0`.
+/// A differential-algebraic model `0 = f(ẋ, x, u, z, p, t)`.
 ///
-/// What a model may contain is in `docs/language.md`. In `f64` the residual has the bits of the
-/// function, but structural zeros are zeros: `0.0 * y`, `0.0 / y` and `y - y` are dropped, whatever
-/// `y` is when it runs, NaN too. Conditions of the compiler (`#[cfg]`) are refused inside of a
-/// model.
+/// ```
+/// use casados::prelude::*;
 ///
-/// `#[dae(nominal(x = [900.0, 2e6], z = 0.1), range(z = 1e-3..=10.0))]` says where it lives.
-/// Algebraic states start Newton's method at their nominal values where a call gives no others
-/// (`set_start`), without one at zero, or at the geometric mean of a range that zero is not in.
-/// Where the equations have several roots, that decides for one; where they have no value or a
-/// singular matrix at `z = 0`, as those with `z.ln()` or `z * z - x[0]`, there is no solution
-/// without it.
+/// /// A mass on a spring, whose force is an algebraic state.
+/// #[dae(nominal(z = 0.1), range(x = -1.0..=1.0))]
+/// fn spring(xdot: [f64; 2], x: [f64; 2], z: f64, p: f64) -> [f64; 3] {
+///     [xdot[0] - x[1], xdot[1] + z, z - p * x[0].sinh()]
+/// }
+/// let irk = Irk::<Spring, RadauIIA<3>>::new(Options::default());
+/// ```
 ///
-/// `#[dae(index_reduction)]` differentiates constraints in time until the model has index 1, and
-/// makes its invariants a function; `#[dae(index_reduction(baumgarte = [2.0, 1.0]))]` lets what
-/// constraints are off by decay, `#[dae(index_reduction(projection))]` is for `casados::Projected`.
+/// Beside the function, which stays as it is, stands a type of its name in upper camel case.
+///
+/// | arguments | by name, in any order, only those that there are |
+/// | --- | --- |
+/// | `xdot`, `x`, `z`, `u`, `p`, `t` | derivatives, states, algebraic states, controls, parameters, time |
+/// | types | `f64`, arrays, tuples, nalgebra vectors and matrices, structs; as many results as there are `x` and `z` |
+///
+/// | attribute | |
+/// | --- | --- |
+/// | `nominal(x = [900.0, 2e6], z = 0.1)` | typical values. Those of `z` are where Newton's method starts: of several roots they decide for one; without one it is zero, or the geometric mean of a range that zero is not in |
+/// | `range(z = 1e-3..=10.0)` | from where to where values may be |
+/// | `N = [3, 5]` | sizes of a model with const parameters |
+/// | `name = Type`, `crate = path` | another name of the type; where casados is |
+/// | `index_reduction`, with `(baumgarte = [2.0, 1.0])` or `(projection)` | constraints are differentiated until the model has index 1, and its invariants are a function |
+///
+/// On a `mod` it takes structs, constants and helper functions as well. The body may be any
+/// computation that can be unrolled while it compiles: loops, closures, iterators, generics, `if`
+/// and `match` on model quantities. In `f64` the residual has the bits of the function, but
+/// structural zeros are zeros: `0.0 * y`, `0.0 / y` and `y - y` are dropped, whatever `y` is when
+/// it runs, NaN too. Conditions of the compiler (`#[cfg]`) are refused inside of a model.
+///
+/// [What a model may contain](https://docs.rs/casados/latest/casados/guide/language/index.html) ·
+/// [The guide](https://docs.rs/casados/latest/casados/guide/index.html)
 #[proc_macro_attribute]
 pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Dae, attribute.into(), item.into()).into()
@@ -42,8 +61,23 @@ pub fn dae(attribute: TokenStream, item: TokenStream) -> TokenStream {
 
 /// An explicit model `ẋ = g(x, u, p, t)`.
 ///
-/// What holds for [`macro@dae`] holds here: what a model may contain is in `docs/language.md`,
-/// structural zeros are zeros, and conditions of the compiler are refused.
+/// ```
+/// use casados::prelude::*;
+///
+/// /// A pendulum that is pushed.
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: f64) -> [f64; 2] {
+///     [x[1], u - 9.81 * x[0].sin()]
+/// }
+/// let irk = Irk::<Pendulum, Gauss<2>>::new(Options::default());
+/// let erk = Erk::<Pendulum, Rk4>::new(Options::default());
+/// ```
+///
+/// What holds for [`macro@dae`] holds here, with the arguments `x`, `u`, `p`, `t` and a result for
+/// each state.
+///
+/// [What a model may contain](https://docs.rs/casados/latest/casados/guide/language/index.html) ·
+/// [The guide](https://docs.rs/casados/latest/casados/guide/index.html)
 #[proc_macro_attribute]
 pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Ode, attribute.into(), item.into()).into()
@@ -52,8 +86,22 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
 /// A function `y(x, z, u, p, t)` of a model's variables: an integrand, an event, a cost, a
 /// constraint.
 ///
-/// It is written in the language of [`macro@dae`]: structural zeros are zeros, and conditions of
-/// the compiler are refused.
+/// ```
+/// use casados::prelude::*;
+///
+/// /// Kinetic and potential energy of a mass on a spring.
+/// #[function]
+/// fn energy(x: [f64; 2], p: f64) -> [f64; 2] {
+///     [0.5 * x[1] * x[1], 0.5 * p * x[0] * x[0]]
+/// }
+/// let integral = Quadrature::<Energy>::new();
+/// ```
+///
+/// It has the arguments of its model, those too that it does not use (`_u`), but no `xdot`, and
+/// fits to every model of the same dimensions. It is written in the language of [`macro@dae`].
+///
+/// [What a model may contain](https://docs.rs/casados/latest/casados/guide/language/index.html) ·
+/// [The guide](https://docs.rs/casados/latest/casados/guide/index.html)
 #[proc_macro_attribute]
 pub fn function(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Function, attribute.into(), item.into()).into()
