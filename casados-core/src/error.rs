@@ -28,6 +28,8 @@ pub enum Error {
         argument: Argument,
         /// The element; of matrices in column-major order.
         index: usize,
+        /// What the model calls it; empty of times and lengths.
+        name: &'static str,
         /// Its value.
         value: f64,
     },

@@ -2,15 +2,44 @@
 
 use crate::error::{Argument, Error};
 use crate::linalg::{are_finite, kernels};
+use crate::model::Dae;
 use crate::scalar::Real;
 
+/// Of what has no names: times and lengths.
+///
 /// # Errors
 /// [`Error::NonFiniteInput`]
 pub(crate) fn check_input<T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
     match not_finite(values) {
-        Some((index, value)) => Err(Error::NonFiniteInput { argument, index, value }),
+        Some((index, value)) => Err(Error::NonFiniteInput { argument, index, name: "", value }),
         None => Ok(()),
     }
+}
+
+/// Of what the model has names for.
+///
+/// # Errors
+/// [`Error::NonFiniteInput`]
+pub(crate) fn check_named<M: Dae, T: Real>(argument: Argument, values: &[T]) -> Result<(), Error> {
+    match not_finite(values) {
+        Some((index, value)) => {
+            Err(Error::NonFiniteInput { argument, index, name: name::<M>(argument, index), value })
+        }
+        None => Ok(()),
+    }
+}
+
+/// What the model calls an element of an argument; of several columns each has these names.
+pub(crate) fn name<M: Dae>(argument: Argument, index: usize) -> &'static str {
+    let structure = &M::STRUCTURE;
+    let names = match argument {
+        Argument::X0 | Argument::Lambda | Argument::SeedX | Argument::StartXdot => structure.x,
+        Argument::Nu | Argument::StartZ => structure.z,
+        Argument::U | Argument::SeedU => structure.u,
+        Argument::P | Argument::SeedP => structure.p,
+        Argument::H | Argument::T => &[],
+    };
+    index.checked_rem(names.len()).and_then(|index| names.get(index)).copied().unwrap_or("")
 }
 
 /// # Errors

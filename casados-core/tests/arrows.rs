@@ -22,7 +22,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("dual", "shape scalar model"),
     ("linalg", "shape tableau memory scalar model"),
     ("result", "shape model"),
-    ("finite", "error scalar linalg"),
+    ("finite", "error scalar model linalg"),
     ("quadrature", "error shape scalar function model linalg result finite"),
     ("integrator", "error shape statistics memory scalar model linalg result finite quadrature"),
     (

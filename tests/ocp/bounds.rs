@@ -1,7 +1,9 @@
 //! Bounds and constraints of every kind, against solutions that are known.
 
 use crate::Test;
-use casados::ocp::{Constraint, GaussNewton, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+use casados::ocp::{
+    Constraint, GaussNewton, HeapOcp, HeapSqp, Horizon, LeastSquaresCost, Map, OcpError, Problem,
+};
 use casados::prelude::*;
 use casados::qp::residuals;
 
@@ -77,6 +79,66 @@ fn soft_bounds() -> Test {
         assert!((outcome.objective - objective).abs() < 1e-6);
     }
     Ok(())
+}
+
+/// Penalties of one side, one output and one stage: a target at 3 with a soft bound there, and what
+/// pulls back where only the other side, output or stage is soft.
+#[test]
+fn penalties_by_output_side_and_stage() -> Test {
+    let solve = |soften: &dyn Fn(&mut Plane) -> Result<(), OcpError>| {
+        let mut ocp = plane(3.0)?;
+        soften(&mut ocp)?;
+        assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+        let end = ocp.stage(2)?;
+        Ok::<_, OcpError>([end.x[0], end.x[1], ocp.stage(1)?.u[0]])
+    };
+    let near = |found: [f64; 3], expected: [f64; 3]| {
+        let distance = |(a, b): (f64, f64)| (a - b).abs();
+        assert!(found.into_iter().zip(expected).map(distance).all(|d| d < 1e-5), "{found:?} {expected:?}");
+    };
+    // Hard: both outputs of the end at 1, and at both stages half of the way.
+    near(solve(&|_| Ok(()))?, [1.0, 1.0, 0.5]);
+    // The force is `3 − x`, and leaving the bound costs 1/2 each.
+    let upper = |ocp: &mut Plane| ocp.soften_upper("Place[0]", .., 0.5, 0.0).map(|_| ());
+    near(solve(&upper)?, [2.5, 1.0, 1.25]);
+    let both = |ocp: &mut Plane| ocp.soften("Place", 2.., 0.5, 0.0).map(|_| ());
+    near(solve(&both)?, [2.5, 2.5, 1.25]);
+    let lower = |ocp: &mut Plane| ocp.soften_lower("Place", .., 0.5, 0.0).map(|_| ());
+    near(solve(&lower)?, [1.0, 1.0, 0.5]);
+    let quadratic = |ocp: &mut Plane| ocp.soften("Place[1]", .., 0.0, 1.0).map(|_| ());
+    near(solve(&quadratic)?, [1.0, 2.0, 0.5]);
+    // Speeds are bounded by 0.4. Beyond that the first one costs 1 at stage 1, and is worth it
+    // until the force is 1 too.
+    let slow = |ocp: &mut Plane| {
+        ocp.set_terminal_bounds(&[-9.0; 2], &[9.0; 2])?.bound("u", .., -0.4, 0.4)?;
+        ocp.soften_upper("u[0]", 1..=1, 1.0, 0.0).map(|_| ())
+    };
+    near(solve(&slow)?, [2.0, 0.8, 1.6]);
+    let text = |result: Result<(), OcpError>| result.err().map(|error| error.to_string()).unwrap_or_default();
+    assert_eq!(
+        text(solve(&|ocp| ocp.soften("Place", ..2, 1.0, 0.0).map(|_| ())).map(|_| ())),
+        "`Place` has no bound at stages 0 to 1 that could be soft: call `bound` before `soften`"
+    );
+    assert_eq!(
+        text(solve(&|ocp| ocp.soften("Place[1]", .., -1.0, 0.0).map(|_| ())).map(|_| ())),
+        "stage 0: a penalty of `Place` is -1: it has to be from 0 on, and finite if it is quadratic"
+    );
+    Ok(())
+}
+
+type Plane =
+    HeapOcp<Problem<Map<Go, f64>, LeastSquaresCost<Speed>, LeastSquaresCost<Place>, (), Constraint<Place>>>;
+
+/// Two intervals from the origin to a target, at both coordinates held by an upper bound of 1.
+/// Speeds cost next to nothing.
+fn plane(target: f64) -> Result<Plane, OcpError> {
+    let mut ocp = Problem::new(Map::<Go, f64>::new())
+        .stage_cost(LeastSquaresCost::<Speed>::diagonal(&[1e-9; 2]))
+        .terminal_cost(LeastSquaresCost::<Place>::diagonal(&[1.0; 2]))
+        .terminal_constraints(Constraint::<Place>::new([-9.0; 2], [1.0; 2]))
+        .on(Horizon::uniform(2, 1.0))?;
+    ocp.fix_initial_state(&[0.0; 2])?.set_terminal_reference(&[target; 2])?.guess(&[0.0; 2], &[0.0; 2])?;
+    Ok(ocp)
 }
 
 /// The same as constraints of the path, two at once, of which the second is soft: `x₀² + x₁² ≤ 4`

@@ -29,12 +29,14 @@ mod ipm;
 mod kept_jacobians;
 mod lifted;
 mod options;
+mod print;
 mod random;
 mod real_time;
 mod secant;
 mod sensitivities;
 mod smoothing;
 mod solution_derivatives;
+mod trajectory;
 mod weights;
 
 type Test = Result<(), Box<dyn std::error::Error>>;

@@ -14,7 +14,7 @@ use super::tape::Tape;
 use super::variational::Variational;
 use crate::error::{Argument, Error, Refusal};
 use crate::integrator::{self, Integrator as _};
-use crate::irk::check;
+use crate::irk::{check, check_named};
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Dense, Forward, Hessian, Nominal};
 use crate::scalar::Real;
@@ -262,8 +262,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// What every call begins with.
     fn begin(&mut self, x0: &VectorX<M, T>, u: &VectorU<M, T>, t_end: T) -> Result<Span<T>, Error> {
         self.statistics = AdaptiveStatistics::default();
-        check(Argument::X0, x0.as_slice())?;
-        check(Argument::U, u.as_slice())?;
+        check_named::<M, T>(Argument::X0, x0.as_slice())?;
+        check_named::<M, T>(Argument::U, u.as_slice())?;
         check(Argument::T, &[t_end, t_end - self.start])?;
         if !self.parameters {
             return Err(Error::ParametersNotSet);

@@ -19,7 +19,7 @@ use super::segment::{Segment, add, dense, filled, refill};
 use super::sensitivities::{Memory, chain, dynamic, fill, place};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error};
-use crate::irk::check;
+use crate::irk::{check, check_named};
 use crate::linalg::axpy;
 use crate::model::{
     Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, MatrixZP, MatrixZU, MatrixZX, VectorP,
@@ -237,7 +237,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         integrand: &mut Q,
     ) -> Result<(PiecewiseHessian<M, T>, Q::Derivatives), Error> {
         self.solved = false;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         let mut sums = Sums::new(self.count, integrand, true)?;
         let forward = self.sweep(x0, true, Some(&mut *integrand), Some(&mut sums))?;
@@ -270,7 +270,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         mut along: Along<'_, '_, M, T>,
     ) -> Result<PiecewiseAdjoint<M, T>, Error> {
         self.solved = false;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         self.replay(x0, reborrow(&mut along))?;
         let Self { integrator, segments, count, nominal, .. } = self;
@@ -303,7 +303,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         lambda: &VectorX<M, T>,
     ) -> Result<PiecewiseHessian<M, T>, Error> {
         self.solved = false;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         self.steps(x0, controls, ends)?;
         let forward = self.sweep(x0, true, None, None)?;
         let at = Columns::<M> { intervals: self.count, model: core::marker::PhantomData };

@@ -8,9 +8,11 @@ use super::statistics::BatchStatistics;
 use super::work::parallel;
 use super::work::{Share, Work, Worker, fill, width};
 use crate::error::{Argument, Error};
-use crate::finite::check_input;
+use crate::finite::check_named;
+use crate::irk;
+use crate::memory::Heap;
 use crate::model::{ArrayK, Dae, VectorX, VectorZ};
-use crate::options::{Options, Start};
+use crate::options::{Newton, Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -67,6 +69,27 @@ impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T> {
     }
 }
 
+/// A batch with the same options and start values: its memory is its own, and empty until the first
+/// call.
+impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T> {
+    fn clone(&self) -> Self {
+        Self {
+            options: self.options,
+            tableau: self.tableau,
+            workers: self.workers.iter().take(1).map(Worker::fresh).collect(),
+            #[cfg(feature = "parallel")]
+            threads: self.threads,
+            given: self.given,
+            status: Vec::new(),
+            records: Vec::new(),
+            warm: Vec::new(),
+            keeps: false,
+            solved: false,
+            statistics: BatchStatistics::default(),
+        }
+    }
+}
+
 impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     fn build(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         let mut workers = Vec::new();
@@ -95,8 +118,8 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check_input(Argument::StartXdot, xdot.as_slice())?;
-        check_input(Argument::StartZ, z.as_slice())?;
+        check_named::<M, T>(Argument::StartXdot, xdot.as_slice())?;
+        check_named::<M, T>(Argument::StartZ, z.as_slice())?;
         self.given = Some((*xdot, *z));
         Ok(())
     }
@@ -228,6 +251,39 @@ impl<M: Dae, B, const S: usize, T: Real> Integrator<M, B, S, T> {
         results: &mut [Hessian<M, T>],
     ) -> Result<(), BatchError> {
         self.run(&Inputs::new(intervals, Some(lambda), Some(nu), results.len())?, results)
+    }
+
+    /// An integrator of single intervals that solves the stages of this one, also of
+    /// [lifted](Options::lifted) ones.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub(crate) fn single(&self) -> Result<irk::Integrator<M, B, S, T, Heap>, Error> {
+        let newton = Newton { fixed_iterations: None, ..self.options.newton };
+        let mut single = irk::Integrator::build(Options { newton, ..self.options }, self.tableau)?;
+        if let Some((xdot, z)) = &self.given {
+            single.set_start(xdot, z)?;
+        }
+        Ok(single)
+    }
+
+    /// Lets such an integrator start where an interval of the last call ended, if that is known.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`]
+    pub(crate) fn start(
+        &self,
+        interval: usize,
+        single: &mut irk::Integrator<M, B, S, T, Heap>,
+    ) -> Result<(), Error> {
+        let record = self.records.chunks_exact(self.options.steps).nth(interval);
+        match (record, self.warm.get(interval), self.options.start) {
+            (Some(record), Some(true), Start::Warm) => single.set_record(record),
+            _ => {
+                single.reset();
+                Ok(())
+            }
+        }
     }
 
     fn run<R: Answer<M, T>>(

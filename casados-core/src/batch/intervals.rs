@@ -2,7 +2,7 @@
 
 use super::error::{BatchError, Slice};
 use crate::error::{Argument, Error};
-use crate::finite::check_input;
+use crate::finite::{check_input, check_named};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
@@ -115,13 +115,13 @@ impl<'a, M: Dae, T: Real> Inputs<'a, M, T> {
             lambda: self.lambda.and_then(|lambda| of(lambda, index)).map_or(&[], Matrix::as_slice),
             nu: self.nu.and_then(|nu| of(nu, index)).map_or(&[], Matrix::as_slice),
         };
-        check_input(Argument::X0, interval.x0.as_slice())?;
-        check_input(Argument::U, interval.u)?;
-        check_input(Argument::P, interval.p)?;
+        check_named::<M, T>(Argument::X0, interval.x0.as_slice())?;
+        check_named::<M, T>(Argument::U, interval.u)?;
+        check_named::<M, T>(Argument::P, interval.p)?;
         check_input(Argument::H, &[interval.h])?;
         check_input(Argument::T, &[interval.t0])?;
-        check_input(Argument::Lambda, interval.lambda)?;
-        check_input(Argument::Nu, interval.nu)?;
+        check_named::<M, T>(Argument::Lambda, interval.lambda)?;
+        check_named::<M, T>(Argument::Nu, interval.nu)?;
         Ok(interval)
     }
 }

@@ -73,7 +73,9 @@ pub type Batch<M, B, T = f64> = <B as Batched>::Integrator<M, T>;
 /// A method that a batch takes.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an implicit Runge-Kutta method",
-    note = "`Gauss<S>`, `RadauIIA<S>` and `Custom<S>` are"
+    label = "a batch needs an implicit Runge-Kutta method",
+    note = "`Gauss<S>`, `RadauIIA<S>` and `Custom<S>` are, for explicit models too; `Erk` integrates one interval after the other with \
+            explicit methods"
 )]
 pub trait Batched {
     /// Its integrator.

@@ -178,6 +178,12 @@ impl<M: Dae, B, const S: usize, T: Real> Worker<M, B, S, T> {
         Ok(Self { single, groups: [None, None], stages, ends, statistics: BatchStatistics::default() })
     }
 
+    /// The same with memory of its own.
+    pub fn fresh(&self) -> Self {
+        let (single, stages, ends) = (self.single.clone(), Vec::new(), Vec::new());
+        Self { single, groups: [None, None], stages, ends, statistics: BatchStatistics::default() }
+    }
+
     pub fn run<R: Answer<M, T>>(&mut self, work: &Work<'_, M, T, S>, mut share: Share<'_, M, T, R, S>) {
         while !share.results.is_empty() {
             let group = share.take(work.size(), work.options.steps);

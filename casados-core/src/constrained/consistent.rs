@@ -111,7 +111,8 @@ impl<M: Constrained> Consistent<M> {
             [(Argument::X0, x.as_slice()), (Argument::P, p.as_slice()), (Argument::T, &[t])]
         {
             if let Some((index, value)) = not_finite(values) {
-                return Err(Inconsistent::NonFiniteInput { argument, index, value });
+                let name = crate::finite::name::<M>(argument, index);
+                return Err(Inconsistent::NonFiniteInput { argument, index, name, value });
             }
         }
         let mut work = Work::<M, T>::new(p, t);

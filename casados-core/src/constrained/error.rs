@@ -18,6 +18,8 @@ pub enum Inconsistent {
         argument: Argument,
         /// The element.
         index: usize,
+        /// What the model calls it; empty of the time.
+        name: &'static str,
         /// Its value.
         value: f64,
     },
@@ -70,8 +72,9 @@ impl fmt::Display for Inconsistent {
             Self::NoSuchState { name } => {
                 write!(f, "no state is called `{name}`: `describe()` of the model lists the names")
             }
-            Self::NonFiniteInput { argument, index, value } => {
-                write!(f, "element {index} of {argument} is {value}")
+            Self::NonFiniteInput { argument, name: "", value, .. } => write!(f, "{argument} is {value}"),
+            Self::NonFiniteInput { argument, name, value, .. } => {
+                write!(f, "`{name}` of {argument} is {value}")
             }
             Self::NonFinite { equation, derivative, value } => {
                 write!(f, "{} is {value}: start elsewhere", Invariant(equation, derivative))

@@ -206,7 +206,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
     where
         I::Memory: WithAdjoint<1>,
     {
-        crate::finite::check_input(crate::error::Argument::Lambda, lambda.as_slice())?;
+        crate::finite::check_named::<M, T>(crate::error::Argument::Lambda, lambda.as_slice())?;
         let end = *self.integrator.solve(x0, u, h)?;
         let memory = self.project(&end, h)?;
         let mu = memory.kkt.multipliers(lambda);
@@ -238,7 +238,7 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
     where
         I::Memory: WithHessian,
     {
-        crate::finite::check_input(crate::error::Argument::Lambda, lambda.as_slice())?;
+        crate::finite::check_named::<M, T>(crate::error::Argument::Lambda, lambda.as_slice())?;
         let end = *self.integrator.solve(x0, u, h)?;
         let memory = self.project(&end, h)?;
         let mu = memory.kkt.multipliers(lambda);

@@ -105,7 +105,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         W: WithHessian,
     {
         begin(&mut along);
-        finite(lambda.as_slice(), Argument::Lambda)?;
+        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.base)?;
         let sweep = &mut W::nominal(&mut self.adjoint)?.sweep;

@@ -120,6 +120,36 @@ where
     }
 }
 
+/// An integrator with the same options, parameters and time: its memory is its own, and empty until
+/// the first call. Parameters for which there is no memory are as if they had never been set.
+#[cfg(feature = "alloc")]
+impl<M: Ode, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
+    fn clone(&self) -> Self {
+        let mut base: <Heap as Memory>::Nominal<Base<M, T, S>> = Default::default();
+        let set = self.base.get().filter(|_| self.parameters_set && M::Shape::NP > 0);
+        let mut parameters_set = M::Shape::NP == 0;
+        if let (Some(from), Ok(to)) = (set, Heap::nominal(&mut base)) {
+            to.point.v = from.point.v;
+            parameters_set = true;
+        }
+        let Scheme { a, b, c, rows, curved } = self.scheme;
+        Self {
+            scheme: Scheme { a, b, c, rows, curved },
+            options: self.options,
+            start: self.start,
+            parameters_set,
+            counts: Counts::default(),
+            base,
+            adjoint: Default::default(),
+            trajectory: Default::default(),
+            forward: Default::default(),
+            hessian: Default::default(),
+            multipliers: Default::default(),
+            method: PhantomData,
+        }
+    }
+}
+
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
     pub const SIZE: usize = size_of::<Self>();
@@ -174,7 +204,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// [`Error::NonFiniteInput`]; the parameters are as before.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        finite(p.as_slice(), Argument::P)?;
+        finite::<M, T>(p.as_slice(), Argument::P)?;
         let base = W::nominal(&mut self.base)?;
         let first = 2 * M::Shape::NX + M::Shape::NU;
         base.point.v.as_mut()[first..first + M::Shape::NP].copy_from_slice(p.as_slice());
@@ -187,7 +217,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// # Errors
     /// [`Error::NonFiniteInput`]; the time is as before.
     pub fn set_time(&mut self, t0: T) -> Result<(), Error> {
-        finite(&[t0], Argument::T)?;
+        finite::<M, T>(&[t0], Argument::T)?;
         self.start = t0;
         Ok(())
     }
@@ -209,9 +239,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         if !self.parameters_set {
             return Err(Error::ParametersNotSet);
         }
-        finite(x0.as_slice(), Argument::X0)?;
-        finite(u.as_slice(), Argument::U)?;
-        finite(&[h], Argument::H)?;
+        finite::<M, T>(x0.as_slice(), Argument::X0)?;
+        finite::<M, T>(u.as_slice(), Argument::U)?;
+        finite::<M, T>(&[h], Argument::H)?;
         base.x.as_mut().copy_from_slice(x0.as_slice());
         let first = 2 * M::Shape::NX;
         base.point.v.as_mut()[first..first + M::Shape::NU].copy_from_slice(u.as_slice());
@@ -220,10 +250,13 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     }
 }
 
-pub(super) fn finite<T: Real>(values: &[T], argument: Argument) -> Result<(), Error> {
+pub(super) fn finite<M: Ode, T: Real>(values: &[T], argument: Argument) -> Result<(), Error> {
     match values.iter().position(|value| !value.is_finite()) {
         None => Ok(()),
-        Some(index) => Err(Error::NonFiniteInput { argument, index, value: values[index].to_f64() }),
+        Some(index) => {
+            let (name, value) = (crate::finite::name::<M>(argument, index), values[index].to_f64());
+            Err(Error::NonFiniteInput { argument, index, name, value })
+        }
     }
 }
 

@@ -68,9 +68,9 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        finite(seeds.x0.as_slice(), Argument::SeedX)?;
-        finite(seeds.u.as_slice(), Argument::SeedU)?;
-        finite(seeds.p.as_slice(), Argument::SeedP)?;
+        finite::<M, T>(seeds.x0.as_slice(), Argument::SeedX)?;
+        finite::<M, T>(seeds.u.as_slice(), Argument::SeedU)?;
+        finite::<M, T>(seeds.p.as_slice(), Argument::SeedP)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.base)?;
         let variation = &mut W::forward(&mut self.forward)?.sweep.forward;
@@ -114,7 +114,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
         lambda: &VectorX<M, T>,
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
-        finite(lambda.as_slice(), Argument::Lambda)?;
+        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         begin(&mut along);
         let base = W::nominal(&mut self.base)?;
@@ -147,7 +147,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        finite(lambdas.as_slice(), Argument::Lambda)?;
+        finite::<M, T>(lambdas.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.base)?;
         let sweep = &mut W::forward(&mut self.forward)?.sweep;
@@ -185,7 +185,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        finite(lambda.as_slice(), Argument::Lambda)?;
+        finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         let base = W::nominal(&mut self.base)?;
         let ForwardMemory { sweep, result } = W::forward(&mut self.forward)?;

@@ -56,8 +56,11 @@ impl fmt::Display for Error {
             }
             Error::NonFiniteInput { argument: Argument::H, value, .. } => write!(f, "h is {value}"),
             Error::NonFiniteInput { argument: Argument::T, value, .. } => write!(f, "t is {value}"),
-            Error::NonFiniteInput { argument, index, value } => {
+            Error::NonFiniteInput { argument, index, name: "", value } => {
                 write!(f, "element {index} of {argument} is {value}")
+            }
+            Error::NonFiniteInput { argument, name, value, .. } => {
+                write!(f, "`{name}` of {argument} is {value}")
             }
             Error::ParametersNotSet => {
                 f.write_str("the model has parameters: call `set_parameters` before the first step")

@@ -5,6 +5,7 @@ use crate::scalar::{Field, Lanes};
 use crate::tableau::Tableau;
 
 /// The coefficients of a tableau in the number type of the integrator.
+#[derive(Clone)]
 pub(crate) struct Coefficients<E, const S: usize> {
     pub a: [[E; S]; S],
     pub b: [E; S],

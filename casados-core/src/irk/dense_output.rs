@@ -35,7 +35,12 @@ impl<T: Real, const S: usize> Point<T, S> {
         tableau: &Tableau<S>,
     ) -> Result<Self, Error> {
         if !t.is_finite() {
-            return Err(Error::NonFiniteInput { argument: Argument::T, index: 0, value: t.to_f64() });
+            return Err(Error::NonFiniteInput {
+                argument: Argument::T,
+                index: 0,
+                name: "",
+                value: t.to_f64(),
+            });
         }
         if !tableau.is_collocation() {
             return Err(Error::NoInterpolation);

@@ -4,9 +4,11 @@
 use super::step::Scheme;
 use super::workspace::{Step, Work};
 use crate::error::{Argument, Error};
-use crate::finite::{check_input, not_finite};
+use crate::finite::{check_input, check_named, not_finite};
 use crate::irk::coefficients::Coefficients;
 use crate::irk::stages::initial_guess::InitialGuess;
+#[cfg(feature = "alloc")]
+use crate::memory::Heap;
 use crate::memory::{Fallback, Memory};
 #[cfg(feature = "alloc")]
 use crate::model::ArrayV;
@@ -99,7 +101,7 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        check_input(Argument::P, p.as_slice())?;
+        check_named::<M, T>(Argument::P, p.as_slice())?;
         W::nominal(&mut self.work)?.parameters = *p;
         self.parameters = true;
         Ok(())
@@ -112,8 +114,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
     }
 
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check_input(Argument::StartXdot, xdot.as_slice())?;
-        check_input(Argument::StartZ, z.as_slice())?;
+        check_named::<M, T>(Argument::StartXdot, xdot.as_slice())?;
+        check_named::<M, T>(Argument::StartZ, z.as_slice())?;
         let given = W::nominal(&mut self.work)?.given.as_mut();
         for (to, from) in given.iter_mut().zip(xdot.as_slice().iter().chain(z.as_slice())) {
             *to = *from;
@@ -144,8 +146,8 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         *statistics = Statistics::default();
         // Of this call alone, refused or not.
         let solved = core::mem::take(&mut self.solved);
-        check_input(Argument::X0, arguments.x0.as_slice())?;
-        check_input(Argument::U, arguments.u.as_slice())?;
+        check_named::<M, T>(Argument::X0, arguments.x0.as_slice())?;
+        check_named::<M, T>(Argument::U, arguments.u.as_slice())?;
         check_input(Argument::H, &[arguments.h])?;
         if M::Shape::NP > 0 && !self.parameters {
             return Err(Error::ParametersNotSet);
@@ -253,6 +255,34 @@ impl<M: Dae, T: Real, const S: usize, W: Memory> Run<M, T, S, W> {
         let [first, second] = &mut self.tapes;
         let steps = W::tape(if self.last_tape == 0 { first } else { second }, self.options.steps)?;
         Ok(Parts { work, coefficients: &self.coefficients, steps, statistics: &mut self.statistics })
+    }
+}
+
+#[cfg(feature = "alloc")]
+impl<M: Dae, T: Real, const S: usize> Run<M, T, S, Heap> {
+    /// The same settings with memory of its own. Parameters and start values for which there is no
+    /// memory are as if they had never been set.
+    pub fn fresh(&self) -> Self {
+        let mut run = Self {
+            options: self.options,
+            coefficients: self.coefficients.clone(),
+            statistics: Statistics::default(),
+            work: Default::default(),
+            tapes: Default::default(),
+            last_tape: 0,
+            any: false,
+            warm: false,
+            solved: false,
+            given: false,
+            parameters: false,
+            time: self.time,
+        };
+        let set = self.work.get().filter(|_| self.parameters || self.given);
+        if let (Some(from), Ok(to)) = (set, Heap::nominal(&mut run.work)) {
+            (to.parameters, to.given) = (from.parameters, from.given);
+            (run.parameters, run.given) = (self.parameters, self.given);
+        }
+        run
     }
 }
 

@@ -106,6 +106,24 @@ where
     }
 }
 
+/// An integrator with the same options, parameters, time and start values: its memory is its own,
+/// and empty until the first call.
+#[cfg(feature = "alloc")]
+impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> {
+    fn clone(&self) -> Self {
+        Self {
+            run: self.run.fresh(),
+            forward: Default::default(),
+            directional: Default::default(),
+            adjoint: Default::default(),
+            hessian: Default::default(),
+            hessian_tape: Default::default(),
+            sweep: None,
+            method: PhantomData,
+        }
+    }
+}
+
 impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
     pub const SIZE: usize = size_of::<Self>();

@@ -48,9 +48,9 @@ pub use forward::{
 pub use integrator::Integrator;
 
 // Finite checks, which rooms above find here too.
-#[cfg(feature = "alloc")]
-pub(crate) use crate::finite::check_input as check;
 pub(crate) use crate::finite::not_finite;
+#[cfg(feature = "alloc")]
+pub(crate) use crate::finite::{check_input as check, check_named};
 
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]

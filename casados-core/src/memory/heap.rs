@@ -50,6 +50,13 @@ impl<V: Stored> Allocated<V> {
     }
 }
 
+impl<V> Allocated<V> {
+    /// The value, if it was needed before.
+    pub(crate) fn get(&self) -> Option<&V> {
+        self.0.as_deref()
+    }
+}
+
 impl<V: Stored> AllocatedTape<V> {
     fn open(&mut self, steps: usize) -> Result<&mut [V], Error> {
         let error = Error::OutOfMemory { bytes: steps.saturating_mul(size_of::<V>()) };

@@ -6,7 +6,7 @@
 //! ```
 
 use super::check::Labels;
-use super::data::split;
+use super::data::{arrival_weights, split};
 use super::dynamics::Dynamics;
 use super::error::{OcpError, Part};
 use super::instance::Ocp;
@@ -67,6 +67,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         crate::qp::assign(arrival, mean);
         crate::qp::assign(arrival.get_mut(nx..).unwrap_or_default(), weight);
         Ok(self)
+    }
+}
+
+impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
+    /// Whether the first state has a cost of its own, by which all of its elements may be coupled.
+    pub(crate) fn has_arrival_cost(&self) -> bool {
+        let weights = arrival_weights::<P, T>(self.data.as_ref(), self.intervals());
+        weights.iter().any(|&weight| weight != T::ZERO)
     }
 }
 

@@ -30,7 +30,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     ///
     /// # Errors
     /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`]
-    fn find(&self, name: &str, stages: &impl RangeBounds<usize>) -> Result<[Range<usize>; 2], OcpError> {
+    pub(super) fn find(
+        &self,
+        name: &str,
+        stages: &impl RangeBounds<usize>,
+    ) -> Result<[Range<usize>; 2], OcpError> {
         let known = self.names();
         let find = |part, names: &[&str], count| match names.iter().any(|variable| means(name, variable)) {
             true => range(part, stages, count),
@@ -39,13 +43,14 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let of_states = find(Part::StateBounds, known.x, self.intervals() + 1)?;
         let of_controls = find(Part::ControlBounds, known.u, self.intervals())?;
         if of_states.is_empty() && of_controls.is_empty() {
+            let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
             return Err(OcpError::UnknownName { name: Text::new(name), known });
         }
         Ok([of_states, of_controls])
     }
 
     /// Does something to the bounds of every variable that a name means.
-    fn each(
+    pub(super) fn each(
         &mut self,
         name: &str,
         [of_states, of_controls]: [Range<usize>; 2],
@@ -69,7 +74,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     }
 
     /// What the first variable that a name means is called, from some stage on.
-    fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
+    pub(super) fn labels(&self, name: &str, stage: usize) -> (Labels, usize) {
         let known = self.names();
         let position = |names: &[&str]| names.iter().position(|variable| means(name, variable));
         match position(known.x) {
@@ -96,36 +101,6 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (labels, index) = self.labels(name, first(&stages));
         labels.check_bounds(index, lower, upper)?;
         self.each(name, found, |bounds, index| bounds.set(index, lower, upper));
-        Ok(self)
-    }
-
-    /// Makes bounds of states or controls soft: leaving one by `e` costs
-    /// `linear · e + ½ quadratic · e²`. An infinite linear penalty makes them hard again.
-    ///
-    /// # Errors
-    /// [`OcpError::UnknownName`], [`OcpError::NoSuchStage`], [`OcpError::EmptyRange`],
-    /// [`OcpError::InvalidValue`]; [`OcpError::NoBound`] if nothing that the name means has a bound
-    /// at these stages. Then no penalty is changed.
-    pub fn soften(
-        &mut self,
-        name: &str,
-        stages: impl RangeBounds<usize>,
-        linear: T,
-        quadratic: T,
-    ) -> Result<&mut Self, OcpError> {
-        let found = self.find(name, &stages)?;
-        let (labels, index) = self.labels(name, first(&stages));
-        labels.check_penalty(index, linear, quadratic)?;
-        let mut is_bounded = false;
-        self.each(name, found.clone(), |bounds, index| {
-            let is_finite = |bounds: &[T]| bounds.get(index).is_some_and(|bound| bound.is_finite());
-            is_bounded |= is_finite(bounds.lower) || is_finite(bounds.upper);
-        });
-        if !is_bounded {
-            let [start, end] = [first(&stages), found.iter().map(|range| range.end).max().unwrap_or(0)];
-            return Err(OcpError::NoBound { name: Text::new(name), start, end });
-        }
-        self.each(name, found, |bounds, index| bounds.soften(index, linear, quadratic));
         Ok(self)
     }
 

@@ -6,11 +6,17 @@ use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
-use crate::shape::{Array, Outputs, Plain, Shape};
+use crate::shape::{Array, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// Constraints at a node, as functions of `(x, z, u, p, t)` with bounds: `()` is none, a pair is
 /// both.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a constraint for models of these dimensions with numbers `{T}`",
+    label = "its function has other arguments than the model",
+    note = "a `#[function]` takes the arguments of the model, as long as there (unused ones with an underscore): `x`, `z`, `u`, `p`, `t`",
+    note = "constraints are `Constraint<F>`, and pairs of constraints"
+)]
 pub trait Constraints<S: Shape, T: Real> {
     /// How many rows.
     const ROWS: usize;
@@ -165,6 +171,8 @@ pub struct Constraint<F: Function, T: Plain = f64> {
     hessian: F::Hessian<T>,
 }
 
+plain!([F: Function, T: Plain] Constraint<F, T> { lower, upper, linear, quadratic, g, jacobian, hessian });
+
 impl<F: Function, T: Real> Constraint<F, T> {
     /// With these bounds at every node.
     #[must_use]
@@ -193,7 +201,8 @@ impl<F: Function, T: Real> Constraint<F, T> {
     }
 }
 
-impl<F: Function, T: Real> Constraints<F::Shape, T> for Constraint<F, T> {
+#[diagnostic::do_not_recommend]
+impl<S: Shape, F: Function<Shape = S>, T: Real> Constraints<S, T> for Constraint<F, T> {
     const ROWS: usize = F::Outputs::NY;
     const ALGEBRAIC: bool = is_algebraic::<F>();
 

@@ -1,12 +1,13 @@
 //! Convex functions of residuals as costs at the nodes.
 
-use super::cost::{At, Cost};
+use super::cost::{At, Cost, Show};
 use super::error::OcpError;
 use super::point::{Cross, Terms, There, finite, is_algebraic, position};
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Plain};
+use crate::shape::{Array, Matrix, Outputs, Plain, Shape};
 use bytemuck::Zeroable;
+use core::fmt;
 
 /// A convex function `φ(r)` of a residual with `NY` elements.
 pub trait Convex<T> {
@@ -158,6 +159,14 @@ pub struct ConvexCost<F: Function, C, T: Plain = f64> {
     hessian: F::Hessian<T>,
 }
 
+impl<F: Function, C: Clone, T: Plain> Clone for ConvexCost<F, C, T> {
+    fn clone(&self) -> Self {
+        let Self { outer, y, mu, phi, jacobian, hessian } = self;
+        let outer = outer.clone();
+        Self { outer, y: *y, mu: *mu, phi: *phi, jacobian: *jacobian, hessian: *hessian }
+    }
+}
+
 impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
     /// The cost of a convex function. Constants that make no sense are refused by `Problem::on` and
     /// by every linearisation: [`OcpError::InvalidWeight`].
@@ -209,7 +218,8 @@ impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
     }
 }
 
-impl<F: Function, C: Convex<T>, T: Real> Cost<F::Shape, T> for ConvexCost<F, C, T> {
+#[diagnostic::do_not_recommend]
+impl<S: Shape, F: Function<Shape = S>, C: Convex<T>, T: Real> Cost<S, T> for ConvexCost<F, C, T> {
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
     const ALGEBRAIC: bool = is_algebraic::<F>();
@@ -224,6 +234,10 @@ impl<F: Function, C: Convex<T>, T: Real> Cost<F::Shape, T> for ConvexCost<F, C, 
             let outputs = [output, output];
             OcpError::InvalidWeight { function: F::STRUCTURE.name, outputs, value, allowed }
         })
+    }
+
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        show(format_args!("φ({} − r)", F::STRUCTURE.name))
     }
 
     fn name(reference: usize) -> (&'static str, usize) {

@@ -5,11 +5,18 @@ use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, finite, is_algebraic, parameter, position};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
-use crate::shape::{Array, Plain, Shape};
+use crate::shape::{Array, Plain, Shape, plain};
 use bytemuck::Zeroable;
+use core::fmt;
 
 /// A cost at a node, as a function of `(x, z, u, p, t)`: `()` is none, and a pair of costs is their
 /// sum.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a cost for models of these dimensions with numbers `{T}`",
+    label = "its function has other arguments than the model",
+    note = "a `#[function]` takes the arguments of the model, as long as there (unused ones with an underscore): `x`, `z`, `u`, `p`, `t`",
+    note = "costs are `LeastSquaresCost<F>`, `GeneralCost<F>`, `ConvexCost<F, _>`, and pairs of costs"
+)]
 pub trait Cost<S: Shape, T: Real> {
     /// How many numbers a reference has.
     const REFERENCES: usize;
@@ -40,6 +47,13 @@ pub trait Cost<S: Shape, T: Real> {
     fn name(reference: usize) -> (&'static str, usize) {
         ("", reference)
     }
+
+    /// Shows its terms as mathematics.
+    ///
+    /// # Errors
+    /// Those of what shows them.
+    #[doc(hidden)]
+    fn terms(&self, show: Show<'_>) -> fmt::Result;
 
     /// Shows where the exact Hessian over `(x, u, z)` may have entries; false if that is not known.
     #[doc(hidden)]
@@ -83,6 +97,9 @@ pub trait Cost<S: Shape, T: Real> {
     ) -> Result<(), OcpError>;
 }
 
+/// What takes terms of an objective.
+pub type Show<'a> = &'a mut dyn FnMut(fmt::Arguments<'_>) -> fmt::Result;
+
 /// Where, how much, and whether the Hessian is to be exact.
 #[derive(Clone, Copy, Debug)]
 pub struct At<'a, T> {
@@ -99,6 +116,9 @@ impl<S: Shape, T: Real> Cost<S, T> for () {
     const CONVEX: bool = true;
     const ALGEBRAIC: bool = false;
     fn check(&self, _: There) -> Result<(), OcpError> {
+        Ok(())
+    }
+    fn terms(&self, _: Show<'_>) -> fmt::Result {
         Ok(())
     }
     fn pattern(&self, _: Entries<'_>) -> bool {
@@ -133,6 +153,10 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
     fn check_weights(&self) -> Result<(), OcpError> {
         self.0.check_weights()?;
         self.1.check_weights()
+    }
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        self.0.terms(show)?;
+        self.1.terms(show)
     }
     fn pattern(&self, visit: Entries<'_>) -> bool {
         self.0.pattern(visit) && self.1.pattern(visit)
@@ -182,6 +206,8 @@ pub struct GeneralCost<F: Function, T: Plain = f64> {
     hessian: F::Hessian<T>,
 }
 
+plain!([F: Function, T: Plain] GeneralCost<F, T> { y, mu, gradient, hessian });
+
 impl<F: Function, T: Plain> GeneralCost<F, T> {
     /// The cost of a function.
     #[must_use]
@@ -196,13 +222,18 @@ impl<F: Function, T: Plain> Default for GeneralCost<F, T> {
     }
 }
 
-impl<F: Function, T: Real> Cost<F::Shape, T> for GeneralCost<F, T> {
+#[diagnostic::do_not_recommend]
+impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for GeneralCost<F, T> {
     const REFERENCES: usize = 0;
     const CONVEX: bool = F::STRUCTURE.hessian.is_empty();
     const ALGEBRAIC: bool = is_algebraic::<F>();
 
     fn check(&self, there: There) -> Result<(), OcpError> {
         there.check::<F>()
+    }
+
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        show(format_args!("{}", F::STRUCTURE.name))
     }
 
     fn pattern(&self, visit: Entries<'_>) -> bool {

@@ -40,7 +40,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn periodic(&mut self, name: &str) -> Result<&mut Self, OcpError> {
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
         let mut found = false;
         for (i, _) in known.x.iter().enumerate().filter(|(_, state)| means(name, state)) {
             found |= self.qp.make_periodic(i);
@@ -86,7 +86,7 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn shared(&mut self, name: &str) -> Result<&mut Self, OcpError> {
-        let known = <P::Dynamics as Dynamics<T>>::NAMES;
+        let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
         let mut found = false;
         for (j, _) in known.u.iter().enumerate().filter(|(_, control)| means(name, control)) {
             found |= self.qp.share(j);

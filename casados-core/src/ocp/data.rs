@@ -85,6 +85,19 @@ pub(super) fn split<P: Formulation<T>, T: Real>(memory: &mut [T], intervals: usi
     Data { times, p, references, lower, upper, algebraic, weights, extended, scratch, arrival }
 }
 
+/// The lower and the upper bounds of all constraints.
+pub(super) fn bounds<P: Formulation<T>, T: Real>(memory: &[T], intervals: usize) -> [&[T]; 2] {
+    let [times, p, references, lower, upper, ..] = lengths::<P, T>(intervals);
+    let begin = times + p + references;
+    [part(memory, begin, lower), part(memory, begin + lower, upper)]
+}
+
+/// The weights of the arrival cost.
+pub(super) fn arrival_weights<P: Formulation<T>, T: Real>(memory: &[T], intervals: usize) -> &[T] {
+    let nx = P::Shape::NX;
+    part(memory, length::<P, T>(intervals) - nx * nx, nx * nx)
+}
+
 /// What is given at a node.
 pub(super) struct Node<'a, T> {
     pub time: T,

@@ -1,5 +1,6 @@
 //! What happens between two nodes of a horizon.
 
+use super::cost::Show;
 use super::error::OcpError;
 use super::names::Names;
 use super::pattern::Origin;
@@ -7,6 +8,7 @@ use crate::model::Dae;
 use crate::result::{Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Plain, Shape};
+use core::fmt;
 
 /// What is given of one interval.
 #[derive(Clone, Copy, Debug)]
@@ -216,6 +218,16 @@ pub trait Dynamics<T: Real> {
         Ok(())
     }
 
+    /// Shows integral costs as mathematics.
+    ///
+    /// # Errors
+    /// Those of what shows them.
+    #[doc(hidden)]
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        let _ = show;
+        Ok(())
+    }
+
     /// From now on stages of intervals are remembered, if that saves anything. With `solved` the
     /// following calls are at the point of the last one, which was successful. Whether they are.
     #[doc(hidden)]
@@ -235,6 +247,18 @@ pub trait Dynamics<T: Real> {
     /// # Errors
     /// [`OcpError::Integration`]
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError>;
+
+    /// States and algebraic states at these parts of every interval, of all of one after those of
+    /// the other. Whether there are any: of maps there are none.
+    ///
+    /// # Errors
+    /// [`OcpError::Integration`]
+    #[cfg(feature = "alloc")]
+    #[doc(hidden)]
+    fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
+        let _ = (nodes, parts, sink);
+        Ok(false)
+    }
 
     /// Stages begin anew, at a guess.
     ///

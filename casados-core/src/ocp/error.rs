@@ -100,7 +100,7 @@ pub enum OcpError {
         /// The name.
         name: Text,
         /// Those that there are.
-        known: Names,
+        known: &'static Names,
     },
     /// A stage that the horizon does not have.
     NoSuchStage {

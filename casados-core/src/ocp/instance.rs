@@ -38,6 +38,10 @@ pub(super) enum Initial {
 ///
 /// With the feature `alloc`, `Problem::on` allocates the memory; elsewhere [`Problem::on_horizon`]
 /// takes it.
+///
+/// It prints itself as mathematics, with names, bounds and sizes (`println!("{ocp}")`). A clone on
+/// the heap has its bounds, data and iterate, and integrators of its own.
+#[derive(Clone)]
 pub struct Ocp<P, T, D, M> {
     pub(super) problem: P,
     pub(super) initial: Initial,
@@ -333,6 +337,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             let stage = index.checked_div(np).unwrap_or(0);
             return Err(OcpError::Missing { part: Part::Parameters, stage });
         }
+        self.check_iterate()
+    }
+
+    /// # Errors
+    /// [`OcpError::InvalidValue`]
+    pub(super) fn check_iterate(&self) -> Result<(), OcpError> {
         // All numbers at once; names are looked for where one of these is not finite.
         if crate::irk::not_finite(self.iterate.numbers()).is_some() { self.name_not_finite() } else { Ok(()) }
     }

@@ -8,6 +8,8 @@ use super::error::Part;
 use super::names::Names;
 use super::problem::Formulation;
 use crate::scalar::Real;
+use crate::shape::Shape;
+use core::fmt;
 
 const fn names<P: Formulation<T>, T: Real>() -> Names {
     <P::Dynamics as Dynamics<T>>::NAMES
@@ -15,6 +17,37 @@ const fn names<P: Formulation<T>, T: Real>() -> Names {
 
 fn listed(names: &[&'static str], index: usize) -> (&'static str, usize) {
     (names.get(index).copied().unwrap_or(""), index)
+}
+
+/// What a constraint is called: as its function, with the output where that has several.
+pub(super) struct OutputName {
+    function: &'static str,
+    output: Option<usize>,
+}
+
+impl OutputName {
+    /// Whether a name means it: that of the function means all of its outputs.
+    pub fn is_meant(&self, name: &str) -> bool {
+        let Some(rest) = name.strip_prefix(self.function) else { return false };
+        let index = rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+        rest.is_empty() || index.is_some_and(|index| index.parse() == Ok(self.output.unwrap_or(0)))
+    }
+}
+
+/// The name of a row.
+pub(super) fn output<C: Constraints<S, T>, S: Shape, T: Real>(row: usize) -> OutputName {
+    let (function, output) = C::name(row);
+    let has_others = (0..C::ROWS).map(C::name).any(|(other, output)| other == function && output > 0);
+    OutputName { function, output: has_others.then_some(output) }
+}
+
+impl fmt::Display for OutputName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.output {
+            Some(output) => write!(f, "{}[{output}]", self.function),
+            None => f.write_str(self.function),
+        }
+    }
 }
 
 impl Labels {

@@ -1,6 +1,6 @@
 //! Least-squares costs at the nodes.
 
-use super::cost::{At, Cost};
+use super::cost::{At, Cost, Show};
 use super::error::OcpError;
 use super::pattern::{self, Entries};
 use super::point::{Cross, Terms, There, finite, is_algebraic, position};
@@ -8,8 +8,9 @@ use super::weights;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::linalg::{Arithmetic, AtRow, Kernel, dispatch, each_row};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Plain};
+use crate::shape::{Array, Matrix, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
+use core::fmt;
 use core::ops::Range;
 
 /// `½ (y − r)ᵀ W (y − r)` of the outputs `y(x, z, u, p, t)` of a function and a reference `r`,
@@ -30,6 +31,8 @@ pub struct LeastSquaresCost<F: Function, T: Plain = f64> {
     jacobian: F::Jacobian<T>,
     hessian: F::Hessian<T>,
 }
+
+plain!([F: Function, T: Plain] LeastSquaresCost<F, T> { weights, invalid, coupled, y, mu, jacobian, hessian });
 
 impl<F: Function, T: Real> LeastSquaresCost<F, T> {
     /// With the weights `W`, a symmetric, positive semidefinite matrix.
@@ -94,7 +97,8 @@ fn weigh<F: Function, T: Real>(
     }
 }
 
-impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
+#[diagnostic::do_not_recommend]
+impl<S: Shape, F: Function<Shape = S>, T: Real> Cost<S, T> for LeastSquaresCost<F, T> {
     const REFERENCES: usize = F::Outputs::NY;
     const CONVEX: bool = true;
     const ALGEBRAIC: bool = is_algebraic::<F>();
@@ -109,6 +113,10 @@ impl<F: Function, T: Real> Cost<F::Shape, T> for LeastSquaresCost<F, T> {
             0 => Ok(()),
             _ => weights::check::<F, T>(&self.weights, self.coupled != 0),
         }
+    }
+
+    fn terms(&self, show: Show<'_>) -> fmt::Result {
+        show(format_args!("½‖{} − r‖²_W", F::STRUCTURE.name))
     }
 
     fn pattern(&self, visit: Entries<'_>) -> bool {

@@ -238,7 +238,8 @@ pub(super) fn reserve(log: &mut Vec<Iteration>, more: usize) -> Result<(), OcpEr
     log.try_reserve(more).map_err(|_| OcpError::OutOfMemory { bytes })
 }
 
-/// Iterations, to be printed as the familiar table.
+/// Iterations, to be printed as the familiar table. Marks behind the length of a step are explained
+/// below it.
 #[derive(Clone, Copy, Debug)]
 pub struct Log<'a>(pub &'a [Iteration]);
 
@@ -272,6 +273,12 @@ impl fmt::Display for Log<'_> {
                 1e3 * i.times.search,
             )?;
         }
+        if self.0.iter().any(|i| i.elastic) {
+            writeln!(f, "e: hard bounds had penalties, since no step satisfies all of them")?;
+        }
+        if self.0.iter().any(|i| i.corrected && !i.elastic) {
+            writeln!(f, "s: the step has a second-order correction of the constraints")?;
+        }
         Ok(())
     }
 }
@@ -300,5 +307,36 @@ impl Watch {
         }
         #[cfg(not(feature = "std"))]
         0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::string::ToString;
+    use alloc::vec::Vec;
+
+    /// What stands below the rows.
+    fn marks(rows: &[Iteration]) -> Vec<alloc::string::String> {
+        Log(rows).to_string().lines().skip(1 + rows.len()).map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn marks_are_explained_where_they_occur() {
+        let plain = Iteration::default();
+        let elastic = Iteration { elastic: true, corrected: true, ..plain };
+        let corrected = Iteration { corrected: true, ..plain };
+        assert!(marks(&[plain]).is_empty());
+        assert_eq!(
+            marks(&[plain, elastic]),
+            ["e: hard bounds had penalties, since no step satisfies all of them"]
+        );
+        assert_eq!(
+            marks(&[corrected, elastic]),
+            [
+                "e: hard bounds had penalties, since no step satisfies all of them",
+                "s: the step has a second-order correction of the constraints"
+            ]
+        );
     }
 }

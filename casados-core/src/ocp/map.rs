@@ -7,7 +7,7 @@ use super::pattern::Origin;
 use super::point::{parameter, position, read};
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::scalar::Real;
-use crate::shape::{Matrix, Outputs, Plain, Shape};
+use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// `x_{k+1} = y(x_k, u_k, p_k, t_k)`: a [`Function`] with as many outputs as there are states.
@@ -30,6 +30,8 @@ pub struct Map<F: Function, T: Plain> {
     h_up: <F::Shape as Shape>::MatrixUP<T>,
     h_pp: <F::Shape as Shape>::MatrixPP<T>,
 }
+
+plain!([F: Function, T: Plain] Map<F, T> { v, y, mu, jacobian, hessian, x, dx, du, dp, h_xx, h_xu, h_uu, h_xp, h_up, h_pp });
 
 impl<F: Function, T: Real> Map<F, T> {
     /// The map of a function.
@@ -120,7 +122,7 @@ impl<F: Function, T: Real> Dynamics<T> for Map<F, T> {
     type Shape = F::Shape;
     const NAMES: Names = {
         let structure = &F::STRUCTURE;
-        Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
+        Names { model: structure.name, x: structure.x, z: structure.z, u: structure.u, p: structure.p }
     };
     const ORIGIN: Origin = Origin::Map(F::STRUCTURE.jacobian, F::STRUCTURE.hessian);
 

@@ -36,6 +36,10 @@
 //! order, `Σ_j ν_j ∇²ζ_j` with `ν = ∂(l + (λ_u − λ_l)ᵀg)/∂z`, are in exact Hessians. At the end of
 //! the horizon there are none.
 //!
+//! `Ocp::solution` has all of this by the names of the model, with multipliers, and
+//! `Ocp::dense_solution` points between the nodes too: a `Trajectory`, to be looked at, written and
+//! read.
+//!
 //! With [`Options::lifted`](crate::Options::lifted) an integrator takes one iteration in each call,
 //! from the stages of the last one: these converge with the iterates, to the same solution.
 //!
@@ -70,6 +74,8 @@ mod error;
 mod filter;
 mod guess;
 mod horizon;
+#[cfg(feature = "alloc")]
+mod inside;
 mod instance;
 mod ipm;
 mod kept_jacobians;
@@ -83,8 +89,9 @@ mod messages;
 mod names;
 mod pattern;
 mod point;
+mod print;
 mod problem;
-#[cfg(feature = "casadi")]
+#[cfg(feature = "alloc")]
 mod program;
 mod real_time;
 #[cfg(feature = "alloc")]
@@ -92,7 +99,10 @@ mod sensitivities;
 #[cfg(feature = "alloc")]
 mod shooting;
 mod single;
+mod soften;
 mod sqp;
+#[cfg(feature = "alloc")]
+mod trajectory;
 mod transfer;
 mod weights;
 mod wrapped;
@@ -134,3 +144,5 @@ pub use single::{Along, IntegralCost};
 #[cfg(feature = "alloc")]
 pub use sqp::HeapSqp;
 pub use sqp::{Globalisation, Sqp, SqpOptions};
+#[cfg(feature = "alloc")]
+pub use trajectory::{Csv, Kind, Series, Trajectory, TrajectoryError};

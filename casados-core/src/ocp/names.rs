@@ -7,6 +7,8 @@ pub struct Names {
     pub model: &'static str,
     /// States.
     pub x: &'static [&'static str],
+    /// Algebraic states.
+    pub z: &'static [&'static str],
     /// Controls.
     pub u: &'static [&'static str],
     /// Parameters.

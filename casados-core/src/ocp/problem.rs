@@ -84,6 +84,12 @@ pub trait Formulation<T: Real> {
     fn parts(
         &mut self,
     ) -> &mut Problem<Self::Dynamics, Self::StageCost, Self::TerminalCost, Self::Path, Self::Terminal>;
+
+    /// All of them, to be looked at.
+    #[allow(clippy::type_complexity)]
+    fn parts_ref(
+        &self,
+    ) -> &Problem<Self::Dynamics, Self::StageCost, Self::TerminalCost, Self::Path, Self::Terminal>;
 }
 
 impl<T: Real, D, L, E, G, H> Formulation<T> for Problem<D, L, E, G, H>
@@ -101,6 +107,9 @@ where
     type Path = G;
     type Terminal = H;
     fn parts(&mut self) -> &mut Self {
+        self
+    }
+    fn parts_ref(&self) -> &Self {
         self
     }
 }

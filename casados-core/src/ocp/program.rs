@@ -1,4 +1,5 @@
-//! What is asked of a problem that is handed to solvers of nonlinear programs.
+//! What is asked of a problem that is handed to others: to solvers of nonlinear programs, or as a
+//! solution.
 
 use super::algebraic;
 use super::constraint::Constraints;
@@ -13,8 +14,8 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Ocp<P, T, D, M> {
-    /// After [`Ocp::linearise`]: the objective without penalties, and `g` of every stage in
-    /// `values`.
+    /// Where algebraic states are those of the iterate: `g` of every stage in `values`, and after
+    /// [`Ocp::linearise`] the objective without penalties.
     ///
     /// # Errors
     /// [`OcpError::NonFiniteFunction`]
@@ -35,12 +36,5 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             }
         }
         Ok(self.objective)
-    }
-
-    /// Whether the first state has a cost of its own, by which all of its elements may be coupled.
-    pub(crate) fn has_arrival_cost(&mut self) -> bool {
-        let intervals = self.intervals();
-        let arrival = split::<P, T>(self.data.as_mut(), intervals).arrival;
-        arrival.iter().skip(P::Shape::NX).any(|&weight| weight != T::ZERO)
     }
 }

@@ -1,11 +1,12 @@
 //! A batch as dynamics: all intervals in one call.
 
-use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, vector};
+use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
+use super::inside::Inside;
 use super::kept_jacobians::{Adjoints, step};
 use super::names::Names;
 use super::pattern::Origin;
-use super::single::{names, origin};
+use super::single::{Begin, at, names, origin};
 use crate::batch::{BatchError, Integrator, Intervals};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
@@ -27,6 +28,13 @@ pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
     forward: Vec<Forward<M, T>>,
     hessian: Vec<Hessian<M, T>>,
     adjoint: Vec<Adjoint<M, T>>,
+}
+
+/// A batch with the same options, and memory of its own.
+impl<M: Dae, B, const S: usize, T: Real> Clone for Shooting<M, B, S, T> {
+    fn clone(&self) -> Self {
+        Self::new(self.batch.clone())
+    }
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Shooting<M, B, S, T> {
@@ -132,6 +140,18 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Shooting<M, B, S, T> {
             sink(k, &result.into());
         }
         Ok(())
+    }
+
+    fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
+        let mut single = at(0, self.batch.single())?;
+        for (k, interval) in nodes.iter().enumerate() {
+            at(k, self.batch.start(k, &mut single))?;
+            at(k, single.begin(&interval))?;
+            let visit =
+                &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
+            at(k, single.at_parts(&interval, parts, visit))?;
+        }
+        Ok(true)
     }
 
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {

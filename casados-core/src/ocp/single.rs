@@ -1,8 +1,11 @@
 //! Integrators of single intervals as dynamics: one interval after the other, without other memory
 //! than theirs.
 
+use super::cost::Show;
 use super::dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
+#[cfg(feature = "alloc")]
+use super::inside::each_inside;
 use super::names::Names;
 use super::pattern::Origin;
 use crate::error::Error;
@@ -14,11 +17,12 @@ use crate::quadrature::{Integrand, LeastSquares, Quadrature};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
 use crate::{erk, irk};
+use core::fmt;
 
 /// The names that a model gives.
 pub(super) const fn names<M: Dae>() -> Names {
     let structure = &M::STRUCTURE;
-    Names { model: structure.name, x: structure.x, u: structure.u, p: structure.p }
+    Names { model: structure.name, x: structure.x, z: structure.z, u: structure.u, p: structure.p }
 }
 
 /// The equations of a model.
@@ -56,6 +60,12 @@ pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
     fn check(&self) -> Result<(), OcpError> {
         Ok(())
     }
+    /// Shows it as mathematics.
+    ///
+    /// # Errors
+    /// Those of what shows it.
+    #[doc(hidden)]
+    fn term(&self, show: Show<'_>) -> fmt::Result;
     /// Before every interval.
     #[doc(hidden)]
     fn prepare(&mut self);
@@ -67,6 +77,9 @@ pub trait IntegralCost<M: Dae, T: Real>: Integrand<M, T> {
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for LeastSquares<F, T> {
     fn check(&self) -> Result<(), OcpError> {
         super::weights::check::<F, T>(&self.weights, true)
+    }
+    fn term(&self, show: Show<'_>) -> fmt::Result {
+        show(format_args!("½∫‖{}‖²_W dt", F::STRUCTURE.name))
     }
     fn prepare(&mut self) {}
     fn terms(&self) -> IntegralTerms<'_, T> {
@@ -84,6 +97,9 @@ impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> IntegralCost<M, T> for Leas
 impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T: Real> IntegralCost<M, T>
     for Quadrature<F, T>
 {
+    fn term(&self, show: Show<'_>) -> fmt::Result {
+        show(format_args!("∫{} dt", F::STRUCTURE.name))
+    }
     fn prepare(&mut self) {
         self.nu.as_mut_slice().fill(T::ONE);
     }
@@ -142,6 +158,15 @@ macro_rules! single {
                 }
                 Ok(())
             }
+            #[cfg(feature = "alloc")]
+            fn inside(
+                &mut self,
+                nodes: &Nodes<'_, T>,
+                parts: &[T],
+                sink: Sink<'_, T>,
+            ) -> Result<bool, OcpError> {
+                each_inside(self, nodes, parts, sink)
+            }
         }
 
         impl<M: $model, B, const S: usize, T: Real, W: WithHessian> SecondOrder<T>
@@ -170,6 +195,9 @@ macro_rules! single {
             fn check(&self) -> Result<(), OcpError> {
                 self.integral.check()
             }
+            fn terms(&self, show: Show<'_>) -> fmt::Result {
+                self.integral.term(show)
+            }
             fn simulate(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
                 let Self { integrator, integral } = self;
                 for (k, interval) in nodes.iter().enumerate() {
@@ -192,6 +220,15 @@ macro_rules! single {
                     sink(k, &Step { cost: integral.terms(), ..result.into() });
                 }
                 Ok(())
+            }
+            #[cfg(feature = "alloc")]
+            fn inside(
+                &mut self,
+                nodes: &Nodes<'_, T>,
+                parts: &[T],
+                sink: Sink<'_, T>,
+            ) -> Result<bool, OcpError> {
+                each_inside(&mut self.integrator, nodes, parts, sink)
             }
         }
 

@@ -1,5 +1,6 @@
 //! Bounds of some components of a stage, and their penalties.
 
+use super::error::Side;
 use crate::scalar::Real;
 
 /// Bounds of some components, and what it costs to leave them.
@@ -50,13 +51,16 @@ impl<T: Real> BoundsMut<'_, T> {
     }
     /// Makes both bounds of a component soft.
     pub fn soften(&mut self, index: usize, linear: T, quadratic: T) {
-        let penalties = [
-            (&mut *self.lower_linear, linear),
-            (&mut *self.upper_linear, linear),
-            (&mut *self.lower_quadratic, quadratic),
-            (&mut *self.upper_quadratic, quadratic),
-        ];
-        for (penalties, value) in penalties {
+        self.soften_side(index, Side::Lower, linear, quadratic);
+        self.soften_side(index, Side::Upper, linear, quadratic);
+    }
+    /// Makes one bound of a component soft.
+    pub fn soften_side(&mut self, index: usize, side: Side, linear: T, quadratic: T) {
+        let [of_linear, of_quadratic] = match side {
+            Side::Lower => [&mut *self.lower_linear, &mut *self.lower_quadratic],
+            Side::Upper => [&mut *self.upper_linear, &mut *self.upper_quadratic],
+        };
+        for (penalties, value) in [(of_linear, linear), (of_quadratic, quadratic)] {
             if let Some(penalty) = penalties.get_mut(index) {
                 *penalty = value;
             }

@@ -9,7 +9,7 @@ use crate::linalg::axpy;
 use crate::model::Dae;
 use crate::result::split;
 use crate::scalar::Real;
-use crate::shape::{Matrix, Plain};
+use crate::shape::{Matrix, Plain, plain};
 use bytemuck::Zeroable;
 
 /// `q = ∫ l dt` of the outputs of a function `F`, along the solution of an integrator that takes it
@@ -40,6 +40,8 @@ pub struct Quadrature<F: Function, T: Plain = f64> {
     memory: Memory<F, T>,
 }
 
+plain!([F: Function, T: Plain] Quadrature<F, T> { q, dq_dx0, dq_du, dq_dp, nu, dq, memory });
+
 impl<F: Function, T: Plain> Default for Quadrature<F, T> {
     fn default() -> Self {
         Self::zeroed()
@@ -65,6 +67,7 @@ impl<F: Function, T: Plain> Quadrature<F, T> {
 
 impl<F: Function, T: Plain> sealed::Sealed for Quadrature<F, T> {}
 
+#[diagnostic::do_not_recommend]
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for Quadrature<F, T> {
     fn begin(&mut self) {
         self.q.as_mut_slice().fill(T::ZERO);

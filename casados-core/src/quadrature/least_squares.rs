@@ -9,7 +9,7 @@ use crate::linalg::axpy;
 use crate::model::Dae;
 use crate::result::symmetric;
 use crate::scalar::Real;
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Matrix, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// `φ = ½ ∫ rᵀ W r dt` of the outputs of a function `F`, along the solution of an integrator that
@@ -62,6 +62,8 @@ pub struct LeastSquares<F: Function, T: Plain = f64> {
     memory: Memory<F, T>,
 }
 
+plain!([F: Function, T: Plain] LeastSquares<F, T> { value, grad_x0, grad_u, grad_p, h_xx, h_xu, h_uu, h_xp, h_up, h_pp, weights, gradient, sum, row, memory });
+
 impl<F: Function, T: Real> LeastSquares<F, T> {
     /// One that is its own memory, with the weights `W`, which are symmetric.
     #[must_use]
@@ -97,6 +99,7 @@ impl<F: Function, T: Real> LeastSquares<F, T> {
 
 impl<F: Function, T: Plain> sealed::Sealed for LeastSquares<F, T> {}
 
+#[diagnostic::do_not_recommend]
 impl<M: Dae, F: Function<Shape = M::Shape>, T: Real> Integrand<M, T> for LeastSquares<F, T> {
     fn begin(&mut self) {
         self.value = T::ZERO;

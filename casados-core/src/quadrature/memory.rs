@@ -6,7 +6,7 @@ use crate::finite::not_finite;
 use crate::function::{ArrayV, ArrayY, Function};
 use crate::linalg::{axpy, dispatch};
 use crate::scalar::Real;
-use crate::shape::{Plain, Shape};
+use crate::shape::{Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// `[T; NW]` of a function.
@@ -34,6 +34,8 @@ pub(super) struct Memory<F: Function, T: Plain> {
     /// The sum of `Dᵀ H D`, its lower triangle.
     pub second: ArrayW<F, ArrayW<F, T>>,
 }
+
+plain!([F: Function, T: Plain] Memory<F, T> { v, d, y, jacobian, dy, mu, gradient, hessian, entries, g, second });
 
 impl<F: Function, T: Real> Memory<F, T> {
     pub fn begin(&mut self) {

@@ -44,31 +44,31 @@ fn input_that_is_not_finite() {
     assert_eq!(irk.solve(&x0, &u, 0.1).unwrap_err(), Error::ParametersNotSet);
     irk.set_parameters(&vector![1.0]).unwrap();
     let nan = f64::NAN;
-    let at = |result: Result<(), Error>, expected: (Argument, usize)| match result {
-        Err(Error::NonFiniteInput { argument, index, value }) => {
-            assert_eq!((argument, index), expected);
+    let at = |result: Result<(), Error>, expected: (Argument, usize, &str)| match result {
+        Err(Error::NonFiniteInput { argument, index, name, value }) => {
+            assert_eq!((argument, index, name), expected);
             assert!(!value.is_finite());
         }
         other => panic!("{other:?}"),
     };
-    at(irk.solve(&vector![1.0, nan], &u, 0.1).map(|_| ()), (Argument::X0, 1));
-    at(irk.forward(&x0, &vector![f64::INFINITY], 0.1).map(|_| ()), (Argument::U, 0));
-    at(irk.solve(&x0, &u, nan).map(|_| ()), (Argument::H, 0));
-    at(irk.adjoint(&x0, &u, 0.1, &vector![nan, 1.0]).map(|_| ()), (Argument::Lambda, 0));
-    at(irk.hessian(&x0, &u, 0.1, &vector![1.0, -f64::INFINITY]).map(|_| ()), (Argument::Lambda, 1));
-    at(irk.forward_adjoint(&x0, &u, 0.1, &vector![1.0, nan]).map(|_| ()), (Argument::Lambda, 1));
-    at(irk.set_parameters(&vector![nan]), (Argument::P, 0));
-    at(irk.set_time(nan), (Argument::T, 0));
-    at(irk.set_start(&vector![nan, 0.0], &vector![0.0]), (Argument::StartXdot, 0));
-    at(irk.set_start(&vector![0.0, 0.0], &vector![nan]), (Argument::StartZ, 0));
+    at(irk.solve(&vector![1.0, nan], &u, 0.1).map(|_| ()), (Argument::X0, 1, "x[1]"));
+    at(irk.forward(&x0, &vector![f64::INFINITY], 0.1).map(|_| ()), (Argument::U, 0, "u[0]"));
+    at(irk.solve(&x0, &u, nan).map(|_| ()), (Argument::H, 0, ""));
+    at(irk.adjoint(&x0, &u, 0.1, &vector![nan, 1.0]).map(|_| ()), (Argument::Lambda, 0, "x[0]"));
+    at(irk.hessian(&x0, &u, 0.1, &vector![1.0, -f64::INFINITY]).map(|_| ()), (Argument::Lambda, 1, "x[1]"));
+    at(irk.forward_adjoint(&x0, &u, 0.1, &vector![1.0, nan]).map(|_| ()), (Argument::Lambda, 1, "x[1]"));
+    at(irk.set_parameters(&vector![nan]), (Argument::P, 0, "p[0]"));
+    at(irk.set_time(nan), (Argument::T, 0, ""));
+    at(irk.set_start(&vector![nan, 0.0], &vector![0.0]), (Argument::StartXdot, 0, "x[0]"));
+    at(irk.set_start(&vector![0.0, 0.0], &vector![nan]), (Argument::StartZ, 0, "z[0]"));
     // None of this is remembered.
     let result = *irk.hessian(&x0, &u, 0.1, &lambda).unwrap();
     let mut fresh = Irk::<Nonlinear, Gauss<2>>::new(Options::default()).unwrap();
     fresh.set_parameters(&vector![1.0]).unwrap();
     assert_eq!(fresh.hessian(&x0, &u, 0.1, &lambda).unwrap(), &result);
-    at(irk.dense(nan).map(|_| ()), (Argument::T, 0));
+    at(irk.dense(nan).map(|_| ()), (Argument::T, 0, ""));
     let error = irk.solve(&vector![1.0, nan], &u, 0.1).unwrap_err();
-    assert_eq!(error.to_string(), "element 1 of x0 is NaN");
+    assert_eq!(error.to_string(), "`x[1]` of x0 is NaN");
 }
 
 #[test]

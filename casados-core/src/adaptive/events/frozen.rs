@@ -7,7 +7,7 @@ use super::evaluate::{evaluate, finite};
 use super::trace::ITERATIONS;
 use super::{Event, Hybrid};
 use crate::error::{Argument, Error, Refusal};
-use crate::irk::check;
+use crate::irk::check_named;
 use crate::model::{Dae, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -55,7 +55,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         t_end: T,
         frozen: Span<T>,
     ) -> Result<(), Error> {
-        check(Argument::U, u.as_slice())?;
+        check_named::<M, T>(Argument::U, u.as_slice())?;
         for (t, expected) in [(self.integrator.start, frozen.start), (t_end, frozen.end)] {
             if t != expected {
                 let (start, end) = (frozen.start.to_f64(), frozen.end.to_f64());

@@ -33,7 +33,7 @@ use super::segment::{Segment, dense, refill};
 use super::sensitivities::{chain, dynamic, fill};
 use super::statistics::AdaptiveStatistics;
 use crate::error::{Argument, Error, Place};
-use crate::irk::{check, not_finite};
+use crate::irk::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixXP, MatrixXU, MatrixXX, VectorP, VectorU, VectorX,
@@ -261,7 +261,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         mut along: Along<'_, '_, M, T>,
     ) -> Result<HybridAdjoint<M, T>, Error> {
         self.asked = None;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let span = self.trace(x0, u, h)?;
         let moments = self.replay(x0, reborrow(&mut along))?;
         let mut result = HybridAdjoint {

@@ -18,7 +18,7 @@ use super::super::sealed::Engine;
 use super::super::sensitivities::{fill, place};
 use super::{Event, Hybrid, HybridAdjoint, HybridForward, Moment};
 use crate::error::{Argument, Error};
-use crate::irk::{check, not_finite};
+use crate::irk::{check_named, not_finite};
 use crate::linalg::axpy;
 use crate::model::{
     ArrayK, ArrayV, ArrayW, ArrayX, Dae, MatrixPP, MatrixUP, MatrixUU, MatrixXP, MatrixXU, MatrixXX, VectorU,
@@ -89,7 +89,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         lambda: &VectorX<M, T>,
     ) -> Result<HybridHessian<M, T>, Error> {
         self.asked = None;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let span = self.trace(x0, u, h)?;
         let (forward, moments) = self.sweep(x0, true, None)?;
         let bytes = size_of::<Second<M, T>>();

@@ -9,7 +9,7 @@ use super::super::statistics::AdaptiveStatistics;
 use super::evaluate::{evaluate, finite, place};
 use super::{Event, Hybrid, Moment, Occurrence};
 use crate::error::{Argument, Error};
-use crate::irk::check;
+use crate::irk::check_named;
 use crate::model::{ArrayK, Dae, VectorP, VectorU, VectorX};
 use crate::scalar::Real;
 use crate::shape::{Matrix, Shape};
@@ -39,7 +39,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Hybrid<M, B, T> {
         self.asked = None;
         self.statistics = AdaptiveStatistics::default();
         self.integrator.reserve()?;
-        check(Argument::X0, x0.as_slice())?;
+        check_named::<M, T>(Argument::X0, x0.as_slice())?;
         let (start, given) = (self.integrator.start, self.integrator.base.given);
         let t_end = self.integrator.end(h)?;
         let result = match self.frozen {

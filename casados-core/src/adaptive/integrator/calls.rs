@@ -62,7 +62,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Adjoint<M, T>, Error> {
         self.last = None;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let span = self.steps(x0, u, h)?;
         let (mut frozen, state, memory, _) = self.parts(span)?;
         frozen.solve::<B>(state, x0, reborrow(&mut along))?;
@@ -79,7 +79,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> integrator::Integrator for Integrator<M, 
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Hessian<M, T>, Error> {
         self.last = None;
-        check(Argument::Lambda, lambda.as_slice())?;
+        check_named::<M, T>(Argument::Lambda, lambda.as_slice())?;
         let span = self.steps(x0, u, h)?;
         let (mut frozen, state, memory, history) = self.parts(span)?;
         history.clear();

@@ -8,7 +8,7 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last parameters stay.
     pub fn set_parameters(&mut self, p: &VectorP<M, T>) -> Result<(), Error> {
-        check(Argument::P, p.as_slice())?;
+        check_named::<M, T>(Argument::P, p.as_slice())?;
         self.base.parameters = *p;
         self.parameters = true;
         Ok(())
@@ -30,8 +30,8 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Integrator<M, B, T> {
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.
     pub fn set_start(&mut self, xdot: &VectorX<M, T>, z: &VectorZ<M, T>) -> Result<(), Error> {
-        check(Argument::StartXdot, xdot.as_slice())?;
-        check(Argument::StartZ, z.as_slice())?;
+        check_named::<M, T>(Argument::StartXdot, xdot.as_slice())?;
+        check_named::<M, T>(Argument::StartZ, z.as_slice())?;
         stack::<M, T>(&mut self.base.given, xdot, z);
         Ok(())
     }

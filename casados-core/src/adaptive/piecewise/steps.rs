@@ -18,13 +18,13 @@ impl<M: Dae, B: Engine<M, T>, T: Real> Piecewise<M, B, T> {
         }
         self.statistics = AdaptiveStatistics::default();
         self.integrator.reserve()?;
-        check(Argument::X0, x0.as_slice())?;
+        check_named::<M, T>(Argument::X0, x0.as_slice())?;
         check(Argument::T, ends)?;
         let start = self.integrator.start;
         let last = ends.last().copied().unwrap_or(start);
         let mut before = start;
         for (index, (u, end)) in controls.iter().zip(ends).enumerate() {
-            check(Argument::U, u.as_slice())?;
+            check_named::<M, T>(Argument::U, u.as_slice())?;
             if !inside(*end, before, last) {
                 let (t, before, end) = (end.to_f64(), before.to_f64(), last.to_f64());
                 return Err(Error::Unordered { index, t, before, end });

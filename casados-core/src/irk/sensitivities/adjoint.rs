@@ -1,7 +1,7 @@
 //! Adjoint sensitivities as users see them.
 
 use crate::error::{Argument, Error};
-use crate::finite::check_input;
+use crate::finite::check_named;
 use crate::irk::driver::Arguments;
 use crate::irk::integrator::Integrator;
 use crate::memory::{Memory, WithAdjoint};
@@ -68,7 +68,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithAdjoint<C>,
     {
-        self.run.needs(check_input(Argument::Lambda, seeds))?;
+        self.run.needs(check_named::<M, T>(Argument::Lambda, seeds))?;
         begin(&mut along);
         let memory = self.run.needs(W::adjoint(&mut self.adjoint))?;
         let count = self.run.options.steps;

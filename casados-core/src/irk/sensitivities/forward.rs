@@ -1,7 +1,7 @@
 //! Forward sensitivities, in all directions or in given ones, as users see them.
 
 use crate::error::{Argument, Error};
-use crate::finite::check_input;
+use crate::finite::check_named;
 use crate::irk::dense_output::Point;
 use crate::irk::driver::Arguments;
 use crate::irk::forward::gradient::gradient;
@@ -85,7 +85,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        self.run.needs(check_input(Argument::Lambda, lambda.as_slice()))?;
+        self.run.needs(check_named::<M, T>(Argument::Lambda, lambda.as_slice()))?;
         self.differentiate::<false>(&Arguments { x0, u, h }, None, None)?;
         gradient(&mut W::forward(&mut self.forward)?.result, lambda.as_slice())?;
         self.keep_forward()?;
@@ -104,7 +104,7 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithForward,
     {
-        self.run.needs(check_input(Argument::Lambda, lambda))?;
+        self.run.needs(check_named::<M, T>(Argument::Lambda, lambda))?;
         self.differentiate::<false>(arguments, None, Some(&mut to.forward))?;
         gradient(to, lambda)?;
         self.keep_forward().map(|_| ())
@@ -232,9 +232,9 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithDirectional<C>,
     {
-        self.run.needs(check_input(Argument::SeedX, seeds.x0.as_slice()))?;
-        self.run.needs(check_input(Argument::SeedU, seeds.u.as_slice()))?;
-        self.run.needs(check_input(Argument::SeedP, seeds.p.as_slice()))?;
+        self.run.needs(check_named::<M, T>(Argument::SeedX, seeds.x0.as_slice()))?;
+        self.run.needs(check_named::<M, T>(Argument::SeedU, seeds.u.as_slice()))?;
+        self.run.needs(check_named::<M, T>(Argument::SeedP, seeds.p.as_slice()))?;
         let memory = self.run.needs(W::directional(&mut self.directional))?;
         memory.seed(seeds);
         let count = self.run.options.steps;

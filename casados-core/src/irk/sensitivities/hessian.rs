@@ -1,7 +1,7 @@
 //! Second-order sensitivities as users see them.
 
 use crate::error::{Argument, Error};
-use crate::finite::check_input;
+use crate::finite::check_named;
 use crate::irk::driver::Arguments;
 use crate::irk::forward::memory::StepOf;
 use crate::irk::hessian::pass::HessianMemory;
@@ -108,8 +108,8 @@ impl<M: Dae, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     where
         W: WithHessian,
     {
-        self.run.needs(check_input(Argument::Lambda, lambda))?;
-        self.run.needs(check_input(Argument::Nu, nu))?;
+        self.run.needs(check_named::<M, T>(Argument::Lambda, lambda))?;
+        self.run.needs(check_named::<M, T>(Argument::Nu, nu))?;
         begin(&mut along);
         self.sweep = None;
         let count = self.run.options.steps;

@@ -24,6 +24,7 @@ use super::dynamics::{
     Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step, vector,
 };
 use super::error::OcpError;
+use super::inside::Inside;
 use super::names::Names;
 use super::single::{Begin, names};
 use crate::error::Error;
@@ -78,6 +79,22 @@ pub struct Collocation<M: Dae, B, const S: usize, T: Real> {
     best: Vec<ArrayK<M, [T; S]>>,
     /// `w̄`, where increments are from.
     from: Vec<T>,
+}
+
+/// The same stages, and integrators with memory of their own.
+impl<M: Dae, B, const S: usize, T: Real> Clone for Collocation<M, B, S, T> {
+    fn clone(&self) -> Self {
+        Self {
+            at: self.at.clone(),
+            newton: self.newton.clone(),
+            coefficients: self.coefficients.clone(),
+            stages: self.stages.clone(),
+            increments: self.increments.clone(),
+            change: self.change.clone(),
+            best: self.best.clone(),
+            from: self.from.clone(),
+        }
+    }
 }
 
 impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
@@ -180,12 +197,7 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
 
     /// Stages go a part of their way.
     fn go(&mut self, along: T) {
-        for (y, change) in self.stages.iter_mut().zip(&self.change) {
-            let y = y.as_mut().as_flattened_mut().iter_mut();
-            for (y, &change) in y.zip(change.as_ref().as_flattened()) {
-                *y = *y + along * change;
-            }
-        }
+        go::<M, S, T>(&mut self.stages, &self.change, along);
     }
 
     /// All intervals at their stages: derivatives of `order` 1 or 2, and ends and algebraic states
@@ -240,6 +252,20 @@ impl<M: Dae, B, const S: usize, T: Real> Collocation<M, B, S, T> {
     }
 }
 
+/// Stages go a part of their way.
+fn go<M: Dae, const S: usize, T: Real>(
+    stages: &mut [ArrayK<M, [T; S]>],
+    change: &[ArrayK<M, [T; S]>],
+    along: T,
+) {
+    for (y, change) in stages.iter_mut().zip(change) {
+        let y = y.as_mut().as_flattened_mut().iter_mut();
+        for (y, &change) in y.zip(change.as_ref().as_flattened()) {
+            *y = *y + along * change;
+        }
+    }
+}
+
 /// Adds `λᵀ (A' − A)`, with matrices column after column.
 fn add_change<T: Real>(weights: &[T], before: &[T], after: &[T], to: &mut [T]) {
     let rows = weights.len().max(1);
@@ -284,6 +310,28 @@ impl<M: Dae, B, const S: usize, T: Real> Dynamics<T> for Collocation<M, B, S, T>
 
     fn linearise(&mut self, nodes: &Nodes<'_, T>, sink: Sink<'_, T>) -> Result<(), OcpError> {
         self.differentiate(nodes, forward::<M, B, S, T>, false, sink)
+    }
+
+    /// By the polynomials through the stages as they are.
+    fn inside(&mut self, nodes: &Nodes<'_, T>, parts: &[T], sink: Sink<'_, T>) -> Result<bool, OcpError> {
+        let count = self.steps();
+        if self.stages.len() != nodes.len() * count {
+            self.place_between(nodes)?;
+        }
+        let along = if self.change_to(nodes)? { T::ONE } else { T::ZERO };
+        for (k, interval) in nodes.iter().enumerate() {
+            let places = k * count..(k + 1) * count;
+            let [stages, change] =
+                [&self.stages, &self.change].map(|list| list.get(places.clone()).unwrap_or_default());
+            let mut stages = stages.to_vec();
+            go::<M, S, T>(&mut stages, change, along);
+            self.at.begin(&interval).map_err(failed(k))?;
+            self.at.set_solution(&stages).map_err(failed(k))?;
+            let visit =
+                &mut |j, x: &[T], z: &[T]| sink(k * parts.len() + j, &Step { x, z, ..Step::default() });
+            self.at.at_parts(&interval, parts, visit).map_err(failed(k))?;
+        }
+        Ok(true)
     }
 
     fn begin_stages(&mut self, nodes: &Nodes<'_, T>) -> Result<(), OcpError> {

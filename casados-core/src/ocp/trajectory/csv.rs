@@ -1,0 +1,41 @@
+//! A trajectory as a table for other programs.
+
+use super::{Series, Trajectory};
+use crate::scalar::Real;
+use core::fmt;
+
+/// A trajectory as comma-separated values, to be printed or written:
+/// `std::fs::write("solution.csv", solution.csv().to_string())`.
+#[derive(Clone, Copy, Debug)]
+pub struct Csv<'a, T = f64>(&'a Trajectory<T>);
+
+impl<T: Real> Trajectory<T> {
+    /// Comma-separated values: a line with `t` and all names, then one for each time. Where
+    /// something has no value, as controls at the end, the place is empty.
+    ///
+    /// Numbers are written with as many digits as it takes to read the same ones.
+    #[must_use]
+    pub fn csv(&self) -> Csv<'_, T> {
+        Csv(self)
+    }
+}
+
+impl<T: Real> fmt::Display for Csv<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Trajectory { times, series, .. } = self.0;
+        f.write_str("t")?;
+        for Series { name, .. } in series {
+            write!(f, ",{name}")?;
+        }
+        for (k, time) in times.iter().enumerate() {
+            write!(f, "\n{}", time.to_f64())?;
+            for Series { first, values, .. } in series {
+                f.write_str(",")?;
+                if let Some(value) = k.checked_sub(*first).and_then(|k| values.get(k)) {
+                    write!(f, "{}", value.to_f64())?;
+                }
+            }
+        }
+        writeln!(f)
+    }
+}
