@@ -5,12 +5,12 @@
 //! cargo run --release --example drift [PICTURE.svg]
 //! ```
 
+use casados::plot::{Figure, Panel};
 use casados::prelude::*;
 use casados::{Integrator, Projected};
 use nalgebra::{Vector4, vector};
-use plotters::prelude::*;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Of length one, and mass one: `z` is the tension over the length.
 #[dae(index_reduction)]
@@ -75,12 +75,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/plots/drift.svg")),
     };
     let curves = [
-        ("no stabilisation", RGBColor(200, 62, 45), run(irk::<Plain>()?)?),
-        ("baumgarte = 1.0", RGBColor(230, 145, 20), run(irk::<Slow>()?)?),
-        ("baumgarte = 20.0", RGBColor(60, 140, 70), run(irk::<Fast>()?)?),
-        ("projection", RGBColor(31, 95, 168), run(Projected::new(irk::<Held>()?))?),
+        ("no stabilisation", run(irk::<Plain>()?)?),
+        ("baumgarte = 1.0", run(irk::<Slow>()?)?),
+        ("baumgarte = 20.0", run(irk::<Fast>()?)?),
+        ("projection", run(Projected::new(irk::<Held>()?))?),
     ];
-    for (name, _, curve) in &curves {
+    for (name, curve) in &curves {
         let at = |t: f64| curve.iter().find(|point| point.0 >= t).map_or(f64::NAN, |point| point.1);
         println!(
             "{name:>18}: {:.1e} after 1 s, {:.1e} after 100 s, {:.1e} after 1000 s",
@@ -89,47 +89,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             at(1000.0)
         );
     }
-    draw(&curves, &path)
-}
-
-fn draw(curves: &[(&str, RGBColor, Curve)], path: &Path) -> Result<(), Box<dyn Error>> {
-    let failed = |error: std::io::Error| format!("cannot write {}: {error}", path.display());
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(failed)?;
-    }
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, (760, 420)).into_drawing_area();
-        area.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&area)
-            .margin(12)
-            .x_label_area_size(42)
-            .y_label_area_size(60)
-            .build_cartesian_2d((STEP..3000.0).log_scale(), (2e-17..10.0).log_scale())?;
-        chart
-            .configure_mesh()
-            .x_desc("time, s")
-            .y_desc("error of the length, m")
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(RGBColor(225, 225, 225))
-            .x_label_formatter(&|x| format!("{x}"))
-            .y_label_formatter(&|y| format!("{y:.0e}"))
-            .draw()?;
-        for &(name, colour, ref curve) in curves {
-            chart
-                .draw_series(LineSeries::new(curve.iter().copied(), colour.stroke_width(2)))?
-                .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
-            .background_style(WHITE.mix(0.85))
-            .border_style(RGBColor(225, 225, 225))
-            .draw()?;
-        area.present()?;
-    }
-    std::fs::write(path, svg).map_err(failed)?;
+    let panel = Panel::new("The error of the length of a pendulum").x("time, s").y("m").log_x().log_y();
+    let panel = curves.into_iter().fold(panel, |panel, (name, curve)| panel.line(name, curve));
+    Figure::new().size(760, 420).with(panel).save(&path)?;
     println!("{}", path.display());
     Ok(())
 }

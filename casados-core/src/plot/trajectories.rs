@@ -3,7 +3,7 @@
 use super::panel::Panel;
 use super::series::Series;
 use super::svg::Colour;
-use crate::ocp::{Formulation, Ocp, OcpError, Text, means};
+use crate::ocp::{Dynamics, Formulation, Ocp, OcpError, Text, means};
 use crate::qp::{Bounds, SolutionStage, StageDims};
 use crate::scalar::Real;
 use alloc::format;
@@ -64,7 +64,7 @@ impl Panel {
         D: AsRef<[StageDims]>,
         M: AsRef<[T]> + AsMut<[T]>,
     {
-        let known = ocp.names();
+        let known = const { &<P::Dynamics as Dynamics<T>>::NAMES };
         let times: Vec<f64> = ocp.times().iter().map(|time| time.to_f64()).collect();
         let mut all = Vec::new();
         for (is_control, names) in [(false, known.x), (true, known.u)] {
