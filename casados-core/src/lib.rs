@@ -61,6 +61,7 @@ pub mod shape;
 pub mod statistics;
 pub mod structure;
 pub mod tableau;
+pub mod tables;
 #[cfg(feature = "testing")]
 pub mod testing;
 

@@ -16,6 +16,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("memory", "error"),
     ("options", "error"),
     ("scalar", "shape"),
+    ("tables", "scalar"),
     ("function", "shape structure scalar"),
     ("model", "shape structure scalar"),
     ("qp", "scalar"),

@@ -33,6 +33,7 @@ mod macros;
 #[path = "nalgebra.rs"]
 mod nalgebra_values;
 mod statements;
+mod tables;
 mod traits;
 
 use casados::shape::{Array, Shape};

@@ -2,7 +2,7 @@
 //! of numbers: they are for those of the library.
 
 use bytemuck::Zeroable;
-use casados::scalar::Known;
+use casados::scalar::{Known, Rows};
 use casados::{Field, Lanes, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -61,6 +61,9 @@ impl Scalar for Wide {
     }
     fn store(self, cell: &mut Self) {
         *cell = self;
+    }
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+        rows.row(a.map(|a| a.0)).map(Self)
     }
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.0.sin_cos();

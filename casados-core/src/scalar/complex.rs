@@ -7,7 +7,7 @@
 //! comparisons), the real part chooses the piece. Inverse functions follow Kahan, "Branch cuts for
 //! complex elementary functions" (1987).
 
-use super::{Field, Scalar, own_cell};
+use super::{Field, Rows, Scalar, own_cell};
 use core::f64::consts::{FRAC_PI_2, LN_2, LN_10, PI};
 use num_complex::Complex64;
 
@@ -41,6 +41,10 @@ impl Field for Complex64 {
 
 impl Scalar for Complex64 {
     own_cell!();
+
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+        rows.row(a.map(|a| a.re)).map(|number| c(number, 0.0))
+    }
 
     fn sqrt(self) -> Self {
         if self.re == 0.0 && self.im == 0.0 {

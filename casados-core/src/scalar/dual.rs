@@ -10,7 +10,7 @@
 //!   `exp(b ln a)`;
 //! - `powi` of a base that is zero multiplies: `num-dual` divides by powers of the base.
 
-use super::{Field, Scalar, own_cell};
+use super::{Field, Rows, Scalar, own_cell};
 use num_dual::{Dual2_64, Dual64, DualNum, HyperDual64};
 
 macro_rules! dual {
@@ -88,6 +88,9 @@ macro_rules! dual {
                 } else {
                     DualNum::exp(&(other * DualNum::ln(&self)))
                 }
+            }
+            fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+                rows.row(a.map(|a| a.re)).map(Self::from)
             }
             fn abs(self) -> Self {
                 if self.re.is_sign_negative() { -self } else { self }

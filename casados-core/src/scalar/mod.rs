@@ -16,6 +16,7 @@ mod field;
 mod float;
 pub(crate) mod lanes;
 mod real;
+mod rows;
 #[cfg(all(feature = "libm", any(test, not(feature = "std"))))]
 mod single;
 mod strided;
@@ -27,6 +28,8 @@ pub(crate) use field::{transposed, two_sum};
 pub use float::Float;
 #[doc(hidden)]
 pub use lanes::functions as elementary;
+#[doc(hidden)]
+pub use rows::Rows;
 pub(crate) use strided::Strided;
 pub use tangent::Tangent;
 
@@ -167,6 +170,9 @@ pub trait Scalar: Field {
     ) -> [[Self; R]; N] {
         a.map(F::of)
     }
+    /// What real parts lead to, each lane by itself: constants, as their derivatives are zero
+    /// wherever they exist.
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C];
     /// `|a|`
     fn abs(self) -> Self;
     /// `±1`, with the sign of `a`

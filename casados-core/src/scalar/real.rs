@@ -1,7 +1,7 @@
 //! `f32` and `f64`.
 
 use super::lanes::{blocks, packed_registers, side_by_side, widest_register};
-use super::{Compiled, Field, Lanes, Packed, Real, Scalar, Sealed, own_cell};
+use super::{Compiled, Field, Lanes, Packed, Real, Rows, Scalar, Sealed, own_cell};
 #[cfg(not(feature = "std"))]
 use super::{double, single};
 
@@ -97,6 +97,10 @@ macro_rules! real {
                     }
                     if n < 0 { 1.0 / power } else { power }
                 }
+            }
+            #[inline(always)]
+            fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+                rows.row(a)
             }
             #[inline(always)]
             fn abs(self) -> Self {

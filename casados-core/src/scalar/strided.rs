@@ -5,7 +5,7 @@
 //! that of another stage make it the others' turn.
 
 use super::lanes::functions::Elementary;
-use super::{Field, Lanes, Piece, Scalar, Sealed};
+use super::{Field, Lanes, Piece, Rows, Scalar, Sealed};
 use crate::shape::Plain;
 use bytemuck::Zeroable;
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -122,6 +122,10 @@ impl<E: Scalar + Plain, const S: usize> Scalar for Strided<E, S> {
         a: [[Self; K]; N],
     ) -> [[Self; R]; N] {
         E::together::<F, K, R, N>(a.map(|a| a.map(|a| a.0))).map(|results| results.map(Self))
+    }
+    #[inline(always)]
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+        E::look_up(a.map(|a| a.0), rows).map(Self)
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {

@@ -5,7 +5,7 @@
 //! those of two equations do, entries of the Jacobian are sums that have rounded what is small
 //! away. Terms that expressions share are rounded once here, and cancel as they should.
 
-use super::{Field, Piece, Scalar, own_cell};
+use super::{Field, Piece, Rows, Scalar, own_cell};
 use bytemuck::Zeroable;
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -148,6 +148,11 @@ impl<S: Scalar> Scalar for Tangent<S> {
         acosh(a, _f) = c::<S>(1.0) / ((a - c(1.0)) * (a + c(1.0))).sqrt();
         atanh(a, _f) = c::<S>(1.0) / ((c::<S>(1.0) - a) * (c::<S>(1.0) + a));
         abs(a, _f) = a.signum();
+    }
+
+    #[inline(always)]
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+        S::look_up(a.map(|a| a.value), rows).map(Self::constant)
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@
 //! emitted code it yields condition times epsilon of every entry, which is what tolerances of
 //! comparisons are made of.
 
-use crate::scalar::{Field, Lanes, Scalar, Sealed, own_cell};
+use crate::scalar::{Field, Lanes, Rows, Scalar, Sealed, own_cell};
 use bytemuck::Zeroable;
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -151,6 +151,9 @@ impl Scalar for Bounded {
         asinh(a, f) = 1.0 / (1.0 + a * a).sqrt();
         acosh(a, f) = 1.0 / (a * a - 1.0).sqrt();
         atanh(a, f) = 1.0 / (1.0 - a * a);
+    }
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+        rows.row(a.map(|a| a.value)).map(Self::exact)
     }
     fn sin_cos(self) -> (Self, Self) {
         (self.sin(), self.cos())

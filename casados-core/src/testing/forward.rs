@@ -1,7 +1,7 @@
 //! Forward differentiation over any scalar: `Forward<Bounded>` yields rounding bounds of first
 //! derivatives, `Forward<Forward<Bounded>>` those of second derivatives.
 
-use crate::scalar::{Field, Scalar, own_cell};
+use crate::scalar::{Field, Rows, Scalar, own_cell};
 use core::f64::consts::{LN_2, LN_10};
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -108,6 +108,9 @@ impl<S: Scalar> Scalar for Forward<S> {
         asinh(a, f) = n::<S>(1.0) / (n::<S>(1.0) + a * a).sqrt();
         acosh(a, f) = n::<S>(1.0) / (a * a - n::<S>(1.0)).sqrt();
         atanh(a, f) = n::<S>(1.0) / (n::<S>(1.0) - a * a);
+    }
+    fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+        S::look_up(a.map(|a| a.re), rows).map(|re| Self { re, d: n::<S>(0.0) })
     }
     fn sin_cos(self) -> (Self, Self) {
         (self.sin(), self.cos())

@@ -1,9 +1,9 @@
 //! What the implementations for a model and for a function have in common: a module with the
 //! functions that compute.
 
-use super::routine::Routine;
+use super::routine::{Outside, Routine};
 use crate::graph::Node;
-use crate::language::{Model, Variables};
+use crate::language::{Model, Table, Variables};
 use crate::structure::Derivatives;
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -45,7 +45,7 @@ pub fn module(
     let krate = &model.krate;
     let mut text = text(model, derivatives, names);
     if let Some(time) = time {
-        let Model { variables, graph, residual, opaque, .. } = model;
+        let Model { variables, graph, residual, .. } = model;
         let (rate, [_, nv, _]) = ("rate", dimensions(variables));
         let routine = Routine {
             name: "time_derivative",
@@ -54,45 +54,95 @@ pub fn module(
             outputs: &[(rate, residual.len())],
             stores: time.iter().map(|&(row, node)| (rate, row as usize, node)).collect(),
         };
-        text += &routine.write(graph, variables, opaque.len());
+        text += &routine.write(graph, variables, of(model));
     }
     let code: TokenStream = text.parse()?;
+    let tables = (!model.tables.is_empty()).then(|| quote!(use #krate::tables::Table;));
     Ok(quote! {
         #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_imports, unused_variables)]
         mod code {
             use #krate::scalar::{Piece, Scalar, elementary};
+            #tables
             #code
         }
     })
 }
 
+fn of(model: &Model) -> Outside<'_> {
+    Outside { constants: model.opaque.len(), tables: &model.tables }
+}
+
+/// What the functions that compute are given from outside: the module of the code sees no name of
+/// the user's.
+pub fn given(model: &Model) -> Option<TokenStream> {
+    let constants = (!model.opaque.is_empty()).then(|| quote!(&C,));
+    let tables = (0..model.tables.len()).map(type_of_table);
+    (constants.is_some() || !model.tables.is_empty()).then(|| quote!(#constants #(#tables,)*))
+}
+
+fn type_of_table(index: usize) -> syn::Ident {
+    quote::format_ident!("CasadosTable{index}")
+}
+
 /// The implementations where no name of theirs meets one of the user's; constants from outside are
 /// `C`.
 pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
-    let Model { opaque, uses, instance, .. } = model;
-    if opaque.is_empty() {
-        quote! {
+    let Model { opaque, uses, instance, tables, .. } = model;
+    if opaque.is_empty() && tables.is_empty() {
+        return quote! {
             const _: () = { #implementations };
-        }
-    } else {
-        let length = Literal::usize_unsuffixed(opaque.len());
-        let parameters = instance.iter().map(|instance| {
-            let (name, ty, value) = (&instance.name, &instance.ty, Literal::u64_unsuffixed(instance.value));
-            quote!(#[allow(dead_code)] const #name: #ty = #value;)
-        });
+        };
+    }
+    let parameters = instance.iter().map(|instance| {
+        let (name, ty, value) = (&instance.name, &instance.ty, Literal::u64_unsuffixed(instance.value));
+        quote!(#[allow(dead_code)] const #name: #ty = #value;)
+    });
+    let names = quote!(#(#uses)* #(#parameters)*);
+    let length = Literal::usize_unsuffixed(opaque.len());
+    let constants = (!opaque.is_empty()).then(|| {
         quote! {
-            const _: () = {
-                #[allow(unused_imports)]
-                const CASADOS_CONSTANTS: [f64; #length] = {
-                    #(#uses)*
-                    #(#parameters)*
-                    [#(#opaque),*]
-                };
-                const _: () = {
-                    const C: [f64; #length] = CASADOS_CONSTANTS;
-                    #implementations
-                };
+            #[allow(unused_imports)]
+            const CASADOS_CONSTANTS: [f64; #length] = {
+                #names
+                [#(#opaque),*]
             };
+        }
+    });
+    let tables = tables.iter().enumerate().map(|(index, table)| self::table(model, index, table, &names));
+    let own = (!opaque.is_empty()).then(|| quote!(const C: [f64; #length] = CASADOS_CONSTANTS;));
+    quote! {
+        const _: () = {
+            #constants
+            #(#tables)*
+            const _: () = {
+                #own
+                #implementations
+            };
+        };
+    }
+}
+
+/// A type that stands for a table. A function that is generic would have numbers of its own for
+/// each scalar.
+fn table(model: &Model, index: usize, table: &Table, names: &TokenStream) -> TokenStream {
+    let (krate, ty, expression) = (&model.krate, type_of_table(index), &table.expression);
+    let variables = Literal::usize_unsuffixed(table.variables);
+    quote! {
+        #[derive(Clone, Copy)]
+        struct #ty;
+        impl #ty {
+            #[allow(unused_imports)]
+            fn table() -> &'static (impl #krate::tables::Table<#variables> + 'static) {
+                #names
+                use #krate::tables as casados_tables;
+                const { &#expression }
+            }
+        }
+        impl #krate::tables::Table<#variables> for #ty {
+            #[inline(always)]
+            fn partial<S: #krate::Scalar>(&self, at: [S; #variables], orders: [u32; #variables]) -> S {
+                #krate::tables::Table::partial(Self::table(), at, orders)
+            }
         }
     }
 }
@@ -101,13 +151,13 @@ pub fn enclose(model: &Model, implementations: &TokenStream) -> TokenStream {
 /// quote.
 fn text(model: &Model, derivatives: &Derivatives, names: &Names) -> String {
     let Derivatives { jacobian, constant, gradient, hessian, .. } = derivatives;
-    let Model { variables, graph, residual, opaque, .. } = model;
+    let Model { variables, graph, residual, .. } = model;
     let [_, nv, _] = dimensions(variables);
     let (ny, Names { value, value_jacobian, output, symbol }) = (residual.len(), names);
     let (nj, nh) = (jacobian.len(), hessian.len());
     let entries = || jacobian.iter().zip(constant).enumerate();
     let equations = || residual.iter().enumerate().map(|(row, &node)| (*output, row, node));
-    let write = |routine: Routine| routine.write(graph, variables, opaque.len());
+    let write = |routine: Routine| routine.write(graph, variables, of(model));
 
     let code_residual = write(Routine {
         name: value,

@@ -11,8 +11,7 @@ use quote::quote;
 pub fn write(analysis: &FunctionAnalysis) -> syn::Result<TokenStream> {
     let FunctionAnalysis { model, derivatives, time, .. } = analysis;
     let code = code::module(model, derivatives, &FUNCTION, Some(time))?;
-    // Constants from outside are an argument: the module of the code sees no name of the user's.
-    let c = (!model.opaque.is_empty()).then(|| quote!(&C,));
+    let c = code::given(model);
     let (function, graph_function) = (self::function(analysis, &c), graph_function(model, &c));
     Ok(code::enclose(model, &quote!(#code #function #graph_function)))
 }

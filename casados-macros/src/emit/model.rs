@@ -11,8 +11,7 @@ use quote::quote;
 pub fn write(analysis: &Analysis) -> syn::Result<TokenStream> {
     let Analysis { model, derivatives, .. } = analysis;
     let code = code::module(model, derivatives, &MODEL, None)?;
-    // Constants from outside are an argument: the module of the code sees no name of the user's.
-    let c = (!model.opaque.is_empty()).then(|| quote!(&C,));
+    let c = code::given(model);
     let (dae, graph_dae, ode) = (dae(analysis, &c), graph_dae(model, &c), ode(analysis));
     Ok(code::enclose(model, &quote!(#code #dae #graph_dae #ode)))
 }

@@ -5,14 +5,23 @@ use super::divisor;
 use super::schedule::{self, Step, Values};
 use super::text::{binary, number, unary};
 use super::together::{self, Function};
-use crate::graph::{Binary, Compare, Graph, Node, Op, Unary};
-use crate::language::Variables;
+use crate::graph::{Binary, Compare, Graph, Node, Op, Table, Unary};
+use crate::language::{self, Variables};
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
 /// The most statements of one function. The pieces of a longer routine are not inlined: a compiler
 /// takes longer over all of them in one, and spills more registers there than the calls cost.
 const LIMIT: usize = 500;
+
+/// What a model has from outside.
+#[derive(Clone, Copy)]
+pub struct Outside<'a> {
+    /// The number of its constants.
+    pub constants: usize,
+    /// Its tables.
+    pub tables: &'a [language::Table],
+}
 
 /// A function to be written.
 pub struct Routine<'a> {
@@ -30,7 +39,7 @@ pub struct Routine<'a> {
 
 impl Routine<'_> {
     /// Writes the routine. `S: Scalar` must be in scope.
-    pub fn write(&self, graph: &Graph, variables: &Variables, opaque: usize) -> String {
+    pub fn write(&self, graph: &Graph, variables: &Variables, outside: Outside) -> String {
         let outputs: Vec<Node> = self.stores.iter().map(|store| store.2).collect();
         let steps = together::together(graph, &schedule::schedule(graph, &outputs));
         let operations = steps.iter().copied().flat_map(chunk::computed).count();
@@ -47,7 +56,7 @@ impl Routine<'_> {
             routine: self,
             graph,
             variables,
-            opaque,
+            outside,
             outputs: &outputs,
             names: &names,
             uses: &uses,
@@ -71,7 +80,7 @@ struct Writer<'a> {
     routine: &'a Routine<'a>,
     graph: &'a Graph,
     variables: &'a Variables,
-    opaque: usize,
+    outside: Outside<'a>,
     outputs: &'a [Node],
     /// Number of the local variable of each node.
     names: &'a [u32],
@@ -82,15 +91,39 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// What a piece is given: name and type of each argument, with a lifetime or without.
-    fn arguments(&self, slots: usize, lifetime: &str) -> Vec<(&str, String)> {
+    /// What a piece is given: name and type of each argument, with a lifetime or without. Tables
+    /// are values of types without numbers.
+    fn arguments(&self, slots: usize, lifetime: &str) -> Vec<(String, String)> {
         let Routine { inputs, outputs, .. } = self.routine;
+        let Outside { constants, tables } = self.outside;
         let mut arguments = Vec::new();
-        arguments.extend((self.opaque > 0).then(|| ("c", format!("&{lifetime}[f64; {}]", self.opaque))));
-        arguments.extend(inputs.iter().map(|(name, n)| (*name, format!("&{lifetime}[S::Cell; {n}]"))));
-        arguments.extend((slots > 0).then(|| ("w", format!("&{lifetime}mut [S; {slots}]"))));
-        arguments.extend(outputs.iter().map(|(name, n)| (*name, format!("&{lifetime}mut [S::Cell; {n}]"))));
+        arguments.extend((constants > 0).then(|| ("c".into(), format!("&{lifetime}[f64; {constants}]"))));
+        arguments.extend((0..tables.len()).map(|k| (format!("table_{k}"), format!("Table{k}"))));
+        let named = |(name, ty): (&str, String)| (name.to_owned(), ty);
         arguments
+            .extend(inputs.iter().map(|(name, n)| (*name, format!("&{lifetime}[S::Cell; {n}]"))).map(named));
+        arguments.extend((slots > 0).then(|| ("w", format!("&{lifetime}mut [S; {slots}]"))).map(named));
+        let cells = |n: usize| format!("&{lifetime}mut [S::Cell; {n}]");
+        arguments.extend(outputs.iter().map(|&(name, n)| (name, cells(n))).map(named));
+        arguments
+    }
+
+    /// The generic parameters of a routine and its pieces.
+    fn parameters(&self) -> String {
+        let mut parameters = String::from("S: Scalar");
+        for (k, table) in self.outside.tables.iter().enumerate() {
+            let _ = write!(parameters, ", Table{k}: Table<{}> + Copy", table.variables);
+        }
+        parameters
+    }
+
+    /// Arguments for them.
+    fn types(&self) -> String {
+        let mut types = String::from("S");
+        for k in 0..self.outside.tables.len() {
+            let _ = write!(types, ", Table{k}");
+        }
+        types
     }
 
     /// The name of the type of a piece.
@@ -100,33 +133,36 @@ impl Writer<'_> {
 
     /// The function that runs the pieces.
     fn driver(&self, text: &mut String, plan: &Plan) {
-        let parameters: Vec<String> =
+        // Who calls it names the scalar alone.
+        let mut parameters: Vec<String> =
             self.arguments(0, "").iter().map(|(name, ty)| format!("{name}: {ty}")).collect();
-        let _ = writeln!(
-            text,
-            "#[inline]\npub fn {}<S: Scalar>({}) {{",
-            self.routine.name,
-            parameters.join(", ")
-        );
+        for (k, table) in self.outside.tables.iter().enumerate() {
+            let at = usize::from(self.outside.constants > 0) + k;
+            parameters[at] = format!("table_{k}: impl Table<{}> + Copy", table.variables);
+        }
+        let name = self.routine.name;
+        let _ = writeln!(text, "#[inline]\npub fn {name}<S: Scalar>({}) {{", parameters.join(", "));
         if plan.slots > 0 {
             let _ = writeln!(text, "let mut w = S::zeros::<{}>();", plan.slots);
         }
-        let names: Vec<&str> = self
+        let names: Vec<String> = self
             .arguments(plan.slots, "")
-            .iter()
-            .map(|&(name, _)| if name == "w" { "&mut w" } else { name })
+            .into_iter()
+            .map(|(name, _)| if name == "w" { String::from("&mut w") } else { name })
             .collect();
+        let (names, types) = (names.join(", "), format!("S{}", ", _".repeat(self.outside.tables.len())));
         for number in 0..plan.chunks.len() {
-            let _ = writeln!(text, "S::vectorize({}::<S>({}));", self.name(number), names.join(", "));
+            let _ = writeln!(text, "S::vectorize({}::<{types}>({names}));", self.name(number));
         }
         text.push_str("}\n");
     }
 
     fn piece(&self, text: &mut String, number: usize, steps: &[Step], piece: &Chunk, slots: usize) {
         let name = self.name(number);
-        let (names, types): (Vec<&str>, Vec<String>) = self.arguments(slots, "'a ").into_iter().unzip();
-        let _ = writeln!(text, "struct {name}<'a, S: Scalar>({});", types.join(", "));
-        let _ = writeln!(text, "impl<S: Scalar> Piece for {name}<'_, S> {{");
+        let (names, types): (Vec<String>, Vec<String>) = self.arguments(slots, "'a ").into_iter().unzip();
+        let generics = self.parameters();
+        let _ = writeln!(text, "struct {name}<'a, {generics}>({});", types.join(", "));
+        let _ = writeln!(text, "impl<{generics}> Piece for {name}<'_, {}> {{", self.types());
         let _ = writeln!(text, "#[inline(always)]\nfn run(self) {{\nlet Self({}) = self;", names.join(", "));
         let steps = &steps[piece.steps.clone()];
 
@@ -300,6 +336,12 @@ impl Writer<'_> {
         let atom = |node: Node| self.atom(node);
         match self.graph.op(node) {
             Op::Unary(Unary::Neg, a) => format!("-{}", atom(a)),
+            Op::Unary(Unary::Table(Table { index, orders, .. }), a) => {
+                format!("table_{index}.partial([{}], {orders:?})", atom(a))
+            }
+            Op::Binary(Binary::Table(Table { index, orders, .. }), a, b) => {
+                format!("table_{index}.partial([{}, {}], {orders:?})", atom(a), atom(b))
+            }
             Op::Unary(function, a) => format!("{}.{}()", atom(a), unary(function)),
             Op::Binary(function, a, b) => {
                 if function == Binary::Div
@@ -312,7 +354,7 @@ impl Writer<'_> {
                     Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => {
                         format!("{a} {} {b}", binary(function))
                     }
-                    Binary::Powf | Binary::Atan2 | Binary::Hypot => format!("{a}.{}({b})", binary(function)),
+                    _ => format!("{a}.{}({b})", binary(function)),
                 }
             }
             Op::Powi(a, n) => format!("{}.powi({n})", atom(a)),

@@ -25,6 +25,7 @@ fn model(name: &str, [nx, nz, nu, np]: [usize; 4], graph: Graph, residual: Vec<N
         spans: vec![Span::call_site(); residual.len()],
         residual,
         opaque: Vec::new(),
+        tables: Vec::new(),
         uses: Vec::new(),
         krate: syn::parse_quote!(::casados),
     }

@@ -25,6 +25,7 @@ pub fn binary(function: Binary) -> &'static str {
         Binary::Powf => "powf",
         Binary::Atan2 => "atan2",
         Binary::Hypot => "hypot",
+        Binary::Table(_) => "partial",
     }
 }
 
@@ -55,6 +56,7 @@ pub fn unary(function: Unary) -> &'static str {
         Unary::Atanh => "atanh",
         Unary::Abs => "abs",
         Unary::Signum => "signum",
+        Unary::Table(_) => "partial",
     }
 }
 

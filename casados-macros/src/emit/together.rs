@@ -28,7 +28,9 @@ fn function(graph: &Graph, step: Step) -> Option<(Function, Values)> {
         Step::SinCos(sin, cos) => Some((Function::SinCos, (sin, Some(cos)))),
         Step::Compute(node) => {
             let function = match graph.op(node) {
-                Op::Unary(Unary::Neg | Unary::Sqrt | Unary::Abs | Unary::Signum, _) => return None,
+                Op::Unary(Unary::Neg | Unary::Sqrt | Unary::Abs | Unary::Signum | Unary::Table(_), _) => {
+                    return None;
+                }
                 Op::Unary(function, _) => Function::Unary(function),
                 Op::Binary(function @ (Binary::Powf | Binary::Atan2 | Binary::Hypot), ..) => {
                     Function::Binary(function)

@@ -67,6 +67,7 @@ pub fn unary_value(function: Unary, a: f64) -> f64 {
         Unary::Atanh => a.atanh(),
         Unary::Abs => a.abs(),
         Unary::Signum => a.signum(),
+        Unary::Table(table) => table.stand_in([a]),
     }
 }
 
@@ -80,6 +81,7 @@ pub fn binary_value(function: Binary, a: f64, b: f64) -> f64 {
         Binary::Powf => a.powf(b),
         Binary::Atan2 => a.atan2(b),
         Binary::Hypot => a.hypot(b),
+        Binary::Table(table) => table.stand_in([a, b]),
     }
 }
 

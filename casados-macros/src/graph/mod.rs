@@ -23,6 +23,7 @@ mod signs;
 mod simplify;
 mod sparsity;
 mod substitute;
+mod table;
 mod tangent;
 #[cfg(test)]
 mod tests;
@@ -32,6 +33,7 @@ pub use hessian::hessian;
 pub use jacobian::jacobian;
 pub use reverse::gradient;
 pub use sparsity::Degree;
+pub use table::Table;
 pub use tangent::tangent;
 
 use std::collections::HashMap;
@@ -100,6 +102,8 @@ pub enum Unary {
     Atanh,
     Abs,
     Signum,
+    /// A derivative of a table.
+    Table(Table<1>),
 }
 
 /// Functions of two arguments. Names as the operators and methods of `f64`.
@@ -113,6 +117,8 @@ pub enum Binary {
     Powf,
     Atan2,
     Hypot,
+    /// A derivative of a table.
+    Table(Table<2>),
 }
 
 /// Comparisons; the others follow by exchange of operands and negation.

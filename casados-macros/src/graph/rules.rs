@@ -88,6 +88,7 @@ impl Graph {
             }
             Unary::Abs => self.unary(Unary::Signum, a),
             Unary::Signum => self.constant(0.0),
+            Unary::Table(table) => self.table_slope(table, a),
         }
     }
 
@@ -142,6 +143,7 @@ impl Graph {
             }
             (Binary::Hypot, true) => self.over(a, c),
             (Binary::Hypot, false) => self.over(b, c),
+            (Binary::Table(table), first) => self.table_partial(table, a, b, first),
         }
     }
 

@@ -6,10 +6,9 @@ use super::{Binary, Compare, Graph, Node, Op, Unary};
 impl Graph {
     /// A function of one argument.
     pub fn unary(&mut self, function: Unary, a: Node) -> Node {
-        if let Some(value) = self.value(a) {
-            return self.constant(unary_value(function, value));
-        }
         match (function, self.op(a)) {
+            (Unary::Table(_), _) => self.node(Op::Unary(function, a)),
+            (_, Op::Constant(bits)) => self.constant(unary_value(function, f64::from_bits(bits))),
             (Unary::Neg, _) => self.negate(a),
             (Unary::Abs, Op::Unary(Unary::Neg, inner)) => self.unary(Unary::Abs, inner),
             (Unary::Abs, Op::Unary(Unary::Abs, _)) => a,
@@ -20,7 +19,9 @@ impl Graph {
     /// A function of two arguments.
     pub fn binary(&mut self, function: Binary, a: Node, b: Node) -> Node {
         let values = (self.value(a), self.value(b));
-        if let (Some(a), Some(b)) = values {
+        if let (Some(a), Some(b)) = values
+            && !matches!(function, Binary::Table(_))
+        {
             return self.constant(binary_value(function, a, b));
         }
         match function {
@@ -30,7 +31,9 @@ impl Graph {
             Binary::Div => self.div(a, b),
             Binary::Powf if values.1 == Some(0.0) => self.constant(1.0),
             Binary::Powf if values.1 == Some(1.0) => a,
-            Binary::Powf | Binary::Atan2 | Binary::Hypot => self.node(Op::Binary(function, a, b)),
+            Binary::Powf | Binary::Atan2 | Binary::Hypot | Binary::Table(_) => {
+                self.node(Op::Binary(function, a, b))
+            }
         }
     }
 

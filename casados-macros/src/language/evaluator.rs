@@ -1,5 +1,6 @@
 //! The state of an evaluation, and what everything else asks of it.
 
+use super::Table;
 use super::environment::Scope;
 use super::items::{Implementation, Symbol};
 use super::place::Cell;
@@ -70,6 +71,8 @@ pub struct Evaluator {
     pub graph: Graph,
     /// Constants from outside: `Op::Opaque` is an index into this.
     pub opaque: Vec<TokenStream>,
+    /// Tables: the graph has indices into this.
+    pub tables: Vec<Table>,
     /// `use` items in bodies, which the opaque constants may need.
     pub uses: Vec<syn::ItemUse>,
     /// What the code that is being executed sees.

@@ -114,10 +114,21 @@ pub struct Model {
     /// Constants from outside, as Rust expressions of type `f64`; `Op::Opaque` is an index into
     /// this.
     pub opaque: Vec<TokenStream>,
+    /// Its tables; `graph::Table` has an index into this.
+    pub tables: Vec<Table>,
     /// `use` items in the body, which the opaque constants may need.
     pub uses: Vec<syn::ItemUse>,
     /// Path of the crate: `::casados` unless the attribute says `crate = path`.
     pub krate: syn::Path,
+}
+
+/// A table of a model.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// A constant expression of a type of `casados::tables`, which is `casados_tables` in it.
+    pub expression: TokenStream,
+    /// The number of its variables.
+    pub variables: usize,
 }
 
 /// A const parameter and its value in this model.

@@ -80,6 +80,7 @@ impl Template<'_> {
             residual,
             spans,
             opaque: evaluator.opaque,
+            tables: evaluator.tables,
             uses: evaluator.uses,
             krate: self.krate.clone(),
         })

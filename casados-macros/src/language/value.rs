@@ -51,6 +51,8 @@ pub enum Value {
     Matrix(Rc<Matrix>),
     /// An `Option`, known to be there or not.
     Option(Option<Box<Value>>),
+    /// A table of `casados::tables`.
+    Table(Rc<Interpolation>),
     /// A constant that is defined where the macro does not see it. It becomes a number when it is
     /// used as one.
     Opaque(Rc<TokenStream>),
@@ -111,6 +113,7 @@ impl Value {
             Value::Reference(_) => "a mutable reference",
             Value::Matrix(_) => "a matrix",
             Value::Option(_) => "an `Option`",
+            Value::Table(_) => "a table",
             Value::Opaque(_) => "a constant that is defined outside of what the macro sees",
         }
     }
@@ -267,6 +270,19 @@ pub enum Style {
     Tuple,
     /// `S`
     Unit,
+}
+
+/// A table of `casados::tables`.
+#[derive(Debug)]
+pub struct Interpolation {
+    /// Its type.
+    pub name: &'static str,
+    /// The number of its variables.
+    pub variables: usize,
+    /// Derivatives of higher order by one variable are zero.
+    pub degree: u8,
+    /// The call that makes it.
+    pub expression: TokenStream,
 }
 
 /// `start..end`, `start..=end` and their relatives.

@@ -9,7 +9,7 @@ use super::together::{Abreast, Wider, abreast, ends, of_eights, of_fours, result
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::{Level, functions::Elementary, level};
-use crate::scalar::{Field, Lanes, Packed, Piece, Scalar, Sealed, as_it_is};
+use crate::scalar::{Field, Lanes, Packed, Piece, Rows, Scalar, Sealed, as_it_is};
 use bytemuck::Zeroable;
 use core::fmt::{self, Debug, Formatter};
 use core::ops::{Add, Div, Mul, Neg, Sub};
@@ -159,6 +159,27 @@ macro_rules! register {
                     left >>= 1;
                 }
                 if n < 0 { Self::splat(1.0) / power } else { power }
+            }
+            #[inline(always)]
+            fn look_up<R: Rows<K, C>, const K: usize, const C: usize>(a: [Self; K], rows: R) -> [Self; C] {
+                let (mut at, mut columns) = ([[0.0; N]; K], [[0.0; N]; C]);
+                for (at, a) in at.iter_mut().zip(a) {
+                    a.store(at);
+                }
+                for lane in 0..N {
+                    let mut own = [0.0; K];
+                    for (own, at) in own.iter_mut().zip(&at) {
+                        *own = at[lane];
+                    }
+                    for (column, number) in columns.iter_mut().zip(rows.row::<$element>(own)) {
+                        column[lane] = number;
+                    }
+                }
+                let mut found = Self::zeros::<C>();
+                for (found, column) in found.iter_mut().zip(&columns) {
+                    *found = Self::load(column);
+                }
+                found
             }
             $functions!($name, $ops: cbrt exp exp2 exp_m1 ln ln_1p log2 log10 sin cos tan asin acos atan sinh
                 cosh tanh asinh acosh atanh; atan2 hypot powf);

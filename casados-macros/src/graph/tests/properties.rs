@@ -182,6 +182,7 @@ fn unary<S: Scalar>(function: Unary, a: S) -> S {
         Unary::Atanh => a.atanh(),
         Unary::Abs => a.abs(),
         Unary::Signum => a.signum(),
+        Unary::Table(_) => unreachable!("no table is drawn"),
     }
 }
 
@@ -203,6 +204,7 @@ fn binary<S: Scalar>(function: Binary, a: S, b: S) -> S {
         Binary::Powf => a.powf(b),
         Binary::Atan2 => a.atan2(b),
         Binary::Hypot => a.hypot(b),
+        Binary::Table(_) => unreachable!("no table is drawn"),
     }
 }
 

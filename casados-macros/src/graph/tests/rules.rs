@@ -305,3 +305,41 @@ fn conditions_are_not_differentiated() {
         assert_eq!(step.graph.op(*output), Op::Constant(0));
     }
 }
+
+/// Of tables only that their derivatives fit to each other: what stands for them are sines.
+#[test]
+fn tables_are_differentiated_by_their_orders() {
+    use crate::graph::Table;
+    let table = |orders| Table { index: 2, orders, degree: 3 };
+    let one = Function::new(|a, b| (a * b).unary(Unary::Table(Table { index: 1, orders: [0], degree: 3 })).1);
+    let two = Function::new(|a, b| (a * a).binary(Binary::Table(table([0, 0])), b).1);
+    let linear = Function::new(|a, b| {
+        let line = Table { index: 1, orders: [0], degree: 1 };
+        (a.unary(Unary::Table(line)) * b).1
+    });
+    assert_eq!(linear.graph.value(linear.outputs[3]), Some(0.0));
+    let (a, b) = (0.7, -0.4);
+    let s = |order: u8| Table { index: 1, orders: [order], degree: 3 }.stand_in([a * b]);
+    let t = |i, j| table([i, j]).stand_in([a * a, b]);
+    let expected = [
+        [s(0), b * s(1), a * s(1), b * b * s(2), s(1) + a * b * s(2), a * a * s(2)],
+        [
+            t(0, 0),
+            2.0 * a * t(1, 0),
+            t(0, 1),
+            2.0 * t(1, 0) + 4.0 * a * a * t(2, 0),
+            2.0 * a * t(1, 1),
+            t(0, 2),
+        ],
+    ];
+    for (function, expected) in [&one, &two].into_iter().zip(&expected) {
+        for (found, expected) in function.at(a, b).into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+        }
+    }
+    // Differences of what stands for tables.
+    let h = 1e-5;
+    let value = |a, b| two.at(a, b)[0];
+    assert!(((value(a + h, b) - value(a - h, b)) / (2.0 * h) - expected[1][1]).abs() < 1e-9);
+    assert!(((value(a, b + h) - value(a, b - h)) / (2.0 * h) - expected[1][2]).abs() < 1e-9);
+}

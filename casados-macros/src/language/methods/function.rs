@@ -1,7 +1,7 @@
 //! Functions and constants of the language that are named by path.
 
 use super::iterator::{self, Iter};
-use super::{Call, float, integer, matrix};
+use super::{Call, float, integer, matrix, table};
 use crate::language::evaluator::{At, Evaluator, error, unsupported};
 use crate::language::place::Place;
 use crate::language::types::Type;
@@ -15,6 +15,9 @@ pub fn call(evaluator: &mut Evaluator, function: &Builtin, call: &Call) -> Resul
     let before = function.path.iter().rev().nth(1).map_or("", String::as_str);
     let at = call.at;
     if let Some(value) = matrix::function(evaluator, function, call)? {
+        return Ok(Some(value));
+    }
+    if let Some(value) = table::construct(evaluator, before, call)? {
         return Ok(Some(value));
     }
     let value = match (before, name) {

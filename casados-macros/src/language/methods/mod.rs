@@ -13,6 +13,7 @@ mod integer;
 pub mod iterator;
 mod matrix;
 mod option;
+mod table;
 
 use super::evaluator::{At, Evaluator, error};
 use super::place::Place;
@@ -87,6 +88,8 @@ pub fn method(evaluator: &mut Evaluator, receiver: &Receiver, call: &Call) -> Re
     let value = evaluator.load(value, call.at)?;
     let special = match &value {
         Value::Real(node) => float::method(evaluator, *node, call)?,
+        Value::Table(of) => table::method(evaluator, of, call)?,
+        Value::Opaque(of) if table::is_method(call.name) => Some(table::from_outside(evaluator, of, call)?),
         Value::Opaque(_) if is_common(call.name) => None,
         Value::Opaque(_) => {
             let node = evaluator.real(&value, call.at)?;

@@ -163,6 +163,7 @@ fn invariants(model: &Model, constraints: &[Constraint]) -> Model {
         residual: outputs,
         spans,
         opaque: model.opaque.clone(),
+        tables: model.tables.clone(),
         uses: model.uses.clone(),
         krate: model.krate.clone(),
     }

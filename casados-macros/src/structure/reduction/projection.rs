@@ -53,6 +53,7 @@ pub fn of(invariants: &Model) -> Model {
         residual,
         spans: Vec::new(),
         opaque: invariants.opaque.clone(),
+        tables: invariants.tables.clone(),
         uses: invariants.uses.clone(),
         krate: invariants.krate.clone(),
     }

@@ -27,6 +27,7 @@ fn model([nx, nz, nu, np]: [usize; 4], build: impl Fn(&mut Graph, &[Node]) -> Ve
         graph,
         residual,
         opaque: Vec::new(),
+        tables: Vec::new(),
         uses: Vec::new(),
         krate: syn::parse_quote!(::casados),
     }

@@ -1,0 +1,151 @@
+//! Linear tables.
+
+use super::Table;
+use super::points::{check, check_values, interval, pair};
+use crate::scalar::{Real, Rows, Scalar};
+
+/// A function that is linear between points, and beyond them.
+///
+/// ```
+/// use casados::tables::Linear;
+///
+/// const SPRING: Linear<4> = Linear::new([-1.0, 0.0, 1.0, 3.0], [-2.0, 0.0, 1.0, 2.0]);
+/// assert_eq!(SPRING.value(2.0), 1.5);
+/// assert_eq!(SPRING.value(5.0), 3.0);
+/// assert_eq!((SPRING.derivative(-0.1), SPRING.derivative(0.0)), (2.0, 1.0));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Linear<const N: usize> {
+    points: [f64; N],
+    values: [f64; N],
+}
+
+impl<const N: usize> Linear<N> {
+    /// A table of values at increasing points.
+    ///
+    /// # Panics
+    /// Where points do not increase or a number is not finite; in a `const` that is an error of the
+    /// compiler.
+    #[must_use]
+    pub const fn new(points: [f64; N], values: [f64; N]) -> Self {
+        check(&points);
+        check_values(&values);
+        Self { points, values }
+    }
+
+    /// `f(x)`
+    #[inline]
+    pub fn value<S: Scalar>(&self, x: S) -> S {
+        self.partial([x], [0])
+    }
+
+    /// `f′(x)`; at a point, of the piece on the right.
+    #[inline]
+    pub fn derivative<S: Scalar>(&self, x: S) -> S {
+        self.partial([x], [1])
+    }
+}
+
+impl<const N: usize> Rows<1, 4> for &Linear<N> {
+    #[inline(always)]
+    fn row<T: Real>(self, [x]: [T; 1]) -> [T; 4] {
+        let i = interval(&self.points, x);
+        let ([x0, x1], [f0, f1]) = (pair(&self.points, i), pair(&self.values, i));
+        [x0, x1, f0, f1].map(|&number| T::from_f64(number))
+    }
+}
+
+impl<const N: usize> Table<1> for Linear<N> {
+    #[inline(always)]
+    fn partial<S: Scalar>(&self, [x]: [S; 1], [order]: [u32; 1]) -> S {
+        let [x0, x1, f0, f1] = S::look_up([x], self);
+        let [a, b] = weights(x, [x0, x1], order);
+        a * f0 + b * f1
+    }
+}
+
+/// A function of two variables that is linear in each of them in every cell of a grid, and beyond.
+///
+/// `values[i][j]` belongs to `x[i]` and `y[j]`.
+///
+/// ```
+/// use casados::tables::Linear2;
+///
+/// const MAP: Linear2<2, 3> = Linear2::new([0.0, 1.0], [0.0, 2.0, 3.0], [[0.0, 2.0, 2.0], [1.0, 3.0, 0.0]]);
+/// assert_eq!(MAP.value(0.5, 1.0), 1.5);
+/// assert_eq!(MAP.gradient(0.5, 2.5), [-0.5, -1.5]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Linear2<const N: usize, const M: usize> {
+    x: [f64; N],
+    y: [f64; M],
+    values: [[f64; M]; N],
+}
+
+impl<const N: usize, const M: usize> Linear2<N, M> {
+    /// A table of values on a grid of increasing points.
+    ///
+    /// # Panics
+    /// Where points do not increase or a number is not finite; in a `const` that is an error of the
+    /// compiler.
+    #[must_use]
+    pub const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
+        check(&x);
+        check(&y);
+        let mut i = 0;
+        while i < N {
+            check_values(&values[i]);
+            i += 1;
+        }
+        Self { x, y, values }
+    }
+
+    /// `f(x, y)`
+    #[inline]
+    pub fn value<S: Scalar>(&self, x: S, y: S) -> S {
+        self.partial([x, y], [0, 0])
+    }
+
+    /// `[∂f/∂x, ∂f/∂y]`
+    #[inline]
+    pub fn gradient<S: Scalar>(&self, x: S, y: S) -> [S; 2] {
+        [self.partial([x, y], [1, 0]), self.partial([x, y], [0, 1])]
+    }
+}
+
+impl<const N: usize, const M: usize> Rows<2, 8> for &Linear2<N, M> {
+    #[inline(always)]
+    fn row<T: Real>(self, [x, y]: [T; 2]) -> [T; 8] {
+        let (i, j) = (interval(&self.x, x), interval(&self.y, y));
+        let ([x0, x1], [y0, y1]) = (pair(&self.x, i), pair(&self.y, j));
+        let [[f00, f01], [f10, f11]] = pair(&self.values, i).map(|row| pair(row, j));
+        [x0, x1, y0, y1, f00, f01, f10, f11].map(|&number| T::from_f64(number))
+    }
+}
+
+impl<const N: usize, const M: usize> Table<2> for Linear2<N, M> {
+    #[inline(always)]
+    fn partial<S: Scalar>(&self, [x, y]: [S; 2], orders: [u32; 2]) -> S {
+        let [x0, x1, y0, y1, f00, f01, f10, f11] = S::look_up([x, y], self);
+        let [a0, a1] = weights(x, [x0, x1], orders[0]);
+        let [b0, b1] = weights(y, [y0, y1], orders[1]);
+        a0 * (b0 * f00 + b1 * f01) + a1 * (b0 * f10 + b1 * f11)
+    }
+}
+
+/// The weights with which a derivative of a linear piece is made of the values at its ends.
+#[inline(always)]
+fn weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 2] {
+    let (one, h) = (S::from_f64(1.0), x1 - x0);
+    match order {
+        0 => {
+            let s = (x - x0) / h;
+            [one - s, s]
+        }
+        1 => {
+            let slope = one / h;
+            [-slope, slope]
+        }
+        _ => [S::from_f64(0.0); 2],
+    }
+}

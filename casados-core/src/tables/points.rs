@@ -1,0 +1,73 @@
+//! The points of a table.
+
+use crate::scalar::Real;
+
+/// Stops the compiler where points do not increase.
+pub const fn check<const N: usize>(points: &[f64; N]) {
+    assert!(N >= 2, "a table has at least two points");
+    let mut i = 0;
+    while i < N {
+        assert!(points[i].is_finite(), "the points of a table have to be finite");
+        assert!(i == 0 || points[i - 1] < points[i], "the points of a table have to increase");
+        i += 1;
+    }
+}
+
+/// Stops the compiler where values are not finite.
+pub const fn check_values<const N: usize>(values: &[f64; N]) {
+    let mut i = 0;
+    while i < N {
+        assert!(values[i].is_finite(), "the values of a table have to be finite");
+        i += 1;
+    }
+}
+
+/// The interval from this point to the next one is that of `x`; outside of all, the nearest.
+#[inline(always)]
+pub fn interval<T: Real, const N: usize>(points: &[f64; N], x: T) -> usize {
+    let (mut first, mut count) = (0, N.saturating_sub(1));
+    while count > 1 {
+        let half = count / 2;
+        let below = points.get(first + half).is_some_and(|&point| T::from_f64(point) <= x);
+        first += if below { half } else { 0 };
+        count -= half;
+    }
+    first
+}
+
+/// Two numbers that follow each other in a table.
+#[inline(always)]
+pub fn pair<T>(table: &[T], first: usize) -> [&T; 2] {
+    match table.get(first..) {
+        Some([a, b, ..]) => [a, b],
+        // Tables have two points at least, and intervals lie between them.
+        _ => [&table[0]; 2],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_found_by_counting() {
+        fn hold<const N: usize>() {
+            let points: [f64; N] = core::array::from_fn(|i| (i * i) as f64);
+            for step in -20..(2 * N * N) as i32 {
+                let x = 0.5 * f64::from(step);
+                let counted = points.iter().filter(|&&point| point <= x).count();
+                let expected = counted.saturating_sub(1).min(N - 2);
+                assert_eq!(interval(&points, x), expected, "{x} of {N}");
+                assert_eq!(interval(&points, x as f32), expected);
+            }
+            assert_eq!(interval(&points, f64::NAN), 0);
+            assert_eq!(interval(&points, f64::INFINITY), N - 2);
+        }
+        hold::<2>();
+        hold::<3>();
+        hold::<4>();
+        hold::<5>();
+        hold::<8>();
+        hold::<17>();
+    }
+}

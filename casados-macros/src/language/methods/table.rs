@@ -1,0 +1,169 @@
+//! Tables of `casados::tables`: how they are made of numbers, and their methods.
+
+use super::Call;
+use crate::graph::{self, Binary, Node, Unary};
+use crate::language::Table;
+use crate::language::evaluator::{At, Evaluator, error};
+use crate::language::value::{Interpolation, Value};
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+use std::rc::Rc;
+use syn::Result;
+
+/// The degree of cubic splines, and of what may be one.
+const CUBIC: u8 = 3;
+
+/// A table by the type and the function that makes it, with the number of its variables and its
+/// degree.
+fn form(ty: &str, function: &str) -> Option<(&'static str, usize, u8)> {
+    Some(match (ty, function) {
+        ("Linear", "new") => ("Linear", 1, 1),
+        ("Linear2", "new") => ("Linear2", 2, 1),
+        ("Spline", "natural") => ("Spline", 1, CUBIC),
+        ("Spline2", "natural") => ("Spline2", 2, CUBIC),
+        _ => return None,
+    })
+}
+
+/// `Spline::natural(points, values)` and the others. `None` if it is none of them.
+pub fn construct(evaluator: &mut Evaluator, ty: &str, call: &Call) -> Result<Option<Value>> {
+    let Some((name, variables, degree)) = form(ty, call.name) else { return Ok(None) };
+    call.expect(variables + 1)?;
+    let mut arguments = Vec::new();
+    for argument in &call.arguments {
+        arguments.push(numbers(evaluator, argument, call.at)?);
+    }
+    for points in &call.arguments[..variables] {
+        increasing(evaluator, points, call.at)?;
+    }
+    let (ident, function) = (format_ident!("{name}"), format_ident!("{}", call.name));
+    let expression = quote!(casados_tables::#ident::#function(#(#arguments),*));
+    Ok(Some(Value::Table(Rc::new(Interpolation { name, variables, degree, expression }))))
+}
+
+/// Numbers and arrays of them as they are emitted.
+fn numbers(evaluator: &mut Evaluator, value: &Value, at: At) -> Result<TokenStream> {
+    Ok(match evaluator.load(value.clone(), at)? {
+        Value::Opaque(tokens) => (*tokens).clone(),
+        Value::Array(elements) => {
+            evaluator.tick(elements.len(), at)?;
+            let elements =
+                elements.iter().map(|value| numbers(evaluator, value, at)).collect::<Result<Vec<_>>>()?;
+            quote!([#(#elements),*])
+        }
+        Value::Real(node) => match (evaluator.graph.value(node), evaluator.graph.op(node)) {
+            (Some(number), _) if number.is_finite() => quote!(#number),
+            (Some(_), _) => return Err(error(at, "the numbers of a table have to be finite")),
+            (None, graph::Op::Opaque(index)) => evaluator.opaque[index as usize].clone(),
+            _ => {
+                return Err(error(
+                    at,
+                    "the numbers of a table have to be known when the program is compiled: make it of literals and \
+                     constants, and multiply its value by what depends on model quantities",
+                ));
+            }
+        },
+        other => {
+            return Err(error(
+                at,
+                format!("a table is made of arrays of `f64`, but {} is among them", other.kind()),
+            ));
+        }
+    })
+}
+
+/// Whether points increase, as far as they are known here; the compiler asks the others.
+fn increasing(evaluator: &mut Evaluator, points: &Value, at: At) -> Result<()> {
+    let Value::Array(points) = evaluator.load(points.clone(), at)? else { return Ok(()) };
+    let known = |value: &Value| match value {
+        Value::Real(node) => evaluator.graph.value(*node),
+        _ => None,
+    };
+    for pair in points.windows(2) {
+        if let (Some(a), Some(b)) = (known(&pair[0]), known(&pair[1]))
+            && a >= b
+        {
+            return Err(error(
+                at,
+                format!("the points of a table have to increase, but {a} is followed by {b}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Whether tables have a method of this name.
+pub fn is_method(name: &str) -> bool {
+    matches!(name, "value" | "derivative" | "gradient")
+}
+
+/// A method of a table. `None` if there is no such method.
+pub fn method(evaluator: &mut Evaluator, of: &Interpolation, call: &Call) -> Result<Option<Value>> {
+    if !is_method(call.name) {
+        return Ok(None);
+    }
+    let (given, name) = (call.arguments.len(), call.name);
+    if given != of.variables {
+        let takes = if of.variables == 1 { "1 argument" } else { "2 arguments" };
+        let are = if given == 1 { "is" } else { "are" };
+        return Err(error(
+            call.at,
+            format!("`{name}` of a `{}` takes {takes}, but {given} {are} given", of.name),
+        ));
+    }
+    apply(evaluator, &of.expression, of.degree, call)
+}
+
+/// A method of a constant that is defined where the macro does not see it.
+pub fn from_outside(evaluator: &mut Evaluator, of: &TokenStream, call: &Call) -> Result<Value> {
+    let value = apply(evaluator, of, CUBIC, call)?;
+    value.ok_or_else(|| error(call.at, "a table has one or two variables"))
+}
+
+fn apply(
+    evaluator: &mut Evaluator,
+    expression: &TokenStream,
+    degree: u8,
+    call: &Call,
+) -> Result<Option<Value>> {
+    let mut at = Vec::new();
+    for argument in &call.arguments {
+        at.push(evaluator.real(argument, call.at)?);
+    }
+    let index = evaluator.table(expression, at.len());
+    Ok(match (call.name, at.as_slice()) {
+        ("value", &[a]) => Some(of_one(evaluator, graph::Table { index, orders: [0], degree }, a)),
+        ("derivative", &[a]) => Some(of_one(evaluator, graph::Table { index, orders: [1], degree }, a)),
+        ("value", &[a, b]) => Some(of_two(evaluator, graph::Table { index, orders: [0, 0], degree }, [a, b])),
+        ("gradient", &[a, b]) => {
+            let partials = [[1, 0], [0, 1]];
+            Some(Value::array(
+                partials
+                    .map(|orders| of_two(evaluator, graph::Table { index, orders, degree }, [a, b]))
+                    .to_vec(),
+            ))
+        }
+        _ => None,
+    })
+}
+
+fn of_one(evaluator: &mut Evaluator, table: graph::Table<1>, a: Node) -> Value {
+    Value::Real(evaluator.graph.unary(Unary::Table(table), a))
+}
+
+fn of_two(evaluator: &mut Evaluator, table: graph::Table<2>, [a, b]: [Node; 2]) -> Value {
+    Value::Real(evaluator.graph.binary(Binary::Table(table), a, b))
+}
+
+impl Evaluator {
+    /// The index of a table: equal expressions are one.
+    fn table(&mut self, expression: &TokenStream, variables: usize) -> u32 {
+        let text = expression.to_string();
+        let same = |table: &Table| table.variables == variables && table.expression.to_string() == text;
+        let index = self.tables.iter().position(same).unwrap_or_else(|| {
+            self.tables.push(Table { expression: expression.clone(), variables });
+            self.tables.len() - 1
+        });
+        index as u32
+    }
+}
