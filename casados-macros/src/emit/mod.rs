@@ -141,10 +141,12 @@ fn assemble(
     }
 }
 
-/// The item as it was written beside its errors, and the type alone: without it, every use of the
-/// model would be an error more.
+/// The item as it was written beside its errors, and its name: without it, every use of the model
+/// would be an error more. It stands for a type that has the first error inside of itself, of which
+/// the compiler says nothing else.
 pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error) -> TokenStream {
-    let error = error.to_compile_error();
+    let errors: Vec<TokenStream> = error.clone().into_iter().map(|error| error.to_compile_error()).collect();
+    let mut first = errors.first();
     let stub = original(&item).map(|(name, item)| {
         let (visibility, parameters) = match &item {
             // In an `impl` there is no place for a type.
@@ -156,13 +158,16 @@ pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error
         let generics =
             generics(parameters.into_iter().flat_map(syn::Generics::const_params).map(|c| (&c.ident, &c.ty)));
         let name = language::model_name(attribute, &name);
+        let error = first.take();
         quote! {
             #[doc(hidden)]
             #[allow(dead_code)]
-            #visibility struct #name #generics;
+            #visibility type #name #generics = [(); #error];
         }
     });
-    quote! { #item #stub #error }
+    // What the type has is not said twice.
+    let others = errors.iter().skip(usize::from(first.is_none()));
+    quote! { #item #stub #(#others)* }
 }
 
 /// The function or module of an item, and its name.
