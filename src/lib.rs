@@ -10,7 +10,7 @@
 #![forbid(unsafe_code)]
 
 pub use casados_core::*;
-pub use casados_macros::{dae, function, ode};
+pub use casados_macros::{Record, dae, function, ode};
 
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {

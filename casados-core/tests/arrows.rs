@@ -17,6 +17,7 @@ const ARROWS: &[(&str, &str)] = &[
     ("options", "error"),
     ("scalar", "shape"),
     ("tables", "scalar"),
+    ("record", "shape scalar"),
     ("function", "shape structure scalar"),
     ("model", "shape structure scalar"),
     ("qp", "scalar"),
@@ -30,7 +31,10 @@ const ARROWS: &[(&str, &str)] = &[
         "constrained",
         "error shape statistics memory scalar function model result finite quadrature integrator",
     ),
-    ("erk", "error shape statistics tableau memory options scalar model linalg result quadrature integrator"),
+    (
+        "erk",
+        "error shape statistics tableau memory options scalar model linalg result finite quadrature integrator",
+    ),
     (
         "irk",
         "error shape statistics structure tableau memory options scalar model linalg result finite quadrature \
@@ -45,7 +49,8 @@ const ARROWS: &[(&str, &str)] = &[
     ("testing", "error shape memory scalar model result integrator"),
     (
         "ocp",
-        "error shape structure memory scalar function model qp linalg result quadrature integrator constrained irk batch",
+        "error shape structure memory scalar record function model qp linalg result quadrature integrator constrained irk \
+         batch",
     ),
     ("plot", "structure scalar ocp qp"),
     (

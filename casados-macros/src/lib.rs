@@ -7,6 +7,7 @@
 mod emit;
 mod graph;
 mod language;
+mod record;
 mod structure;
 
 #[cfg(test)]
@@ -105,6 +106,12 @@ pub fn ode(attribute: TokenStream, item: TokenStream) -> TokenStream {
 #[proc_macro_attribute]
 pub fn function(attribute: TokenStream, item: TokenStream) -> TokenStream {
     expand(language::Form::Function, attribute.into(), item.into()).into()
+}
+
+/// The trait `casados::Record`: a struct as the numbers of an argument of a model, in their order.
+#[proc_macro_derive(Record)]
+pub fn record(item: TokenStream) -> TokenStream {
+    record::derive(item.into()).into()
 }
 
 /// The item as it was written and, beside it, its type or the errors: an editor stays alive on a

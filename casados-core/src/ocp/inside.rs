@@ -1,8 +1,8 @@
 //! Integrators of single intervals inside of these.
 
+use super::begin::{Begin, at};
 use super::dynamics::{Interval, Nodes, Sink, Step, vector};
 use super::error::OcpError;
-use super::single::{Begin, at};
 use crate::error::Error;
 use crate::memory::Memory;
 use crate::model::{Dae, Ode, VectorU, VectorX};

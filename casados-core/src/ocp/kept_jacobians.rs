@@ -4,11 +4,11 @@
 //! QP with kept [A B], and the gradient  ∇f + ([A B]_exact − [A B]_kept)ᵀ π
 //! ```
 
+use super::begin::{Begin, at};
 use super::convexify::Convexification;
 use super::curvature::{Curvature, GaussNewton};
 use super::dynamics::{Dynamics, IntegralTerms, Nodes, Sink, Step, vector};
 use super::error::OcpError;
-use super::single::{Begin, at};
 use crate::memory::{WithAdjoint, WithForward};
 use crate::model::{Dae, Ode, VectorU, VectorX};
 use crate::scalar::Real;

@@ -238,6 +238,57 @@ pub(super) fn reserve(log: &mut Vec<Iteration>, more: usize) -> Result<(), OcpEr
     log.try_reserve(more).map_err(|_| OcpError::OutOfMemory { bytes })
 }
 
+/// A row of the table that [`Log`] prints, without the end of the line: for an observer that shows
+/// how a run goes on.
+///
+/// ```
+/// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Log, Map, Problem};
+/// use casados::prelude::*;
+/// use std::ops::ControlFlow;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+///     .on(Horizon::uniform(10, 0.1))?;
+/// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// print!("{}", Log(&[])); // the head of the table
+/// HeapSqp::new(&ocp)?.solve_observed(&mut ocp, &mut |iteration| {
+///     println!("{iteration}");
+///     ControlFlow::Continue(())
+/// })?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+impl fmt::Display for Iteration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Residuals { stationarity, dynamics, inequalities, complementarity } = self.residuals;
+        let mark = match (self.elastic, self.corrected) {
+            (true, _) => "e",
+            (_, true) => "s",
+            _ => " ",
+        };
+        write!(
+            f,
+            "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:8.1e} {:6} {:8.3} {:8.3} {:10.3}",
+            self.iteration,
+            self.objective,
+            stationarity,
+            dynamics,
+            inequalities,
+            complementarity,
+            self.step,
+            self.regularisation,
+            self.qp_iterations,
+            1e3 * self.times.linearise,
+            1e3 * self.times.qp,
+            1e3 * self.times.search,
+        )
+    }
+}
+
 /// Iterations, to be printed as the familiar table. Marks behind the length of a step are explained
 /// below it.
 #[derive(Clone, Copy, Debug)]
@@ -249,29 +300,8 @@ impl fmt::Display for Log<'_> {
             f,
             "iter       objective   stationar.  dynamics  inequal.  complem.      step  regular.  QP it.   lin ms    QP ms  search ms"
         )?;
-        for i in self.0 {
-            let Residuals { stationarity, dynamics, inequalities, complementarity } = i.residuals;
-            let mark = match (i.elastic, i.corrected) {
-                (true, _) => "e",
-                (_, true) => "s",
-                _ => " ",
-            };
-            writeln!(
-                f,
-                "{:4} {:17.9e} {:11.2e} {:9.2e} {:9.2e} {:9.2e} {:9.2e}{mark} {:8.1e} {:6} {:8.3} {:8.3} {:10.3}",
-                i.iteration,
-                i.objective,
-                stationarity,
-                dynamics,
-                inequalities,
-                complementarity,
-                i.step,
-                i.regularisation,
-                i.qp_iterations,
-                1e3 * i.times.linearise,
-                1e3 * i.times.qp,
-                1e3 * i.times.search,
-            )?;
+        for row in self.0 {
+            writeln!(f, "{row}")?;
         }
         if self.0.iter().any(|i| i.elastic) {
             writeln!(f, "e: hard bounds had penalties, since no step satisfies all of them")?;

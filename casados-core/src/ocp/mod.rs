@@ -57,6 +57,7 @@
 
 mod algebraic;
 mod arrival;
+mod begin;
 mod bounds;
 mod check;
 #[cfg(feature = "alloc")]

@@ -1,12 +1,13 @@
 //! A batch as dynamics: all intervals in one call.
 
+use super::begin::{Begin, at};
 use super::dynamics::{Dynamics, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
 use super::inside::Inside;
 use super::kept_jacobians::{Adjoints, step};
 use super::names::Names;
 use super::pattern::Origin;
-use super::single::{Begin, at, names, origin};
+use super::single::{names, origin};
 use crate::batch::{BatchError, Integrator, Intervals};
 use crate::model::{Dae, VectorP, VectorU, VectorX, VectorZ};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};

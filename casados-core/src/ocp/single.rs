@@ -1,6 +1,7 @@
 //! Integrators of single intervals as dynamics: one interval after the other, without other memory
 //! than theirs.
 
+use super::begin::{Begin, at};
 use super::cost::Show;
 use super::dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, Step, vector};
 use super::error::OcpError;
@@ -112,10 +113,6 @@ impl<M: Dae, F: Function<Shape = M::Shape, Outputs = crate::shape::Count<1>>, T:
             ..IntegralTerms::default()
         }
     }
-}
-
-pub(super) fn at<V>(interval: usize, result: Result<V, Error>) -> Result<V, OcpError> {
-    result.map_err(|error| OcpError::Integration { interval, error })
 }
 
 macro_rules! single {
@@ -253,11 +250,6 @@ macro_rules! single {
             }
         }
     };
-}
-
-/// What an integrator is told before an interval.
-pub(super) trait Begin<T> {
-    fn begin(&mut self, interval: &Interval<'_, T>) -> Result<(), Error>;
 }
 
 single!(irk, Dae, nu);

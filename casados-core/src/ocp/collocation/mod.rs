@@ -20,13 +20,14 @@
 
 mod equations;
 
+use super::begin::Begin;
 use super::dynamics::{
     Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step, vector,
 };
 use super::error::OcpError;
 use super::inside::Inside;
 use super::names::Names;
-use super::single::{Begin, names};
+use super::single::names;
 use crate::error::Error;
 use crate::irk::{Arguments, Coefficients, Integrator};
 use crate::memory::Heap;

@@ -17,6 +17,7 @@ pub use csv::Csv;
 pub use error::TrajectoryError;
 
 use super::bounds::means;
+use crate::record::Record;
 use crate::scalar::Real;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -43,7 +44,7 @@ use alloc::vec::Vec;
 /// let erk = Erk::<Cart, Rk4>::new(Options::default())?;
 /// let mut ocp = Problem::new(erk)
 ///     .running_cost(LeastSquaresCost::<Effort>::diagonal(&[1.0]))
-///     .path_constraints(Constraint::<Speed>::new([0.0], [1.2]))
+///     .path_constraints(Constraint::<Speed>::new([-1.2], [1.2]))
 ///     .on(Horizon::uniform(10, 0.1))?;
 /// ocp.fix_initial_state(&[0.0, 0.0])?.guess(&[0.0; 2], &[0.0])?;
 /// ocp.bound("x[0]", 10.., 1.0, 1.0)?.bound("x[1]", 10.., 0.0, 0.0)?;
@@ -192,6 +193,37 @@ impl<T: Real> Trajectory<T> {
     pub fn get(&self, name: &str) -> Result<&Series<T>, TrajectoryError> {
         let kind = self.series.iter().find(|series| means(name, &series.name)).map(|series| series.kind);
         self.find(name, |series| kind.is_none_or(|kind| series.kind == kind))
+    }
+
+    /// Everything of a kind at one of the times, as a struct of the model; `None` where there is
+    /// nothing, or not as much.
+    ///
+    /// ```
+    /// use casados::ocp::{Horizon, Kind, Problem};
+    /// use casados::prelude::*;
+    /// use casados::Record;
+    ///
+    /// #[ode]
+    /// mod cart {
+    ///     #[derive(Debug, PartialEq, casados::Record)]
+    ///     pub struct State { pub place: f64, pub speed: f64 }
+    ///     pub fn cart(x: &State, u: f64) -> State { State { place: x.speed, speed: u } }
+    /// }
+    ///
+    /// let start = cart::State { place: 0.0, speed: 1.0 };
+    /// let mut ocp = Problem::new(Erk::<Cart, Rk4>::new(Options::default())?).on(Horizon::uniform(2, 0.5))?;
+    /// ocp.fix_initial_state(&start.numbers())?.guess(&start.numbers(), &[0.0])?;
+    /// let solution = ocp.solution()?;
+    /// assert_eq!(solution.record(Kind::State, 2), Some(start));
+    /// assert_eq!(solution.state("x.speed")?, [1.0; 3]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn record<R: Record>(&self, kind: Kind, time: usize) -> Option<R> {
+        let of_kind = self.series.iter().filter(|series| series.kind == kind);
+        let at = |series: &Series<T>| series.values.get(time.checked_sub(series.first)?).copied();
+        let values: Option<Vec<T>> = of_kind.map(at).collect();
+        R::from_slice(&values?)
     }
 
     fn of(&self, name: &str, kind: Kind) -> Result<&Series<T>, TrajectoryError> {
