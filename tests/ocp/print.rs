@@ -76,6 +76,10 @@ Slider: 6 intervals, t from 0 to 1.5
 ";
     assert_eq!(ocp.to_string(), expected);
     assert!(format!("{ocp:?}").starts_with("Ocp { model: \"Slider\", intervals: 6, initial: Unknown"));
+    let problem = format!("{:?}", ocp.problem());
+    for part in ["Irk { model: \"Slider\", options: Options { steps: 1", "outer: Huber { weights: [1.0]"] {
+        assert!(problem.contains(part), "{part}: {problem}");
+    }
     Ok(())
 }
 

@@ -270,6 +270,9 @@ fn mistakes() -> Test {
         "the solution of `Cart` has no `x[2]`: it has `x[0]`, `x[1]`"
     );
     assert!(matches!(other.solution(), Err(OcpError::Missing { .. })));
+    for points in [usize::MAX, usize::MAX / 2, 1 << 50] {
+        assert!(matches!(ocp.dense_solution(points), Err(OcpError::OutOfMemory { .. })), "{points}");
+    }
     Ok(())
 }
 

@@ -69,6 +69,13 @@ impl<M: Dae, const S: usize, T: Real> Integrator<M, Custom<S>, S, T> {
     }
 }
 
+impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Integrator<M, B, S, T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let model = M::STRUCTURE.name;
+        f.debug_struct("Batch").field("model", &model).field("options", &self.options).finish_non_exhaustive()
+    }
+}
+
 /// A batch with the same options and start values: its memory is its own, and empty until the first
 /// call.
 impl<M: Dae, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T> {

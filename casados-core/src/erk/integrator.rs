@@ -150,6 +150,13 @@ impl<M: Ode, B, const S: usize, T: Real> Clone for Integrator<M, B, S, T, Heap> 
     }
 }
 
+impl<M: Ode, B, const S: usize, T: Real, W: Memory> core::fmt::Debug for Integrator<M, B, S, T, W> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let model = M::STRUCTURE.name;
+        f.debug_struct("Erk").field("model", &model).field("options", &self.options).finish_non_exhaustive()
+    }
+}
+
 impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
     pub const SIZE: usize = size_of::<Self>();

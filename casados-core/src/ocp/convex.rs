@@ -167,6 +167,16 @@ impl<F: Function, C: Clone, T: Plain> Clone for ConvexCost<F, C, T> {
     }
 }
 
+impl<F: Function, C: core::fmt::Debug, T: Plain> core::fmt::Debug for ConvexCost<F, C, T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let name = F::STRUCTURE.name;
+        f.debug_struct("ConvexCost")
+            .field("function", &name)
+            .field("outer", &self.outer)
+            .finish_non_exhaustive()
+    }
+}
+
 impl<F: Function, C: Convex<T>, T: Real> ConvexCost<F, C, T> {
     /// The cost of a convex function. Constants that make no sense are refused by `Problem::on` and
     /// by every linearisation: [`OcpError::InvalidWeight`].

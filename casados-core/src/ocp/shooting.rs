@@ -31,6 +31,12 @@ pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
     adjoint: Vec<Adjoint<M, T>>,
 }
 
+impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Shooting<M, B, S, T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Shooting").field("batch", &self.batch).finish_non_exhaustive()
+    }
+}
+
 /// A batch with the same options, and memory of its own.
 impl<M: Dae, B, const S: usize, T: Real> Clone for Shooting<M, B, S, T> {
     fn clone(&self) -> Self {

@@ -82,6 +82,12 @@ pub struct Collocation<M: Dae, B, const S: usize, T: Real> {
     from: Vec<T>,
 }
 
+impl<M: Dae, B, const S: usize, T: Real> core::fmt::Debug for Collocation<M, B, S, T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Collocation").field("integrator", &self.at).finish_non_exhaustive()
+    }
+}
+
 /// The same stages, and integrators with memory of their own.
 impl<M: Dae, B, const S: usize, T: Real> Clone for Collocation<M, B, S, T> {
     fn clone(&self) -> Self {

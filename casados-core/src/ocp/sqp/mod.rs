@@ -46,6 +46,7 @@ use alloc::vec::Vec;
 /// residuals are small at the solution, as in tracking; elsewhere it may not converge at all.
 ///
 /// Memory is made for one problem, of whose dimensions all others are to be.
+#[derive(Clone, Debug)]
 pub struct Sqp<S, C, T, D, M> {
     /// Options, which may be changed between calls.
     pub options: SqpOptions,

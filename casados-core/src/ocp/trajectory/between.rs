@@ -11,7 +11,6 @@ use crate::ocp::problem::{Formulation, Problem};
 use crate::qp::{StageDims, part, part_mut};
 use crate::scalar::Real;
 use crate::shape::Shape;
-use alloc::vec;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
 
@@ -54,9 +53,15 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     /// ```
     pub fn dense_solution(&mut self, points: usize) -> Result<Trajectory<T>, OcpError> {
         let solution = self.solution()?;
-        let count = T::from_whole(points.saturating_add(1));
+        let width = P::Shape::NX + P::Shape::NZ + P::Path::ROWS;
+        let count = self.intervals().saturating_mul(points).saturating_mul(width);
+        let bytes = count.saturating_mul(size_of::<T>());
+        let mut values = Vec::new();
+        values.try_reserve_exact(count).map_err(|_| OcpError::OutOfMemory { bytes })?;
+        values.resize(count, T::ZERO);
+        let count = T::from_whole(points + 1);
         let parts: Vec<T> = (1..=points).map(|part| T::from_whole(part) / count).collect();
-        let Some(inside) = self.inside(&parts)? else { return Ok(solution) };
+        let Some(inside) = self.inside(&parts, values)? else { return Ok(solution) };
         let Trajectory { model, times, series } = solution;
         let mut dense = inside.spread(&times, |k, j| {
             let [start, end] = [k, k + 1].map(|node| get(&times, node));
@@ -72,12 +77,11 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         Ok(Trajectory { model, times: dense, series })
     }
 
-    /// What is inside of the intervals; nothing of maps.
-    fn inside(&mut self, parts: &[T]) -> Result<Option<Inside<T>>, OcpError> {
+    /// What is inside of the intervals, in these places; nothing of maps.
+    fn inside(&mut self, parts: &[T], mut values: Vec<T>) -> Result<Option<Inside<T>>, OcpError> {
         let (intervals, points) = (self.intervals(), parts.len());
         let (nx, nz, np) = (P::Shape::NX, P::Shape::NZ, P::Shape::NP);
         let width = nx + nz + P::Path::ROWS;
-        let mut values = vec![T::ZERO; intervals * points * width];
         let data = split::<P, T>(self.data.as_mut(), intervals);
         let Problem { dynamics, path, .. } = self.problem.parts();
         let (v, multipliers) = self.iterate.vectors();

@@ -128,6 +128,12 @@ impl<T: Real> Series<T> {
         }
     }
 
+    /// Whether a name means it; of `x.cart.position` also `cart.position`.
+    fn is_meant(&self, name: &str) -> bool {
+        let field = ["x.", "z.", "u.", "p."].iter().find_map(|argument| self.name.strip_prefix(argument));
+        means(name, &self.name) || field.is_some_and(|field| means(name, field))
+    }
+
     /// `λ_upper − λ_lower` of every value: positive where the upper bound holds it back.
     #[must_use]
     pub fn multipliers(&self) -> Vec<T> {
@@ -186,12 +192,13 @@ impl<T: Real> Trajectory<T> {
     }
 
     /// A quantity by its name. That of several (`x` of `x[0]` and `x[1]`) is enough where there is
-    /// one. Where a function is both path and terminal constraint, the former is meant.
+    /// one, and so is `speed` of `x.speed`. Where something of more than one [`Kind`] is called so,
+    /// the first is meant.
     ///
     /// # Errors
     /// [`TrajectoryError::Unknown`], [`TrajectoryError::Ambiguous`]
     pub fn get(&self, name: &str) -> Result<&Series<T>, TrajectoryError> {
-        let kind = self.series.iter().find(|series| means(name, &series.name)).map(|series| series.kind);
+        let kind = self.series.iter().find(|series| series.is_meant(name)).map(|series| series.kind);
         self.find(name, |series| kind.is_none_or(|kind| series.kind == kind))
     }
 
@@ -216,6 +223,7 @@ impl<T: Real> Trajectory<T> {
     /// let solution = ocp.solution()?;
     /// assert_eq!(solution.record(Kind::State, 2), Some(start));
     /// assert_eq!(solution.state("x.speed")?, [1.0; 3]);
+    /// assert_eq!(solution.state("speed")?, solution.state("x.speed")?);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     #[must_use]
@@ -232,13 +240,13 @@ impl<T: Real> Trajectory<T> {
 
     fn find(&self, name: &str, among: impl Fn(&Series<T>) -> bool) -> Result<&Series<T>, TrajectoryError> {
         let candidates = || self.series.iter().filter(|series| among(series));
-        let mut found = candidates().filter(|series| means(name, &series.name));
+        let mut found = candidates().filter(|series| series.is_meant(name));
         let names = |series: &Series<T>| series.name.clone();
         match (found.next(), found.next()) {
             (Some(series), None) => Ok(series),
             (Some(_), Some(_)) => Err(TrajectoryError::Ambiguous {
                 name: name.into(),
-                found: candidates().filter(|series| means(name, &series.name)).map(names).collect(),
+                found: candidates().filter(|series| series.is_meant(name)).map(names).collect(),
             }),
             (None, _) => Err(TrajectoryError::Unknown {
                 model: self.model.clone(),
