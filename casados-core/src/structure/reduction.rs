@@ -44,13 +44,20 @@ impl Reduction {
 
 impl Display for Reduction {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        title(f, "index reduction")?;
-        for (place, &(equation, times)) in self.differentiated.iter().enumerate() {
-            let comma = if place == 0 { "equation" } else { ", equation" };
+        title(f, "reduced")?;
+        // Neighbours that were differentiated as often are one entry.
+        let alike = |a: &(u32, u32), b: &(u32, u32)| b.0 == a.0 + 1 && b.1 == a.1;
+        for (place, run) in self.differentiated.chunk_by(alike).enumerate() {
+            let (first, times) = run[0];
+            let comma = if place == 0 { "" } else { ", " };
+            match run.len() {
+                1 => write!(f, "{comma}equation {first}")?,
+                count => write!(f, "{comma}equations {first}-{}", first as usize + count - 1)?,
+            }
             match times {
-                1 => write!(f, "{comma} {equation} differentiated once")?,
-                2 => write!(f, "{comma} {equation} differentiated twice")?,
-                _ => write!(f, "{comma} {equation} differentiated {times} times")?,
+                1 => write!(f, " differentiated once")?,
+                2 => write!(f, " differentiated twice")?,
+                _ => write!(f, " differentiated {times} times")?,
             }
         }
         writeln!(f)?;

@@ -13,8 +13,8 @@ use syn::spanned::Spanned;
 use syn::{Error, Expr, Result, Token};
 
 /// What the brackets of `index_reduction` can say.
-const POSSIBLE: &str = "`index_reduction` takes `baumgarte = [2.0, 1.0]`, the rates at which what a constraint \
-    and its derivatives are off by decays, or `baumgarte = 2.0` for one rate; or `projection`";
+const POSSIBLE: &str = "`index_reduction` stands alone or takes `(baumgarte = [2.0, 1.0])`, the rates at which what a \
+    constraint and its derivatives are off by decays, `(baumgarte = 2.0)` for one rate, or `(projection)`";
 
 /// How the index of a model is reduced.
 #[derive(Clone, Debug)]
@@ -42,6 +42,9 @@ impl Reduction {
     /// Reads what follows the word.
     pub fn read(span: Span, input: ParseStream) -> Result<Self> {
         if !input.peek(syn::token::Paren) {
+            if !input.is_empty() && !input.peek(Token![,]) {
+                return Err(Error::new(input.span(), POSSIBLE));
+            }
             return Ok(Self { span, rates: Rates::None, projection: false });
         }
         let content;

@@ -92,13 +92,19 @@ fn resolve(model: &mut Model, rates: &mut BTreeMap<u32, Node>) -> Result<()> {
 }
 
 fn not_explicit(model: &Model, unknown: u32, row: usize, missing: u32) -> Error {
-    let name = variable(&model.variables, unknown);
+    let algebraic = unknown as usize >= model.variables.x.len();
+    let way_out = if algebraic && missing == 1 {
+        "make it a state: then the differentiated equations give its derivative; or solve one of them for it, so that it \
+         stands there with a constant factor"
+    } else {
+        "solve one of them for it, so that it stands there with a constant factor, as `xdot[0]` in `xdot[0] - x[2]`, or \
+         differentiate the constraint by hand"
+    };
     let message = format!(
-        "{name} would have to be differentiated {}, since equation {row} and those that depend on it have to be, and no \
-         equation gives it explicitly: write one of them as `{name} = ..`, with a constant factor at most, or \
-         differentiate the constraint by hand (equations are counted from 0)",
+        "{} would have to be differentiated {}, since equation {row} and those that depend on it have to be, and no \
+         equation gives it explicitly: {way_out} (equations are counted from 0)",
+        variable(&model.variables, unknown),
         times(missing as usize)
     );
-    let message = message.replace("`the derivative of `", "`the derivative of ").replace("`` =", "` =");
     Error::new(model.spans.get(row).copied().unwrap_or_else(|| model.name.span()), message)
 }

@@ -108,7 +108,43 @@ fn derivatives_that_are_not_explicit() {
     );
     assert!(
         error.contains("the derivative of `x[0]` would have to be differentiated once")
-            && error.contains("no equation gives it explicitly"),
+            && error.contains("no equation gives it explicitly: solve one of them for it"),
+        "{error}"
+    );
+    // A contact that an equation gives implicitly, and a constraint of velocities at it.
+    let contact = |unknowns: &str, names: &str| {
+        format!(
+            "fn f({unknowns}) -> [f64; 4] {{
+                let ({names}) = (x, z);
+                [xdot[0] - v, xdot[1] - force + 9.81, c * c * c + c - q, v * (1.0 + c) - 1.0]
+            }}"
+        )
+    };
+    let error = refusal(&contact("xdot: [f64; 2], x: [f64; 2], z: [f64; 2]", "[q, v], [force, c]"));
+    assert!(
+        error.contains("`z[1]` would have to be differentiated once") && error.contains("make it a state"),
+        "{error}"
+    );
+    let state = reduced(&contact("xdot: [f64; 3], x: [f64; 3], z: f64", "[q, v, c], force"));
+    let reduction = state.expect("its derivative follows").reduction.expect("it is reduced");
+    assert_eq!(reduction.differentiated, [(2, 1), (3, 1)]);
+}
+
+/// A spring whose far end is moved so that the near one follows a wave, of index 5: the equations
+/// that give derivatives are used in turn.
+#[test]
+fn a_constraint_that_is_differentiated_four_times() {
+    let spring = "fn f(xdot: [f64; 4], x: [f64; 4], z: f64, t: f64) -> [f64; 5] {
+        let [a, b, va, vb] = x;
+        [xdot[0] - va, xdot[1] - vb, xdot[2] - 7.0 * (b - a), xdot[3] + 7.0 * (b - a) - z, a - t.sin()]
+    }";
+    let reduction = reduced(spring).expect("its index can be reduced").reduction.expect("it is reduced");
+    assert_eq!(reduction.differentiated, [(4, 4)]);
+    // The rate of one end from an equation that is not linear in it: no rule for its derivative.
+    let error = refusal(&spring.replace("xdot[2] - 7.0 * (b - a)", "xdot[2].sinh() - 7.0 * (b - a)"));
+    assert!(
+        error.contains("the derivative of `x[2]` would have to be differentiated twice")
+            && error.contains("differentiate the constraint by hand"),
         "{error}"
     );
 }
@@ -119,8 +155,10 @@ fn rates_have_to_fit() {
     let refused = |attribute: &str| read(attribute, item).err().expect("the rates are refused");
     assert!(refused("index_reduction(baumgarte = [1.0, 2.0])").contains("once, but there are 2 rates"));
     assert!(refused("index_reduction(baumgarte = 0.0)").contains("does not let errors decay"));
-    assert!(refused("index_reduction(baumgarte = [])").contains("`baumgarte = 2.0` for one rate"));
-    assert!(refused("index_reduction(other = 1.0)").contains("`index_reduction` takes"));
+    assert!(refused("index_reduction(baumgarte = [])").contains("`(baumgarte = 2.0)` for one rate"));
+    assert!(refused("index_reduction(other = 1.0)").contains("`index_reduction` stands alone or takes"));
+    assert!(refused("index_reduction = true").contains("`index_reduction` stands alone or takes"));
+    assert!(refused("index_reduction(projection, baumgarte = 1.0)").contains("or `(projection)`"));
     assert!(refused("index_reduction, index_reduction").contains("given twice"));
     let analysis = read("index_reduction(baumgarte = 2)", item).expect("one rate for all");
     assert_eq!(analysis.reduction.map(|reduction| reduction.rates), Some(vec![2.0]));
