@@ -137,6 +137,23 @@ pub trait Matrix<T>: Plain + Index<(usize, usize), Output = T> + IndexMut<(usize
     fn as_mut_slice(&mut self) -> &mut [T];
 }
 
+/// An element whose place comes out of a table; zeroed if there is none.
+pub(crate) fn entry<T: Plain, A: Matrix<T>>(matrix: &A, row: usize, column: usize) -> T {
+    matrix.as_slice().get(row + column * A::ROWS).copied().unwrap_or_else(T::zeroed)
+}
+
+/// Changes an element whose place comes out of a table.
+pub(crate) fn change<T: Plain, A: Matrix<T>>(
+    matrix: &mut A,
+    row: usize,
+    column: usize,
+    by: impl FnOnce(T) -> T,
+) {
+    if let Some(element) = matrix.as_mut_slice().get_mut(row + column * A::ROWS) {
+        *element = by(*element);
+    }
+}
+
 impl<T: Plain, const R: usize, const C: usize> Matrix<T> for SMatrix<T, R, C> {
     const ROWS: usize = R;
     const COLUMNS: usize = C;

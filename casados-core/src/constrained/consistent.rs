@@ -15,7 +15,7 @@ use crate::finite::not_finite;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYX, MatrixYY};
 use crate::model::{ArrayX, Dae, VectorP, VectorX};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Shape};
+use crate::shape::{Array, Matrix, Outputs, Shape, change};
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
 
@@ -165,13 +165,12 @@ impl<M: Constrained, T: Real> Work<M, T> {
                 bad = bad.or(Some((output, value.to_f64())));
             }
             let state = variable.wrapping_sub(nx);
-            match held.as_ref().get(state) {
-                Some(false) => self.rows[(output, state)] = value,
-                Some(true) => {
-                    let size = x.as_slice()[state].abs() + T::from_f64(TINY);
-                    self.held[output] = self.held[output] + value.abs() * size;
+            match (held.as_ref().get(state), x.as_slice().get(state), self.held.as_mut().get_mut(output)) {
+                (Some(false), ..) => change(&mut self.rows, output, state, |_| value),
+                (Some(true), Some(x), Some(sum)) => {
+                    *sum = *sum + value.abs() * (x.abs() + T::from_f64(TINY));
                 }
-                None => {}
+                _ => {}
             }
         }
         let Some((output, value)) = bad else { return Ok(()) };

@@ -16,7 +16,7 @@ use crate::finite::not_finite;
 use crate::function::{ArrayV, ArrayY, Function, MatrixYY};
 use crate::model::{VectorP, VectorX};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Shape};
+use crate::shape::{Array, Matrix, Outputs, Shape, change, entry};
 use bytemuck::Zeroable;
 
 /// Iterations of Newton's method after which the projection is given up.
@@ -99,7 +99,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         for ((row, variable), &value) in pattern.iter().zip(self.jacobian.as_ref()) {
             let column = variable.wrapping_sub(nx);
             if column < count {
-                self.factors[(row, column)] = value;
+                change(&mut self.factors, row, column, |_| value);
             }
         }
         if not_finite(self.f.as_ref()).is_some() || !self.factorise() { Err(self.refusal()) } else { Ok(()) }
@@ -126,14 +126,15 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         for step in 0..count {
             let mut pivot = step;
             for row in step + 1..count {
-                if self.factors[(row, step)].abs() > self.factors[(pivot, step)].abs() {
+                if self.factors[(row, step)].abs() > entry(&self.factors, pivot, step).abs() {
                     pivot = row;
                 }
             }
             self.exchanged[step] = pivot;
             for column in 0..count {
-                let (a, b) = (self.factors[(step, column)], self.factors[(pivot, column)]);
-                (self.factors[(step, column)], self.factors[(pivot, column)]) = (b, a);
+                let other = entry(&self.factors, pivot, column);
+                let own = core::mem::replace(&mut self.factors[(step, column)], other);
+                change(&mut self.factors, pivot, column, |_| own);
             }
             let diagonal = self.factors[(step, step)];
             if diagonal == T::ZERO || !diagonal.is_finite() {
@@ -157,7 +158,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     pub fn solve(&self, b: &mut ArrayY<Equations<M>, T>) {
         let count = rows::<M>();
         for step in 0..count {
-            b.as_mut().swap(step, self.exchanged[step]);
+            exchange(b.as_mut(), step, self.exchanged[step]);
         }
         for row in 0..count {
             for column in 0..row {
@@ -187,7 +188,7 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
             }
         }
         for step in (0..count).rev() {
-            b.as_mut().swap(step, self.exchanged[step]);
+            exchange(b.as_mut(), step, self.exchanged[step]);
         }
     }
 
@@ -195,7 +196,11 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
     pub fn direction(&self, change: impl Fn(usize) -> T, dp: impl Fn(usize) -> T) -> ArrayY<Equations<M>, T> {
         let mut b =
             ArrayY::<Equations<M>, T>::from_fn(|row| if row < M::Shape::NX { change(row) } else { T::ZERO });
-        self.by_parameters(|row, parameter, value| b[row] = b[row] - value * dp(parameter));
+        self.by_parameters(|row, parameter, value| {
+            if let Some(b) = b.as_mut().get_mut(row) {
+                *b = *b - value * dp(parameter);
+            }
+        });
         self.solve(&mut b);
         b
     }
@@ -225,6 +230,14 @@ impl<M: Projectable, T: Real> Kkt<M, T> {
         hessian: &mut <Equations<M> as Function>::Hessian<T>,
     ) {
         <Equations<M> as Function>::hessian::<T>(&self.v, mu, hessian);
+    }
+}
+
+/// Exchanges two elements.
+fn exchange<T: Copy>(b: &mut [T], first: usize, second: usize) {
+    if let (Some(&one), Some(&other)) = (b.get(first), b.get(second)) {
+        b[first] = other;
+        b[second] = one;
     }
 }
 

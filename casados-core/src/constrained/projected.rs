@@ -10,7 +10,7 @@ use crate::model::{ArrayW, Dae, VectorP, VectorU, VectorX};
 use crate::quadrature::Along;
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Outputs, Plain, Shape};
+use crate::shape::{Array, Matrix, Outputs, Plain, Shape, change, entry};
 use crate::statistics::Statistics;
 use bytemuck::Zeroable;
 use core::marker::PhantomData;
@@ -220,8 +220,8 @@ impl<M: Projectable, T: Real, I: Integrator<Model = M, Number = T>> Integrator f
         let kkt = &I::Memory::nominal(&mut self.nominal)?.kkt;
         let gradient = result.grad_p.as_mut_slice();
         kkt.by_parameters(|row, parameter, value| {
-            if let Some(gradient) = gradient.get_mut(parameter) {
-                *gradient = *gradient - value * mu[row];
+            if let (Some(gradient), Some(mu)) = (gradient.get_mut(parameter), mu.as_ref().get(row)) {
+                *gradient = *gradient - value * *mu;
             }
         });
         Ok(result)
@@ -265,8 +265,10 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
         directions(kkt, &mut first.forward.dx_dp, true, |row, column, value| by_p[(row, column)] = value);
         let mut gradient = VectorP::<M, T>::zeroed();
         kkt.by_parameters(|row, parameter, value| {
-            let gradient = &mut gradient.as_mut_slice()[parameter];
-            *gradient = *gradient - value * mu[row];
+            let gradient = gradient.as_mut_slice().get_mut(parameter);
+            if let (Some(gradient), Some(mu)) = (gradient, mu.as_ref().get(row)) {
+                *gradient = *gradient - value * *mu;
+            }
         });
         add(first.grad_p.as_mut_slice(), gradient.as_slice());
         kkt.hessian(mu, second);
@@ -280,10 +282,10 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
                         T::ZERO
                     }
                 }
-                (Variable::Unknown(row), Some(p)) => by_p[(row, p)],
+                (Variable::Unknown(row), Some(p)) => entry(by_p, row, p),
                 (Variable::Unknown(row), None) => match w.checked_sub(nx) {
-                    Some(u) => by_u[(row, u)],
-                    None => by_x[(row, w)],
+                    Some(u) => entry(by_u, row, u),
+                    None => entry(by_x, row, w),
                 },
             })
         };
@@ -297,21 +299,28 @@ impl<M: Projectable, T: Real> HessianMemory<M, T> {
 
 /// `H −= value (a bᵀ + b aᵀ)`
 fn subtract<M: Dae, T: Real>(result: &mut Hessian<M, T>, a: &ArrayW<M, T>, b: &ArrayW<M, T>, value: T) {
-    let (nx, nu) = (M::Shape::NX, M::Shape::NU);
-    let term = |i: usize, j: usize| value * (a[i] * b[j] + b[i] * a[j]);
-    let block = |matrix: &mut dyn FnMut(usize, usize, T), rows: (usize, usize), columns: (usize, usize)| {
-        for j in 0..columns.1 {
-            for i in 0..rows.1 {
-                matrix(i, j, term(rows.0 + i, columns.0 + j));
-            }
+    let (a, b) = (parts::<M, T>(a), parts::<M, T>(b));
+    let [x, u, p] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
+    block(&mut result.h_xx, x, x, value);
+    block(&mut result.h_xu, x, u, value);
+    block(&mut result.h_uu, u, u, value);
+    block(&mut result.h_xp, x, p, value);
+    block(&mut result.h_up, u, p, value);
+    block(&mut result.h_pp, p, p, value);
+}
+
+/// What belongs to `x₀`, `u` and `p`.
+fn parts<M: Dae, T: Real>(row: &ArrayW<M, T>) -> [&[T]; 3] {
+    let (x, rest) = row.as_ref().split_at_checked(M::Shape::NX).unwrap_or_default();
+    let (u, p) = rest.split_at_checked(M::Shape::NU).unwrap_or_default();
+    [x, u, p]
+}
+
+/// The same of one block, with the parts of its rows and of its columns.
+fn block<T: Real, V: Matrix<T>>(matrix: &mut V, rows: [&[T]; 2], columns: [&[T]; 2], value: T) {
+    for (j, (a_j, b_j)) in columns[0].iter().zip(columns[1]).enumerate() {
+        for (i, (a_i, b_i)) in rows[0].iter().zip(rows[1]).enumerate() {
+            change(matrix, i, j, |element| element - value * (*a_i * *b_j + *b_i * *a_j));
         }
-    };
-    let Hessian { h_xx, h_xu, h_uu, h_xp, h_up, h_pp, .. } = result;
-    let (x, u, p) = ((0, nx), (nx, nu), (nx + nu, M::Shape::NP));
-    block(&mut |i, j, term| h_xx[(i, j)] = h_xx[(i, j)] - term, x, x);
-    block(&mut |i, j, term| h_xu[(i, j)] = h_xu[(i, j)] - term, x, u);
-    block(&mut |i, j, term| h_uu[(i, j)] = h_uu[(i, j)] - term, u, u);
-    block(&mut |i, j, term| h_xp[(i, j)] = h_xp[(i, j)] - term, x, p);
-    block(&mut |i, j, term| h_up[(i, j)] = h_up[(i, j)] - term, u, p);
-    block(&mut |i, j, term| h_pp[(i, j)] = h_pp[(i, j)] - term, p, p);
+    }
 }

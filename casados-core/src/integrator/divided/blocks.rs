@@ -5,7 +5,7 @@ use crate::linalg::axpy;
 use crate::model::{ArrayW, Dae};
 use crate::result::{Forward, Hessian};
 use crate::scalar::Real;
-use crate::shape::{Array, Matrix, Shape};
+use crate::shape::{Array, Matrix, Shape, change, entry};
 
 /// A row of `(A, B_u, B_p)` times `D`.
 fn row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
@@ -16,11 +16,11 @@ fn row<M: Dae, T: Real, A: Matrix<T>, B: Matrix<T>, C: Matrix<T>>(
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let mut sum = ArrayW::<M, T>::from_fn(|w| match w.checked_sub(nx) {
         None => T::ZERO,
-        Some(input) if input < nu => by_u[(index, input)],
-        Some(input) => by_p[(index, input - nu)],
+        Some(input) if input < nu => entry(by_u, index, input),
+        Some(input) => entry(by_p, index, input - nu),
     });
     for (column, v) in v.as_ref().iter().enumerate() {
-        axpy(by_x[(index, column)], v.as_ref(), sum.as_mut());
+        axpy(entry(by_x, index, column), v.as_ref(), sum.as_mut());
     }
     sum
 }
@@ -48,9 +48,9 @@ pub(super) fn of_end<M: Dae, T: Real>(
         let sum = row::<M, T, _, _, _>(index, now, (&part.dz_dx0, &part.dz_du, &part.dz_dp));
         for (w, value) in sum.as_ref().iter().enumerate() {
             match w.checked_sub(nx) {
-                None => dz_dx0[(index, w)] = *value,
-                Some(input) if input < nu => dz_du[(index, input)] = *value,
-                Some(input) => dz_dp[(index, input - nu)] = *value,
+                None => change(dz_dx0, index, w, |_| *value),
+                Some(input) if input < nu => change(dz_du, index, input, |_| *value),
+                Some(input) => change(dz_dp, index, input - nu, |_| *value),
             }
         }
     }
@@ -86,15 +86,15 @@ fn element<M: Dae, T: Real>(from: &Hessian<M, T>, r: usize, c: usize) -> T {
     let (nx, nu) = (M::Shape::NX, M::Shape::NU);
     let (i, j) = (r.min(c), r.max(c));
     if j < nx {
-        from.h_xx[(i, j)]
+        entry(&from.h_xx, i, j)
     } else if j < nx + nu {
-        if i < nx { from.h_xu[(i, j - nx)] } else { from.h_uu[(i - nx, j - nx)] }
+        if i < nx { entry(&from.h_xu, i, j - nx) } else { entry(&from.h_uu, i - nx, j - nx) }
     } else if i < nx {
-        from.h_xp[(i, j - nx - nu)]
+        entry(&from.h_xp, i, j - nx - nu)
     } else if i < nx + nu {
-        from.h_up[(i - nx, j - nx - nu)]
+        entry(&from.h_up, i - nx, j - nx - nu)
     } else {
-        from.h_pp[(i - nx - nu, j - nx - nu)]
+        entry(&from.h_pp, i - nx - nu, j - nx - nu)
     }
 }
 
