@@ -351,7 +351,8 @@ fn explicit_pairs() {
     assert!(work[1].steps < 600, "{work:?}");
     let problem = Problem::load("pleiades", 1.0, 1e4);
     let work = follows!(eighth::<Pleiades, 28, 0, 0>(problem, [1e-4, 1e-7, 1e-10], 5.0, states));
-    assert!(work[2].steps < 330, "{work:?}");
+    // Errors that nothing takes back count once for ten steps of the interval.
+    assert!(work[2].steps < 380, "{work:?}");
     // Twelve stages for each step, the one that is the next step's first included, which most that
     // are refused do without, and few to start.
     let AdaptiveStatistics { steps, rejected, residuals, .. } = work[2];

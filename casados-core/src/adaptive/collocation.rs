@@ -10,7 +10,8 @@
 mod estimate;
 mod points;
 
-use super::defect_filter::{DefectFilter, LENIENT};
+use super::control::LENIENT;
+use super::defect_filter::DefectFilter;
 use super::kernels::{Advance, Continue, GROUP, Groups, Residual, Split};
 use super::norm::{mean, norm};
 use super::stages::{

@@ -4,8 +4,12 @@
 //! Control-theoretic techniques for stepsize selection in implicit Runge-Kutta methods, ACM Trans.
 //! Math. Softw. 20 (1994).
 
-use super::defect_filter::LENIENT;
 use crate::scalar::Scalar;
+
+/// Where the first estimate is asked for this much less than the solution, or even less, its
+/// tolerance says nothing of components that lose their order; where it is asked for about as much,
+/// it says all, and the second one fades out.
+pub(super) const LENIENT: f64 = 4.0;
 
 /// What the controller may do, of one method.
 #[derive(Clone, Copy, Debug)]

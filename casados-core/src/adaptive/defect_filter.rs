@@ -25,7 +25,7 @@
 //! solve with the factors that Newton's method has gives it. The same solve gives `r(z)/z²`: of an
 //! oscillation it points against the error, of a decay along it.
 
-use super::control::power;
+use super::control::{LENIENT, power};
 use crate::linalg::{Complex, PARTS};
 use crate::scalar::{Real, Scalar};
 
@@ -35,11 +35,6 @@ const DAMPED: f64 = 0.2;
 /// The errors of oscillations add up, over more steps the more accurate these are: from where the
 /// second estimate says little to where it says all, they count so often.
 const KEPT: [f64; 2] = [4.0, 12.0];
-/// Where the first estimate is asked for this much less than the solution, or even less, its
-/// tolerance says nothing of components that lose their order; where it is asked for about as much,
-/// it says all, and the second one fades out.
-pub(super) const LENIENT: f64 = 4.0;
-
 /// A complex number.
 type Number = Complex<f64, 2>;
 

@@ -6,7 +6,7 @@ mod tolerances;
 mod walk;
 
 use super::consistent::{At, Consistent};
-use super::defect_filter::LENIENT;
+use super::control::LENIENT;
 use super::levels::{Levels, interpolate};
 use super::options::AdaptiveOptions;
 use super::sealed::Family;
