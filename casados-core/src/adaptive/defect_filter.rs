@@ -35,6 +35,7 @@ const DAMPED: f64 = 0.2;
 /// The errors of oscillations add up, over more steps the more accurate these are: from where the
 /// second estimate says little to where it says all, they count so often.
 const KEPT: [f64; 2] = [4.0, 12.0];
+
 /// A complex number.
 type Number = Complex<f64, 2>;
 

@@ -1,9 +1,10 @@
 //! Integrators that wrap others as dynamics: with a projection, and divided intervals.
 
+use super::begin::at;
 use super::dynamics::{Dynamics, Interval, Nodes, SecondOrder, Sink, vector};
 use super::error::OcpError;
 use super::names::Names;
-use super::single::{at, names};
+use super::single::names;
 use crate::constrained::{Projectable, Projected};
 use crate::error::Error;
 use crate::integrator::{Divided, Integrator};
