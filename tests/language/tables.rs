@@ -112,6 +112,7 @@ fn integrators_take_tables() -> Result<(), casados::Error> {
     // The second derivatives of these equations jump, as `Seen` has a derivative of a spline.
     let tight = AdaptiveOptions { rtol: 1e-10, atol: 1e-10, ..Default::default() };
     let mut adaptive = Adaptive::<Seen, DormandPrince8>::new(tight)?;
+    adaptive.control_sensitivities(true)?;
     let fine = Options { steps: 2000, ..Default::default() };
     let mut fixed = Irk::<Seen, RadauIIA<3>>::new(fine)?;
     let (x0, u) = (vector![-1.0, 0.4], vector![0.3]);

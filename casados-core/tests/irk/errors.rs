@@ -52,7 +52,7 @@ fn input_that_is_not_finite() {
         other => panic!("{other:?}"),
     };
     at(irk.solve(&vector![1.0, nan], &u, 0.1).map(|_| ()), (Argument::X0, 1, "x[1]"));
-    at(irk.forward(&x0, &vector![f64::INFINITY], 0.1).map(|_| ()), (Argument::U, 0, "u[0]"));
+    at(irk.forward(&x0, &vector![f64::INFINITY], 0.1).map(|_| ()), (Argument::U, 0, "u"));
     at(irk.solve(&x0, &u, nan).map(|_| ()), (Argument::H, 0, ""));
     at(irk.adjoint(&x0, &u, 0.1, &vector![nan, 1.0]).map(|_| ()), (Argument::Lambda, 0, "x[0]"));
     at(irk.hessian(&x0, &u, 0.1, &vector![1.0, -f64::INFINITY]).map(|_| ()), (Argument::Lambda, 1, "x[1]"));

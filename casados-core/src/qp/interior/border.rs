@@ -13,22 +13,19 @@
 //! where pivots of controls and of the border together have as many negative signs as there are
 //! conditions.
 
-use super::coupling::Coupling;
+use super::coupling::{Coupling, SIDE};
 use super::kernels::{Columns, Part, Source, product};
 use super::riccati::{Equations, Riccati};
 use super::set;
 use super::shared::Shared;
 use super::symmetric::Symmetric;
-use crate::linalg::axpy;
+use super::vector::add_scaled;
 use crate::qp::error::QpError;
 use crate::qp::layout::{Place, Places, assign, pad, part, part_mut};
 use crate::qp::{QpView, marked};
 use crate::scalar::{Packed, Piece, Real};
 use core::marker::PhantomData;
 use core::ops::Range;
-
-/// How many parameters go side by side: the columns of the widest tile of a product.
-pub(super) const SIDE: usize = 6;
 
 /// Solves Newton's equations with the parameters; see [`Riccati::solve`].
 ///
@@ -179,7 +176,7 @@ impl<T: Real> Coupling<'_, T> {
             let Some(own) = own.last_mut() else { break };
             let signed = *own * inverse;
             *own = if inverse < T::ZERO { -signed } else { signed };
-            axpy(-signed, part(panel, i * ld + nx + i + 1, below.len()), below);
+            add_scaled(below, -signed, part(panel, i * ld + nx + i + 1, below.len()));
             set(self.minus, i * SIDE + index, signed);
         }
         // Rows of shared controls were passed by: they belong to `S`, whose other half comes with
@@ -214,7 +211,7 @@ impl<T: Real> Coupling<'_, T> {
                     let Some((&factor, _)) = own.get(b..).and_then(<[T]>::split_first) else { break };
                     let factor = if inverse < T::ZERO { factor } else { -factor };
                     let (own, column) = (part(own, b, count - b), part_mut(column, b, count - b));
-                    axpy(factor, own, column);
+                    add_scaled(column, factor, own);
                 }
             }
         }

@@ -3,12 +3,14 @@
 //! Periodic states have multipliers `θ` of `x₀ − x_N = 0`. These and the shared controls `w` are
 //! parameters of the recursion, `θ` first: see [`border`](super::border).
 
-use super::border::SIDE;
 use super::riccati::{First, Riccati};
 use super::vector::{add_scaled, shrink};
 use crate::qp::layout::{Place, Places, end, take_mut};
 use crate::qp::{QpView, StageDims, marked};
 use crate::scalar::Real;
+
+/// How many parameters go side by side: the columns of the widest tile of a product.
+pub(super) const SIDE: usize = 6;
 
 /// That there are couplings. Without the feature `alloc` there are none: no value of this type, so
 /// that programs that cannot ask for couplings do not contain them.

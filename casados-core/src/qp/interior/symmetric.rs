@@ -4,7 +4,7 @@
 //! Bunch and Kaufman, "Some stable methods for calculating inertia and solving symmetric linear
 //! systems", Math. Comp. 31 (1977).
 
-use crate::linalg::axpy;
+use super::vector::add_scaled;
 use crate::qp::layout::{part, part_mut};
 use crate::scalar::Real;
 
@@ -159,7 +159,7 @@ impl<T: Real> Elimination<'_, T> {
         {
             let (own, column) = (part(own, j, n - j), part_mut(column, j, n - j));
             let Some(&first) = own.first() else { break };
-            axpy(-(first / pivot), own, column);
+            add_scaled(column, -(first / pivot), own);
         }
         for i in k + 1..self.n {
             let value = self.get(i, k) / pivot;
@@ -179,8 +179,8 @@ impl<T: Real> Elimination<'_, T> {
             let [first, second] = of_pair(self.a, n, k, [self.get(j, k), self.get(j, k + 1)]);
             let (before, rest) = self.a.split_at_mut_checked(j * n).unwrap_or_default();
             let column = part_mut(rest, j, n - j);
-            axpy(-first, part(before, k * n + j, n - j), column);
-            axpy(-second, part(before, (k + 1) * n + j, n - j), column);
+            add_scaled(column, -first, part(before, k * n + j, n - j));
+            add_scaled(column, -second, part(before, (k + 1) * n + j, n - j));
         }
         for i in k + 2..self.n {
             let [first, second] = of_pair(self.a, self.n, k, [self.get(i, k), self.get(i, k + 1)]);
