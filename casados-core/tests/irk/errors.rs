@@ -57,10 +57,10 @@ fn input_that_is_not_finite() {
     at(irk.adjoint(&x0, &u, 0.1, &vector![nan, 1.0]).map(|_| ()), (Argument::Lambda, 0, "x[0]"));
     at(irk.hessian(&x0, &u, 0.1, &vector![1.0, -f64::INFINITY]).map(|_| ()), (Argument::Lambda, 1, "x[1]"));
     at(irk.forward_adjoint(&x0, &u, 0.1, &vector![1.0, nan]).map(|_| ()), (Argument::Lambda, 1, "x[1]"));
-    at(irk.set_parameters(&vector![nan]), (Argument::P, 0, "p[0]"));
+    at(irk.set_parameters(&vector![nan]), (Argument::P, 0, "p"));
     at(irk.set_time(nan), (Argument::T, 0, ""));
     at(irk.set_start(&vector![nan, 0.0], &vector![0.0]), (Argument::StartXdot, 0, "x[0]"));
-    at(irk.set_start(&vector![0.0, 0.0], &vector![nan]), (Argument::StartZ, 0, "z[0]"));
+    at(irk.set_start(&vector![0.0, 0.0], &vector![nan]), (Argument::StartZ, 0, "z"));
     // None of this is remembered.
     let result = *irk.hessian(&x0, &u, 0.1, &lambda).unwrap();
     let mut fresh = Irk::<Nonlinear, Gauss<2>>::new(Options::default()).unwrap();
