@@ -83,6 +83,61 @@ fn adaptive_derivatives_are_those_of_the_form_by_hand() {
     assert!((found.h_xx - expected.h_xx).amax() < 1e-6 * size, "{} {}", found.h_xx, expected.h_xx);
 }
 
+/// What adaptive steps return is projected as anything else.
+#[test]
+fn adaptive_steps_are_projected() {
+    let options = AdaptiveOptions { rtol: 1e-4, atol: 1e-4, ..Default::default() };
+    let mut plain = Adaptive::<Circle, Radau>::new(options).unwrap();
+    let off = |x: &Vector4<f64>| (x[0].hypot(x[1]) - 0.7).abs();
+    let x0 = start(1.2);
+    let end = plain.solve(&x0, &vector![], 5.0).unwrap().x;
+    assert!(off(&end) > 1e-6, "{}", off(&end));
+    let mut projected = Projected::new(plain);
+    let end = projected.solve(&x0, &vector![], 5.0).unwrap().x;
+    assert!(off(&end) < 2e-16, "{}", off(&end));
+}
+
+/// Links in a row, each of length and mass one: one text for any number.
+#[dae(N = [2, 4], index_reduction(projection))]
+fn links<const N: usize>(
+    xdot: ([[f64; 2]; N], [[f64; 2]; N]),
+    x: ([[f64; 2]; N], [[f64; 2]; N]),
+    z: [f64; N],
+) -> ([[f64; 2]; N], [[f64; 2]; N], [f64; N]) {
+    let along: [[f64; 2]; N] = core::array::from_fn(|i| {
+        let before = if i == 0 { [0.0, 0.0] } else { x.0[i - 1] };
+        [x.0[i][0] - before[0], x.0[i][1] - before[1]]
+    });
+    let pull = |i: usize, c: usize| if i < N { z[i] * along[i][c] } else { 0.0 };
+    (
+        core::array::from_fn(|i| [xdot.0[i][0] - x.1[i][0], xdot.0[i][1] - x.1[i][1]]),
+        core::array::from_fn(|i| {
+            [xdot.1[i][0] + pull(i, 0) - pull(i + 1, 0), xdot.1[i][1] + pull(i, 1) - pull(i + 1, 1) + 9.81]
+        }),
+        along.map(|a| a[0] * a[0] + a[1] * a[1] - 1.0),
+    )
+}
+
+/// Energy and lengths of a chain of four links that falls from a horizontal line.
+#[test]
+fn families_are_reduced_one_by_one() {
+    let of = |reduction: Option<&casados::structure::Reduction>| reduction.unwrap().differentiated;
+    assert_eq!(of(Links::<2>::STRUCTURE.reduction), [(8, 2), (9, 2)]);
+    assert_eq!(of(Links::<4>::STRUCTURE.reduction), [(16, 2), (17, 2), (18, 2), (19, 2)]);
+    let mut irk = Projected::new(Irk::<Links<4>, Gauss<4>>::new(Options::default()).unwrap());
+    let mut x = nalgebra::SVector::<f64, 16>::zeros();
+    (0..4).for_each(|i| x[2 * i] = 1.0 + i as f64);
+    for _ in 0..200 {
+        x = irk.solve(&x, &vector![], 0.005).unwrap().x;
+        let energy: f64 =
+            (0..4).map(|i| 0.5 * (x[8 + 2 * i].powi(2) + x[9 + 2 * i].powi(2)) + 9.81 * x[2 * i + 1]).sum();
+        // Rates of up to thirty in a second, steps of 5 ms: (0.15)⁸ of energies of a hundred.
+        assert!(energy.abs() < 3e-5, "{energy}");
+        assert!((x[0].hypot(x[1]) - 1.0).abs() < 4e-16);
+        assert!(((x[6] - x[4]).hypot(x[7] - x[5]) - 1.0).abs() < 2e-15);
+    }
+}
+
 /// The pendulum passes the bottom.
 #[function]
 fn sideways(x: [f64; 4], _z: f64, _p: [f64; 2]) -> f64 {

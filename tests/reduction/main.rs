@@ -3,6 +3,8 @@
 mod car_axis;
 mod circuit;
 mod consistent;
+#[path = "../data/mod.rs"]
+mod data;
 mod divided;
 mod double_pendulum;
 mod everywhere;
@@ -12,4 +14,5 @@ mod pendulum;
 mod projected;
 mod singular;
 mod slider_crank;
+mod squeezer;
 mod wheelset;

@@ -57,6 +57,54 @@ fn invariants_are_at_rounding_after_many_steps() {
     assert!(off(&x, length).iter().any(|off| off.abs() > 1e-4), "without it they drift: {x}");
 }
 
+/// A hundred thousand of the same steps with rates: what a step does is forgotten within seconds.
+/// So the last thousand of them are off by as much as the first, and less with faster rates.
+#[test]
+fn errors_stay_with_rates() {
+    fn worst<M: Dae<Shape = <Circle as Dae>::Shape>>() -> [f64; 2] {
+        let mut irk = Irk::<M, RadauIIA<2>>::new(Options::default()).unwrap();
+        irk.set_parameters(&vector![0.7]).unwrap();
+        let mut x = vector![0.7, 0.0, 0.0, 0.0];
+        let [mut first, mut last] = [0.0f64; 2];
+        for step in 0..100_000 {
+            x = irk.solve(&x, &vector![], 0.02).unwrap().x;
+            let off = off(&x, 0.7)[0].abs();
+            if step < 1000 {
+                first = first.max(off);
+            } else if step >= 99_000 {
+                last = last.max(off);
+            }
+        }
+        [first, last]
+    }
+    let (slow, fast) = (worst::<Slow>(), worst::<Fast>());
+    // The swings get smaller by the damping of the method, and with them its errors.
+    assert!(slow[1] < slow[0] && slow[1] > 0.5 * slow[0], "{slow:?}");
+    assert!(fast[1] < fast[0] && fast[0] < 0.5 * slow[0], "{fast:?} {slow:?}");
+}
+
+#[dae(index_reduction(baumgarte = 1.0))]
+fn slow(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] + z * x[0],
+        xdot[3] + z * x[1] + 9.81,
+        x[0] * x[0] + x[1] * x[1] - p * p,
+    ]
+}
+
+#[dae(index_reduction(baumgarte = 10.0))]
+fn fast(xdot: [f64; 4], x: [f64; 4], z: f64, p: f64) -> [f64; 5] {
+    [
+        xdot[0] - x[2],
+        xdot[1] - x[3],
+        xdot[2] + z * x[0],
+        xdot[3] + z * x[1] + 9.81,
+        x[0] * x[0] + x[1] * x[1] - p * p,
+    ]
+}
+
 /// The projected state is the nearest: what it was moved by is in the row space of `G`.
 #[test]
 fn the_projection_is_orthogonal() {
