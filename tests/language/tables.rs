@@ -122,6 +122,39 @@ fn integrators_take_tables() -> Result<(), casados::Error> {
     Ok(())
 }
 
+/// A bead on a wire: index reduction differentiates the table twice in time.
+#[dae(index_reduction)]
+mod bead {
+    use casados::tables::Spline;
+
+    pub const WIRE: Spline<4> = Spline::natural([-3.0, -1.0, 1.0, 3.0], [2.0, 0.2, 0.2, 2.0]);
+
+    pub fn bead(xdot: [f64; 4], x: [f64; 4], z: f64) -> [f64; 5] {
+        let [position, height, v, w] = x;
+        [
+            xdot[0] - v,
+            xdot[1] - w,
+            xdot[2] + z * WIRE.derivative(position),
+            xdot[3] + 9.81 - z,
+            height - WIRE.value(position),
+        ]
+    }
+}
+
+#[test]
+fn tables_are_differentiated_in_time() -> Result<(), casados::Error> {
+    let x0 = vector![0.6, bead::WIRE.value(0.6), 0.0, 0.0];
+    let mut irk = Irk::<Bead, Gauss<3>>::new(Options { steps: 100, ..Default::default() })?;
+    let x = irk.solve(&x0, &vector![], 1.0)?.x;
+    assert!(x[0] < 0.0, "it has passed the middle");
+    assert!((x[1] - bead::WIRE.value(x[0])).abs() < 1e-10);
+    let energy = 0.5 * (x[2] * x[2] + x[3] * x[3]) + 9.81 * (x[1] - x0[1]);
+    assert!(energy.abs() < 1e-9, "{energy:e}");
+    check_derivatives::<Bead>(&Points::given([[0.1, 0.2, -0.3, 0.4, 0.5, 0.7, 0.3, -0.6, 2.0, 0.0]]))
+        .assert();
+    Ok(())
+}
+
 /// Registers look up lane by lane, inside of the points and outside.
 #[test]
 fn batches_take_tables() -> Result<(), Box<dyn std::error::Error>> {

@@ -59,7 +59,7 @@ use crate::scalar::Scalar;
 /// A function of `K` variables with all of its derivatives: what emitted code calls.
 #[doc(hidden)]
 #[diagnostic::on_unimplemented(
-    message = "`{Self}` is no table of {K} variables",
+    message = "`{Self}` is no table of `casados::tables` with so many variables: {K}",
     note = "`value` of a `Linear` or `Spline` takes one argument, that of a `Linear2` or `Spline2` two"
 )]
 pub trait Table<const K: usize> {
