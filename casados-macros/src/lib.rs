@@ -145,26 +145,31 @@ fn expand_within(
     }
     let expansion = language::read(form, attribute.clone(), item.clone()).and_then(|source| {
         let warnings = source.warnings.clone();
-        let mut expansion = expand_source(form, source)?;
+        let mut expansion = expand_source(source)?;
         expansion.extend(warnings);
         Ok(expansion)
     });
     expansion.unwrap_or_else(|error| emit::with_errors(attribute, item, &error))
 }
 
-fn expand_source(form: language::Form, source: language::Source) -> syn::Result<proc_macro2::TokenStream> {
-    if form == language::Form::Function {
-        let functions: Vec<_> = source.models.into_iter().map(structure::analyse_function).collect();
-        return emit::expand_functions(source.item, source.place, &functions);
-    }
-    let mut models = Vec::new();
+fn expand_source(source: language::Source) -> syn::Result<proc_macro2::TokenStream> {
+    let mut parts = Vec::new();
     let mut mistakes = language::mistakes::Mistakes::default();
-    for model in source.models {
-        match structure::analyse(model) {
-            Ok(model) => models.push(model),
-            Err(error) => mistakes.note(error),
+    for language::Part { form, original, models } in source.parts {
+        if form == language::Form::Function {
+            let functions = models.into_iter().map(structure::analyse_function).collect();
+            parts.push(emit::Part::Functions(functions));
+            continue;
         }
+        let mut analysed = Vec::new();
+        for model in models {
+            match structure::analyse(model) {
+                Ok(model) => analysed.push(model),
+                Err(error) => mistakes.note(error),
+            }
+        }
+        parts.push(emit::Part::Models(original, analysed));
     }
     mistakes.none()?;
-    emit::expand(source.item, source.place, &models)
+    emit::expand(source.item, source.place, &parts)
 }

@@ -30,6 +30,7 @@ mod forms;
 mod function;
 mod iterators;
 mod macros;
+mod modules;
 #[path = "nalgebra.rs"]
 mod nalgebra_values;
 mod statements;

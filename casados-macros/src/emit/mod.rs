@@ -22,44 +22,55 @@ use crate::structure::{Analysis, FunctionAnalysis};
 use proc_macro2::TokenStream;
 use quote::{ToTokens, quote};
 
-/// The item as written, the model types and their implementations of `Dae` (and `GraphDae`, `Ode`).
-pub fn expand(item: TokenStream, place: Place, models: &[Analysis]) -> syn::Result<TokenStream> {
-    let Some(first) = models.first() else {
-        return Ok(item);
-    };
-    let original = original(&item).map(|(name, _)| name).unwrap_or_else(|| first.model.name.clone());
-    let mut implementations = models.iter().map(model::write).collect::<syn::Result<TokenStream>>()?;
-    let documentation = documentation::of_type(&original, models);
-    let Model { name, visibility, instance, krate, .. } = &first.model;
-    let mut types = vec![Type { name, visibility, documentation, instance }];
-    implementations.extend(models.iter().filter_map(model::constrained));
-    for of in [model::invariants, model::projection] {
-        let functions: Vec<&FunctionAnalysis> = models.iter().filter_map(of).collect();
-        let Some(first) = functions.first() else { continue };
-        for function in &functions {
-            implementations.extend(function::write(function)?);
+/// Models or functions that one function was read as, with the name of that.
+pub enum Part {
+    /// Models.
+    Models(syn::Ident, Vec<Analysis>),
+    /// Functions of a model's variables.
+    Functions(Vec<FunctionAnalysis>),
+}
+
+/// The item as written, the types and their implementations of `Dae` (and `GraphDae`, `Ode`) or of
+/// `Function`.
+pub fn expand(item: TokenStream, place: Place, parts: &[Part]) -> syn::Result<TokenStream> {
+    let (mut types, mut implementations) = (Vec::new(), TokenStream::new());
+    let mut krate = None;
+    for part in parts {
+        match part {
+            Part::Models(original, models) => {
+                let Some(first) = models.first() else { continue };
+                krate = krate.or(Some(&first.model.krate));
+                for model in models {
+                    implementations.extend(model::write(model)?);
+                }
+                types.push(Type::of(&first.model, documentation::of_type(original, models)));
+                implementations.extend(models.iter().filter_map(model::constrained));
+                for of in [model::invariants, model::projection] {
+                    let functions: Vec<&FunctionAnalysis> = models.iter().filter_map(of).collect();
+                    types.extend(self::functions(functions.iter().copied(), &mut implementations)?);
+                }
+            }
+            Part::Functions(functions) => {
+                krate = krate.or(functions.first().map(|first| &first.model.krate));
+                types.extend(self::functions(functions.iter(), &mut implementations)?);
+            }
         }
-        let documentation = documentation::of_function(functions.iter().copied());
-        types.push(Type { name: &first.model.name, visibility, documentation, instance });
     }
+    let Some(krate) = krate else { return Ok(item) };
     let item = with_elementary_functions(item, krate);
     assemble(item, place, &types, implementations)
 }
 
-/// The same for functions, whose types implement `Function`.
-pub fn expand_functions(
-    item: TokenStream,
-    place: Place,
-    functions: &[FunctionAnalysis],
-) -> syn::Result<TokenStream> {
-    let Some(first) = functions.first() else {
-        return Ok(item);
-    };
-    let implementations = functions.iter().map(function::write).collect::<syn::Result<TokenStream>>()?;
-    let documentation = documentation::of_function(functions.iter());
-    let Model { name, visibility, instance, krate, .. } = &first.model;
-    let item = with_elementary_functions(item, krate);
-    assemble(item, place, &[Type { name, visibility, documentation, instance }], implementations)
+/// The type of functions, whose implementations are added.
+fn functions<'a>(
+    functions: impl Iterator<Item = &'a FunctionAnalysis> + Clone,
+    implementations: &mut TokenStream,
+) -> syn::Result<Option<Type<'a>>> {
+    for function in functions.clone() {
+        implementations.extend(function::write(function)?);
+    }
+    let documentation = documentation::of_function(functions.clone());
+    Ok(functions.clone().next().map(|first| Type::of(&first.model, documentation)))
 }
 
 /// The same for dual models.
@@ -88,6 +99,13 @@ struct Type<'a> {
     visibility: &'a syn::Visibility,
     documentation: TokenStream,
     instance: &'a [Instance],
+}
+
+impl<'a> Type<'a> {
+    fn of(model: &'a Model, documentation: TokenStream) -> Self {
+        let Model { name, visibility, instance, .. } = model;
+        Self { name, visibility, documentation, instance }
+    }
 }
 
 /// The item, the types and their implementations, where they belong.
@@ -141,33 +159,42 @@ fn assemble(
     }
 }
 
-/// The item as it was written beside its errors, and its name: without it, every use of the model
-/// would be an error more. It stands for a type that has the first error inside of itself, of which
-/// the compiler says nothing else.
+/// The item as it was written beside its errors, and the names of its types: without them, every
+/// use of the models would be an error more. The first stands for a type that has the first error
+/// inside of itself, of which the compiler says nothing else, and the others for that type.
 pub fn with_errors(attribute: TokenStream, item: TokenStream, error: &syn::Error) -> TokenStream {
-    let errors: Vec<TokenStream> = error.clone().into_iter().map(|error| error.to_compile_error()).collect();
-    let mut first = errors.first();
-    let stub = original(&item).map(|(name, item)| {
-        let (visibility, parameters) = match &item {
-            // In an `impl` there is no place for a type.
-            syn::Item::Fn(function) if function.sig.receiver().is_some() => return TokenStream::new(),
-            syn::Item::Fn(function) => (&function.vis, Some(&function.sig.generics)),
-            syn::Item::Mod(module) => (&module.vis, None),
-            _ => return TokenStream::new(),
-        };
-        let generics =
-            generics(parameters.into_iter().flat_map(syn::Generics::const_params).map(|c| (&c.ident, &c.ty)));
-        let name = language::model_name(attribute, &name);
-        let error = first.take();
+    let mut errors = error.clone().into_iter().map(|error| error.to_compile_error());
+    let Some((name, original)) = original(&item) else { return quote!(#item #(#errors)*) };
+    let stub = |visibility: &syn::Visibility, generics: &TokenStream, name: &syn::Ident, is: TokenStream| {
         quote! {
             #[doc(hidden)]
             #[allow(dead_code)]
-            #visibility type #name #generics = [(); #error];
+            #visibility type #name #generics = #is;
         }
-    });
-    // What the type has is not said twice.
-    let others = errors.iter().skip(usize::from(first.is_none()));
-    quote! { #item #stub #(#others)* }
+    };
+    let parameters = |of: &syn::Generics| {
+        generics(of.const_params().map(|constant| (&constant.ident, &constant.ty))).unwrap_or_default()
+    };
+    let name = language::model_name(attribute, &name);
+    match original {
+        // In an `impl` there is no place for a type.
+        syn::Item::Fn(function) if function.sig.receiver().is_none() => {
+            let first = errors.next();
+            let stub = stub(&function.vis, &parameters(&function.sig.generics), &name, quote!([(); #first]));
+            quote! { #item #stub #(#errors)* }
+        }
+        syn::Item::Mod(mut module) => {
+            let item = language::tokens::without_attributes(item);
+            let first = errors.next();
+            let mut stubs = stub(&module.vis, &TokenStream::new(), &name, quote!([(); #first]));
+            for (function, attribute) in language::marked(&mut module) {
+                let other = language::model_name(attribute, &function.ident);
+                stubs.extend(stub(&module.vis, &parameters(&function.generics), &other, quote!(#name)));
+            }
+            quote! { #item #stubs #(#errors)* }
+        }
+        _ => quote!(#item #(#errors)*),
+    }
 }
 
 /// The function or module of an item, and its name.

@@ -35,8 +35,10 @@ fn analysis(model: Model) -> Analysis {
     analyse(model).unwrap()
 }
 
-fn pretty(item: TokenStream, place: Place, models: &[Analysis]) -> String {
-    let file: syn::File = syn::parse2(expand(item, place, models).unwrap()).unwrap();
+fn pretty(item: TokenStream, place: Place, models: Vec<Analysis>) -> String {
+    let (name, _) = super::original(&item).unwrap();
+    let file: syn::File =
+        syn::parse2(expand(item, place, &[super::Part::Models(name, models)]).unwrap()).unwrap();
     prettyplease::unparse(&file)
 }
 
@@ -136,7 +138,7 @@ fn of_a_pendulum() {
     let item = quote!(
         fn pendulum() {}
     );
-    insta::assert_snapshot!(pretty(item, Place::Beside, &[analysis(pendulum())]));
+    insta::assert_snapshot!(pretty(item, Place::Beside, vec![analysis(pendulum())]));
 }
 
 #[test]
@@ -146,7 +148,7 @@ fn of_a_module_with_a_selection_and_an_outer_constant() {
             fn model() {}
         }
     );
-    insta::assert_snapshot!(pretty(item, Place::Inside, &[analysis(valve())]));
+    insta::assert_snapshot!(pretty(item, Place::Inside, vec![analysis(valve())]));
 }
 
 #[test]
@@ -154,7 +156,7 @@ fn of_instances_of_an_explicit_model() {
     let item = quote!(
         fn decay<const N: usize>() {}
     );
-    insta::assert_snapshot!(pretty(item, Place::Beside, &[analysis(decay(1)), analysis(decay(2))]));
+    insta::assert_snapshot!(pretty(item, Place::Beside, vec![analysis(decay(1)), analysis(decay(2))]));
 }
 
 #[test]

@@ -26,8 +26,8 @@ const MAX_INSTANCES: usize = 1000;
 
 /// The arguments of an attribute.
 pub struct Arguments {
-    /// Path of the crate.
-    pub krate: syn::Path,
+    /// Path of the crate, if it is given.
+    pub krate: Option<syn::Path>,
     /// Another name for the model's type.
     pub name: Option<Ident>,
     /// How the index is reduced, if that is asked for.
@@ -47,23 +47,16 @@ struct Values {
 impl Arguments {
     /// Reads the tokens in the brackets.
     pub fn read(tokens: TokenStream) -> Result<Self> {
-        let mut arguments = Self {
-            krate: syn::parse_quote!(::casados),
-            name: None,
-            reduction: None,
-            values: Vec::new(),
-            settings: Vec::new(),
-        };
+        let mut arguments =
+            Self { krate: None, name: None, reduction: None, values: Vec::new(), settings: Vec::new() };
         let entries = syn::punctuated::Punctuated::<Entry, Token![,]>::parse_terminated.parse2(tokens)?;
-        let mut krate = false;
         let mut mistakes = Mistakes::default();
         for entry in entries {
             match entry {
                 Entry::Crate(span, path) => {
-                    if std::mem::replace(&mut krate, true) {
+                    if arguments.krate.replace(path).is_some() {
                         mistakes.note(Error::new(span, "`crate` is given twice"));
                     }
-                    arguments.krate = path;
                 }
                 Entry::Name(span, name) => {
                     if arguments.name.replace(name).is_some() {
@@ -95,6 +88,23 @@ impl Arguments {
         }
         mistakes.none()?;
         Ok(arguments)
+    }
+
+    /// Path of the crate.
+    pub fn path(&self) -> syn::Path {
+        self.krate.clone().unwrap_or_else(|| syn::parse_quote!(::casados))
+    }
+
+    /// Refuses what is said about the model of a module in which every one has its own attribute.
+    pub fn without_model(&self, module: &Ident) -> Result<()> {
+        let settings = self.name.is_some() || self.reduction.is_some();
+        if settings || !self.values.is_empty() || !self.settings.is_empty() {
+            return Err(Error::new(
+                module.span(),
+                "every model of this module has an attribute of its own: say there what belongs to it",
+            ));
+        }
+        Ok(())
     }
 
     /// What is known about the values of each of the variables `(ẋ, x, z, u, p, t)`.

@@ -67,7 +67,8 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
             (item, Place::Beside, function, Vec::new(), name, visibility, attributes)
         }
         Item::Mod(mut module) => {
-            let Ok(index) = module::model_function(form, &mut module) else { return Ok(None) };
+            let marked = module::marked(&mut module);
+            let Ok(Some(index)) = module::model_function(form, &mut module, &marked) else { return Ok(None) };
             let items = module.content.as_ref().map(|(_, items)| items.clone()).unwrap_or_default();
             let Some(Item::Fn(function)) = items.get(index).cloned() else { return Ok(None) };
             let (name, visibility) = (module.ident.clone(), module.vis.clone());
@@ -114,7 +115,7 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> Result<Opt
                 arguments: signature.arguments,
                 equations: signature.equations,
                 scalar: signature.scalar,
-                krate: arguments.krate.clone(),
+                krate: arguments.path(),
             })
         })
         .collect::<Result<_>>()?;

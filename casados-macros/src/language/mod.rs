@@ -59,6 +59,16 @@ pub enum Form {
 }
 
 impl Form {
+    /// The attribute of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "dae" => Self::Dae,
+            "ode" => Self::Ode,
+            "function" => Self::Function,
+            _ => return None,
+        })
+    }
+
     /// What the function is, with its article.
     pub fn what(self) -> &'static str {
         match self {
@@ -83,10 +93,20 @@ pub struct Source {
     pub item: TokenStream,
     /// Where the generated items go.
     pub place: Place,
-    /// One model; several where the attribute lists values of const generics.
-    pub models: Vec<Model>,
+    /// The function; of a module those with attributes of their own too.
+    pub parts: Vec<Part>,
     /// Items at which the compiler warns of what is right, but hardly meant.
     pub warnings: TokenStream,
+}
+
+/// What a function is read as.
+pub struct Part {
+    /// Which attribute.
+    pub form: Form,
+    /// Name of the function, or of the module that it stands for.
+    pub original: syn::Ident,
+    /// One model; several where the attribute lists values of const generics.
+    pub models: Vec<Model>,
 }
 
 /// A model as a graph.
@@ -173,34 +193,66 @@ pub fn read(form: Form, attribute: TokenStream, item: TokenStream) -> syn::Resul
                 name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&function.sig.ident)),
                 visibility: function.vis.clone(),
                 documentation: documentation(&function.attrs),
-                krate: arguments.krate.clone(),
+                krate: arguments.path(),
             };
             let models = models(&arguments, &template)?;
-            Ok(Source { item: written, place: Place::Beside, models, warnings })
+            let part = Part { form, original: function.sig.ident.clone(), models };
+            Ok(Source { item: written, place: Place::Beside, parts: vec![part], warnings })
         }
-        syn::Item::Mod(mut module) => {
-            let index = module::model_function(form, &mut module)?;
-            let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
-            let Some(syn::Item::Fn(function)) = items.get(index) else {
-                return Err(syn::Error::new_spanned(&module, "no model in this module"));
-            };
-            let template = Template {
-                form,
-                function,
-                items,
-                name: arguments.name.clone().unwrap_or_else(|| signature::type_name(&module.ident)),
-                visibility: module.vis.clone(),
-                documentation: documentation(&module.attrs),
-                krate: arguments.krate.clone(),
-            };
-            let models = models(&arguments, &template)?;
-            Ok(Source { item: tokens::without_marks(written), place: Place::Inside, models, warnings })
+        syn::Item::Mod(module) => {
+            let parts = parts(form, &arguments, module)?;
+            let item = tokens::without_attributes(written);
+            Ok(Source { item, place: Place::Inside, parts, warnings })
         }
         other => Err(syn::Error::new_spanned(
             other,
             format!("{} is a function, or a module with a function in it", form.what()),
         )),
     }
+}
+
+/// The model of a module, and its functions with attributes of their own.
+fn parts(form: Form, arguments: &Arguments, mut module: syn::ItemMod) -> syn::Result<Vec<Part>> {
+    let marked = module::marked(&mut module);
+    let index = module::model_function(form, &mut module, &marked)?;
+    let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
+    let template = |form, index: usize, named: Option<&syn::ItemMod>, own: &Arguments| match items.get(index)
+    {
+        Some(syn::Item::Fn(function)) => Ok(Template {
+            form,
+            function,
+            items,
+            name: own.name.clone().unwrap_or_else(|| {
+                signature::type_name(named.map_or(&function.sig.ident, |module| &module.ident))
+            }),
+            visibility: module.vis.clone(),
+            documentation: documentation(named.map_or(&function.attrs, |module| &module.attrs)),
+            krate: own.krate.clone().unwrap_or_else(|| arguments.path()),
+        }),
+        _ => Err(syn::Error::new_spanned(&module, "no model in this module")),
+    };
+    let mut parts = Vec::new();
+    match index {
+        Some(index) => {
+            let models = models(arguments, &template(form, index, Some(&module), arguments)?)?;
+            parts.push(Part { form, original: module.ident.clone(), models });
+        }
+        None => arguments.without_model(&module.ident)?,
+    }
+    let mut mistakes = mistakes::Mistakes::default();
+    for module::Marked { index, form, attribute } in marked {
+        let part = Arguments::read(attribute).and_then(|own| {
+            let Some(syn::Item::Fn(function)) = items.get(index) else { return Ok(None) };
+            let models = models(&own, &template(form, index, None, &own)?)?;
+            Ok(Some(Part { form, original: function.sig.ident.clone(), models }))
+        });
+        match part {
+            Ok(part) => parts.extend(part),
+            Err(error) => mistakes.note(error),
+        }
+    }
+    mistakes.none()?;
+    Ok(parts)
 }
 
 fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>> {
@@ -223,6 +275,17 @@ fn models(arguments: &Arguments, template: &Template) -> syn::Result<Vec<Model>>
         Ok(model)
     };
     instances.into_iter().map(model).collect()
+}
+
+/// The functions of a module with attributes of their own, and what stands in these.
+pub fn marked(module: &mut syn::ItemMod) -> Vec<(syn::Signature, TokenStream)> {
+    let marked = module::marked(module);
+    let items = module.content.as_ref().map_or(&[][..], |(_, items)| items);
+    let signature = |marked: module::Marked| match items.get(marked.index) {
+        Some(syn::Item::Fn(function)) => Some((function.sig.clone(), marked.attribute)),
+        _ => None,
+    };
+    marked.into_iter().filter_map(signature).collect()
 }
 
 /// The name of the type of a model, as far as its attribute can be read.

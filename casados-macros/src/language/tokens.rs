@@ -156,6 +156,17 @@ pub fn without_marks(item: TokenStream) -> TokenStream {
     without(item, |attribute, _| (attribute.stream().to_string() == "model").then_some(0))
 }
 
+/// A module without the marks `#[model]` and the attributes of models and functions on its
+/// functions.
+pub fn without_attributes(item: TokenStream) -> TokenStream {
+    without(item, |attribute, rest| {
+        let path = attribute.stream().into_iter().take_while(|token| !matches!(token, TokenTree::Group(_)));
+        let last = path.last().map(|token| token.to_string())?;
+        let ours = last == "model" || super::Form::named(&last).is_some();
+        (ours && module_end(rest).is_none()).then_some(0)
+    })
+}
+
 /// The item without attributes in its body, and as many tokens behind each as `removed` says; it is
 /// given an attribute and what follows.
 fn without(item: TokenStream, removed: impl Fn(&Group, &[TokenTree]) -> Option<usize>) -> TokenStream {

@@ -18,7 +18,7 @@ fn a_chain_of_any_length_is_linear_in_size() {
         let start = std::time::Instant::now();
         let source =
             read(Form::Dae, quote!(NX = [#nx]), chain.clone()).unwrap_or_else(|error| panic!("{error}"));
-        let model = &source.models[0];
+        let model = &source.parts[0].models[0];
         println!("nx = {nx}: {:?}", start.elapsed());
         model.graph.operations(&model.residual)
     };

@@ -10,7 +10,12 @@ fn read(attribute: &str, item: &str) -> Result<Analysis, String> {
     let tokens = |text: &str| text.parse::<proc_macro2::TokenStream>().expect("these are tokens");
     let source =
         language::read(Form::Dae, tokens(attribute), tokens(item)).map_err(|error| error.to_string())?;
-    let model = source.models.into_iter().next().expect("there is a model");
+    let model = source
+        .parts
+        .into_iter()
+        .next()
+        .and_then(|part| part.models.into_iter().next())
+        .expect("there is a model");
     analyse(model).map_err(|error| error.to_string())
 }
 
