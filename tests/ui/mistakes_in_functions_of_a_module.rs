@@ -22,6 +22,8 @@ mod cart {
     }
 }
 
+fn used<A, B, C>() {}
+
 fn main() {
-    let _: [&dyn std::any::Any; 3] = [&Cart, &Rounded, &Unknown];
+    used::<Cart, Rounded, Unknown>();
 }
