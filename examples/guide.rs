@@ -79,10 +79,12 @@ fn ocp() -> Result<Figure, Box<dyn Error>> {
     if !outcome.is_converged() {
         return Err(outcome.to_string().into());
     }
+    let solution = ocp.dense_solution(3)?;
+    let nodes = ocp.solution()?;
     Ok(Figure::new()
         .size(1000, 520)
-        .with(Panel::trajectories(&ocp, "x")?.title("Swing-up: angle, rate").x("time, s"))
-        .with(Panel::trajectories(&ocp, "u")?.title("Push, within 4 1/s²").x("time, s"))
+        .with(Panel::trajectories(&solution, "x")?.title("Swing-up: angle, rate").x("time, s"))
+        .with(Panel::trajectories(&nodes, "u")?.title("Push, within 4 1/s²").x("time, s"))
         .column(0.7)
         .with(Panel::convergence(sqp.log())))
 }

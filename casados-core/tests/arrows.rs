@@ -52,7 +52,7 @@ const ARROWS: &[(&str, &str)] = &[
         "error shape structure memory scalar record function model qp linalg result quadrature integrator constrained irk \
          batch",
     ),
-    ("plot", "structure scalar ocp qp"),
+    ("plot", "structure scalar ocp"),
     (
         "casadi",
         "error shape structure tableau memory options function model qp result quadrature integrator adaptive batch \

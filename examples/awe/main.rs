@@ -90,6 +90,7 @@ impl Orbit {
             .with(Panel::new("Power of the turbines").y("kW").line("", over(|state, _| power(state) / 1e3)))
             .with(
                 Panel::new("Tension of the tether")
+                    .y_range(1.7..1.9)
                     .y("kN")
                     .line("", over(|_, z| TETHER_SCALE * z * LENGTH / 1e3)),
             )

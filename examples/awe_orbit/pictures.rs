@@ -84,7 +84,7 @@ impl Picture {
         let tension = times().zip(self.tensions.iter().map(|t| t / 1e3));
         Figure::new()
             .size(1000, 760)
-            .with(panel("Tension of the tether", "kN").line("", tension).limit(1.8))
+            .with(panel("Tension of the tether", "kN").y_range(0.0..2.0).line("", tension).limit(1.8))
             .with(
                 panel("Angles of attack and sideslip", "degrees")
                     .line("attack", of_state(|s| (air(s).z / air(s).x).to_degrees()))

@@ -2,7 +2,9 @@
 
 mod reader;
 
-use casados::ocp::{HeapOcp, HeapSqp, Horizon, Iteration, LeastSquaresCost, Log, OcpError, Problem};
+use casados::ocp::{
+    Constraint, HeapOcp, HeapSqp, Horizon, Iteration, LeastSquaresCost, Log, Problem, TrajectoryError,
+};
 use casados::plot::{Colour, Figure, Panel, Series, Space, Sparsity};
 use casados::prelude::*;
 use casados::qp::Residuals;
@@ -39,8 +41,8 @@ fn solved() -> Result<(HeapOcp<CartProblem>, HeapSqp), Box<dyn std::error::Error
 
 #[test]
 fn trajectories_are_those_of_the_iterate_with_bounds_and_active_parts() -> Test {
-    let (ocp, _) = solved()?;
-    let svg = Figure::new().with(Panel::trajectories(&ocp, "u")?).to_svg();
+    let (mut ocp, _) = solved()?;
+    let svg = Figure::new().with(Panel::trajectories(&ocp.solution()?, "u")?).to_svg();
     let document = Document::parse(&svg)?;
     let panel = groups(&document, "panel", Some("Cart: u"))[0];
     let [x, y] = axes(&panel)?;
@@ -87,8 +89,8 @@ fn trajectories_are_those_of_the_iterate_with_bounds_and_active_parts() -> Test 
 
 #[test]
 fn a_name_means_what_it_means_for_bounds() -> Test {
-    let (ocp, _) = solved()?;
-    let svg = Figure::new().with(Panel::trajectories(&ocp, "x")?).to_svg();
+    let (mut ocp, _) = solved()?;
+    let svg = Figure::new().with(Panel::trajectories(&ocp.solution()?, "x")?).to_svg();
     let document = Document::parse(&svg)?;
     let panel = groups(&document, "panel", None)[0];
     for (i, name) in ["x[0]", "x[1]"].into_iter().enumerate() {
@@ -98,8 +100,50 @@ fn a_name_means_what_it_means_for_bounds() -> Test {
             assert!((point[1] - stage.x[i]).abs() < 0.01, "{name}: {point:?}, but {}", stage.x[i]);
         }
     }
-    let unknown = Panel::trajectories(&ocp, "y").map(|_| ()).unwrap_err();
-    assert!(matches!(unknown, OcpError::UnknownName { .. }), "{unknown}");
+    let unknown = Panel::trajectories(&ocp.solution()?, "y").map(|_| ()).unwrap_err();
+    assert!(matches!(unknown, TrajectoryError::Unknown { .. }), "{unknown}");
+    Ok(())
+}
+
+#[function]
+fn speed(x: [f64; 2], _u: f64) -> f64 {
+    x[1]
+}
+
+#[test]
+fn constraints_are_drawn_between_nodes_too() -> Test {
+    let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+        .running_cost(LeastSquaresCost::<Deviation>::diagonal(&[10.0, 0.01, 0.01]))
+        .path_constraints(Constraint::<Speed>::new([-0.5], [f64::INFINITY]))
+        .on(Horizon::uniform(20, 0.2))?;
+    ocp.fix_initial_state(&[2.0, 0.0])?.guess(&[0.0; 2], &[0.0])?;
+    assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+    let solution = ocp.dense_solution(3)?;
+    let svg = Figure::new().with(Panel::trajectories(&solution, "Speed")?).to_svg();
+    let document = Document::parse(&svg)?;
+    let panel = groups(&document, "panel", None)[0];
+    let drawn = points(&panel, &groups(&document, "series", Some("Speed"))[0])?.concat();
+    let expected = solution.get("Speed")?;
+    assert_eq!(expected.values.len(), 80);
+    // Points that a picture does not show apart are left out.
+    assert!(drawn.len() > 40);
+    let [x, y] = axes(&panel)?;
+    for point in &drawn {
+        let is_there = |(&time, &value): (&f64, &f64)| {
+            (x.pixel(time) - x.pixel(point[0])).abs() < PIXEL
+                && (y.pixel(value) - y.pixel(point[1])).abs() < PIXEL
+        };
+        assert!(solution.times().iter().zip(&expected.values).any(is_there), "{point:?}");
+    }
+    // Where the speed is at its bound the line is wide, and only there.
+    let wide: Vec<_> =
+        lines(&panel).into_iter().filter(|l| l.attribute("stroke-width") == Some("6")).collect();
+    assert!(!wide.is_empty());
+    for line in &wide {
+        for pixel in pixels(line)? {
+            assert!((y.value(pixel[1]) + 0.5).abs() < 0.01, "{} is no bound", y.value(pixel[1]));
+        }
+    }
     Ok(())
 }
 
@@ -261,6 +305,34 @@ fn directions_of_a_field_are_those_of_the_model() -> Test {
         let cosine = (dx * -y + dy * x) / (dx.hypot(dy) * x.hypot(y));
         assert!(cosine > 0.99, "{stroke:?}");
     }
+    Ok(())
+}
+
+#[test]
+fn names_stand_below_their_dots() -> Test {
+    let names = ["one", "two", "three"];
+    let panel = Panel::new("").x_names(names).dots("dots", [(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)]);
+    let svg = Figure::new().with(panel).to_svg();
+    let document = Document::parse(&svg)?;
+    let dots = groups(&document, "series", Some("dots"))[0];
+    let dots: Vec<_> = dots.descendants().filter_map(|node| node.attribute("cx")).collect();
+    for (name, dot) in names.into_iter().zip(dots) {
+        let text = document.descendants().find(|node| node.text() == Some(name) && node.has_tag_name("text"));
+        assert_eq!(text.and_then(|text| text.attribute("x")), Some(dot), "{name}");
+    }
+    Ok(())
+}
+
+#[test]
+fn axes_of_a_column_begin_at_the_same_place() -> Test {
+    let [short, long] = [1.0, 1e4].map(|size| Panel::new("").y("unit").line("", [(0.0, 0.0), (1.0, size)]));
+    let svg = Figure::new().with(short).with(long).to_svg();
+    let document = Document::parse(&svg)?;
+    let frames = groups(&document, "axes", None).into_iter().filter_map(|group| {
+        group.children().find(|node| node.has_tag_name("rect")).and_then(|frame| frame.attribute("x"))
+    });
+    let frames: Vec<_> = frames.collect();
+    assert!(frames.len() == 2 && frames[0] == frames[1], "{frames:?}");
     Ok(())
 }
 

@@ -51,7 +51,7 @@ pub struct Text {
 }
 
 impl Text {
-    pub(crate) fn new(text: &str) -> Self {
+    pub(super) fn new(text: &str) -> Self {
         let mut length = text.len().min(32);
         while !text.is_char_boundary(length) {
             length -= 1;

@@ -10,6 +10,8 @@ use core::ops::Range;
 pub(super) struct Axis {
     pub label: String,
     pub is_log: bool,
+    /// What stands at 0, 1, 2, … in place of numbers.
+    pub names: Vec<String>,
     /// What is drawn, if it does not follow from the data.
     pub given: Option<(f64, f64)>,
 }
@@ -27,6 +29,14 @@ pub(super) struct Scale {
 }
 
 impl Axis {
+    /// About `count` numbers to be written, with their texts; or the names.
+    pub fn ticks(&self, scale: &Scale, count: usize) -> Vec<(f64, String)> {
+        if self.names.is_empty() {
+            return scale.ticks(count);
+        }
+        self.names.iter().enumerate().map(|(i, name)| (i as f64, name.clone())).collect()
+    }
+
     /// The scale over pixels `from..to`, of data.
     pub fn scale(&self, data: impl Iterator<Item = f64>, pixels: Range<f64>, room: f64) -> Scale {
         let place = |value: f64| if self.is_log { value.log10() } else { value };
@@ -129,31 +139,40 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
     // Numbers whose neighbours are the same have no ticks of their own.
     let all = (0..=(last - first).clamp(0.0, 100.0) as usize).map(|i| (first + i as f64) * step);
+    let is_wide = !(1e-2..1e5).contains(&largest);
+    let precision = (largest / step).log10().ceil().clamp(0.0, 17.0) as usize;
     all.map(|value| {
-        let is_wide = largest >= 1e5 || step < 1e-3;
-        let text = if value == 0.0 {
-            "0".to_string()
-        } else if is_wide {
-            short(value)
-        } else {
-            format!("{value:.digits$}")
+        let text = match value {
+            0.0 => "0".to_string(),
+            _ if is_wide => scientific(value, precision),
+            _ => format!("{value:.digits$}"),
         };
         (value, text)
     })
     .collect()
 }
 
-/// With up to six digits.
+/// With three digits.
+pub(super) fn rounded(value: f64) -> String {
+    let unit = 10f64.powf(value.abs().log10().floor() - 2.0);
+    short(if unit > 0.0 && unit.is_finite() { (value / unit).round() * unit } else { value })
+}
+
+/// With four digits behind the point at most.
 pub(super) fn short(value: f64) -> String {
-    let size = value.abs();
-    if size != 0.0 && !(1e-3..1e5).contains(&size) {
-        let text = format!("{value:.3e}");
-        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-        let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
-        return format!("{mantissa}e{exponent}");
+    if value != 0.0 && !(1e-3..1e5).contains(&value.abs()) {
+        return scientific(value, 3);
     }
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+/// With a power of ten, and digits behind the point as far as they are not zero.
+fn scientific(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let short = if digits > 0 { mantissa.trim_end_matches('0').trim_end_matches('.') } else { mantissa };
+    format!("{short}e{exponent}")
 }
 
 /// A power of ten.
@@ -192,6 +211,13 @@ mod tests {
         assert_eq!(texts(1.7, 1.9, 4), ["1.70", "1.75", "1.80", "1.85", "1.90"]);
         assert_eq!(texts(0.0, 4e6, 4), ["0", "1e6", "2e6", "3e6", "4e6"]);
         assert_eq!(texts(0.0, 2e-5, 2), ["0", "1e-5", "2e-5"]);
+        // Neighbours differ, however close they are.
+        assert_eq!(texts(1.79951, 1.79953, 2), ["1.79951", "1.79952", "1.79953"]);
+        assert_eq!(texts(1.0e6 + 100.0, 1.0e6 + 300.0, 2), ["1.0001e6", "1.0002e6", "1.0003e6"]);
+        assert_eq!(
+            (rounded(8.6572), rounded(-1234.5), rounded(0.0)),
+            ("8.66".into(), "-1230".into(), "0".into())
+        );
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Panels become shapes.
 
-use super::axis::{Scale, short};
+use super::axis::{Scale, rounded};
 use super::panel::Panel;
 use super::series::Series;
 use super::svg::{Anchor, Canvas, Colour, LETTERS, Point, Stroke, width};
@@ -100,18 +100,27 @@ pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, name: &str, (low, high
             canvas.rectangle((left, top + step * i as f64), (10.0, step + 0.3), Some(colour), None);
         }
         for share in [0.0, 0.5, 1.0] {
-            let text = short(low + share * (high - low));
+            let text = rounded(low + share * (high - low));
             canvas.words((left + 15.0, top + height * (1.0 - share) + 0.35 * LETTERS), &text, Anchor::Start);
         }
     });
 }
 
-impl Panel {
-    pub(super) fn draw(&self, canvas: &mut Canvas, area: Area) {
-        canvas.group("panel", &self.title, |canvas| self.draw_all(canvas, area));
-    }
+/// Where what is in a panel, and how it is coloured.
+struct Layout<'a> {
+    coloured: Vec<(&'a Series, Colour)>,
+    legend: Vec<Vec<(String, Stroke, f64)>>,
+    /// The least and the largest of what decides about colours, if there is something.
+    values: Option<(f64, f64)>,
+    /// Of the legend's rows, and of the axes.
+    begin: f64,
+    top: f64,
+    bottom: f64,
+    right: f64,
+}
 
-    fn draw_all(&self, canvas: &mut Canvas, area: Area) {
+impl Panel {
+    fn layout(&self, area: Area) -> Layout<'_> {
         let mut next = 0;
         let coloured: Vec<(&Series, Colour)> = (self.series.iter())
             .map(|series| {
@@ -122,41 +131,60 @@ impl Panel {
                 (series, colour)
             })
             .collect();
-        let values = span(self.series.iter().flat_map(|series| &series.values));
-        let has_bar = values.0 <= values.1;
-        let rows = legend(&coloured, area.width - 40.0);
-        let top = if self.title.is_empty() { 10.0 } else { 28.0 } + ROW * rows.len() as f64 + 4.0;
+        let values = Some(span(self.series.iter().flat_map(|series| &series.values)));
+        let values = values.filter(|(low, high)| low <= high);
+        let legend = legend(&coloured, area.width - 40.0);
+        let begin = if self.title.is_empty() { 6.0 } else { 28.0 };
+        let top = begin + ROW * legend.len() as f64 + 4.0;
         let bottom = 24.0 + if self.x.label.is_empty() { 0.0 } else { 18.0 };
-        let right = if has_bar { BAR } else { 16.0 };
-        // How wide numbers at the left are follows from the vertical scale.
-        let inside = area.inside(0.0, top, right, bottom);
-        let y = self.y_scale(inside);
-        let numbers = y.ticks((inside.height / APART[1]) as usize);
-        let widest = numbers.iter().map(|(_, text)| width(text)).fold(0.0, f64::max);
-        let left = GAP + widest + 6.0 + if self.y.label.is_empty() { 0.0 } else { 20.0 };
-        let inside = area.inside(left, top, right, bottom);
-        let (x, y) = self.scales(inside, y);
+        let right = if values.is_some() { BAR } else { 16.0 };
+        Layout { coloured, legend, values, begin, top, bottom, right }
+    }
 
-        canvas.heading((area.x + left, area.y + 18.0), &self.title);
-        draw_legend(canvas, (area.x + left, area.y + top - 4.0 - ROW * rows.len() as f64), &rows);
-        self.draw_axes(canvas, area, inside, [&x, &y]);
-        canvas.inside((inside.x, inside.y), (inside.width, inside.height), |canvas| {
-            self.draw_field(canvas, [&x, &y]);
-            for &limit in &self.limits {
-                let stroke = Stroke { colour: Colour::RED, width: 1.0, dashed: true };
-                let line = [(inside.x, y.at(limit)), (inside.x + inside.width, y.at(limit))];
-                canvas.group("limit", "", |canvas| canvas.line(&line, stroke));
+    /// Pixels at the left of the axes: what numbers and the label take.
+    pub(super) fn left(&self, area: Area) -> f64 {
+        let Layout { top, bottom, right, .. } = self.layout(area);
+        let inside = area.inside(0.0, top, right, bottom);
+        let numbers = self.y_scale(inside).ticks((inside.height / APART[1]) as usize);
+        let widest = numbers.iter().map(|(_, text)| width(text)).fold(0.0, f64::max);
+        GAP + widest + 6.0 + if self.y.label.is_empty() { 0.0 } else { 20.0 }
+    }
+
+    /// With room at the left, of which there may be more than is needed.
+    pub(super) fn draw(&self, canvas: &mut Canvas, area: Area, left: f64) {
+        let layout = self.layout(area);
+        let inside = area.inside(left, layout.top, layout.right, layout.bottom);
+        let (x, y) = self.scales(inside);
+        canvas.group("panel", &self.title, |canvas| {
+            canvas.heading((area.x + left, area.y + 18.0), &self.title);
+            draw_legend(canvas, (area.x + left, area.y + layout.begin), &layout.legend);
+            self.draw_axes(canvas, (area.x, inside), [&x, &y]);
+            let data = |canvas: &mut Canvas| self.draw_data(canvas, inside, &layout, [&x, &y]);
+            if self.x.given.is_some() || self.y.given.is_some() {
+                canvas.inside((inside.x, inside.y), (inside.width, inside.height), data);
+            } else {
+                data(canvas);
             }
-            for (series, colour) in &coloured {
-                canvas.group("series", &series.name, |canvas| series.draw(canvas, [&x, &y], *colour, values));
-            }
-            for (at, words) in &self.texts {
-                canvas.words((x.at(at.0) + 5.0, y.at(at.1) - 5.0), words, Anchor::Start);
+            if let Some(values) = layout.values {
+                let name = self.series.iter().find(|series| !series.values.is_empty());
+                colour_bar(canvas, inside, name.map_or("", |series| &series.name), values);
             }
         });
-        if has_bar {
-            let name = self.series.iter().find(|series| !series.values.is_empty()).map_or("", |s| &s.name);
-            colour_bar(canvas, inside, name, values);
+    }
+
+    fn draw_data(&self, canvas: &mut Canvas, inside: Area, layout: &Layout<'_>, [x, y]: [&Scale; 2]) {
+        self.draw_field(canvas, [x, y]);
+        for &limit in &self.limits {
+            let stroke = Stroke { colour: Colour::RED, width: 1.0, dashed: true };
+            let line = [(inside.x, y.at(limit)), (inside.x + inside.width, y.at(limit))];
+            canvas.group("limit", "", |canvas| canvas.line(&line, stroke));
+        }
+        let values = layout.values.unwrap_or_default();
+        for (series, colour) in &layout.coloured {
+            canvas.group("series", &series.name, |canvas| series.draw(canvas, [x, y], *colour, values));
+        }
+        for (at, words) in &self.texts {
+            canvas.words((x.at(at.0) + 5.0, y.at(at.1) - 5.0), words, Anchor::Start);
         }
     }
 
@@ -165,11 +193,10 @@ impl Panel {
         self.y.scale(all.chain(self.limits.iter().copied()), area.y + area.height..area.y, 0.06)
     }
 
-    fn scales(&self, area: Area, mut y: Scale) -> (Scale, Scale) {
+    fn scales(&self, area: Area) -> (Scale, Scale) {
+        let mut y = self.y_scale(area);
         let all = self.series.iter().flat_map(|series| &series.points).map(|point| point.0);
-        // Half of a dot at the border would be cut off.
-        let has_dots = self.series.iter().any(|series| series.radius > 0.0);
-        let room = if self.is_equal || has_dots { 0.03 } else { 0.0 };
+        let room = if self.is_equal { 0.06 } else { 0.0 };
         let mut x = self.x.scale(all, area.x..area.x + area.width, room);
         if self.is_equal {
             let unit = x.unit().max(y.unit());
@@ -180,11 +207,11 @@ impl Panel {
     }
 
     /// Frame, lines of the grid, numbers and what they are.
-    fn draw_axes(&self, canvas: &mut Canvas, area: Area, inside: Area, [x, y]: [&Scale; 2]) {
+    fn draw_axes(&self, canvas: &mut Canvas, (border, inside): (f64, Area), [x, y]: [&Scale; 2]) {
         let (right, bottom) = (inside.x + inside.width, inside.y + inside.height);
         let grid = Stroke::new(Colour::GRID, 1.0);
         canvas.group("axes", "", |canvas| {
-            for (value, text) in x.ticks((inside.width / APART[0]) as usize) {
+            for (value, text) in self.x.ticks(x, (inside.width / APART[0]) as usize) {
                 let at = x.at(value);
                 canvas.line(&[(at, inside.y), (at, bottom)], grid);
                 canvas.words((at, bottom + 16.0), &text, Anchor::Middle);
@@ -197,7 +224,7 @@ impl Panel {
             let size = (inside.width, inside.height);
             canvas.rectangle((inside.x, inside.y), size, None, Some(Colour::INK));
             canvas.words((inside.x + 0.5 * inside.width, bottom + 35.0), &self.x.label, Anchor::Middle);
-            canvas.upright((area.x + LETTERS + 2.0, inside.y + 0.5 * inside.height), &self.y.label);
+            canvas.upright((border + LETTERS + 2.0, inside.y + 0.5 * inside.height), &self.y.label);
         });
     }
 

@@ -104,10 +104,15 @@ impl Figure {
         for (share, cells) in &self.columns {
             let wide = (width - 2.0 * MARGIN) * share / shares;
             let high = (height - 2.0 * MARGIN) / cells.len().max(1) as f64;
+            let area = |i: usize| Area { x, y: MARGIN + high * i as f64, width: wide, height: high };
+            // Axes of a column begin at the same place.
+            let left = (cells.iter().enumerate())
+                .map(|(i, cell)| if let Cell::Panel(panel) = cell { panel.left(area(i)) } else { 0.0 })
+                .fold(0.0, f64::max);
             for (i, cell) in cells.iter().enumerate() {
-                let area = Area { x, y: MARGIN + high * i as f64, width: wide, height: high };
+                let area = area(i);
                 match cell {
-                    Cell::Panel(panel) => panel.draw(&mut canvas, area),
+                    Cell::Panel(panel) => panel.draw(&mut canvas, area, left),
                     Cell::Space(space) => space.draw(&mut canvas, area),
                     Cell::Sparsity(sparsity) => sparsity.draw(&mut canvas, area),
                 }

@@ -27,15 +27,16 @@
 //! sqp.solve(&mut ocp)?;
 //!
 //! // All that can be drawn of a model with two states, in two columns.
-//! let stages = || ocp.iterate().stages();
+//! let solution = ocp.dense_solution(3)?;
+//! let (angle, rate) = (solution.state("x[0]")?, solution.state("x[1]")?);
 //! let phase = Panel::new("Phase portrait without a push")
 //!     .x("angle, rad")
 //!     .y("rate, rad/s")
 //!     .field(|x| pendulum(x, 0.0))
-//!     .line("solution", stages().map(|stage| (stage.x[0], stage.x[1])));
+//!     .line("solution", angle.iter().copied().zip(rate.iter().copied()));
 //! let figure = Figure::new()
-//!     .with(Panel::trajectories(&ocp, "x")?)
-//!     .with(Panel::trajectories(&ocp, "u")?)
+//!     .with(Panel::trajectories(&solution, "x")?)
+//!     .with(Panel::trajectories(&solution, "u")?)
 //!     .column(0.8)
 //!     .with(phase)
 //!     .with(Panel::convergence(sqp.log()));

@@ -66,6 +66,15 @@ impl Panel {
         self
     }
 
+    /// Names in place of numbers below the horizontal axis: the first one at zero, the second at
+    /// one.
+    #[must_use]
+    pub fn x_names<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
+        self.x.names = names.into_iter().map(Into::into).collect();
+        self.x.given = Some((-0.5, self.x.names.len() as f64 - 0.5));
+        self
+    }
+
     /// A logarithmic horizontal axis. Numbers that are not positive are left out.
     #[must_use]
     pub fn log_x(mut self) -> Self {
