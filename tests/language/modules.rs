@@ -69,7 +69,7 @@ fn parts_of_a_module_share_its_names() {
 #[test]
 fn several_models_stand_in_one_module() -> Result<(), casados::Error> {
     let options = Options { steps: 40, ..Default::default() };
-    let mut irk = Irk::<Crane, Gauss<3>>::new(options.clone())?;
+    let mut irk = Irk::<Crane, Gauss<3>>::new(options)?;
     let mut slow = Erk::<SlowCrane, Rk4>::new(Options { steps: 4000, ..options })?;
     irk.set_parameters(&vector![2.0])?;
     slow.set_parameters(&vector![2.0])?;

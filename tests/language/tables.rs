@@ -159,7 +159,7 @@ fn tables_are_differentiated_in_time() -> Result<(), casados::Error> {
 #[test]
 fn batches_take_tables() -> Result<(), Box<dyn std::error::Error>> {
     let options = Options { steps: 2, ..Default::default() };
-    let mut batch = Batch::<Seen, Gauss<2>>::new(options.clone())?;
+    let mut batch = Batch::<Seen, Gauss<2>>::new(options)?;
     let mut irk = Irk::<Seen, Gauss<2>>::new(options)?;
     let x0: Vec<_> = (0..21).map(|k| vector![-2.0 + 0.2 * f64::from(k), 1.9 - 0.17 * f64::from(k)]).collect();
     let u: Vec<_> = (0..21).map(|k| vector![0.6 - 0.05 * f64::from(k)]).collect();
