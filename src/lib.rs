@@ -14,6 +14,7 @@ pub use casados_macros::{Record, dae, function, ode};
 
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {
+    pub use casados_core::Integrator as _;
     pub use casados_core::prelude::*;
     pub use casados_macros::{dae, function, ode};
 }

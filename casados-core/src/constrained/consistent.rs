@@ -45,6 +45,7 @@ const TINY: f64 = 1e-30;
 /// # Ok::<(), casados::Inconsistent>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
+#[must_use = "`hold` returns another one, which holds more"]
 pub struct Consistent<M: Constrained> {
     held: ArrayX<M, bool>,
     model: PhantomData<M>,
@@ -77,7 +78,6 @@ struct Work<M: Constrained, T: Real> {
 
 impl<M: Constrained> Consistent<M> {
     /// All states are free.
-    #[must_use]
     pub fn new() -> Self {
         Self { held: ArrayX::<M, bool>::from_fn(|_| false), model: PhantomData }
     }
