@@ -179,9 +179,12 @@ fn linear(r: &mut Random, imaginary: bool) -> (Vec<f64>, Vec<f64>, f64) {
             let s: f64 = row.iter().zip(&v).map(|(a, v)| a * v).sum();
             row.iter_mut().zip(&v).for_each(|(a, v)| *a -= 2.0 * s * v);
         }
-        for j in 0..6 {
-            let s: f64 = (0..6).map(|i| a[i][j] * v[i]).sum();
-            (0..6).for_each(|i| a[i][j] -= 2.0 * s * v[i]);
+        let mut sums = [0.0; 6];
+        for (row, v) in a.iter().zip(&v) {
+            sums.iter_mut().zip(row).for_each(|(sum, a)| *sum += a * v);
+        }
+        for (row, v) in a.iter_mut().zip(&v) {
+            row.iter_mut().zip(&sums).for_each(|(a, sum)| *a -= 2.0 * sum * v);
         }
     }
     let mut p: Vec<f64> = a.concat();
