@@ -44,6 +44,7 @@ mod everything;
 mod failures;
 mod identities;
 mod invariants;
+mod jumps;
 mod orbit;
 mod order;
 mod pollution;
