@@ -4,7 +4,7 @@ use super::barrier::{self, Barrier};
 use super::lengths::Lengths;
 use super::line_search::{Accepted, Expected, Found, Room, longest};
 use super::measure;
-use super::newton::{attach, dynamics_after, evaluate};
+use super::newton::{attach, attach_to_new, dynamics_after, evaluate};
 use super::state::{MARGIN, State};
 use super::work::Work;
 use super::{Ipm, IpmOptions, elastic};
@@ -133,7 +133,7 @@ where
         self.curve(ocp, capacity, state)?;
         ocp.linearise(EXACT)?;
         let (qp, solution) = ocp.qp_and_iterate();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         iterate.take_point(&solution.view_mut());
         iterate.store(&mut solution.view_mut());
         Ok(())

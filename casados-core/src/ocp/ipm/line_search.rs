@@ -2,7 +2,7 @@
 
 use super::lengths::Lengths;
 use super::measure;
-use super::newton::{attach, evaluate_values};
+use super::newton::{attach, attach_to_new, evaluate_values};
 use super::state::State;
 use super::work::Work;
 use crate::ocp::dynamics::Dynamics;
@@ -219,7 +219,8 @@ where
         for _ in 0..CORRECTIONS {
             ocp.correct(self.trial, self.work.ends);
             let (solved, alpha) = {
-                let mut iterate = attach(ocp.qp.view(), self.lengths, self.numbers, self.indices)?;
+                let qp = ocp.qp.view();
+                let mut iterate = attach_to_new(qp, self.lengths, self.numbers, self.indices)?;
                 // Sides keep their slacks; the gradient stays what it was.
                 evaluate_values(&mut iterate);
                 let (mu, delta) = (T::from_f64(expected.mu), T::from_f64(expected.delta));

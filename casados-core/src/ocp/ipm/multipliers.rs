@@ -2,7 +2,7 @@
 
 use super::Ipm;
 use super::lengths::Lengths;
-use super::newton::{attach, evaluate_values, least_squares};
+use super::newton::{attach, attach_to_new, evaluate_values, least_squares};
 use super::start::begin_sides;
 use super::state::State;
 use super::work::Work;
@@ -36,7 +36,7 @@ where
         let ends = ocp.ends();
         let (qp, solution) = ocp.qp_and_iterate();
         let mut view = solution.view_mut();
-        let mut iterate = attach(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
+        let mut iterate = attach_to_new(qp, &state.lengths, &mut self.numbers, &mut self.indices)?;
         let mut work = Work::new(qp.dims, ends, capacity, self.work.as_mut());
         iterate.take_point(&view);
         iterate.give_initial_state();

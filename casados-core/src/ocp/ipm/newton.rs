@@ -9,8 +9,7 @@ use crate::qp::interior::{First, Iterate, Sides};
 use crate::qp::{Field, Places, QpError, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
-/// The iterate of Newton's method in its memory. What is in the memory stays as it was; bounds are
-/// those of the QP.
+/// The iterate of Newton's method in its memory, whose contents stay as they were.
 ///
 /// # Errors
 /// [`QpError::OutOfMemory`], [`QpError::Dimension`]
@@ -23,9 +22,24 @@ pub(super) fn attach<'a, T: Real>(
     let mut numbers = numbers.at_least(lengths.numbers, Field::Numbers)?;
     let mut indices = indices.at_least(lengths.counts.indices(), Field::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
-    let mut sides = Sides::list(qp, &reading(qp), lengths.counts, &mut numbers, &mut indices);
+    let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
     sides.compliance = T::from_f64(T::EPSILON).sqrt();
     Ok(Iterate::new(qp, first, sides, &mut numbers))
+}
+
+/// As [`attach`], where the QP is new: sides are listed, with its bounds and penalties.
+///
+/// # Errors
+/// As [`attach`].
+pub(super) fn attach_to_new<'a, T: Real>(
+    qp: QpView<'a, T>,
+    lengths: &Lengths,
+    numbers: &'a mut impl Store<T>,
+    indices: &'a mut impl Store<u32>,
+) -> Result<Iterate<'a, T>, QpError> {
+    let mut iterate = attach(qp, lengths, numbers, indices)?;
+    iterate.sides.list(qp, &reading(qp));
+    Ok(iterate)
 }
 
 /// Evaluates all residuals at a point with its multipliers `π`.

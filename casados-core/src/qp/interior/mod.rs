@@ -164,7 +164,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         let mut numbers = self.numbers.at_least(length, Field::Numbers)?;
         let mut indices = self.indices.at_least(counts.indices(), Field::Indices)?;
         numbers.fill(T::ZERO);
-        let sides = Sides::list(qp, &reading, counts, &mut numbers, &mut indices);
+        let mut sides = Sides::new(counts, &mut numbers, &mut indices);
+        sides.list(qp, &reading);
         let first = if reading.fixed { First::Fixed } else { First::Free };
         let mut iterate = Iterate::new(qp, first, sides, &mut numbers);
         iterate.objective = attempt.penalties == Penalties::Given;

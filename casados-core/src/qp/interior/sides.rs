@@ -207,16 +207,10 @@ pub struct Sides<'a, T> {
 }
 
 impl<'a, T: Real> Sides<'a, T> {
-    /// Lists the sides.
-    pub fn list(
-        qp: QpView<'_, T>,
-        reading: &Reading<T>,
-        counts: Counts,
-        numbers: &mut &'a mut [T],
-        indices: &mut &'a mut [u32],
-    ) -> Self {
+    /// In memory whose contents stay.
+    pub fn new(counts: Counts, numbers: &mut &'a mut [T], indices: &mut &'a mut [u32]) -> Self {
         let (pairs, sides) = (counts.pairs(), counts.sides());
-        let list = Self {
+        Self {
             counts,
             compliance: T::ZERO,
             rows: take_mut(indices, sides),
@@ -238,8 +232,13 @@ impl<'a, T: Real> Sides<'a, T> {
             free: take_mut(numbers, counts.equations),
             equation_residual: take_mut(numbers, counts.equations),
             equation_bound: take_mut(numbers, counts.equations),
-        };
-        let (mut lower, mut upper, mut soft, mut equations) = (0, counts.lower, 0, 0);
+        }
+    }
+
+    /// Lists the sides of a problem that has so many: rows, bounds and penalties.
+    pub fn list(&mut self, qp: QpView<'_, T>, reading: &Reading<T>) {
+        let list = self;
+        let (mut lower, mut upper, mut soft, mut equations) = (0, list.counts.lower, 0, 0);
         constraints(qp, reading.fixed, |constraint| {
             let row = constraint.row as u32;
             let (equation, lower_kind, upper_kind) = constraint.kinds(reading);
@@ -265,7 +264,6 @@ impl<'a, T: Real> Sides<'a, T> {
                 }
             }
         });
-        list
     }
 }
 
