@@ -9,14 +9,137 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub use casados_core::*;
+#[cfg(feature = "casadi")]
+pub use casados_core::casadi;
+#[cfg(feature = "plot")]
+pub use casados_core::plot;
+#[cfg(feature = "testing")]
+pub use casados_core::testing;
+#[cfg(feature = "alloc")]
+pub use casados_core::{
+    Adaptive, AdaptiveOptions, AdaptiveStatistics, Batch, BatchError, BatchStatistics, Crossing, Event, Heap,
+    Hybrid, Intervals, Piecewise, Radau,
+};
+pub use casados_core::{
+    Butcher6, Consistent, Constrained, Custom, Dae, Dims, Divided, DormandPrince5, DormandPrince8, Erk,
+    Error, Euler, Function, Gauss, GraphDae, GraphFunction, Heun, Inconsistent, Inline, Integrator, Irk,
+    LeastSquares, Method, Midpoint, Ode, Options, Projectable, Projected, Quadrature, RadauIIA, Real, Record,
+    Rk4, Shape, Statistics, Tableau, TableauError, mode, nalgebra, ocp, qp, result, tables,
+};
 pub use casados_macros::{Record, dae, function, ode};
+
+#[doc(hidden)]
+pub use casados_core::__private;
 
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {
     pub use casados_core::Integrator as _;
     pub use casados_core::prelude::*;
     pub use casados_macros::{dae, function, ode};
+}
+
+/// Choices of [`Options`].
+pub mod options {
+    pub use casados_core::options::{Jacobian, Newton, Start};
+}
+
+/// What an [`Error`] tells: which argument, where, and why.
+pub mod error {
+    pub use casados_core::error::{Argument, Place, Quantity, Refusal, Started};
+}
+
+/// Vectors and matrices of a model, and what is known about it before it runs.
+///
+/// With the dimensions of a model `M` that is generic, its initial state is a `VectorX<M, f64>`;
+/// of a known model it is an `SVector<f64, NX>` of [`nalgebra`](crate::nalgebra).
+///
+/// ```
+/// use casados::model::{VectorU, VectorX};
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// /// The state after `n` intervals of a second.
+/// fn after<M: Dae>(n: usize, x: &VectorX<M, f64>, u: &VectorU<M, f64>) -> Result<VectorX<M, f64>, Error> {
+///     let mut irk = Irk::<M, Gauss<2>>::new(Options::default())?;
+///     (0..n).try_fold(*x, |x, _| Ok(irk.solve(&x, u, 1.0)?.x))
+/// }
+///
+/// let x = after::<Cart>(2, &vector![0.0, 0.0], &vector![1.0])?;
+/// assert!((x - vector![2.0, 2.0]).norm() < 1e-13);
+/// assert_eq!(Cart::describe().x, ["x[0]", "x[1]"]);
+/// # Ok::<(), casados::Error>(())
+/// ```
+pub mod model {
+    pub use casados_core::model::{
+        Cost, MatrixPC, MatrixPP, MatrixUC, MatrixUP, MatrixUU, MatrixXC, MatrixXP, MatrixXU, MatrixXX,
+        MatrixZC, MatrixZP, MatrixZU, MatrixZX, Operations, Pattern, Range, Structure, VectorP, VectorU,
+        VectorX, VectorZ,
+    };
+}
+
+/// Vectors and matrices of a [`Function`].
+pub mod function {
+    pub use casados_core::function::{MatrixYP, MatrixYU, MatrixYX, MatrixYY, MatrixYZ, VectorY};
+}
+
+/// Implicit methods: what [`Irk`] stands for.
+pub mod irk {
+    pub use casados_core::irk::{Implicit, Integrator};
+}
+
+/// Explicit methods: what [`Erk`] stands for.
+pub mod erk {
+    pub use casados_core::erk::{Explicit, Integrator};
+}
+
+/// Many intervals at once: what [`Batch`] stands for.
+#[cfg(feature = "alloc")]
+pub mod batch {
+    pub use casados_core::batch::{Batched, Integrator, Slice};
+}
+
+/// Steps of variable size: what [`Adaptive`] stands for, and the results of [`Piecewise`] and
+/// [`Hybrid`].
+#[cfg(feature = "alloc")]
+pub mod adaptive {
+    pub use casados_core::adaptive::{
+        AdaptiveMethod, HybridAdjoint, HybridForward, HybridHessian, Integrator, Occurrence,
+        PiecewiseAdjoint, PiecewiseForward, PiecewiseHessian, PiecewiseLeastSquares, PiecewiseQuadrature,
+        Solution, Spanning, TimeGradient,
+    };
+}
+
+/// Integrands beside an integrator.
+pub mod integrator {
+    pub use casados_core::integrator::With;
+    pub use casados_core::quadrature::Integrand;
+}
+
+/// What memory of an integrator is for, in bounds: `W: Memory + WithForward`.
+pub mod memory {
+    pub use casados_core::memory::{
+        Memory, WithAdjoint, WithDirectional, WithForward, WithHessian,
+        fallback::{Pivoting, Refusing},
+    };
+}
+
+/// Elementary functions of `f64` and `f32` as methods, where there is no `std`.
+///
+/// A model has them in scope. Helper functions outside of it take
+/// `use casados::scalar::Float as _;`.
+pub mod scalar {
+    pub use casados_core::scalar::Float;
+}
+
+/// Models over num-dual, for Rust that the attributes cannot read.
+#[cfg(feature = "num-dual")]
+pub mod dual {
+    pub use casados_core::dual::{DualModel, DualNum, DualNumCopy};
 }
 
 // Of the documentation only, whose examples are run.

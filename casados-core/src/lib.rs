@@ -1,4 +1,7 @@
-//! The integrators of `casados`.
+//! The engine of `casados`: **use `casados`, this crate is a part of it.**
+//!
+//! Its modules are the rooms of the source, and its paths may change in any version; those of
+//! `casados` follow semantic versioning.
 //!
 //! Implicit and explicit Runge-Kutta methods for differential-algebraic equations
 //! `f(ẋ, x, u, z, p, t) = 0`, with forward, adjoint and second-order sensitivities that are the
@@ -92,6 +95,30 @@ pub use tableau::{
     Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4,
     Tableau, TableauError,
 };
+
+// What vectors and matrices of arguments and results are made of.
+pub use nalgebra;
+
+/// What the attributes write, and tests of the engine read: any version may change it.
+#[doc(hidden)]
+pub mod __private {
+    #[cfg(feature = "num-dual")]
+    pub use crate::dual;
+    pub use crate::function::{self, ArrayY, FunctionStructure, begins, by_row};
+    pub use crate::memory::{Absent, Fallback, Family, Inside, Kept, Stored};
+    pub use crate::model::{ArrayK, ArrayV, ArrayW, ArrayX, Range};
+    pub use crate::scalar::{Float, Known, Piece, Rows, Tangent, elementary};
+    pub use crate::shape::{Aligned, Array, Count, Matrix, Outputs, Plain};
+    pub use crate::structure::{
+        Assembly, Cost, Dependent, Elimination, Kinematic, Left, Lone, NO_COLUMN, Operations, Pattern, Pivot,
+        Reduction, Structure, Supernode, Term, Update, all, by_column, columns, symmetric,
+    };
+    pub use crate::tables;
+    pub use crate::{
+        Constrained, Dae, Dims, Field, Function, GraphDae, GraphFunction, Lanes, Ode, Projectable, Record,
+        Scalar, Shape,
+    };
+}
 
 /// What most programs need: `use casados::prelude::*;`
 pub mod prelude {

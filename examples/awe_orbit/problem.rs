@@ -1,7 +1,7 @@
 //! The problem: the most power on a periodic orbit.
 
 use crate::awe::Awe;
-use casados::model::Dae;
+use casados::Dae;
 use casados::ocp::{Constraint, Formulation, GeneralCost, HeapOcp, Horizon, Problem, SecondOrder};
 use casados::prelude::*;
 use std::error::Error;

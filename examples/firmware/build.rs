@@ -15,7 +15,7 @@ fn main() -> std::io::Result<()> {
         Path::new(&env::var("OUT_DIR").unwrap()).join("case.rs"),
         format!(
             "type Model = firmware::{model};\nconst STAGES: usize = {stages};\ntype Number = {number};\n\
-             type Fallback = casados::memory::fallback::{fallback};\n"
+             type Fallback = casados::memory::{fallback};\n"
         ),
     )
 }

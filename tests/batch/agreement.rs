@@ -8,8 +8,8 @@
 
 use crate::horizon::*;
 use crate::models::chain::Chain;
-use casados::memory::Heap;
-use casados::model::Kinematic;
+use casados::__private::Kinematic;
+use casados::Heap;
 use casados::prelude::*;
 use casados::result::{Hessian, Nominal};
 use casados::{Method, batch, irk};

@@ -4,11 +4,11 @@ use crate::data::Record;
 use crate::models::awe::Awe;
 use crate::models::chain::{Chain, stretched};
 use crate::models::pendulum::Pendulum;
-use casados::memory::Heap;
+use casados::__private::Matrix;
+use casados::Heap;
 use casados::model::{VectorP, VectorU, VectorX};
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
-use casados::shape::Matrix;
 use casados::{Method, Real, batch, irk};
 use nalgebra::{SVector, Vector1, vector};
 

@@ -7,7 +7,7 @@ use casados::batch::Slice;
 use casados::error::Argument;
 use casados::prelude::*;
 use casados::result::Hessian;
-use casados::{Error, Method, batch, irk, memory::Heap};
+use casados::{Error, Heap, Method, batch, irk};
 use nalgebra::{SMatrix, SVector, vector};
 
 type Test = Result<(), Box<dyn std::error::Error>>;

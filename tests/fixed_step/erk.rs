@@ -1,8 +1,8 @@
 //! Explicit integrators against an independent implementation over dual numbers.
 
-use casados::memory::{Inline, mode};
-use casados::tableau::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Method, Midpoint, Rk4};
+use casados::{Butcher6, DormandPrince5, DormandPrince8, Euler, Heun, Method, Midpoint, Rk4};
 use casados::{Custom, Erk, Error, Ode, Options, Tableau, dae};
+use casados::{Inline, mode};
 use nalgebra::{SMatrix, SVector, vector};
 use num_dual::HyperDual64;
 

@@ -4,8 +4,8 @@
 
 use crate::lost::Lost;
 use crate::models::chain::{Chain, stretched};
+use casados::__private::Kinematic;
 use casados::irk::Integrator;
-use casados::model::Kinematic;
 use casados::prelude::*;
 use casados::result::{Forward, Hessian};
 use casados::{Method, Shape, Statistics};

@@ -1,7 +1,7 @@
 //! Steps of variable size.
 
 use super::*;
-use casados::{Adaptive, DormandPrince5, DormandPrince8, Field, Radau, RadauIIA};
+use casados::{__private::Field, Adaptive, DormandPrince5, DormandPrince8, Radau, RadauIIA};
 use everything::Everything;
 use source::Source;
 

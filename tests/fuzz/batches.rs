@@ -1,7 +1,7 @@
 //! Batches: an interval that fails takes nobody with it, and those that succeed are finite.
 
 use super::*;
-use casados::batch::BatchError;
+use casados::BatchError;
 use casados::options::Start;
 use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use casados::{Batch, Gauss, Intervals};

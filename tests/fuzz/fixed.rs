@@ -3,7 +3,7 @@
 use super::*;
 use casados::options::Start;
 use casados::result::Seeds;
-use casados::{DormandPrince8, Erk, Field, Gauss, Irk, RadauIIA, Rk4};
+use casados::{__private::Field, DormandPrince8, Erk, Gauss, Irk, RadauIIA, Rk4};
 use everything::Everything;
 use source::Source;
 

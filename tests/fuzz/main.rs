@@ -15,7 +15,7 @@ mod batches;
 mod fixed;
 mod source;
 
-use casados::error::Error;
+use casados::Error;
 use casados::{Real, dae, ode};
 use nalgebra::SVector;
 use runs::{Counts, seeds, shows, times};

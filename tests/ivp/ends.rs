@@ -7,7 +7,7 @@
 //! So each problem has its factor, `amplification`, between tolerance and the relative error of the
 //! worst component; a mistake in an estimate or in an order shows as powers of ten.
 
-use casados::shape::Shape;
+use casados::Shape;
 use casados::{
     Adaptive, AdaptiveOptions, AdaptiveStatistics, Dae, DormandPrince5, DormandPrince8, Error, Ode, Radau,
     RadauIIA,

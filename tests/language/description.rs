@@ -227,7 +227,7 @@ fn costs_are_those_of_the_plan() {
 /// without a plan.
 #[test]
 fn costs_without_a_plan() {
-    let structure = Structure { elimination: casados::model::Elimination::NONE, ..*Tank::describe() };
+    let structure = Structure { elimination: casados::__private::Elimination::NONE, ..*Tank::describe() };
     for s in 1..=4 {
         let n = 3 * s;
         let mut a: Matrix = (0..n)

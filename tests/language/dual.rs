@@ -1,10 +1,13 @@
 //! Models over dual numbers: their derivatives against the graphs of the same models, and their
 //! passes.
 
+use casados::__private::Array;
+use casados::__private::Tangent;
 use casados::dual::DualModel;
-use casados::model::{ArrayK, ArrayV, Pattern};
-use casados::scalar::Tangent;
-use casados::shape::Array;
+use casados::{
+    __private::{ArrayK, ArrayV},
+    model::Pattern,
+};
 use casados::{Dae, Ode, Shape, dae, ode};
 use num_dual::DualNum;
 

@@ -1,7 +1,7 @@
 //! Forms of a model: arguments in any order, references, structs, modules, const parameters.
 
 use crate::{part, same_bits};
-use casados::shape::Shape;
+use casados::Shape;
 use casados::{Dae, Ode, dae, ode};
 
 #[dae]

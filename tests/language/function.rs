@@ -1,10 +1,10 @@
 //! Functions of a model's variables: values, patterns, and derivatives three ways (forward
 //! differentiation through the emitted code, the complex step, formulas by hand).
 
-use casados::function::FunctionStructure;
+use casados::__private::FunctionStructure;
 use casados::prelude::*;
 use casados::testing::{Forward, Random};
-use casados::{GraphFunction, Scalar};
+use casados::{__private::Scalar, GraphFunction};
 use nalgebra::Complex;
 
 /// Every kind of argument: `v = (ẋ₀, ẋ₁, x₀, x₁, z, u₀, u₁, p, t)`.

@@ -37,8 +37,8 @@ mod statements;
 mod tables;
 mod traits;
 
-use casados::shape::{Array, Shape};
-use casados::{Dae, model::ArrayV};
+use casados::{__private::Array, Shape};
+use casados::{__private::ArrayV, Dae};
 
 /// The residual that was emitted for a model.
 pub fn emitted<M: Dae>(v: &[f64]) -> Vec<f64> {

@@ -4,7 +4,7 @@
 //! Errors are those of `tests/batch`.
 
 use crate::models::chain::{Chain, stretched};
-use casados::batch::BatchStatistics;
+use casados::BatchStatistics;
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use casados::testing::limit_cache;

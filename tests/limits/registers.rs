@@ -3,12 +3,15 @@
 
 use crate::models::chain::{Chain, stretched};
 use crate::models::pendulum::Pendulum;
+use casados::__private::Matrix;
 use casados::batch;
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, Hessian, Nominal};
-use casados::shape::Matrix;
 use casados::testing::{Level, limit};
-use casados::{irk, memory::Heap, model::VectorU, model::VectorX};
+use casados::{
+    Heap, irk,
+    model::{VectorU, VectorX},
+};
 use nalgebra::{SVector, Vector1, vector};
 
 type Test = Result<(), Box<dyn std::error::Error>>;

@@ -5,7 +5,7 @@ use crate::Test;
 use crate::chain_model::Chain;
 use crate::chain_problem;
 use crate::data::Record;
-use casados::Scalar;
+use casados::__private::Scalar;
 use casados::ocp::{Convexification, Exact, Globalisation, HeapSqp, Shooting};
 use casados::prelude::*;
 use casados::qp::{Condensing, HeapInteriorPoint};

@@ -2,8 +2,8 @@
 
 use super::mechanisms::{CarAxis, Pendulum};
 use bytemuck::Zeroable;
+use casados::__private::function::ArrayV;
 use casados::error::Argument;
-use casados::function::ArrayV;
 use casados::{Consistent, Constrained, Dae, Function, Inconsistent, Shape};
 use nalgebra::{DMatrix, DVector, Vector4, vector};
 

@@ -121,7 +121,7 @@ fn links<const N: usize>(
 /// Energy and lengths of a chain of four links that falls from a horizontal line.
 #[test]
 fn families_are_reduced_one_by_one() {
-    let of = |reduction: Option<&casados::structure::Reduction>| reduction.unwrap().differentiated;
+    let of = |reduction: Option<&casados::__private::Reduction>| reduction.unwrap().differentiated;
     assert_eq!(of(Links::<2>::STRUCTURE.reduction), [(8, 2), (9, 2)]);
     assert_eq!(of(Links::<4>::STRUCTURE.reduction), [(16, 2), (17, 2), (18, 2), (19, 2)]);
     let mut irk = Projected::new(Irk::<Links<4>, Gauss<4>>::new(Options::default()).unwrap());

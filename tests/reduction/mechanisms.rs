@@ -86,7 +86,7 @@ fn what_is_differentiated_is_told() {
         assert_eq!(reduction.differentiated, differentiated);
         assert_eq!(
             reduction.invariants(),
-            <<M::Invariants as Function>::Outputs as casados::shape::Outputs>::NY
+            <<M::Invariants as Function>::Outputs as casados::__private::Outputs>::NY
         );
     }
     told::<Pendulum>(&[(4, 2)]);

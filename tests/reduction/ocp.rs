@@ -1,11 +1,11 @@
 //! Optimal control of a mechanism that is written with its constraint: a crane whose load hangs on
 //! a rope of fixed length, beside its form by the angle.
 
+use casados::__private::Array;
 use casados::ocp::{
     Collocation, Constraint, GeneralCost, HeapIpm, HeapSqp, Horizon, Problem, SecondOrder, Shooting,
 };
 use casados::prelude::*;
-use casados::shape::Array;
 use casados::{Constrained, Divided, Integrator, Projected};
 use nalgebra::vector;
 

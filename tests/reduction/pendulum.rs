@@ -3,7 +3,7 @@
 
 use super::mechanisms::{ByHand, Damped, Pendulum};
 use bytemuck::Zeroable;
-use casados::model::{ArrayK, ArrayV};
+use casados::__private::{ArrayK, ArrayV};
 use casados::prelude::*;
 use casados::result::Hessian;
 use nalgebra::{SVector, Vector4, vector};

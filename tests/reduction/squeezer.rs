@@ -3,7 +3,7 @@
 
 use crate::data::Record;
 use bytemuck::Zeroable;
-use casados::function::ArrayV;
+use casados::__private::function::ArrayV;
 use casados::prelude::*;
 use casados::{Consistent, Constrained};
 use nalgebra::SVector;

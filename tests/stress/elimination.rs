@@ -1,7 +1,7 @@
 //! The elimination planned by the macro, on models made to break a static order: the pivoted
 //! factorisation of the whole matrix takes over, and results stay right.
 
-use casados::memory::fallback::Refusing;
+use casados::memory::Refusing;
 use casados::mode;
 use casados::prelude::*;
 use nalgebra::{SVector, vector};
@@ -42,7 +42,7 @@ fn t21_pivots_that_vanish() {
 fn without_a_fallback() {
     fn check<const S: usize>(newton: Newton)
     where
-        RadauIIA<S>: casados::tableau::Method<S>,
+        RadauIIA<S>: casados::Method<S>,
     {
         type Whole<const S: usize> = Irk<Vanishing, RadauIIA<S>, f64, Inline<mode::Forward>>;
         type Lean<const S: usize> = Irk<Vanishing, RadauIIA<S>, f64, Inline<mode::Forward, 1, Refusing>>;

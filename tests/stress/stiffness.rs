@@ -4,8 +4,8 @@ use super::data::Record;
 use super::pollution::{self, Pollution};
 use crate::models::chemistry::{E5Conserved, Hires, Oregonator, Robertson};
 use crate::models::oscillators::VanDerPolScaled;
+use casados::__private::Matrix;
 use casados::model::{VectorP, VectorX};
-use casados::shape::Matrix;
 use casados::{Adaptive, AdaptiveOptions, Dae, Error, Gauss, Irk, Options, Radau, RadauIIA, Shape, ode};
 use nalgebra::{SVector, vector};
 

@@ -1,14 +1,14 @@
 //! Models by hand for tests of the integrators alone: derivatives are those of `num-dual`, dense.
 #![allow(dead_code)]
 
-use casados::model::{ArrayK, ArrayV};
-use casados::{Dae, Lanes, Shape};
+use casados::__private::{ArrayK, ArrayV};
+use casados::{__private::Lanes, Dae, Shape};
 use num_dual::{Dual64, HyperDual64};
 
 /// A model whose residual is a function of any scalar.
 pub trait Equations: Dae {
     /// `f(v)`
-    fn equations<S: casados::Scalar>(v: &[S], f: &mut [S]);
+    fn equations<S: casados::__private::Scalar>(v: &[S], f: &mut [S]);
 }
 
 /// Number of variables of each block of the Jacobian, `(ẋ, x, z, u, p)`.
@@ -132,7 +132,7 @@ macro_rules! system {
         $(#[$doc])*
         struct $name;
         const _: () = {
-            use casados::model::{ArrayK, ArrayV, Elimination, Operations, Pattern, Structure, all, by_column, symmetric};
+            use casados::{__private::{ArrayK, ArrayV, Elimination, all, by_column, symmetric}, model::{Operations, Pattern, Structure}};
             const NV: usize = 2 * $nx + $nz + $nu + $np + 1;
             const JACOBIAN: usize = ($nx + $nz) * (NV - 1);
             const HESSIAN: usize = NV * (NV - 1) / 2;
@@ -141,9 +141,9 @@ macro_rules! system {
             static TRIANGLE: [[u32; HESSIAN]; 2] = $crate::systems::triangle::<HESSIAN>();
             impl casados::Dae for $name {
                 type Shape = D;
-                type Jacobian<T: casados::shape::Plain> = [T; JACOBIAN];
-                type Hessian<T: casados::shape::Plain> = [T; HESSIAN];
-                type Factors<B: casados::shape::Plain> = [B; 0];
+                type Jacobian<T: casados::__private::Plain> = [T; JACOBIAN];
+                type Hessian<T: casados::__private::Plain> = [T; HESSIAN];
+                type Factors<B: casados::__private::Plain> = [B; 0];
                 const STRUCTURE: Structure = Structure {
                     name: stringify!($name),
                     x: &["x"; $nx],
@@ -181,11 +181,11 @@ macro_rules! system {
                     elimination: Elimination::NONE,
                     reduction: None,
                 };
-                fn residual<S: casados::Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
+                fn residual<S: casados::__private::Lanes>(v: &ArrayV<Self, S::Cell>, f: &mut ArrayK<Self, S::Cell>) {
                     $crate::systems::residual::<Self, S>(v, f);
                 }
-                fn jacobian_constants<S: casados::Lanes>(_: &mut Self::Jacobian<S::Cell>) {}
-                fn residual_jacobian<S: casados::Lanes>(
+                fn jacobian_constants<S: casados::__private::Lanes>(_: &mut Self::Jacobian<S::Cell>) {}
+                fn residual_jacobian<S: casados::__private::Lanes>(
                     v: &ArrayV<Self, S::Cell>,
                     f: &mut ArrayK<Self, S::Cell>,
                     jacobian: &mut Self::Jacobian<S::Cell>,
@@ -193,10 +193,10 @@ macro_rules! system {
                     $crate::systems::residual::<Self, S>(v, f);
                     $crate::systems::jacobian::<Self, S>(v, jacobian);
                 }
-                fn adjoint<S: casados::Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, g: &mut ArrayV<Self, S::Cell>) {
+                fn adjoint<S: casados::__private::Lanes>(v: &ArrayV<Self, S::Cell>, mu: &ArrayK<Self, S::Cell>, g: &mut ArrayV<Self, S::Cell>) {
                     $crate::systems::adjoint::<Self, S>(v, mu, g);
                 }
-                fn hessian<S: casados::Lanes>(
+                fn hessian<S: casados::__private::Lanes>(
                     v: &ArrayV<Self, S::Cell>,
                     mu: &ArrayK<Self, S::Cell>,
                     hessian: &mut Self::Hessian<S::Cell>,
@@ -205,7 +205,7 @@ macro_rules! system {
                 }
             }
             impl $crate::systems::Equations for $name {
-                fn equations<$s: casados::Scalar>($v: &[$s], $f: &mut [$s]) $body
+                fn equations<$s: casados::__private::Scalar>($v: &[$s], $f: &mut [$s]) $body
             }
         };
     };

@@ -2,8 +2,8 @@
 //! of numbers: they are for those of the library.
 
 use bytemuck::Zeroable;
-use casados::scalar::{Known, Rows};
-use casados::{Field, Lanes, Scalar};
+use casados::__private::{Known, Rows};
+use casados::__private::{Field, Lanes, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Zeroable)]

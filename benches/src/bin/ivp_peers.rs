@@ -12,7 +12,7 @@
 //! call that makes a solver and integrates.
 
 use casados::GraphDae;
-use casados::shape::Shape;
+use casados::Shape;
 use cpu_time::ThreadTime;
 use diffsol::{MatrixCommon, NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
 use models::chemistry::{AkzoNobel, E5Conserved, Hires, Oregonator, Robertson};

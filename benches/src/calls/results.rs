@@ -3,7 +3,7 @@
 use crate::case::Values;
 use casados::prelude::*;
 use casados::result::{Adjoint, Forward, Hessian, Nominal};
-use casados::shape::{Matrix, Shape};
+use casados::{__private::Matrix, Shape};
 
 /// Places of results, one for each input, once they are asked for.
 pub(super) struct Results<M: Dae> {

@@ -65,10 +65,14 @@ pub use crate::{
     __casadi_export as export, __casadi_export_horizon as export_horizon,
     __casadi_export_problem as export_problem,
 };
-pub use horizon::{Horizon, Horizons};
-pub use integral::{Integral, Nothing, Of};
-pub use integrators::{Integrators, Settings};
-pub use interval::Interval;
-pub use library::Library;
-pub use problem::Problems;
 pub use program::Program;
+// What the macros write.
+#[doc(hidden)]
+pub use self::{
+    horizon::{Horizon, Horizons},
+    integral::{Integral, Nothing, Of},
+    integrators::{Integrators, Settings},
+    interval::Interval,
+    library::Library,
+    problem::Problems,
+};

@@ -117,7 +117,9 @@ pub use convex::{Convex, ConvexCost, Huber, PseudoHuber};
 pub use convexify::Convexification;
 pub use cost::{Cost, GeneralCost};
 pub use curvature::{Curvature, Exact, GaussNewton, Secant, Update};
-pub use dynamics::{Dynamics, IntegralTerms, Interval, Nodes, SecondOrder, Sink, StageAction, Step};
+pub use dynamics::{Dynamics, SecondOrder};
+#[doc(hidden)]
+pub use dynamics::{IntegralTerms, Interval, Nodes, Sink, StageAction, Step};
 pub use error::{ConstraintName, OcpError, Part, Text};
 pub use horizon::Horizon;
 #[cfg(feature = "alloc")]

@@ -30,6 +30,7 @@ mod points;
 mod report;
 mod sensitivities;
 
+#[doc(hidden)]
 pub use crate::scalar::lanes::{Level, limit, limit_cache};
 pub use bounded::Bounded;
 pub use convergence::{Convergence, convergence};

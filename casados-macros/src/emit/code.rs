@@ -57,11 +57,11 @@ pub fn module(
         text += &routine.write(graph, variables, of(model));
     }
     let code: TokenStream = text.parse()?;
-    let tables = (!model.tables.is_empty()).then(|| quote!(use #krate::tables::Table;));
+    let tables = (!model.tables.is_empty()).then(|| quote!(use #krate::__private::tables::Table;));
     Ok(quote! {
         #[allow(clippy::all, clippy::pedantic, non_camel_case_types, unused_imports, unused_variables)]
         mod code {
-            use #krate::scalar::{Piece, Scalar, elementary};
+            use #krate::__private::{Piece, Scalar, elementary};
             #tables
             #code
         }
@@ -132,16 +132,16 @@ fn table(model: &Model, index: usize, table: &Table, names: &TokenStream) -> Tok
         struct #ty;
         impl #ty {
             #[allow(unused_imports)]
-            fn table() -> &'static (impl #krate::tables::Table<#variables> + 'static) {
+            fn table() -> &'static (impl #krate::__private::tables::Table<#variables> + 'static) {
                 #names
-                use #krate::tables as casados_tables;
+                use #krate::__private::tables as casados_tables;
                 const { &#expression }
             }
         }
-        impl #krate::tables::Table<#variables> for #ty {
+        impl #krate::__private::tables::Table<#variables> for #ty {
             #[inline(always)]
-            fn partial<S: #krate::Scalar>(&self, at: [S; #variables], orders: [u32; #variables]) -> S {
-                #krate::tables::Table::partial(Self::table(), at, orders)
+            fn partial<S: #krate::__private::Scalar>(&self, at: [S; #variables], orders: [u32; #variables]) -> S {
+                #krate::__private::tables::Table::partial(Self::table(), at, orders)
             }
         }
     }

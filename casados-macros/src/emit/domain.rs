@@ -29,10 +29,10 @@ pub fn write(
         .then(|| quote!(const START: &'static [f64] = &[#(#starts),*];));
     let ranges = samplings.iter().any(|sampling| sampling.range.is_some()).then(|| {
         let ranges = samplings.iter().map(|sampling| match sampling.range {
-            Some((low, high)) => quote!(#krate::model::Range { low: #low, high: #high }),
-            None => quote!(#krate::model::Range::ANY),
+            Some((low, high)) => quote!(#krate::__private::Range { low: #low, high: #high }),
+            None => quote!(#krate::__private::Range::ANY),
         });
-        quote!(const RANGES: &'static [#krate::model::Range] = &[#(#ranges),*];)
+        quote!(const RANGES: &'static [#krate::__private::Range] = &[#(#ranges),*];)
     });
     quote!(#starts #ranges)
 }

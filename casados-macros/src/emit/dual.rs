@@ -57,7 +57,7 @@ impl Sizes {
     fn shape(&self, krate: &syn::Path) -> TokenStream {
         let &Self { nx, nz, nu, np, nk, nv, nw, .. } = self;
         let numbers = [nx, nz, nu, np, nk, nv, nw].map(Literal::usize_unsuffixed);
-        quote!(#krate::Dims<#(#numbers),*>)
+        quote!(#krate::__private::Dims<#(#numbers),*>)
     }
 }
 
@@ -72,7 +72,7 @@ pub fn write(model: &Model) -> TokenStream {
         let rows = (0..sizes.nx).map(Literal::usize_unsuffixed);
         quote! {
             #[automatically_derived]
-            impl #krate::Ode for #ty {
+            impl #krate::__private::Ode for #ty {
                 const ROWS: &'static [(u32, f64)] = &[#((#rows, 1.0)),*];
             }
         }
@@ -97,13 +97,13 @@ fn dual_model(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
     let equations = Literal::usize_unsuffixed(model.equations);
     quote! {
             #[automatically_derived]
-            impl #krate::dual::DualModel for #ty {
+            impl #krate::__private::dual::DualModel for #ty {
                 fn evaluate<CasadosT>(
                     casados_variable: impl Fn(usize) -> CasadosT,
                     mut casados_equation: impl FnMut(usize, CasadosT),
                 )
                 where
-                    CasadosT: #krate::dual::DualNum<Primitive = f64> + #krate::dual::DualNumCopy,
+                    CasadosT: #krate::__private::dual::DualNum<Primitive = f64> + #krate::__private::dual::DualNumCopy,
                 {
                     let casados_residual: [CasadosT; #equations] = #returned;
                     for (casados_row, casados_value) in casados_residual.into_iter().enumerate() {
@@ -111,8 +111,8 @@ fn dual_model(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
                     }
                 }
 
-                fn passes() -> &'static ::std::sync::OnceLock<#krate::dual::Passes> {
-                    static PASSES: ::std::sync::OnceLock<#krate::dual::Passes> = ::std::sync::OnceLock::new();
+                fn passes() -> &'static ::std::sync::OnceLock<#krate::__private::dual::Passes> {
+                    static PASSES: ::std::sync::OnceLock<#krate::__private::dual::Passes> = ::std::sync::OnceLock::new();
                     &PASSES
                 }
             }
@@ -128,56 +128,56 @@ fn dae(model: &Model, sizes: &Sizes, ty: &TokenStream) -> TokenStream {
     let structure = structure(model, sizes);
     quote! {
         #[automatically_derived]
-        impl #krate::Dae for #ty {
+        impl #krate::__private::Dae for #ty {
             type Shape = #shape;
-            type Jacobian<T: #krate::shape::Plain> = [T; #lj];
-            type Hessian<T: #krate::shape::Plain> = [T; #lh];
-            type Factors<B: #krate::shape::Plain> = [B; 0];
+            type Jacobian<T: #krate::__private::Plain> = [T; #lj];
+            type Hessian<T: #krate::__private::Plain> = [T; #lh];
+            type Factors<B: #krate::__private::Plain> = [B; 0];
             #domain
-            const STRUCTURE: #krate::model::Structure = {
-                    const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::dual::jacobian_pattern::<
+            const STRUCTURE: #krate::__private::Structure = {
+                    const JACOBIAN: ([u32; #lj], [u32; #lj]) = #krate::__private::dual::jacobian_pattern::<
                         #shape,
                         #lj,
                     >();
-                    const HESSIAN: ([u32; #lh], [u32; #lh]) = #krate::dual::hessian_pattern();
+                    const HESSIAN: ([u32; #lh], [u32; #lh]) = #krate::__private::dual::hessian_pattern();
                     #structure
             };
 
-                fn residual<CasadosS: #krate::Lanes>(variables: &[CasadosS::Cell; #lv], residual: &mut [CasadosS::Cell; #lk]) {
-                    #krate::dual::residual::<Self, CasadosS>(variables, residual);
+                fn residual<CasadosS: #krate::__private::Lanes>(variables: &[CasadosS::Cell; #lv], residual: &mut [CasadosS::Cell; #lk]) {
+                    #krate::__private::dual::residual::<Self, CasadosS>(variables, residual);
                 }
 
-                fn jacobian_constants<CasadosS: #krate::Lanes>(_: &mut [CasadosS::Cell; #lj]) {}
+                fn jacobian_constants<CasadosS: #krate::__private::Lanes>(_: &mut [CasadosS::Cell; #lj]) {}
 
-                fn residual_jacobian<CasadosS: #krate::Lanes>(
+                fn residual_jacobian<CasadosS: #krate::__private::Lanes>(
                     variables: &[CasadosS::Cell; #lv],
                     residual: &mut [CasadosS::Cell; #lk],
                     jacobian: &mut [CasadosS::Cell; #lj],
                 ) {
-                    #krate::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
+                    #krate::__private::dual::residual_jacobian::<Self, CasadosS>(variables, residual, jacobian);
                 }
 
-                fn tangent<CasadosS: #krate::Lanes>(
-                    variables: &[#krate::scalar::Tangent<CasadosS>; #lv],
-                    residual: &mut [#krate::scalar::Tangent<CasadosS>; #lk],
+                fn tangent<CasadosS: #krate::__private::Lanes>(
+                    variables: &[#krate::__private::Tangent<CasadosS>; #lv],
+                    residual: &mut [#krate::__private::Tangent<CasadosS>; #lk],
                 ) {
-                    #krate::dual::tangent::<Self, CasadosS>(variables, residual);
+                    #krate::__private::dual::tangent::<Self, CasadosS>(variables, residual);
                 }
 
-                fn adjoint<CasadosS: #krate::Lanes>(
+                fn adjoint<CasadosS: #krate::__private::Lanes>(
                     variables: &[CasadosS::Cell; #lv],
                     seeds: &[CasadosS::Cell; #lk],
                     gradient: &mut [CasadosS::Cell; #lv],
                 ) {
-                    #krate::dual::adjoint::<Self, CasadosS>(variables, seeds, gradient);
+                    #krate::__private::dual::adjoint::<Self, CasadosS>(variables, seeds, gradient);
                 }
 
-                fn hessian<CasadosS: #krate::Lanes>(
+                fn hessian<CasadosS: #krate::__private::Lanes>(
                     variables: &[CasadosS::Cell; #lv],
                     seeds: &[CasadosS::Cell; #lk],
                     hessian: &mut [CasadosS::Cell; #lh],
                 ) {
-                    #krate::dual::hessian::<Self, CasadosS>(variables, seeds, hessian);
+                    #krate::__private::dual::hessian::<Self, CasadosS>(variables, seeds, hessian);
                 }
         }
     }
@@ -199,22 +199,22 @@ fn structure(model: &Model, sizes: &Sizes) -> TokenStream {
     let text = name.to_string();
     let Variables { x, z, u, p } = variables;
     quote! {
-                    #krate::model::Structure {
+                    #krate::__private::Structure {
                         name: #text,
                         x: &[#(#x),*],
                         z: &[#(#z),*],
                         u: &[#(#u),*],
                         p: &[#(#p),*],
-                        jacobian: #krate::model::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
+                        jacobian: #krate::__private::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
                         blocks: [#(#blocks),*],
                         by_column: &const {
-                            #krate::model::by_column::<#lcurved, #linputs>(
-                                &#krate::model::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
+                            #krate::__private::by_column::<#lcurved, #linputs>(
+                                &#krate::__private::Pattern { rows: &JACOBIAN.0, columns: &JACOBIAN.1 },
                                 #first,
                             )
                         },
                         constant: &[false; #lj],
-                        hessian: #krate::model::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
+                        hessian: #krate::__private::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
                         linear: &[false; #lk],
                         linear_in_state: false,
                         constant_matrix: false,
@@ -222,23 +222,23 @@ fn structure(model: &Model, sizes: &Sizes) -> TokenStream {
                         constant_rows: &[false; #lk],
                         trivial: &[],
                         quadratures: &[],
-                        directions: &const { #krate::model::all::<#lw>() },
-                        column_of_direction: &const { #krate::model::all::<#lw>() },
-                        curved: &const { #krate::model::all::<#lcurved>() },
+                        directions: &const { #krate::__private::all::<#lw>() },
+                        column_of_direction: &const { #krate::__private::all::<#lw>() },
+                        curved: &const { #krate::__private::all::<#lcurved>() },
                         symmetric: &const {
-                            #krate::model::symmetric::<#lcurved, #lterms>(
-                                &#krate::model::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
-                                &#krate::model::all(),
+                            #krate::__private::symmetric::<#lcurved, #lterms>(
+                                &#krate::__private::Pattern { rows: &HESSIAN.0, columns: &HESSIAN.1 },
+                                &#krate::__private::all(),
                             )
                         },
                         lone: &[],
-                        operations: #krate::model::Operations {
+                        operations: #krate::__private::Operations {
                             residual: 0,
                             residual_jacobian: 0,
                             adjoint: 0,
                             hessian: 0,
                         },
-                        elimination: #krate::model::Elimination::NONE,
+                        elimination: #krate::__private::Elimination::NONE,
                         reduction: ::core::option::Option::None,
                     }
     }

@@ -18,9 +18,9 @@ pub fn write(krate: &syn::Path, tables: &Tables) -> TokenStream {
     let [slots, slot_of_equation] = [&tables.slots, &tables.slot_of_equation].map(|table| numbers(table));
     let constructors = constructors();
     quote! {{
-        use #krate::model::{Assembly, Dependent, Kinematic, Left, Pivot, Supernode, Update};
+        use #krate::__private::{Assembly, Dependent, Kinematic, Left, Pivot, Supernode, Update};
         #constructors
-        #krate::model::Elimination {
+        #krate::__private::Elimination {
             pivots: &const { [#(#pivots),*] },
             slots: &[#(#slots),*],
             left: &const { [#(#left),*] },

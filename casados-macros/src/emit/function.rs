@@ -28,25 +28,25 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
     let (ty, structure) = (ty(model), structure::of_function(analysis));
     quote! {
         #[automatically_derived]
-        impl #krate::Function for #ty {
-            type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
-            type Outputs = #krate::shape::Count<#ly>;
-            type Jacobian<T: #krate::shape::Plain> = [T; #lj];
-            type Hessian<T: #krate::shape::Plain> = [T; #lh];
-            const STRUCTURE: #krate::function::FunctionStructure = #structure;
+        impl #krate::__private::Function for #ty {
+            type Shape = #krate::__private::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
+            type Outputs = #krate::__private::Count<#ly>;
+            type Jacobian<T: #krate::__private::Plain> = [T; #lj];
+            type Hessian<T: #krate::__private::Plain> = [T; #lh];
+            const STRUCTURE: #krate::__private::FunctionStructure = #structure;
 
             #[inline]
-            fn value<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_y: &mut [S::Cell; #ly]) {
+            fn value<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_y: &mut [S::Cell; #ly]) {
                 code::value::<S>(#c casados_v, casados_y);
             }
 
             #[inline]
-            fn jacobian_constants<S: #krate::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
+            fn jacobian_constants<S: #krate::__private::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
                 code::jacobian_constants::<S>(#c casados_jacobian);
             }
 
             #[inline]
-            fn value_jacobian<S: #krate::Lanes>(
+            fn value_jacobian<S: #krate::__private::Lanes>(
                 casados_v: &[S::Cell; #lv],
                 casados_y: &mut [S::Cell; #ly],
                 casados_jacobian: &mut [S::Cell; #lj],
@@ -55,13 +55,13 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
             }
 
             #[inline]
-            fn adjoint<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #ly], casados_gradient: &mut [S::Cell; #lv]) {
+            fn adjoint<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #ly], casados_gradient: &mut [S::Cell; #lv]) {
                 code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
                 S::from_f64(0.0).store(&mut casados_gradient[#last]);
             }
 
             #[inline]
-            fn time_derivative<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_rate: &mut [S::Cell; #ly]) {
+            fn time_derivative<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_rate: &mut [S::Cell; #ly]) {
                 for casados_rate in casados_rate.iter_mut() {
                     S::from_f64(0.0).store(casados_rate);
                 }
@@ -69,7 +69,7 @@ fn function(analysis: &FunctionAnalysis, c: &Option<TokenStream>) -> TokenStream
             }
 
             #[inline]
-            fn hessian<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #ly], casados_hessian: &mut [S::Cell; #lh]) {
+            fn hessian<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #ly], casados_hessian: &mut [S::Cell; #lh]) {
                 code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
@@ -82,14 +82,14 @@ fn graph_function(model: &Model, c: &Option<TokenStream>) -> TokenStream {
     let last = Literal::usize_unsuffixed(nv - 1);
     quote! {
         #[automatically_derived]
-        impl #krate::GraphFunction for #ty {
-            fn value_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_y: &mut [S]) {
+        impl #krate::__private::GraphFunction for #ty {
+            fn value_of<S: #krate::__private::Scalar<Cell = S>>(casados_v: &[S], casados_y: &mut [S]) {
                 if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_y)) = (casados_v.first_chunk(), casados_y.first_chunk_mut()) {
                     code::value::<S>(#c casados_v, casados_y);
                 }
             }
 
-            fn adjoint_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
+            fn adjoint_of<S: #krate::__private::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
                 if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_mu), ::core::option::Option::Some(casados_gradient)) =
                     (casados_v.first_chunk(), casados_mu.first_chunk(), casados_gradient.first_chunk_mut())
                 {

@@ -88,7 +88,7 @@ pub fn expand_dual(source: language::dual::Source) -> syn::Result<TokenStream> {
 fn with_elementary_functions(item: TokenStream, krate: &syn::Path) -> TokenStream {
     let import = quote! {
         #[allow(unused_imports)]
-        use #krate::scalar::Float as _;
+        use #krate::__private::Float as _;
     };
     language::tokens::with(item, &import, &TokenStream::new())
 }

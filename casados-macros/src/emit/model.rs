@@ -30,26 +30,26 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
     let domain = domain::write(krate, variables, &model.samplings, |unknown| analysis.nonlinear[unknown]);
     quote! {
         #[automatically_derived]
-        impl #krate::Dae for #ty {
-            type Shape = #krate::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
-            type Jacobian<T: #krate::shape::Plain> = [T; #lj];
-            type Hessian<T: #krate::shape::Plain> = [T; #lh];
-            type Factors<B: #krate::shape::Plain> = [B; #lb];
-            const STRUCTURE: #krate::model::Structure = #structure;
+        impl #krate::__private::Dae for #ty {
+            type Shape = #krate::__private::Dims<#lx, #lz, #lu, #lp, #lk, #lv, #lw>;
+            type Jacobian<T: #krate::__private::Plain> = [T; #lj];
+            type Hessian<T: #krate::__private::Plain> = [T; #lh];
+            type Factors<B: #krate::__private::Plain> = [B; #lb];
+            const STRUCTURE: #krate::__private::Structure = #structure;
             #domain
 
             #[inline]
-            fn residual<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_f: &mut [S::Cell; #lk]) {
+            fn residual<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_f: &mut [S::Cell; #lk]) {
                 code::residual::<S>(#c casados_v, casados_f);
             }
 
             #[inline]
-            fn jacobian_constants<S: #krate::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
+            fn jacobian_constants<S: #krate::__private::Lanes>(casados_jacobian: &mut [S::Cell; #lj]) {
                 code::jacobian_constants::<S>(#c casados_jacobian);
             }
 
             #[inline]
-            fn residual_jacobian<S: #krate::Lanes>(
+            fn residual_jacobian<S: #krate::__private::Lanes>(
                 casados_v: &[S::Cell; #lv],
                 casados_f: &mut [S::Cell; #lk],
                 casados_jacobian: &mut [S::Cell; #lj],
@@ -58,18 +58,18 @@ fn dae(analysis: &Analysis, c: &Option<TokenStream>) -> TokenStream {
             }
 
             #[inline]
-            fn tangent<S: #krate::Lanes>(casados_v: &[#krate::scalar::Tangent<S>; #lv], casados_f: &mut [#krate::scalar::Tangent<S>; #lk]) {
-                code::residual::<#krate::scalar::Tangent<S>>(#c casados_v, casados_f);
+            fn tangent<S: #krate::__private::Lanes>(casados_v: &[#krate::__private::Tangent<S>; #lv], casados_f: &mut [#krate::__private::Tangent<S>; #lk]) {
+                code::residual::<#krate::__private::Tangent<S>>(#c casados_v, casados_f);
             }
 
             #[inline]
-            fn adjoint<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_gradient: &mut [S::Cell; #lv]) {
+            fn adjoint<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_gradient: &mut [S::Cell; #lv]) {
                 code::adjoint::<S>(#c casados_v, casados_mu, casados_gradient);
                 S::from_f64(0.0).store(&mut casados_gradient[#time]);
             }
 
             #[inline]
-            fn hessian<S: #krate::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_hessian: &mut [S::Cell; #lh]) {
+            fn hessian<S: #krate::__private::Lanes>(casados_v: &[S::Cell; #lv], casados_mu: &[S::Cell; #lk], casados_hessian: &mut [S::Cell; #lh]) {
                 code::hessian::<S>(#c casados_v, casados_mu, casados_hessian);
             }
         }
@@ -82,14 +82,14 @@ fn graph_dae(model: &Model, c: &Option<TokenStream>) -> TokenStream {
     let time = Literal::usize_unsuffixed(nv - 1);
     quote! {
         #[automatically_derived]
-        impl #krate::GraphDae for #ty {
-            fn residual_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_f: &mut [S]) {
+        impl #krate::__private::GraphDae for #ty {
+            fn residual_of<S: #krate::__private::Scalar<Cell = S>>(casados_v: &[S], casados_f: &mut [S]) {
                 if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_f)) = (casados_v.first_chunk(), casados_f.first_chunk_mut()) {
                     code::residual::<S>(#c casados_v, casados_f);
                 }
             }
 
-            fn adjoint_of<S: #krate::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
+            fn adjoint_of<S: #krate::__private::Scalar<Cell = S>>(casados_v: &[S], casados_mu: &[S], casados_gradient: &mut [S]) {
                 if let (::core::option::Option::Some(casados_v), ::core::option::Option::Some(casados_mu), ::core::option::Option::Some(casados_gradient)) =
                     (casados_v.first_chunk(), casados_mu.first_chunk(), casados_gradient.first_chunk_mut())
                 {
@@ -113,7 +113,7 @@ fn ode(analysis: &Analysis) -> Option<TokenStream> {
         });
         quote! {
             #[automatically_derived]
-            impl #krate::Ode for #ty {
+            impl #krate::__private::Ode for #ty {
                 const ROWS: &'static [(u32, f64)] = &[#(#rows),*];
             }
         }
@@ -138,14 +138,14 @@ pub fn constrained(analysis: &Analysis) -> Option<TokenStream> {
         let projection = ty(&projection.model);
         quote! {
             #[automatically_derived]
-            impl #krate::Projectable for #model {
+            impl #krate::__private::Projectable for #model {
                 type Projection = #projection;
             }
         }
     });
     Some(quote! {
         #[automatically_derived]
-        impl #krate::Constrained for #model {
+        impl #krate::__private::Constrained for #model {
             type Invariants = #invariants;
         }
         #projectable

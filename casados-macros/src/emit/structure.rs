@@ -17,7 +17,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let width = Literal::usize_unsuffixed(x.len() + u.len() + p.len());
     let lone = facts.lone.iter().map(|&(entry, direction)| {
         let [entry, direction] = [entry, direction].map(Literal::u32_unsuffixed);
-        quote!(#krate::model::Lone { entry: #entry, direction: #direction })
+        quote!(#krate::__private::Lone { entry: #entry, direction: #direction })
     });
     let (jacobian, hessian) = (pattern(krate, jacobian), pattern(krate, hessian));
     let variables = Literal::usize_unsuffixed(2 * x.len() + z.len() + u.len() + p.len());
@@ -31,11 +31,11 @@ pub fn write(analysis: &Analysis) -> TokenStream {
     let elimination = elimination::write(krate, &analysis.elimination.tables);
     let reduction = reduction(krate, analysis.reduction.as_ref());
     quote! {{
-        const JACOBIAN: #krate::model::Pattern = #jacobian;
-        const HESSIAN: #krate::model::Pattern = #hessian;
+        const JACOBIAN: #krate::__private::Pattern = #jacobian;
+        const HESSIAN: #krate::__private::Pattern = #hessian;
         const DIRECTIONS: &[u32] = &[#(#directions),*];
         const CURVED: &[u32; #count] = &[#(#curved),*];
-        #krate::model::Structure {
+        #krate::__private::Structure {
             name: #name,
             x: &[#(#x),*],
             z: &[#(#z),*],
@@ -43,7 +43,7 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             p: &[#(#p),*],
             jacobian: JACOBIAN,
             blocks: [#(#blocks),*],
-            by_column: &const { #krate::model::by_column::<#variables, #inputs>(&JACOBIAN, #begin) },
+            by_column: &const { #krate::__private::by_column::<#variables, #inputs>(&JACOBIAN, #begin) },
             constant: &[#(#constant),*],
             hessian: HESSIAN,
             linear: &[#(#linear),*],
@@ -54,9 +54,9 @@ pub fn write(analysis: &Analysis) -> TokenStream {
             trivial: &[#(#trivial),*],
             quadratures: &[#(#quadratures),*],
             directions: DIRECTIONS,
-            column_of_direction: &const { #krate::model::columns::<#width>(DIRECTIONS) },
+            column_of_direction: &const { #krate::__private::columns::<#width>(DIRECTIONS) },
             curved: CURVED,
-            symmetric: &const { #krate::model::symmetric::<#count, #terms>(&HESSIAN, CURVED) },
+            symmetric: &const { #krate::__private::symmetric::<#count, #terms>(&HESSIAN, CURVED) },
             lone: &[#(#lone),*],
             operations: #operations,
             elimination: #elimination,
@@ -77,7 +77,7 @@ fn reduction(krate: &syn::Path, reduction: Option<&Reduction>) -> TokenStream {
     let singular = singular.map(Literal::u32_unsuffixed);
     let projection = projection.is_some();
     quote! {
-        ::core::option::Option::Some(&#krate::model::Reduction {
+        ::core::option::Option::Some(&#krate::__private::Reduction {
             differentiated: &[#(#differentiated),*],
             rates: &[#(#rates),*],
             projection: #projection,
@@ -100,9 +100,9 @@ pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
     let operations = self::operations(krate, operations);
     let variables = numbers(used);
     quote! {{
-        const JACOBIAN: #krate::model::Pattern = #jacobian;
-        const BY_ROW: &[u32] = &const { #krate::function::by_row::<#rows, #entries>(&JACOBIAN) };
-        #krate::function::FunctionStructure {
+        const JACOBIAN: #krate::__private::Pattern = #jacobian;
+        const BY_ROW: &[u32] = &const { #krate::__private::by_row::<#rows, #entries>(&JACOBIAN) };
+        #krate::__private::FunctionStructure {
             name: #name,
             x: &[#(#x),*],
             z: &[#(#z),*],
@@ -111,7 +111,7 @@ pub fn of_function(analysis: &FunctionAnalysis) -> TokenStream {
             jacobian: JACOBIAN,
             blocks: [#(#blocks),*],
             by_row: BY_ROW,
-            begins: &const { #krate::function::begins::<#begins>(&JACOBIAN, BY_ROW) },
+            begins: &const { #krate::__private::begins::<#begins>(&JACOBIAN, BY_ROW) },
             constant: &[#(#constant),*],
             hessian: #hessian,
             linear: &[#(#linear),*],
@@ -126,7 +126,7 @@ fn operations(krate: &syn::Path, operations: &Operations) -> TokenStream {
     let [residual, residual_jacobian, adjoint, hessian] =
         [residual, residual_jacobian, adjoint, hessian].map(Literal::u32_unsuffixed);
     quote! {
-        #krate::model::Operations {
+        #krate::__private::Operations {
             residual: #residual,
             residual_jacobian: #residual_jacobian,
             adjoint: #adjoint,
@@ -144,6 +144,6 @@ fn pattern(krate: &syn::Path, entries: &[(u32, u32, Node)]) -> TokenStream {
     let rows = entries.iter().map(|entry| Literal::u32_unsuffixed(entry.0));
     let columns = entries.iter().map(|entry| Literal::u32_unsuffixed(entry.1));
     quote! {
-        #krate::model::Pattern { rows: &[#(#rows),*], columns: &[#(#columns),*] }
+        #krate::__private::Pattern { rows: &[#(#rows),*], columns: &[#(#columns),*] }
     }
 }

@@ -4,7 +4,7 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 use casados::model::{VectorU, VectorX};
-use casados::options::{Newton, Options};
+use casados::{options::Newton, Options};
 use casados::{Error, Gauss, Inline, Irk, mode};
 use core::mem::MaybeUninit;
 use core::ptr::{self, NonNull};

@@ -3,7 +3,7 @@
 
 use crate::pendulum::Pendulum;
 use crate::{board, memory::Static, options, report};
-use casados::memory::fallback::Refusing;
+use casados::memory::Refusing;
 use casados::{Error, Gauss, Inline, Irk, Real, mode};
 use nalgebra::{Vector1, Vector4};
 

@@ -1,9 +1,12 @@
 //! A model whose plan of elimination is good for nothing: what a call takes at most, when the whole
 //! matrix is pivoted in every iteration and for the derivatives too.
 
+use casados::__private::Lanes;
 use casados::Dae;
-use casados::model::{ArrayK, ArrayV, Elimination, Structure};
-use casados::scalar::Lanes;
+use casados::{
+    __private::{ArrayK, ArrayV, Elimination},
+    model::Structure,
+};
 use core::marker::PhantomData;
 
 /// The model `M`, of whose Newton matrix the plan sees zeros only: its pivots vanish.
@@ -11,9 +14,9 @@ pub struct Lost<M>(PhantomData<M>);
 
 impl<M: Dae> Dae for Lost<M> {
     type Shape = M::Shape;
-    type Jacobian<T: casados::shape::Plain> = M::Jacobian<T>;
-    type Hessian<T: casados::shape::Plain> = M::Hessian<T>;
-    type Factors<B: casados::shape::Plain> = M::Factors<B>;
+    type Jacobian<T: casados::__private::Plain> = M::Jacobian<T>;
+    type Hessian<T: casados::__private::Plain> = M::Hessian<T>;
+    type Factors<B: casados::__private::Plain> = M::Factors<B>;
     const STRUCTURE: Structure =
         Structure { elimination: Elimination { assembly: &[], ..M::STRUCTURE.elimination }, ..M::STRUCTURE };
 

@@ -43,7 +43,7 @@ macro_rules! modes {
         }
     };
     (@ $number:ty, $name:literal, $integrator:ident, $model:ty, $method:ty, $far:literal) => {{
-        use casados::memory::{Inline, fallback::Refusing};
+        use casados::{Inline, memory::Refusing};
         use casados::model::{VectorU, VectorX};
         use $crate::{board, memory::Static, modes};
         type Of<Mode> = casados::$integrator<$model, $method, $number, Inline<Mode, 1, Refusing>>;

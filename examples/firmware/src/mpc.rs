@@ -4,7 +4,7 @@
 use crate::memory::Parts;
 use crate::pendulum::Pendulum;
 use crate::{board, report};
-use casados::memory::fallback::Refusing;
+use casados::memory::Refusing;
 use casados::ocp::{GaussNewton, Horizon, LeastSquaresCost, OcpError, Problem, RealTime};
 use casados::qp::{InteriorPoint, StageDims};
 use casados::{Gauss, Inline, Irk, Real, function, mode};

@@ -4,7 +4,7 @@
 mod controlled;
 mod discrete;
 
-use casados::shape::Shape;
+use casados::Shape;
 use casados::{
     Adaptive, AdaptiveOptions, Crossing, Dae, DormandPrince5, DormandPrince8, Error, Event, Gauss, Hybrid,
     Piecewise, Radau, RadauIIA,

@@ -26,7 +26,7 @@ impl Program {
 /// Prints the operations of the model.
 const HEAD: &str = r"#![allow(dead_code, unused_imports, unused_macros)]
 use casados::prelude::*;
-use casados::shape::Matrix;
+use casados::__private::Matrix;
 use casados::{Batch, Intervals, Radau};
 use std::hint::black_box;
 

@@ -52,7 +52,7 @@ macro_rules! every_call {
 /// An integrator that does not pivot.
 #[inline(never)]
 fn refusing() -> Result<(), Error> {
-    type Refusing = Inline<mode::Hessian, 3, casados::memory::fallback::Refusing>;
+    type Refusing = Inline<mode::Hessian, 3, casados::memory::Refusing>;
     let mut integrator = Irk::<Pendulum, Gauss<3>, f64, Refusing>::inline(black_box(Options::default()))?;
     let (x, u) = black_box((SVector::<f64, 4>::from_element(0.1), SVector::<f64, 1>::from_element(0.1)));
     integrator.hessian(&x, &u, black_box(0.05), &x)?;

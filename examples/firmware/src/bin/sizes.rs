@@ -2,7 +2,7 @@
 //! for every mode.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-use casados::memory::fallback::{Pivoting, Refusing};
+use casados::memory::{Pivoting, Refusing};
 use casados::{Erk, Gauss, Inline, Irk, Rk4, mode};
 use firmware::pendulum::Pendulum;
 use firmware::quadrotor::{PlanarQuadrotor, Quadrotor};
