@@ -232,6 +232,7 @@ pub enum Refusal {
 
 /// An algebraic state, and where Newton's method started for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Started {
     /// Its name.
     pub unknown: &'static str,
@@ -241,6 +242,7 @@ pub struct Started {
 
 /// Where in a run: all counted from zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Place {
     /// The step of the interval.
     pub step: usize,

@@ -8,6 +8,29 @@ const COARSEST: f64 = 0.1;
 const MOST_ITERATIONS: usize = 10_000;
 
 /// What can be chosen about an integrator.
+///
+/// Newton's method to rounding and one step are the defaults. A later version may have more fields:
+/// write `..Default::default()`.
+///
+/// # Errors
+/// What makes no sense is [`Error::InvalidOption`] of the integrator that is made with it.
+///
+/// # Example
+/// ```
+/// use casados::options::{Jacobian, Newton, Start};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let newton = Newton { tolerance: 1e-8, jacobian: Jacobian::Frozen, ..Default::default() };
+/// let options = Options { steps: 4, newton, start: Start::Warm, ..Default::default() };
+/// assert!(Irk::<Cart, Gauss<2>>::new(options).is_ok());
+/// let none = Options { steps: 0, ..options };
+/// assert!(matches!(Irk::<Cart, Gauss<2>>::new(none), Err(Error::InvalidOption { option: "steps", .. })));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Steps of equal size in one interval, at least one.
@@ -30,6 +53,16 @@ impl Default for Options {
 }
 
 /// How the equations of the stages are solved.
+///
+/// A later version may have more fields: write `..Default::default()`.
+///
+/// ```
+/// use casados::options::Newton;
+///
+/// // The same run time in every call.
+/// let newton = Newton { fixed_iterations: Some(3), ..Default::default() };
+/// assert_eq!(newton.tolerance, 0.0); // to rounding, if iterations were not fixed
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
     /// The iteration ends when its error is expected below this, relative to the size of each
@@ -55,6 +88,7 @@ impl Default for Newton {
 
 /// The Jacobian in Newton's method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Jacobian {
     /// That of the start values in the first step, that of the last step in later ones; evaluated
     /// and factorised anew as soon as the iterations that are still expected with it cost more (by
@@ -90,7 +124,28 @@ impl Jacobian {
 /// that nobody wants looks like any other: say where the model lives, `#[dae(nominal(z = 0.1))]`,
 /// or give values with `set_start`. Where a residual has no value at `z = 0`, as that of `ln z`, or
 /// a matrix there is singular, as that of `z² = x`, there is no solution without such values.
+///
+/// ```
+/// use casados::options::Start;
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// `z² = x` has two roots; the model lives on the positive one.
+/// #[dae(nominal(z = 1.0))]
+/// fn tank(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], u: [f64; 1]) -> [f64; 2] {
+///     [xdot[0] - u[0] + z[0], z[0] * z[0] - x[0]]
+/// }
+///
+/// let mut irk = Irk::<Tank, RadauIIA<2>>::new(Options::default())?;
+/// assert!(irk.solve(&vector![4.0], &vector![2.0], 0.1)?.z[0] > 0.0);
+///
+/// let mut irk = Irk::<Tank, RadauIIA<2>>::new(Options { start: Start::Given, ..Default::default() })?;
+/// irk.set_start(&vector![0.0], &vector![-1.0])?;
+/// assert!(irk.solve(&vector![4.0], &vector![2.0], 0.1)?.z[0] < 0.0);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Start {
     /// The values of `set_start` if it was called, else the nominal values of the model,
     /// [`Dae::START`](crate::Dae::START): `z` at its `nominal(..)`, or, where there is none, at the

@@ -14,6 +14,7 @@ use core::ops::Deref;
 /// The solution.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct Nominal<M: Dae, T: Plain = f64> {
     /// Differential states at the end of the interval.
     pub x: VectorX<M, T>,
@@ -26,6 +27,7 @@ pub struct Nominal<M: Dae, T: Plain = f64> {
 /// The solution and its derivatives with respect to `x₀`, `u` and `p`.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct Forward<M: Dae, T: Plain = f64> {
     /// `x`, `z` and `z0`.
     pub nominal: Nominal<M, T>,
@@ -52,6 +54,7 @@ pub struct Forward<M: Dae, T: Plain = f64> {
 /// The solution and its derivatives in `C` directions.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct Directional<M: Dae, T: Plain, const C: usize> {
     /// `x`, `z` and `z0`.
     pub nominal: Nominal<M, T>,
@@ -79,6 +82,7 @@ pub struct Seeds<M: Dae, T: Plain, const C: usize> {
 /// The solution and the gradients of `λᵀx` for each of `C` seeds `λ`, one a column.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct Adjoint<M: Dae, T: Plain = f64, const C: usize = 1> {
     /// `x`, `z` and `z0`.
     pub nominal: Nominal<M, T>,
@@ -93,6 +97,7 @@ pub struct Adjoint<M: Dae, T: Plain = f64, const C: usize = 1> {
 /// The solution, its derivatives, and the gradient of `λᵀx`.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
     /// The solution and its derivatives.
     pub forward: Forward<M, T>,
@@ -111,6 +116,7 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
 /// the upper ones are given.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct Hessian<M: Dae, T: Plain = f64> {
     /// The solution, its derivatives, and the gradient.
     pub first: ForwardAdjoint<M, T>,
@@ -131,6 +137,7 @@ pub struct Hessian<M: Dae, T: Plain = f64> {
 /// The solution at a time inside the interval.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct Dense<M: Dae, T: Plain = f64> {
     /// Differential states.
     pub x: VectorX<M, T>,
@@ -141,6 +148,7 @@ pub struct Dense<M: Dae, T: Plain = f64> {
 /// The solution at a time inside the interval, and its derivatives.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
+#[non_exhaustive]
 pub struct DenseForward<M: Dae, T: Plain = f64> {
     /// `x` and `z`.
     pub dense: Dense<M, T>,

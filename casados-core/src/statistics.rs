@@ -1,7 +1,24 @@
 //! What the last call did.
 
 /// What the last call did, successful or not.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0] - 9.81 * x[0].sin()]
+/// }
+///
+/// let mut irk = Irk::<Pendulum, Gauss<2>>::new(Options { steps: 3, ..Default::default() })?;
+/// irk.solve(&vector![0.3, 0.0], &vector![0.0], 0.1)?;
+/// assert_eq!(irk.statistics().steps, 3);
+/// assert!(irk.statistics().iterations >= 3);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Statistics {
     /// Steps that were completed.
     pub steps: usize,

@@ -7,7 +7,6 @@ use casados::ocp::{
 };
 use casados::plot::{Colour, Figure, Panel, Series, Space, Sparsity};
 use casados::prelude::*;
-use casados::qp::Residuals;
 use reader::{axes, groups, lines, pixels, points};
 use roxmltree::Document;
 
@@ -149,10 +148,12 @@ fn constraints_are_drawn_between_nodes_too() -> Test {
 
 #[test]
 fn convergence_is_the_log_on_a_logarithmic_axis() -> Test {
-    let row = |iteration, size: f64| Iteration {
-        iteration,
-        residuals: Residuals { stationarity: size, dynamics: 1e-3 * size, ..Residuals::default() },
-        ..Iteration::default()
+    let row = |iteration, size: f64| {
+        let mut row = Iteration::default();
+        row.iteration = iteration;
+        row.residuals.stationarity = size;
+        row.residuals.dynamics = 1e-3 * size;
+        row
     };
     let rows = [row(0, 1e2), row(1, 3.0), row(2, 1e-4), row(3, 1e-9)];
     let figure = Figure::new()

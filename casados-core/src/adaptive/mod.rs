@@ -70,6 +70,56 @@ use stages::Stages;
 
 /// The adaptive integrator of the method `B` for the model `M`, with numbers `T`:
 /// `Adaptive<Model, Radau>`.
+///
+/// Steps are as long as the estimate of their error allows, weighted with `atol + rtol |x|`.
+/// Derivatives are those of the accepted steps. Methods are [`Radau`], of orders 5, 9 and 13 as it
+/// goes; one of `RadauIIA<3>`, `<5>`, `<7>`, `Gauss<2>` to `Gauss<6>`; and for explicit models
+/// `DormandPrince5` and `DormandPrince8`.
+///
+/// It is an [`Integrator`], whose page has all that it can do:
+///
+/// | | |
+/// | --- | --- |
+/// | [`new`](Integrator::new) | memory on the heap |
+/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time), [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, start values of `ẋ` and `z` |
+/// | [`set_relative_tolerances`](Integrator::set_relative_tolerances), [`set_absolute_tolerances`](Integrator::set_absolute_tolerances) | tolerances of single states |
+/// | [`control_sensitivities`](Integrator::control_sensitivities) | derivatives take part in the error control |
+/// | [`solve`](Integrator::solve), [`solve_at`](Integrator::solve_at) | `x₊`, also with the solution at given times |
+/// | [`forward`](Integrator::forward) | and derivatives by `(x₀, u, p)` |
+/// | [`adjoint`](Integrator::adjoint) | and gradients of `λᵀx₊` |
+/// | [`hessian`](Integrator::hessian) | and second derivatives |
+/// | [`dense`](Integrator::dense) | the solution inside the last interval |
+/// | [`freeze`](Integrator::freeze), [`thaw`](Integrator::thaw) | later calls take the same steps |
+/// | [`times`](Integrator::times), [`statistics`](Integrator::statistics) | the accepted steps, and what they took |
+///
+/// By default six digits: [`AdaptiveOptions`]. Units are those of the model.
+///
+/// # Errors
+/// Those of [`Integrator`]: no consistent start, steps that would have to be too short or too many,
+/// a model without a value, inputs that are not finite.
+///
+/// # Example
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::{Vector1, vector};
+///
+/// /// A first-order lag of 1/rate seconds.
+/// #[ode]
+/// fn lag(x: [f64; 1], u: [f64; 1], p: [f64; 1]) -> [f64; 1] {
+///     [p[0] * (u[0] - x[0])]
+/// }
+///
+/// let options = AdaptiveOptions { rtol: 1e-10, atol: 1e-12, ..Default::default() };
+/// let mut adaptive = Adaptive::<Lag, Radau>::new(options)?;
+/// adaptive.set_parameters(&vector![100.0])?;
+/// let step = adaptive.forward(&vector![1.0], &Vector1::zeros(), 0.02)?;
+/// // x₊ = x₀ e^(−p h): errors of single steps are below rtol, and steps are a few dozens.
+/// let exact = (-2.0_f64).exp();
+/// assert!((step.x[0] - exact).abs() < 1e-8);
+/// assert!((step.dx_dx0[(0, 0)] - exact).abs() < 1e-8);
+/// assert!((adaptive.dense(0.01)?.x[0] - (-1.0_f64).exp()).abs() < 1e-8);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub type Adaptive<M, B, T = f64> = <B as AdaptiveMethod>::Integrator<M, T>;
 
 /// A method that an adaptive integrator takes.
@@ -85,6 +135,23 @@ pub trait AdaptiveMethod {
 
 /// Radau IIA methods of 3, 5 and 7 stages: more of them where Newton's method converges fast, fewer
 /// where it is slow.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// Van der Pol's oscillator, which is stiff.
+/// #[ode]
+/// fn oscillator(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], 1e3 * (1.0 - x[0] * x[0]) * x[1] - x[0] + u[0]]
+/// }
+///
+/// let mut adaptive = Adaptive::<Oscillator, Radau>::new(AdaptiveOptions::default())?;
+/// adaptive.solve(&vector![2.0, 0.0], &vector![0.0], 500.0)?;
+/// // An explicit method of fixed steps needs more than 1e6 for the same.
+/// assert!(adaptive.statistics().steps < 1000);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Radau;
 

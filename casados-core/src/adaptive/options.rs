@@ -3,6 +3,26 @@
 use crate::error::Error;
 
 /// What can be chosen about an adaptive integrator.
+///
+/// A later version may have more fields: write `..Default::default()`.
+///
+/// # Errors
+/// What makes no sense is [`Error::InvalidOption`] of the integrator that is made with it.
+///
+/// # Example
+/// ```
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let options = AdaptiveOptions { rtol: 1e-9, max_step: 0.1, ..Default::default() };
+/// assert!(Adaptive::<Cart, Radau>::new(options).is_ok());
+/// let coarse = AdaptiveOptions { rtol: 2.0, ..options };
+/// assert!(Adaptive::<Cart, Radau>::new(coarse).is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptiveOptions {
     /// Relative tolerance of the error of one step, between 10 ε of the number type and 1.

@@ -66,6 +66,7 @@ pub struct Piecewise<M: Dae, B: Engine<M, T>, T: Real> {
 }
 
 /// The solution at the end and its derivatives with respect to `x₀`, all controls, and `p`.
+#[non_exhaustive]
 pub struct PiecewiseForward<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
@@ -84,6 +85,7 @@ pub struct PiecewiseForward<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end and the gradient of `λᵀx`.
+#[non_exhaustive]
 pub struct PiecewiseAdjoint<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
@@ -96,6 +98,7 @@ pub struct PiecewiseAdjoint<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+#[non_exhaustive]
 pub struct PiecewiseHessian<M: Dae, T: Real = f64> {
     /// The solution and its derivatives.
     pub forward: PiecewiseForward<M, T>,

@@ -2,6 +2,7 @@
 
 /// What the last call of an adaptive integrator did, successful or not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct AdaptiveStatistics {
     /// Steps that were accepted.
     pub steps: usize,

@@ -10,6 +10,23 @@ use bytemuck::Zeroable;
 
 /// Many intervals of one model: one element of each slice for each interval. Of all but `x0` there
 /// may be one element for all of them instead.
+///
+/// What a program says begins with `..Default::default()`, which is no interval at all.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let (x0, u) = ([vector![0.0, 0.0]; 8], [vector![1.0]; 8]);
+/// // A control for each interval, one length for all of them.
+/// let intervals = Intervals::<Cart> { x0: &x0, u: &u, h: &[0.1], ..Default::default() };
+/// assert!(intervals.t0.is_empty()); // all begin at zero
+/// ```
 #[derive(Debug)]
 pub struct Intervals<'a, M: Dae, T: Plain = f64> {
     /// States at the start: as many as there are intervals.

@@ -35,38 +35,59 @@ use crate::scalar::Real;
 use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 
 /// The implicit integrator of many intervals, of the method `B` for the model `M`, with numbers
-/// `T`.
+/// `T`: `Batch<Model, Gauss<4>>`.
 ///
+/// Intervals `k = 0, 1, …` have their own `(x₀, u, p, t₀, h)`, which [`Intervals`] lists; each is
+/// integrated as [`Irk`](crate::Irk) does, side by side in registers and, with the feature
+/// `parallel`, over threads. Results are written into the caller's slice, an element for each.
+///
+/// It is an [`Integrator`], whose page has all that it can do:
+///
+/// | | |
+/// | --- | --- |
+/// | [`new`](Integrator::new), [`with_tableau`](Integrator::with_tableau) | memory on the heap, for any number of intervals |
+/// | [`set_start`](Integrator::set_start) | start values of `ẋ` and `z` |
+/// | [`solve`](Integrator::solve) | `x₊`, and `z` at both ends |
+/// | [`forward`](Integrator::forward) | and derivatives by `(x₀, u, p)` |
+/// | [`adjoint`](Integrator::adjoint), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients of `λᵀx₊`, alone or with derivatives |
+/// | [`hessian`](Integrator::hessian), [`hessian_with_z0`](Integrator::hessian_with_z0) | and second derivatives, of `λᵀx₊` or `λᵀx₊ + νᵀz₀` |
+/// | [`status`](Integrator::status) | what happened to an interval |
+/// | [`statistics`](Integrator::statistics) | what the last call did |
+///
+/// # Errors
+/// [`BatchError`]: slices of wrong lengths before anything is computed; afterwards, how many
+/// intervals failed, each for itself. An interval that fails leaves its result as it was.
+///
+/// # Example
 /// ```
-/// # use casados_core::{Batch, BatchError, Gauss, Dae, Error, Intervals, Options, result::Forward, model::{VectorU, VectorX}};
-/// # fn example<Pendulum: Dae>(x0: &[VectorX<Pendulum, f64>], u: &[VectorU<Pendulum, f64>]) -> Result<(), Box<dyn std::error::Error>> {
-/// let mut batch = Batch::<Pendulum, Gauss<4>>::new(Options { steps: 2, ..Default::default() })?;
-/// let mut results = vec![Forward::default(); x0.len()];
-/// batch.forward(&Intervals { x0, u, h: &[0.05], ..Default::default() }, &mut results)?;
-/// for step in &results {
-///     let (x, jacobian) = (step.x, step.dx_dx0);
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// x = [position m, velocity m/s], u = [acceleration m/s²].
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
 /// }
-/// # Ok(())
-/// # }
-/// ```
 ///
-/// Some intervals may fail:
-///
-/// ```
-/// # use casados_core::{Batch, BatchError, Gauss, Dae, Intervals, result::Nominal};
-/// # fn example<M: Dae>(batch: &mut Batch<M, Gauss<4>>, intervals: &Intervals<M>, results: &mut [Nominal<M>]) -> Result<(), BatchError> {
-/// match batch.solve(intervals, results) {
-///     Err(BatchError::Intervals { .. }) => {
-///         for i in 0..results.len() {
-///             if let Err(error) = batch.status(i) {
-///                 println!("interval {i}: {error}");
-///             }
-///         }
-///     }
-///     others => others?,
+/// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// let x0 = [vector![0.0, 1.0], vector![1.0, 0.0], vector![2.0, -1.0]];
+/// let mut ends = vec![casados::result::Forward::default(); 3];
+/// // One control and one length for all.
+/// let intervals = Intervals { x0: &x0, u: &[vector![2.0]], h: &[0.5], ..Default::default() };
+/// batch.forward(&intervals, &mut ends)?;
+/// for (x, end) in x0.iter().zip(&ends) {
+///     assert!((end.x - vector![x[0] + 0.5 * x[1] + 0.25, x[1] + 1.0]).norm() < 1e-14);
+///     assert!((end.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
 /// }
-/// # Ok(())
-/// # }
+///
+/// // One that fails does so alone.
+/// let x0 = [vector![0.0, 1.0], vector![f64::NAN, 0.0]];
+/// let mut ends = vec![casados::result::Nominal::default(); 2];
+/// let failed = batch.solve(&Intervals { x0: &x0, ..intervals }, &mut ends);
+/// assert!(matches!(failed, Err(BatchError::Intervals { .. })));
+/// assert!(batch.status(0).is_ok());
+/// assert!(matches!(batch.status(1), Err(Error::NonFiniteInput { .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub type Batch<M, B, T = f64> = <B as Batched>::Integrator<M, T>;
 

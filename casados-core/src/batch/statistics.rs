@@ -4,6 +4,7 @@ use crate::statistics::Statistics;
 
 /// What the last call did.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct BatchStatistics {
     /// How many times several intervals were computed side by side.
     pub groups: usize,

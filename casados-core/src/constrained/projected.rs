@@ -46,6 +46,7 @@ use core::marker::PhantomData;
 /// assert!((x[0].hypot(x[1]) - 1.0).abs() < 1e-15);
 /// # Ok::<(), casados::Error>(())
 /// ```
+#[non_exhaustive]
 pub struct Projected<I: Integrator<Model: Projectable>> {
     integrator: I,
     parameters: VectorP<I::Model, I::Number>,

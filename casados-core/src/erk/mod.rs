@@ -51,16 +51,51 @@ impl<const S: usize> Explicit for Custom<S> {
     type Integrator<M: Ode, T: Real, W: Memory> = Integrator<M, Self, S, T, W>;
 }
 
-/// The explicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
+/// The explicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`:
+/// `Erk<Model, Rk4>`.
 ///
+/// ```text
+/// ξ_i = x_n + h Σ_{j<i} a_ij k_j      k_i = g(ξ_i, u, p, t_n + c_i h)      x_{n+1} = x_n + h Σ_i b_i k_i
 /// ```
-/// # use casados_core::{Error, Erk, Rk4, Ode, Options, model::{VectorU, VectorX}};
-/// # fn example<Pendulum: Ode>(x0: VectorX<Pendulum, f64>, u: VectorU<Pendulum, f64>) -> Result<(), Error> {
-/// let mut erk = Erk::<Pendulum, Rk4>::new(Options { steps: 2, ..Default::default() })?;
-/// let step = erk.forward(&x0, &u, 0.05)?;
-/// let (x, jacobian) = (step.x, step.dx_dx0);
-/// # Ok(())
-/// # }
+///
+/// It is an [`Integrator`], whose page has all that it can do:
+///
+/// | | |
+/// | --- | --- |
+/// | [`new`](Integrator::new) | memory on the heap; [`inline`](Integrator::inline) inside, [`with_tableau`](Integrator::with_tableau) for a tableau of one's own |
+/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time) | `p`, and `t` at the start of intervals |
+/// | [`solve`](Integrator::solve) | `x₊` |
+/// | [`forward`](Integrator::forward), [`directional`](Integrator::directional) | and derivatives by `(x₀, u, p)`: all of them, or in given directions |
+/// | [`adjoint`](Integrator::adjoint), [`adjoint_many`](Integrator::adjoint_many) | and gradients of `λᵀx₊` |
+/// | [`hessian`](Integrator::hessian), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients with second derivatives, or with first ones |
+/// | [`with`](Integrator::with) | integrals along the way |
+/// | [`statistics`](Integrator::statistics) | what the last call did |
+///
+/// By default, one step in each interval: [`Options`](crate::Options), of which `newton` and
+/// `start` are not read. Units are those of the model; results have its dimensions.
+///
+/// # Errors
+/// `Error::NonFiniteModel` where the model has no value, `Error::NonFiniteInput`,
+/// `Error::ParametersNotSet`, `Error::Overflow`, and `Error::OutOfMemory` of the first call of its
+/// kind.
+///
+/// # Example
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// x = [position m, velocity m/s], u = [acceleration m/s²].
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut erk = Erk::<Cart, Rk4>::new(Options { steps: 2, ..Default::default() })?;
+/// let step = erk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// // Of polynomials the method is exact: x₊ = (x + v h + u h²/2, v + u h).
+/// assert!((step.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// assert!((step.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
 /// ```
 #[cfg(feature = "alloc")]
 pub type Erk<M, B, T = f64, W = crate::memory::Heap> = <B as Explicit>::Integrator<M, T, W>;

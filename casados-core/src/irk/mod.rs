@@ -73,16 +73,54 @@ use crate::model::Dae;
 use crate::scalar::Real;
 use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 
-/// The implicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`.
+/// The implicit integrator of the method `B` for the model `M`, with numbers `T` and memory `W`:
+/// `Irk<Model, Gauss<4>>`.
 ///
+/// ```text
+/// ξ_i = x_n + h Σ_j a_ij k_j        0 = f(k_i, ξ_i, u, z_i, p, t_n + c_i h)        i = 1 … s
+/// x_{n+1} = x_n + h Σ_i b_i k_i
 /// ```
-/// # use casados_core::{Error, Irk, Gauss, Dae, Options, model::{VectorU, VectorX}};
-/// # fn example<Pendulum: Dae>(x0: VectorX<Pendulum, f64>, u: VectorU<Pendulum, f64>) -> Result<(), Error> {
-/// let mut irk = Irk::<Pendulum, Gauss<4>>::new(Options { steps: 2, ..Default::default() })?;
-/// let step = irk.forward(&x0, &u, 0.05)?;
-/// let (x, jacobian) = (step.x, step.dx_dx0);
-/// # Ok(())
-/// # }
+///
+/// It is an [`Integrator`], whose page has all that it can do:
+///
+/// | | |
+/// | --- | --- |
+/// | [`new`](Integrator::new) | memory on the heap; [`inline`](Integrator::inline) inside, [`with_tableau`](Integrator::with_tableau) for a tableau of one's own |
+/// | [`set_parameters`](Integrator::set_parameters), [`set_time`](Integrator::set_time), [`set_start`](Integrator::set_start) | `p`, `t` at the start of intervals, start values of `ẋ` and `z` |
+/// | [`solve`](Integrator::solve) | `x₊`, and `z` at both ends |
+/// | [`forward`](Integrator::forward), [`directional`](Integrator::directional) | and derivatives by `(x₀, u, p)`: all of them, or in given directions |
+/// | [`adjoint`](Integrator::adjoint), [`adjoint_many`](Integrator::adjoint_many) | and gradients of `λᵀx₊` |
+/// | [`hessian`](Integrator::hessian), [`forward_adjoint`](Integrator::forward_adjoint) | and gradients with second derivatives, or with first ones |
+/// | [`dense`](Integrator::dense), [`dense_forward`](Integrator::dense_forward) | the solution inside the last interval |
+/// | [`with`](Integrator::with) | integrals along the way |
+/// | [`statistics`](Integrator::statistics) | what the last call did |
+///
+/// By default, one step in each interval, and Newton's method to rounding:
+/// [`Options`](crate::Options). Units are those of the model; results have its dimensions.
+///
+/// # Errors
+/// Those of [`Integrator`]: a model without a value, an iteration that does not converge, a
+/// singular matrix, inputs that are not finite.
+///
+/// # Example
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// x = [position m, velocity m/s], u = [acceleration m/s²].
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options { steps: 2, ..Default::default() })?;
+/// let step = irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// // Of polynomials the method is exact: x₊ = (x + v h + u h²/2, v + u h).
+/// assert!((step.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// assert!((step.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
+/// let step = irk.adjoint(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
+/// assert!((step.grad_x0 - vector![1.0, 0.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
 /// ```
 #[cfg(feature = "alloc")]
 pub type Irk<M, B, T = f64, W = crate::memory::Heap> = <B as Implicit>::Integrator<M, T, W>;

@@ -6,6 +6,7 @@ use crate::scalar::Real;
 
 /// What is done with the Hessian of a stage that is not positive definite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Convexification {
     /// Stages stay as they are. Where a QP is not convex in the directions that its dynamics and
     /// bounds leave, a multiple of the identity is added to all of them, as little as it takes (A.

@@ -67,6 +67,7 @@ impl<D: Dynamics<T>, T: Real> Curvature<D, T> for GaussNewton {
 
 /// How a Hessian learns from a step `s` and the difference `y` of gradients.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Update {
     /// `B ← B − B s sᵀB / sᵀB s + r rᵀ / sᵀr`, where `r` is a mean of `y` and `B s` with `sᵀr ≥ 0.2
     /// sᵀB s`: positive definite whatever `y` is.

@@ -77,6 +77,7 @@ impl fmt::Debug for Text {
 
 /// A constraint by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct ConstraintName {
     /// What kind of bounds.
     pub part: Part,

@@ -12,6 +12,7 @@ use core::fmt;
 
 /// Seconds that an iteration took; zero without the feature `std`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Times {
     /// Integration and derivatives of all functions.
     pub linearise: f64,
@@ -31,6 +32,7 @@ impl Times {
 
 /// An iteration: where it began, and how it went on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Iteration {
     /// Counted from zero.
     pub iteration: usize,
@@ -118,6 +120,7 @@ pub enum Status {
 
 /// The outcome of a run. The iterate of the problem is the best one, whatever the status.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Outcome {
     /// How it ended.
     pub status: Status,

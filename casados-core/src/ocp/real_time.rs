@@ -101,6 +101,7 @@ pub struct Prepared<'a, P, S, T, D, M> {
 
 /// What is to be done now.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Feedback<'a, T> {
     /// The control to be applied: the first of the plan.
     pub u: &'a [T],

@@ -7,6 +7,7 @@ use super::statistics::Statistics;
 
 /// Where a solver begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Start {
     /// Somewhere.
     #[default]

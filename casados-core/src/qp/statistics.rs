@@ -4,6 +4,7 @@ use core::fmt;
 
 /// How far a point is from the conditions of optimality: the largest element of each of the four.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Residuals {
     /// Gradient of the Lagrangian.
     pub stationarity: f64,
@@ -51,6 +52,7 @@ impl fmt::Display for Residuals {
 
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Statistics {
     /// Newton's steps with a matrix of their own: active sets, and iterations of the interior
     /// point.

@@ -23,6 +23,27 @@ use bytemuck::Zeroable;
 /// | `hessian` | `q` and its derivatives; gradient and Hessian are those of `λᵀx + νᵀq` |
 ///
 /// What a call does not compute is zero after it. After an error the values mean nothing.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+/// #[function]
+/// fn way(x: [f64; 2], _u: [f64; 1]) -> [f64; 1] {
+///     [x[1]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut way = Quadrature::<Way>::new();
+/// let end = irk.with(&mut way).solve(&vector![1.0, 1.0], &vector![2.0], 0.5)?.x[0];
+/// // The integral of the velocity is what the position has changed by.
+/// assert!((way.q[0] - (end - 1.0)).abs() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Quadrature<F: Function, T: Plain = f64> {

@@ -30,6 +30,29 @@ use bytemuck::Zeroable;
 /// | `hessian` | `φ`, its gradient, `H`; gradient and Hessian that are returned are the exact ones of `λᵀx + φ` |
 ///
 /// What a call does not compute is zero after it. After an error the values mean nothing.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::{Matrix1, vector};
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+/// #[function]
+/// fn push(_x: [f64; 2], u: [f64; 1]) -> [f64; 1] {
+///     [u[0] - 1.0]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut effort = LeastSquares::<Push>::new(&Matrix1::new(4.0));
+/// irk.with(&mut effort).forward(&vector![0.0, 0.0], &vector![3.0], 0.5)?;
+/// // φ = ½ · 4 (u − 1)² h, ∂φ/∂u = 4 (u − 1) h, ∂²φ/∂u² = 4 h.
+/// assert!((effort.value - 4.0).abs() < 1e-14);
+/// assert!((effort.grad_u[0] - 4.0).abs() < 1e-14);
+/// assert!((effort.h_uu[(0, 0)] - 2.0).abs() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct LeastSquares<F: Function, T: Plain = f64> {

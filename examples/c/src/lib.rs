@@ -4,8 +4,8 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 use casados::model::{VectorU, VectorX};
-use casados::{options::Newton, Options};
 use casados::{Error, Gauss, Inline, Irk, mode};
+use casados::{Options, options::Newton};
 use core::mem::MaybeUninit;
 use core::ptr::{self, NonNull};
 

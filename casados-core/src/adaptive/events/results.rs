@@ -3,6 +3,7 @@
 use super::*;
 
 /// An event that happened.
+#[non_exhaustive]
 pub struct Occurrence<M: Dae, T: Real = f64> {
     /// Which.
     pub event: usize,
@@ -15,6 +16,7 @@ pub struct Occurrence<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end, and what happened before.
+#[non_exhaustive]
 pub struct Solution<M: Dae, T: Real = f64> {
     /// `x` and `z` at the end, `z0` at the start.
     pub nominal: Nominal<M, T>,
@@ -29,6 +31,7 @@ pub struct Solution<M: Dae, T: Real = f64> {
 
 /// The solution at the end and its derivatives; if an event ended the integration, with the change
 /// of its time.
+#[non_exhaustive]
 pub struct HybridForward<M: Dae, T: Real = f64> {
     /// The solution.
     pub solution: Solution<M, T>,
@@ -43,6 +46,7 @@ pub struct HybridForward<M: Dae, T: Real = f64> {
 }
 
 /// The derivatives of the time of an event.
+#[non_exhaustive]
 pub struct TimeGradient<M: Dae, T: Real = f64> {
     /// `∂t/∂x₀`
     pub x0: VectorX<M, T>,
@@ -53,6 +57,7 @@ pub struct TimeGradient<M: Dae, T: Real = f64> {
 }
 
 /// The solution at the end and the gradient of `λᵀx`.
+#[non_exhaustive]
 pub struct HybridAdjoint<M: Dae, T: Real = f64> {
     /// The solution.
     pub solution: Solution<M, T>,

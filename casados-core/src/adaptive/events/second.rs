@@ -32,6 +32,7 @@ use bytemuck::allocation::try_zeroed_box;
 use core::marker::PhantomData;
 
 /// The solution at the end, its derivatives, and the gradient and the Hessian of `λᵀx`.
+#[non_exhaustive]
 pub struct HybridHessian<M: Dae, T: Real = f64> {
     /// The solution and its derivatives.
     pub forward: HybridForward<M, T>,

@@ -14,6 +14,7 @@ use crate::scalar::{Real, Scalar};
 /// options.barrier = Barrier::Adaptive;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Barrier {
     /// It shrinks where the barrier problem is solved well enough: Wächter and Biegler (2006), with
     /// proofs of convergence.

@@ -104,6 +104,7 @@ pub struct SolutionFactors<T> {
 
 /// `λᵀ dw/dx₀` and `λᵀ dw/dp`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SolutionAdjoint<'a, T> {
     /// By the initial state, `NX`; empty where it is free.
     pub x0: &'a [T],
@@ -114,6 +115,7 @@ pub struct SolutionAdjoint<'a, T> {
 /// The Hessian of the optimal value; matrices column after column. Where the initial state is free
 /// there is nothing but `∂²V/∂p²`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ValueHessian<'a, T> {
     /// `∂²V/∂x₀²`, `NX × NX`.
     pub xx: &'a [T],

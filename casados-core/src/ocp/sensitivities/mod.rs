@@ -32,6 +32,7 @@ use alloc::vec::Vec;
 /// Where few functions of the solution are of interest, adjoints by [`SolutionFactors`] are
 /// cheaper.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Sensitivities<T> {
     factors: SolutionFactors<T>,
     /// `dx/dx₀`, `du/dx₀`: matrices column after column, one stage after the other.

@@ -4,6 +4,7 @@ use crate::ocp::error::OcpError;
 
 /// How far a step goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Globalisation {
     /// All the way, always.
     FullStep,
