@@ -16,7 +16,7 @@
 
 use casados::ocp::{Constraint, GaussNewton, GeneralCost, HeapIpm, Horizon, Problem};
 use casados::prelude::*;
-use casados::qp::{Clarabel, QpSolver, SecondOrderCone, Start};
+use casados::qp::{Clarabel, QpSolver, QpStart, SecondOrderCone};
 
 /// Of Mars, m/s².
 const GRAVITY: f64 = 3.71;
@@ -80,7 +80,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         clarabel.cones.push(SecondOrderCone { stage, first: 4, count: 3 });
     }
     let (qp, iterate) = ocp.qp_and_iterate();
-    let statistics = clarabel.solve(qp, Start::Cold, iterate.view_mut())?;
+    let statistics = clarabel.solve(qp, QpStart::Cold, iterate.view_mut())?;
 
     let mut other = problem!(Constraint::<Smooth>::new([0.0; 2], [f64::INFINITY; 2]));
     let outcome = HeapIpm::new(&other)?.solve(&mut other)?;

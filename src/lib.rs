@@ -32,6 +32,24 @@ pub use casados_macros::{Record, dae, function, ode};
 pub use casados_core::__private;
 
 /// What most programs need: `use casados::prelude::*;`
+///
+/// It stands beside the globs of [`ocp`], [`qp`] and nalgebra: no name is in two of them. A program
+/// that does not depend on nalgebra itself takes it from here, with its macros:
+///
+/// ```
+/// use casados::nalgebra::{self, vector};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut erk = Erk::<Cart, Rk4>::new(Options::default())?;
+/// let end = erk.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// assert!((end.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub mod prelude {
     pub use casados_core::Integrator as _;
     pub use casados_core::prelude::*;
@@ -84,7 +102,9 @@ pub mod model {
 
 /// Vectors and matrices of a [`Function`].
 pub mod function {
-    pub use casados_core::function::{MatrixYP, MatrixYU, MatrixYX, MatrixYY, MatrixYZ, VectorY};
+    pub use casados_core::function::{
+        FunctionStructure, MatrixYP, MatrixYU, MatrixYX, MatrixYY, MatrixYZ, VectorY,
+    };
 }
 
 /// Implicit methods: what [`Irk`] stands for.

@@ -5,6 +5,24 @@ mod display;
 /// Why there is no result: what, where, and the values that say so.
 ///
 /// After an error the integrator is usable, and its warm start is as it was before the call.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn growth(x: [f64; 1], u: [f64; 1]) -> [f64; 1] {
+///     [u[0] * x[0].ln()]
+/// }
+///
+/// let mut irk = Irk::<Growth, Gauss<2>>::new(Options::default())?;
+/// match irk.solve(&vector![-1.0], &vector![1.0], 0.1) {
+///     Err(error @ Error::NonFiniteModel { .. }) => println!("{error}"), // where, and the values
+///     other => panic!("{other:?}"),
+/// }
+/// assert!(irk.solve(&vector![1.0], &vector![1.0], 0.1).is_ok()); // the integrator stays usable
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
@@ -232,7 +250,6 @@ pub enum Refusal {
 
 /// An algebraic state, and where Newton's method started for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct Started {
     /// Its name.
     pub unknown: &'static str,
@@ -242,7 +259,6 @@ pub struct Started {
 
 /// Where in a run: all counted from zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct Place {
     /// The step of the interval.
     pub step: usize,

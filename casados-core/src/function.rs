@@ -41,6 +41,30 @@ pub type MatrixYP<F, T> = <<F as Function>::Outputs as Outputs>::MatrixYP<<F as 
 /// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
 /// [`Function::STRUCTURE`]. Derivatives are taken with respect to all variables, by `t` only the
 /// first ones ([`Function::time_derivative`]).
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// An oscillator, and its energy.
+/// #[ode]
+/// fn oscillator(x: [f64; 2], p: [f64; 1]) -> [f64; 2] {
+///     [x[1], -p[0] * x[0]]
+/// }
+/// #[function]
+/// fn energy(x: [f64; 2], p: [f64; 1]) -> [f64; 1] {
+///     [0.5 * x[1] * x[1] + 0.5 * p[0] * x[0] * x[0]]
+/// }
+///
+/// assert_eq!(energy([1.0, 0.0], [4.0]), [2.0]); // still an ordinary function
+/// let mut irk = Irk::<Oscillator, Gauss<3>>::new(Options { steps: 10, ..Default::default() })?;
+/// irk.set_parameters(&vector![4.0])?;
+/// let mut mean = Quadrature::<Energy>::new();
+/// irk.with(&mut mean).solve(&vector![1.0, 0.0], &Default::default(), 0.5)?;
+/// // It is conserved along the solution; at stages up to their error, of order three.
+/// assert!((mean.q[0] - 2.0 * 0.5).abs() < 1e-6);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a function of a model's variables",
     note = "write it as `#[function] fn name(x: [f64; NX], ...) -> [f64; NY]` and use its type, `Name`"

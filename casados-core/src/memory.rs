@@ -190,6 +190,25 @@ impl<V: Zeroable> Default for Inside<V> {
 ///
 /// For a model of one's own `cargo doc` prints the number beside a public constant that is `SIZE`,
 /// for the target that it is asked for.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::{Inline, mode};
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// type Predictor = Irk<Cart, Gauss<2>, f32, Inline<mode::Forward, 2>>;
+/// const BYTES: usize = Predictor::SIZE;
+/// let mut irk = Predictor::inline(Options { steps: 2, ..Default::default() })?;
+/// let step = irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// assert!((step.x - vector![0.75, 2.0]).norm() < 1e-6);
+/// assert!(BYTES < 4096);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Inline<Mode, const STEPS: usize = 1, F = fallback::Pivoting>(PhantomData<fn() -> (Mode, F)>);
 

@@ -60,6 +60,27 @@ pub type MatrixPC<M, T, const C: usize> = <<M as Dae>::Shape as Shape>::MatrixPC
 ///
 /// Entries of the Jacobian and the Hessian are arrays of values in the order of the patterns in
 /// [`Dae::STRUCTURE`].
+///
+/// Users write it in bounds, `M: Dae`, print what is known ([`Dae::describe`]), and leave the rest
+/// to integrators.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// /// A tank that drains through a valve: level m, outflow m/s, inflow m/s.
+/// #[dae(nominal(z = 1.0))]
+/// fn tank(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], u: [f64; 1]) -> [f64; 2] {
+///     [xdot[0] - u[0] + z[0], z[0] * z[0] - x[0]]
+/// }
+///
+/// println!("{}", Tank::describe());
+/// assert_eq!(Tank::describe().z, ["z[0]"]);
+/// let mut irk = Irk::<Tank, RadauIIA<3>>::new(Options::default())?;
+/// let end = irk.solve(&vector![4.0], &vector![2.0], 0.1)?;
+/// assert!((end.x[0] - 4.0).abs() < 1e-12 && (end.z[0] - 2.0).abs() < 1e-12); // at rest
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub trait Dae: 'static {
     /// Dimensions.
     type Shape: Shape;
@@ -174,6 +195,25 @@ pub trait GraphDae: Dae {
 /// `c` and every `j` occurs once; there are no algebraic states.
 ///
 /// Then `g_j = −f_r / c` at `ẋ = 0`, and every derivative of `g` is one of `f`.
+///
+/// ```
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+/// /// The same, recognised.
+/// #[dae]
+/// fn same(xdot: [f64; 2], x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [xdot[0] - x[1], 2.0 * (xdot[1] - u[0])]
+/// }
+///
+/// fn explicit<M: Ode>() -> usize {
+///     M::ROWS.len()
+/// }
+/// assert_eq!((explicit::<Cart>(), explicit::<Same>()), (2, 2));
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an explicit model",
     label = "explicit Runge-Kutta methods need `ẋ = g(x, u, p, t)`",

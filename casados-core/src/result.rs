@@ -12,6 +12,21 @@ use bytemuck::Zeroable;
 use core::ops::Deref;
 
 /// The solution.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let end = irk.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// assert!((end.x - vector![0.75, 2.0]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]
@@ -25,6 +40,22 @@ pub struct Nominal<M: Dae, T: Plain = f64> {
 }
 
 /// The solution and its derivatives with respect to `x₀`, `u` and `p`.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let end = irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// assert!((end.dx_dx0[(0, 1)] - 0.5).abs() < 1e-14); // ∂position/∂velocity = h
+/// assert!((end.x[1] - 2.0).abs() < 1e-14); // what a smaller call returns is there too
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]
@@ -52,6 +83,23 @@ pub struct Forward<M: Dae, T: Plain = f64> {
 }
 
 /// The solution and its derivatives in `C` directions.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut seeds = Seeds::<Cart, f64, 1>::default();
+/// seeds.u[(0, 0)] = 1.0;
+/// let end = irk.directional(&vector![0.0, 1.0], &vector![2.0], 0.5, &seeds)?;
+/// assert!((end.dx - vector![0.125, 0.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]
@@ -80,6 +128,22 @@ pub struct Seeds<M: Dae, T: Plain, const C: usize> {
 }
 
 /// The solution and the gradients of `λᵀx` for each of `C` seeds `λ`, one a column.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let end = irk.adjoint(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
+/// assert!((end.grad_x0 - vector![1.0, 0.5]).norm() < 1e-14);
+/// assert!((end.grad_u[0] - 0.125).abs() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]
@@ -114,6 +178,22 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
 ///
 /// The Hessian over `(x₀, u, p)` is symmetric to the last bit; of its blocks beside the diagonal
 /// the upper ones are given.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let end = irk.hessian(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
+/// assert!((end.grad_x0 - vector![1.0, 0.5]).norm() < 1e-14);
+/// assert!(end.h_xx.norm() < 1e-14 && end.h_uu.norm() < 1e-14); // the model is linear
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]
@@ -135,6 +215,22 @@ pub struct Hessian<M: Dae, T: Plain = f64> {
 }
 
 /// The solution at a time inside the interval.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// irk.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// let middle = irk.dense(0.25)?;
+/// assert!((middle.x - vector![0.3125, 1.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]

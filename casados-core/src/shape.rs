@@ -174,6 +174,22 @@ impl<T: Plain, const R: usize, const C: usize> Matrix<T> for SMatrix<T, R, C> {
 ///   matrix;
 /// - variables of the model `(ẋ, x, z, u, p, t)`, length `NV = 2 NX + NZ + NU + NP + 1`;
 /// - directions of sensitivities `w = (x₀, u, p)`, length `NW = NX + NU + NP`.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::Shape;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1], p: [f64; 1]) -> [f64; 2] {
+///     [x[1], p[0] * u[0]]
+/// }
+///
+/// /// How many directions first derivatives have.
+/// const fn directions<M: Dae>() -> usize {
+///     <M::Shape as Shape>::NW
+/// }
+/// assert_eq!(directions::<Cart>(), 2 + 1 + 1);
+/// ```
 pub trait Shape: 'static {
     /// Differential states.
     const NX: usize;

@@ -48,7 +48,8 @@ fn failures() -> Test {
                 1 => copy.x0[bad] = Vector1::new(-1.0),
                 _ => (copy.x0[bad], copy.p[bad]) = (good.x0[bad], Vector1::new(0.0)),
             }
-            let before = Hessian { h_xx: Vector1::new(42.0), ..Default::default() };
+            let mut before = Hessian::default();
+            before.h_xx = Vector1::new(42.0);
             let mut results = vec![before; count];
             let outcome = batch.hessian(&copy.intervals(), &copy.lambda, &mut results);
             single.set_parameters(&copy.p[bad])?;

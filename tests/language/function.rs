@@ -1,7 +1,7 @@
 //! Functions of a model's variables: values, patterns, and derivatives three ways (forward
 //! differentiation through the emitted code, the complex step, formulas by hand).
 
-use casados::__private::FunctionStructure;
+use casados::function::FunctionStructure;
 use casados::prelude::*;
 use casados::testing::{Forward, Random};
 use casados::{__private::Scalar, GraphFunction};

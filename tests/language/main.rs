@@ -28,6 +28,7 @@ mod elementary;
 mod emit;
 mod forms;
 mod function;
+mod globs;
 mod iterators;
 mod macros;
 mod modules;

@@ -93,14 +93,14 @@ fn gains_are_those_of_the_qp() -> Test {
 /// The control is the first of the QP that was prepared, for the state that was measured.
 #[test]
 fn feedback_solves_the_prepared_qp() -> Test {
-    use casados::qp::{HeapInteriorPoint, HeapSolution, QpSolver, Start};
+    use casados::qp::{HeapInteriorPoint, HeapSolution, QpSolver, QpStart};
     let measured = [0.7, 0.5];
     let mut controller = HeapRealTime::new(problem()?)?;
     let mut ocp = problem()?;
     ocp.linearise(casados::ocp::GaussNewton::default())?;
     ocp.fix_initial_state(&measured)?;
     let mut solution = HeapSolution::new(ocp.qp().dims())?;
-    HeapInteriorPoint::new().solve(ocp.qp(), Start::Cold, solution.view_mut())?;
+    HeapInteriorPoint::new().solve(ocp.qp(), QpStart::Cold, solution.view_mut())?;
     let feedback = controller.prepare()?.feedback(&measured)?;
     let expected = solution.stage(0).ok_or("a stage")?.u;
     assert!((feedback.u[0] - expected[0]).abs() < 1e-7, "{} {}", feedback.u[0], expected[0]);

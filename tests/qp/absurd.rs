@@ -8,7 +8,7 @@ use crate::known::{Hessian, Kind, Numbers, PLAIN, numbers, problem};
 use crate::runs::{Counts, seeds, shows};
 use casados::qp::{
     Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPointOptions, QpError, QpSolver,
-    Residuals, StageMut, Start, Statistics, residuals,
+    QpStart, QpStatistics, Residuals, StageMut, residuals,
 };
 
 const SPECIAL: [f64; 16] = [
@@ -109,14 +109,14 @@ fn options(random: &mut Numbers) -> InteriorPointOptions {
 }
 
 /// Numbers of all kinds.
-fn start(random: &mut Numbers, solution: &mut HeapSolution<f64>) -> Start {
+fn start(random: &mut Numbers, solution: &mut HeapSolution<f64>) -> QpStart {
     for k in 0..solution.dims().len() {
         let Some(stage) = solution.stage_mut(k) else { break };
         for value in stage.x.iter_mut().chain(stage.u).chain(stage.g_lower).chain(stage.x_upper) {
             *value = if random.chance(0.1) { any(random) } else { random.next() };
         }
     }
-    if random.chance(0.5) { Start::Warm } else { Start::Cold }
+    if random.chance(0.5) { QpStart::Warm } else { QpStart::Cold }
 }
 
 /// What residuals may be of a point that is a solution: the tolerance, the relative one of the
@@ -159,9 +159,9 @@ impl Class {
         &mut self,
         seed: u64,
         qp: &HeapQp<f64>,
-        start: Start,
+        start: QpStart,
         solution: &mut HeapSolution<f64>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         let mut other = solution.clone();
         let found = self.solver.solve(qp.view(), start, solution.view_mut());
         let mut fresh = HeapInteriorPoint::new();
@@ -172,7 +172,7 @@ impl Class {
         if let Ok(statistics) = found {
             assert!(numbers(solution).all(f64::is_finite), "{seed}");
             assert!(statistics.objective.is_finite(), "{seed}: {statistics:?}");
-            let (Residuals { stationarity, dynamics, inequalities, complementarity }, _) =
+            let (Residuals { stationarity, dynamics, inequalities, complementarity, .. }, _) =
                 residuals(qp.view(), solution);
             let allowed = allowed(&self.solver.options, qp, solution);
             for residual in [stationarity, dynamics, inequalities, complementarity] {

@@ -4,7 +4,7 @@ use crate::Test;
 use crate::data::Record;
 use casados::Real;
 use casados::qp::{
-    BlockMut, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start, residuals,
+    BlockMut, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims, residuals,
 };
 
 /// Elements of a list of matrices, of which the last one repeats.
@@ -100,7 +100,7 @@ fn stored_problems_have_their_reference_solutions() -> Test {
         let chain = Chain::load(masses)?;
         let qp = chain.qp::<f64>()?;
         let mut solution = HeapSolution::new(qp.dims())?;
-        let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
         assert!(statistics.iterations <= 14, "{statistics:?}");
         let error = chain.error(&solution)?;
         let tolerance = if masses == 3 { 1e-5 } else { 3e-7 };
@@ -124,8 +124,8 @@ fn a_warm_start_takes_few_iterations() -> Test {
     let chain = Chain::load(5)?;
     let mut qp = chain.qp::<f64>()?;
     let mut solution = HeapSolution::new(qp.dims())?;
-    let cold = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
-    let warm = solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
+    let cold = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+    let warm = solver.solve(qp.view(), QpStart::Warm, solution.view_mut())?;
     assert!(2 * warm.iterations <= cold.iterations, "{} after {}", warm.iterations, cold.iterations);
     // The next sampling instant: the state moves on, and the solution with it.
     let x1 = solution.stage(1).ok_or("no stage 1")?.x.to_vec();
@@ -147,9 +147,9 @@ fn a_warm_start_takes_few_iterations() -> Test {
     qp.fix_initial_state(&x1)?;
     let mut shifted = reference.clone();
     shifted.shift();
-    let after_shift = solver.solve(qp.view(), Start::Warm, shifted.view_mut())?;
+    let after_shift = solver.solve(qp.view(), QpStart::Warm, shifted.view_mut())?;
     let mut again = reference.clone();
-    let cold = solver.solve(qp.view(), Start::Cold, again.view_mut())?;
+    let cold = solver.solve(qp.view(), QpStart::Cold, again.view_mut())?;
     assert!(
         after_shift.iterations < cold.iterations,
         "{} against {}",
@@ -168,7 +168,7 @@ fn single_precision() -> Test {
     let mut solution = HeapSolution::new(qp.dims())?;
     let mut solver = HeapInteriorPoint::new();
     solver.options.relative_tolerance = 0.0;
-    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     assert!(statistics.residuals.largest() <= 1e-4);
     let error = chain.error(&solution)?;
     assert!(error < 1e-2, "{error:e}");
@@ -213,10 +213,10 @@ fn in_other_units<T: Real>(relative: f64) -> Test {
     (solver.options.start_mu, solver.options.max_iterations, solver.options.locate) = (UNIT, 20, false);
     // Rounding errors are a few ε of the terms.
     (solver.options.tolerance, solver.options.relative_tolerance) = (0.1 * T::EPSILON * UNIT, 0.0);
-    let absolute = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+    let absolute = solver.solve(qp.view(), QpStart::Cold, solution.view_mut());
     assert!(absolute.is_err(), "{absolute:?}");
     (solver.options.tolerance, solver.options.relative_tolerance) = (0.0, relative);
-    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     let (found, _) = residuals(qp.view(), &solution);
     let force = largest_force(&solution);
     // Multipliers are among the terms of gradients, and none of the others is more than ten times
@@ -247,7 +247,7 @@ fn clarabel_agrees() -> Test {
     let mut clarabel = casados::qp::Clarabel::new();
     // The second time data is updated in place.
     for _ in 0..2 {
-        let statistics = clarabel.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        let statistics = clarabel.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
         let expected = chain.record.number("objective")?;
         assert!((statistics.objective - expected).abs() < 1e-7 * expected);
         let (residuals, _) = residuals(qp.view(), &solution);
@@ -266,9 +266,9 @@ fn condensed() -> Test {
         plain.options.tolerance = 1e-11;
         let mut solver = Condensing::new(block, plain.clone());
         let mut expected = HeapSolution::new(qp.dims())?;
-        plain.solve(qp.view(), Start::Cold, expected.view_mut())?;
+        plain.solve(qp.view(), QpStart::Cold, expected.view_mut())?;
         let mut solution = HeapSolution::new(qp.dims())?;
-        solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
         let (residuals, _) = residuals(qp.view(), &solution);
         assert!(residuals.largest() < 1e-10, "{residuals}");
         let pairs = solution.stages().zip(expected.stages());

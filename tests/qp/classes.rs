@@ -6,8 +6,8 @@ use crate::Test;
 use crate::known::{Hessian, Kind, Known, Numbers, PLAIN, numbers, problem, senseless};
 use crate::runs::{Counts, kind, seeds, shows};
 use casados::qp::{
-    Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver,
-    SolutionStage, Stage, StageDims, StageMut, Start, Statistics, residuals,
+    Block, BlockMut, Bounds, BoundsMut, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart,
+    QpStatistics, SolutionStage, Stage, StageDims, StageMut, residuals,
 };
 
 const TOLERANCE: f64 = 1e-8;
@@ -27,9 +27,9 @@ impl Class {
     fn solve(
         &mut self,
         qp: &HeapQp<f64>,
-        start: Start,
+        start: QpStart,
         solution: &mut HeapSolution<f64>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         let mut other = solution.clone();
         let mut fresh = HeapInteriorPoint::new();
         fresh.options = self.solver.options;
@@ -121,7 +121,7 @@ fn objective_terms(data: &Stage<'_, f64>, point: &SolutionStage<'_, f64>) -> f64
 }
 
 /// Solves problems of a kind; `start` may write something senseless into the solution first.
-fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Class, QpError> {
+fn run(name: &str, kind: &Kind, few: u64, start: QpStart) -> Result<Class, QpError> {
     let mut class = Class::new(name);
     if kind.units > 0.0 {
         // Terms of other sizes: a part of them is what can be asked for.
@@ -133,7 +133,7 @@ fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Class, QpError
         let (own, _) = residuals(known.qp.view(), &known.solution);
         assert!(own.largest() < 1e-11 * 10_f64.powf(2.0 * kind.units), "{seed}: {own}");
         let mut solution = HeapSolution::new(known.qp.dims())?;
-        if start == Start::Warm {
+        if start == QpStart::Warm {
             senseless(&mut random, &mut solution);
         }
         let found = class.solve(&known.qp, start, &mut solution);
@@ -146,10 +146,10 @@ fn run(name: &str, kind: &Kind, few: u64, start: Start) -> Result<Class, QpError
 
 #[test]
 fn strictly_convex() -> Test {
-    let class = run("strictly convex", &PLAIN, 300, Start::Cold)?;
+    let class = run("strictly convex", &PLAIN, 300, QpStart::Cold)?;
     assert_eq!(class.counts.of("Ok"), class.counts.all());
     let kind = Kind { empty: true, ..PLAIN };
-    let class = run("strictly convex with empty stages", &kind, 300, Start::Cold)?;
+    let class = run("strictly convex with empty stages", &kind, 300, QpStart::Cold)?;
     assert_eq!(class.counts.of("Ok"), class.counts.all());
     Ok(())
 }
@@ -158,7 +158,7 @@ fn strictly_convex() -> Test {
 fn convex() -> Test {
     for hessian in [Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, empty: true, ..PLAIN };
-        let class = run(&format!("{hessian:?}"), &kind, 300, Start::Cold)?;
+        let class = run(&format!("{hessian:?}"), &kind, 300, QpStart::Cold)?;
         assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
     }
     Ok(())
@@ -168,7 +168,7 @@ fn convex() -> Test {
 fn degenerate() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, degenerate: true, empty: true, ..PLAIN };
-        let class = run(&format!("degenerate, {hessian:?}"), &kind, 300, Start::Cold)?;
+        let class = run(&format!("degenerate, {hessian:?}"), &kind, 300, QpStart::Cold)?;
         assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
     }
     Ok(())
@@ -179,7 +179,7 @@ fn soft() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank] {
         for huge in [1e3, 1e8, 1e10, 1e12, 1e14, 1e20, f64::INFINITY] {
             let kind = Kind { hessian, soft: Some(huge), empty: true, ..PLAIN };
-            let class = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, Start::Cold)?;
+            let class = run(&format!("soft, {hessian:?}, none is {huge:e}"), &kind, 100, QpStart::Cold)?;
             assert!(class.false_verdicts() == 0 && class.unsolved(1), "{}", class.counts);
         }
     }
@@ -190,7 +190,7 @@ fn soft() -> Test {
 fn senseless_starts() -> Test {
     for hessian in [Hessian::Definite, Hessian::LowRank, Hessian::Zero] {
         let kind = Kind { hessian, soft: Some(1e12), degenerate: true, empty: true, ..PLAIN };
-        let class = run(&format!("senseless start, {hessian:?}"), &kind, 200, Start::Warm)?;
+        let class = run(&format!("senseless start, {hessian:?}"), &kind, 200, QpStart::Warm)?;
         assert!(class.false_verdicts() == 0 && class.unsolved(5), "{}", class.counts);
     }
     Ok(())
@@ -201,7 +201,7 @@ fn other_units() -> Test {
     for hessian in [Hessian::Definite, Hessian::Zero] {
         for units in [1.0, 3.0] {
             let kind = Kind { hessian, units, ..PLAIN };
-            let class = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, Start::Cold)?;
+            let class = run(&format!("units of 1e±{units}, {hessian:?}"), &kind, 200, QpStart::Cold)?;
             assert!(class.false_verdicts() == 0 && class.unsolved(5), "{}", class.counts);
         }
     }
@@ -221,7 +221,7 @@ fn infeasible() -> Test {
             let known = problem(&mut random, &kind)?;
             let Some((qp, stage)) = contradict(&known, &mut random, distance)? else { continue };
             let mut solution = HeapSolution::new(qp.dims())?;
-            let found = class.solve(&qp, Start::Cold, &mut solution);
+            let found = class.solve(&qp, QpStart::Cold, &mut solution);
             class.count(seed, &found.map(|_| Some("solved".into())));
             let Err(QpError::Infeasible { violation, .. }) = found else { continue };
             // The named violation is the largest of the point, and at least half of what is missing
@@ -336,7 +336,7 @@ fn not_convex() -> Test {
         let x0: Vec<f64> = (0..dims[0].nx).map(|_| random.next()).collect();
         qp.fix_initial_state(&x0)?;
         let mut solution = HeapSolution::new(&dims)?;
-        let found = class.solve(&qp, Start::Cold, &mut solution);
+        let found = class.solve(&qp, QpStart::Cold, &mut solution);
         let least = least_curvature(&qp);
         convex += u64::from(least > 1e-6);
         match found {

@@ -5,7 +5,7 @@ use crate::{Test, solve_to};
 #[cfg(feature = "clarabel")]
 use casados::qp::Clarabel;
 use casados::qp::{
-    Condensing, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, QpError, QpSolver, StageDims, Start,
+    Condensing, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, QpError, QpSolver, QpStart, StageDims,
 };
 
 /// Numbers in −1 .. 1.
@@ -74,7 +74,7 @@ fn same_minimum_as_clarabel() -> Test {
     for seed in 0..120 {
         let qp = problem(seed, 3 + seed as usize % 11)?;
         let mut solution = HeapSolution::new(qp.dims())?;
-        let clarabel = Clarabel::new().solve(qp.view(), Start::Cold, solution.view_mut())?;
+        let clarabel = Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut())?;
         let (found, own, _) = solve_to(1e-9, &qp)?;
         let difference = (clarabel.objective - own.objective).abs();
         assert!(difference < 2e-7 * (1.0 + own.objective.abs()), "{seed} {difference:e}");
@@ -93,7 +93,7 @@ fn warm_starts() -> Test {
     for seed in 0..40 {
         let qp = problem(seed, 8)?;
         let (mut solution, cold, _) = solve_to(1e-9, &qp)?;
-        let warm = HeapInteriorPoint::new().solve(qp.view(), Start::Warm, solution.view_mut())?;
+        let warm = HeapInteriorPoint::new().solve(qp.view(), QpStart::Warm, solution.view_mut())?;
         assert!((warm.objective - cold.objective).abs() < 1e-6 * (1.0 + cold.objective.abs()), "{seed}");
         assert!(warm.iterations <= cold.iterations, "{seed} {warm:?}");
     }
@@ -111,7 +111,7 @@ fn memory_of_the_caller() -> Test {
         let mut solution = HeapSolution::new(qp.dims())?;
         InteriorPoint::in_memory(&mut numbers[..], &mut indices[..]).solve(
             qp.view(),
-            Start::Cold,
+            QpStart::Cold,
             solution.view_mut(),
         )
     };
@@ -132,7 +132,8 @@ fn deadlines() -> Test {
         left -= 1;
         left < 0
     };
-    let error = HeapInteriorPoint::new().solve_until(qp.view(), Start::Cold, solution.view_mut(), &mut over);
+    let error =
+        HeapInteriorPoint::new().solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut over);
     assert!(matches!(error, Err(QpError::OutOfTime { iterations: 3, .. })), "{error:?}");
     assert!(solution.stages().flat_map(|stage| stage.u).all(|u| u.is_finite() && *u != 0.0));
     Ok(())
@@ -143,7 +144,7 @@ fn others_refuse() -> Test {
     let qp = problem(3, 8)?;
     let mut solution = HeapSolution::new(qp.dims())?;
     let mut condensing = Condensing::new(2, HeapInteriorPoint::new());
-    let error = condensing.solve(qp.view(), Start::Cold, solution.view_mut());
+    let error = condensing.solve(qp.view(), QpStart::Cold, solution.view_mut());
     assert!(matches!(error, Err(QpError::Coupled)), "{error:?}");
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 use crate::Test;
 use casados::qp::{
-    Condensing, Field, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, Qp, QpError, QpSolver,
-    Solution, StageDims, Start,
+    Condensing, HeapInteriorPoint, HeapQp, HeapSolution, InteriorPoint, Qp, QpError, QpField, QpSolver,
+    QpStart, Solution, StageDims,
 };
 
 const DIMS: [StageDims; 3] = [StageDims::new(2, 1, 1), StageDims::new(2, 1, 1), StageDims::new(2, 0, 0)];
@@ -24,7 +24,7 @@ fn problem() -> Result<HeapQp<f64>, QpError> {
 
 fn error_of(qp: &HeapQp<f64>) -> Result<QpError, Box<dyn std::error::Error>> {
     let mut solution = HeapSolution::new(qp.dims())?;
-    let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    let found = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
     Ok(found.err().ok_or("solved")?)
 }
 
@@ -33,7 +33,7 @@ fn crossed_bounds() -> Test {
     let mut qp = problem()?;
     qp.stage_mut(1).ok_or("no stage")?.g_bounds_mut().set(0, 2.0, 1.0);
     let expected =
-        QpError::CrossedBounds { field: Field::GeneralBounds, stage: 1, index: 0, lower: 2.0, upper: 1.0 };
+        QpError::CrossedBounds { field: QpField::GeneralBounds, stage: 1, index: 0, lower: 2.0, upper: 1.0 };
     assert_eq!(error_of(&qp)?, expected);
     assert_eq!(
         expected.to_string(),
@@ -46,16 +46,16 @@ fn crossed_bounds() -> Test {
 #[test]
 fn not_finite() -> Test {
     type Spoil = fn(&mut casados::qp::StageMut<'_, f64>);
-    let places: [(Spoil, Field, usize); 9] = [
-        (|s| s.a_mut().set(1, 0, f64::NAN), Field::A, 1),
-        (|s| s.b_mut().set(1, 0, f64::INFINITY), Field::B, 1),
-        (|s| s.offset_mut()[1] = f64::NAN, Field::Offset, 1),
-        (|s| s.q_mut().set(1, 0, f64::NAN), Field::Q, 1),
-        (|s| s.r_mut().set(0, 0, f64::NAN), Field::R, 0),
-        (|s| s.s_mut().set(0, 1, f64::NAN), Field::S, 1),
-        (|s| s.gradient_x_mut()[0] = f64::NEG_INFINITY, Field::GradientX, 0),
-        (|s| s.gradient_u_mut()[0] = f64::NAN, Field::GradientU, 0),
-        (|s| s.u_bounds_mut().set(0, f64::NAN, 1.0), Field::ControlBounds, 0),
+    let places: [(Spoil, QpField, usize); 9] = [
+        (|s| s.a_mut().set(1, 0, f64::NAN), QpField::A, 1),
+        (|s| s.b_mut().set(1, 0, f64::INFINITY), QpField::B, 1),
+        (|s| s.offset_mut()[1] = f64::NAN, QpField::Offset, 1),
+        (|s| s.q_mut().set(1, 0, f64::NAN), QpField::Q, 1),
+        (|s| s.r_mut().set(0, 0, f64::NAN), QpField::R, 0),
+        (|s| s.s_mut().set(0, 1, f64::NAN), QpField::S, 1),
+        (|s| s.gradient_x_mut()[0] = f64::NEG_INFINITY, QpField::GradientX, 0),
+        (|s| s.gradient_u_mut()[0] = f64::NAN, QpField::GradientU, 0),
+        (|s| s.u_bounds_mut().set(0, f64::NAN, 1.0), QpField::ControlBounds, 0),
     ];
     for (spoil, expected, at) in places {
         let mut qp = problem()?;
@@ -80,7 +80,7 @@ fn not_finite_where_nothing_is_bounded() -> Test {
     let QpError::InvalidValue { field, stage, index, .. } = error_of(&qp)? else {
         return Err("another error".into());
     };
-    assert_eq!((field, stage, index), (Field::C, 0, 1));
+    assert_eq!((field, stage, index), (QpField::C, 0, 1));
     Ok(())
 }
 
@@ -90,7 +90,7 @@ fn negative_penalty() -> Test {
     qp.stage_mut(0).ok_or("no stage")?.u_bounds_mut().soften(0, -1.0, 0.0);
     assert_eq!(
         error_of(&qp)?,
-        QpError::InvalidValue { field: Field::Penalty, stage: 0, index: 0, value: -1.0 }
+        QpError::InvalidValue { field: QpField::Penalty, stage: 0, index: 0, value: -1.0 }
     );
     Ok(())
 }
@@ -100,19 +100,19 @@ fn wrong_lengths() -> Test {
     let mut qp = problem()?;
     assert_eq!(
         qp.fix_initial_state(&[0.0]),
-        Err(QpError::Dimension { field: Field::StateBounds, stage: 0, expected: 2, found: 1 })
+        Err(QpError::Dimension { field: QpField::StateBounds, stage: 0, expected: 2, found: 1 })
     );
     let mut stage = qp.stage_mut(1).ok_or("no stage")?;
     assert_eq!(
         stage.b_mut().copy_from_columns(&[0.0; 3]),
-        Err(QpError::Dimension { field: Field::B, stage: 1, expected: 2, found: 3 })
+        Err(QpError::Dimension { field: QpField::B, stage: 1, expected: 2, found: 3 })
     );
     let mut other = HeapSolution::new(&DIMS[..2])?;
     assert_eq!(
-        HeapInteriorPoint::new().solve(qp.view(), Start::Cold, other.view_mut()),
-        Err(QpError::Dimension { field: Field::Stages, stage: 0, expected: 3, found: 2 })
+        HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, other.view_mut()),
+        Err(QpError::Dimension { field: QpField::Stages, stage: 0, expected: 3, found: 2 })
     );
-    assert!(matches!(HeapQp::<f64>::new(&[]), Err(QpError::Dimension { field: Field::Stages, .. })));
+    assert!(matches!(HeapQp::<f64>::new(&[]), Err(QpError::Dimension { field: QpField::Stages, .. })));
     Ok(())
 }
 
@@ -136,21 +136,21 @@ fn memory_of_the_owner() -> Test {
     qp.fix_initial_state(&[1.0, -1.0])?;
     let mut solution = Solution::in_memory(DIMS, [0.0; POINT])?;
     let mut solver = InteriorPoint::in_memory([0.0; WORK.0], [0; WORK.1]);
-    solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     let mut on_heap = HeapSolution::new(&DIMS)?;
-    HeapInteriorPoint::new().solve(problem()?.view(), Start::Cold, on_heap.view_mut())?;
+    HeapInteriorPoint::new().solve(problem()?.view(), QpStart::Cold, on_heap.view_mut())?;
     for (a, b) in solution.stages().zip(on_heap.stages()) {
         assert_eq!((a.x, a.u, a.dynamics), (b.x, b.u, b.dynamics));
     }
     let mut short = InteriorPoint::in_memory([0.0; WORK.0 - 1], [0; WORK.1]);
     assert_eq!(
-        short.solve(qp.view(), Start::Cold, solution.view_mut()),
-        Err(QpError::Dimension { field: Field::Numbers, stage: 0, expected: WORK.0, found: WORK.0 - 1 })
+        short.solve(qp.view(), QpStart::Cold, solution.view_mut()),
+        Err(QpError::Dimension { field: QpField::Numbers, stage: 0, expected: WORK.0, found: WORK.0 - 1 })
     );
     let mut short = InteriorPoint::in_memory([0.0; WORK.0], [0; WORK.1 - 1]);
     assert_eq!(
-        short.solve(qp.view(), Start::Cold, solution.view_mut()),
-        Err(QpError::Dimension { field: Field::Indices, stage: 0, expected: WORK.1, found: WORK.1 - 1 })
+        short.solve(qp.view(), QpStart::Cold, solution.view_mut()),
+        Err(QpError::Dimension { field: QpField::Indices, stage: 0, expected: WORK.1, found: WORK.1 - 1 })
     );
     Ok(())
 }
@@ -175,18 +175,18 @@ fn options() -> Test {
     for (spoil, expected) in cases {
         let mut solver = HeapInteriorPoint::new();
         spoil(&mut solver.options);
-        let found = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+        let found = solver.solve(qp.view(), QpStart::Cold, solution.view_mut());
         assert!(matches!(found, Err(QpError::InvalidOption { name, .. }) if name == expected), "{found:?}");
     }
     let mut solver = HeapInteriorPoint::new();
     (solver.options.max_iterations, solver.options.active_sets) = (usize::MAX, usize::MAX);
-    solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
+    solver.solve(qp.view(), QpStart::Warm, solution.view_mut())?;
     let mut unbounded = HeapQp::<f64>::new(&[StageDims::new(0, 1, 0)])?;
     let mut stage = unbounded.stage_mut(0).ok_or("no stage")?;
     stage.gradient_u_mut()[0] = -1.0;
     stage.u_bounds_mut().set(0, 0.0, f64::INFINITY);
     let mut solution = HeapSolution::new(unbounded.dims())?;
-    let found = solver.solve(unbounded.view(), Start::Cold, solution.view_mut());
+    let found = solver.solve(unbounded.view(), QpStart::Cold, solution.view_mut());
     assert!(matches!(found, Err(QpError::Stalled { .. })), "{found:?}");
     Ok(())
 }
@@ -210,9 +210,9 @@ fn clarabel_settings() -> Test {
     for (expected, change, values) in cases {
         for &wrong in values {
             let mut solver = Clarabel::new();
-            solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+            solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
             change(&mut solver, wrong);
-            let found = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+            let found = solver.solve(qp.view(), QpStart::Cold, solution.view_mut());
             assert!(
                 matches!(found, Err(QpError::InvalidOption { name, .. }) if name == expected),
                 "{expected} {wrong}: {found:?}"
@@ -220,15 +220,15 @@ fn clarabel_settings() -> Test {
         }
     }
     let mut solver = Clarabel::new();
-    let iterations = solver.solve(qp.view(), Start::Cold, solution.view_mut())?.iterations;
+    let iterations = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?.iterations;
     assert!(iterations > 2);
     solver.settings.max_iter = 2;
-    let found = solver.solve(qp.view(), Start::Cold, solution.view_mut());
+    let found = solver.solve(qp.view(), QpStart::Cold, solution.view_mut());
     assert!(matches!(found, Err(QpError::MaxIterations { iterations: 2, .. })), "{found:?}");
     solver.settings.max_iter = 100;
     // This one holds for the life of a solver: a new one is made.
     solver.settings.equilibrate_enable = false;
-    solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     Ok(())
 }
 
@@ -237,11 +237,11 @@ fn clarabel_settings() -> Test {
 fn blocks_of_any_length() -> Test {
     let qp = problem()?;
     let mut expected = HeapSolution::new(qp.dims())?;
-    HeapInteriorPoint::new().solve(qp.view(), Start::Cold, expected.view_mut())?;
+    HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, expected.view_mut())?;
     for block in [0, usize::MAX] {
         let mut solution = HeapSolution::new(qp.dims())?;
         let mut solver = Condensing::new(block, HeapInteriorPoint::new());
-        solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+        solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
         for (found, expected) in solution.stages().zip(expected.stages()) {
             for (found, expected) in found.u.iter().zip(expected.u) {
                 // Both are within tolerances of 1e-8 of the solution of a problem whose Hessian is

@@ -2,7 +2,7 @@
 
 use crate::{Test, solve};
 use casados::qp::{
-    Field, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, Side, StageDims, Start,
+    HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpField, QpSolver, QpStart, Side, StageDims,
 };
 
 const INFINITY: f64 = f64::INFINITY;
@@ -215,11 +215,11 @@ fn infeasible_and_where() -> Test {
     }
     qp.stage_mut(3).ok_or("no stage")?.x_bounds_mut().set(0, 1.0, INFINITY);
     let mut solution = HeapSolution::new(qp.dims())?;
-    let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    let found = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
     let Err(QpError::Infeasible { field, stage, index, side, violation }) = found else {
         return Err(format!("{found:?}").into());
     };
-    assert_eq!((field, stage, index, side), (Field::StateBounds, 3, 0, Side::Lower));
+    assert_eq!((field, stage, index, side), (QpField::StateBounds, 3, 0, Side::Lower));
     close(violation, 0.7, 1e-6);
     // The point is the one that is least infeasible.
     close(solution.stage(3).ok_or("no stage")?.x[0], 0.3, 1e-6);
@@ -247,11 +247,11 @@ fn contradictions() -> Test {
         stage.g_bounds_mut().set(0, first.0, first.1);
         stage.g_bounds_mut().set(1, second.0, second.1);
         let mut solution = HeapSolution::new(qp.dims())?;
-        let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+        let found = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
         let Err(QpError::Infeasible { field, stage, violation: found, .. }) = found else {
             return Err(format!("{found:?}").into());
         };
-        assert_eq!((field, stage), (Field::GeneralBounds, 2));
+        assert_eq!((field, stage), (QpField::GeneralBounds, 2));
         // The sum of both violations is what is smallest, and the larger one is at least half of
         // it.
         assert!(found >= 0.5 * violation - 1e-6 && found <= violation + 1e-6, "{found}");
@@ -265,7 +265,7 @@ fn not_convex() -> Test {
     qp.stage_mut(3).ok_or("no stage")?.r_mut().set(0, 0, -10.0);
     qp.fix_initial_state(&[1.0])?;
     let mut solution = HeapSolution::new(qp.dims())?;
-    let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    let found = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
     assert!(
         matches!(found, Err(QpError::NotConvex { stage: 3, index: 0, pivot }) if pivot < 0.0),
         "{found:?}"
@@ -281,7 +281,7 @@ fn unbounded() -> Test {
     stage.gradient_u_mut()[0] = -1.0;
     stage.u_bounds_mut().set(0, 0.0, INFINITY);
     let mut solution = HeapSolution::new(qp.dims())?;
-    let found = HeapInteriorPoint::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    let found = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
     assert!(matches!(found, Err(QpError::Stalled { .. } | QpError::MaxIterations { .. })), "{found:?}");
     Ok(())
 }
@@ -299,7 +299,7 @@ fn badly_scaled() -> Test {
     qp.fix_initial_state(&[5.0])?;
     let mut solver = HeapInteriorPoint::new();
     let mut solution = HeapSolution::new(qp.dims())?;
-    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     assert!(statistics.residuals.largest() <= solver.options.tolerance);
     close(solution.stage(0).ok_or("no stage")?.u[0], -1e3, 1e-6);
     Ok(())

@@ -18,22 +18,25 @@ mod known;
 mod random;
 
 use casados::qp::{
-    HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, Residuals, Start, Statistics, residuals,
+    HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, QpStatistics, Residuals, residuals,
 };
 
 type Test = Result<(), Box<dyn std::error::Error>>;
 
 /// A solution to 1e-10, and its residuals.
-fn solve(qp: &HeapQp<f64>) -> Result<(HeapSolution<f64>, Statistics, Residuals), QpError> {
+fn solve(qp: &HeapQp<f64>) -> Result<(HeapSolution<f64>, QpStatistics, Residuals), QpError> {
     solve_to(1e-10, qp)
 }
 
 /// A solution to a tolerance that is below what is asserted, and its residuals.
-fn solve_to(tolerance: f64, qp: &HeapQp<f64>) -> Result<(HeapSolution<f64>, Statistics, Residuals), QpError> {
+fn solve_to(
+    tolerance: f64,
+    qp: &HeapQp<f64>,
+) -> Result<(HeapSolution<f64>, QpStatistics, Residuals), QpError> {
     let mut solver = HeapInteriorPoint::new();
     solver.options.tolerance = tolerance;
     let mut solution = HeapSolution::new(qp.dims())?;
-    let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     let (residuals, objective) = residuals(qp.view(), &solution);
     // Sums of at most some hundred terms of sizes up to 1e2, rounded in a different order; and soft
     // violations are complementary to the tolerance only.

@@ -8,8 +8,8 @@ use crate::known::{Numbers, numbers};
 use crate::runs::{Counts, seeds, shows};
 use crate::{Test, solve_to};
 use casados::qp::{
-    Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, SecondOrderCone,
-    StageDims, Start, Statistics, residuals,
+    Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, QpStatistics,
+    SecondOrderCone, StageDims, residuals,
 };
 
 const TOLERANCE: f64 = 1e-9;
@@ -99,7 +99,7 @@ fn dims(seed: u64) -> Vec<StageDims> {
     (0..stages).map(|_| StageDims::new(1 + random.below(8), random.below(4), random.below(3))).collect()
 }
 
-fn counted(counts: &mut Counts, seed: u64, found: &Result<Statistics, QpError>) {
+fn counted(counts: &mut Counts, seed: u64, found: &Result<QpStatistics, QpError>) {
     counts.result(found);
     if shows() && found.is_err() {
         println!("{counts} {seed}: {found:?}");
@@ -111,9 +111,9 @@ fn solve<S: QpSolver<f64>>(
     solver: &mut S,
     fresh: impl FnOnce() -> S,
     qp: &HeapQp<f64>,
-    start: Start,
+    start: QpStart,
     solution: &mut HeapSolution<f64>,
-) -> Result<Statistics, QpError> {
+) -> Result<QpStatistics, QpError> {
     let mut other = solution.clone();
     let found = solver.solve(qp.view(), start, solution.view_mut());
     match &found {
@@ -123,7 +123,7 @@ fn solve<S: QpSolver<f64>>(
         }
         Err(error) => {
             let again = fresh().solve(qp.view(), start, other.view_mut());
-            assert_eq!(format!("{:?}", Err::<Statistics, _>(error)), format!("{again:?}"));
+            assert_eq!(format!("{:?}", Err::<QpStatistics, _>(error)), format!("{again:?}"));
             assert!(numbers(solution).zip(numbers(&other)).all(|(a, b)| a.to_bits() == b.to_bits()));
         }
     }
@@ -158,8 +158,8 @@ fn same_minimum_as_clarabel() -> Test {
         let dims = dims(seed);
         let qp = problem(&dims, seed)?;
         let mut solution = HeapSolution::new(&dims)?;
-        let clarabel = Clarabel::new().solve(qp.view(), Start::Cold, solution.view_mut());
-        let own = solve(&mut solver, interior_point, &qp, Start::Cold, &mut solution);
+        let clarabel = Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
+        let own = solve(&mut solver, interior_point, &qp, QpStart::Cold, &mut solution);
         counted(&mut counts, seed, &own);
         match (clarabel, own) {
             (Ok(clarabel), Ok(own)) => {
@@ -188,7 +188,7 @@ fn condensed_is_uncondensed() -> Test {
         let fresh = || Condensing::new(1 + seed as usize % 4, interior_point());
         let mut solver = fresh();
         let mut solution = HeapSolution::new(&dims)?;
-        for start in [Start::Cold, Start::Warm] {
+        for start in [QpStart::Cold, QpStart::Warm] {
             let found = solve(&mut solver, fresh, &qp, start, &mut solution);
             counted(&mut counts, seed, &found);
             let Ok(found) = found else { continue };
@@ -212,12 +212,12 @@ fn warm_is_cold() -> Test {
         let dims = dims(seed ^ (1 << 40));
         let mut qp = problem(&dims, seed ^ (1 << 40))?;
         let mut solution = HeapSolution::new(&dims)?;
-        if solve(&mut solver, interior_point, &qp, Start::Cold, &mut solution).is_err() {
+        if solve(&mut solver, interior_point, &qp, QpStart::Cold, &mut solution).is_err() {
             continue;
         }
         disturb(&mut qp, seed, 10_f64.powi(-(seed as i32 % 4)))?;
         let Ok((_, cold, _)) = solve_to(TOLERANCE, &qp) else { continue };
-        let warm = solve(&mut solver, interior_point, &qp, Start::Warm, &mut solution);
+        let warm = solve(&mut solver, interior_point, &qp, QpStart::Warm, &mut solution);
         counted(&mut counts, seed, &warm);
         if let Ok(warm) = warm {
             let (_, objective) = residuals(qp.view(), &solution);
@@ -255,11 +255,11 @@ fn few_active_sets_lie_between_neighbours() -> Test {
         let mut qp = problem(&dims, seed)?;
         let mut solver = HeapInteriorPoint::new();
         let mut solution = HeapSolution::new(&dims)?;
-        if solver.solve(qp.view(), Start::Cold, solution.view_mut()).is_err() {
+        if solver.solve(qp.view(), QpStart::Cold, solution.view_mut()).is_err() {
             continue;
         }
         disturb(&mut qp, seed, 0.01)?;
-        let Ok(statistics) = solver.solve(qp.view(), Start::Warm, solution.view_mut()) else { continue };
+        let Ok(statistics) = solver.solve(qp.view(), QpStart::Warm, solution.view_mut()) else { continue };
         all += 1;
         alone += usize::from(statistics.active_sets == statistics.iterations);
     }
@@ -282,11 +282,11 @@ fn second_order_cone() -> Test {
     let mut clarabel = Clarabel::new();
     clarabel.cones = vec![SecondOrderCone { stage: 0, first: 0, count: 3 }];
     let mut solution = HeapSolution::new(qp.dims())?;
-    clarabel.solve(qp.view(), Start::Cold, solution.view_mut())?;
+    clarabel.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
     let u = solution.stage(0).ok_or("no stage")?.u;
     assert!((u[0] - 0.6).abs() < 1e-7 && (u[1] - 0.8).abs() < 1e-7, "{u:?}");
     clarabel.cones[0].count = 4;
-    assert!(clarabel.solve(qp.view(), Start::Cold, solution.view_mut()).is_err());
+    assert!(clarabel.solve(qp.view(), QpStart::Cold, solution.view_mut()).is_err());
     Ok(())
 }
 
@@ -300,7 +300,7 @@ fn clarabel_finds_what_is_infeasible() -> Test {
     stage.x_bounds_mut().set(0, f64::NEG_INFINITY, 0.0);
     stage.g_bounds_mut().set(0, 1.0, f64::INFINITY);
     let mut solution = HeapSolution::new(qp.dims())?;
-    let found = Clarabel::new().solve(qp.view(), Start::Cold, solution.view_mut());
+    let found = Clarabel::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
     // Half of the distance, on either side.
     assert!(
         matches!(found, Err(casados::qp::QpError::Infeasible { stage: 0, index: 0, violation, .. }) if (violation - 0.5).abs() < 1e-6),

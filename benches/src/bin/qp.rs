@@ -10,7 +10,7 @@
 //! two columns of clarabel carries it here.
 
 use casados::qp::{
-    Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, StageDims, Start,
+    Clarabel, Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, StageDims,
 };
 use casados_benches::record::{load, numbers};
 use casados_benches::time::{Summary, measure, pin};
@@ -61,7 +61,7 @@ fn chain(masses: usize) -> Result<HeapQp<f64>, Failure> {
 struct Entry {
     name: String,
     solver: Box<dyn QpSolver<f64>>,
-    start: Start,
+    start: QpStart,
     solution: HeapSolution<f64>,
     best: f64,
     iterations: usize,
@@ -71,12 +71,12 @@ impl Entry {
     fn new(
         name: String,
         solver: Box<dyn QpSolver<f64>>,
-        start: Start,
+        start: QpStart,
         qp: &HeapQp<f64>,
     ) -> Result<Self, QpError> {
         let solution = HeapSolution::new(qp.dims())?;
         let mut entry = Self { name, solver, start, solution, best: f64::INFINITY, iterations: 0 };
-        entry.solver.solve(qp.view(), Start::Cold, entry.solution.view_mut())?;
+        entry.solver.solve(qp.view(), QpStart::Cold, entry.solution.view_mut())?;
         Ok(entry)
     }
     fn run(&mut self, qp: &HeapQp<f64>) -> Result<(), QpError> {
@@ -97,7 +97,7 @@ fn main() -> Result<(), Failure> {
     for (masses, [cold, warm, clarabel_there]) in REFERENCES {
         let qp = chain(masses)?;
         let mut entries = Vec::new();
-        for start in [Start::Cold, Start::Warm] {
+        for start in [QpStart::Cold, QpStart::Warm] {
             entries.push(Entry::new(
                 "interior point".into(),
                 Box::new(HeapInteriorPoint::new()),
@@ -112,7 +112,7 @@ fn main() -> Result<(), Failure> {
         let mut clarabel = Clarabel::new();
         let settings = &mut clarabel.settings;
         (settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas) = (1e-8, 1e-8, 1e-8);
-        entries.push(Entry::new("clarabel".into(), Box::new(clarabel), Start::Cold, &qp)?);
+        entries.push(Entry::new("clarabel".into(), Box::new(clarabel), QpStart::Cold, &qp)?);
         for _ in 0..ROUNDS {
             for entry in &mut entries {
                 entry.run(&qp)?;
@@ -121,8 +121,8 @@ fn main() -> Result<(), Failure> {
         for Entry { name, start, iterations, best, .. } in &entries {
             let reference = match (name.as_str(), start) {
                 ("clarabel", _) => clarabel_there,
-                (_, Start::Cold) => cold,
-                (_, Start::Warm) => warm,
+                (_, QpStart::Cold) => cold,
+                (_, QpStart::Warm) => warm,
             };
             println!("| {masses} | {name} | {start:?} | {iterations} | {best:.3} | {reference} |");
         }

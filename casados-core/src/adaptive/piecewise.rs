@@ -34,9 +34,22 @@ use bytemuck::Zeroable;
 
 /// An adaptive integrator over intervals, each with a control of its own.
 ///
-/// ```text
-/// let mut horizon = Piecewise::new(Adaptive::<Pendulum, Radau>::new(options)?);
-/// let end = horizon.forward(&x0, &controls, &ends)?;      // end.x, end.dx_dx0, end.dx_du[k], end.dx_dp
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut horizon = Piecewise::new(Adaptive::<Cart, Radau>::new(AdaptiveOptions::default())?);
+/// // Full power until t = 1, brakes until t = 3.
+/// let end = horizon.forward(&vector![0.0, 0.0], &[vector![2.0], vector![-1.0]], &[1.0, 3.0])?;
+/// assert!((end.nominal.x - vector![3.0, 0.0]).norm() < 1e-12);
+/// assert!((end.dx_du[0] - vector![2.5, 1.0]).norm() < 1e-12);
+/// assert!((end.dx_du[1] - vector![2.0, 2.0]).norm() < 1e-12);
+/// # Ok::<(), casados::Error>(())
 /// ```
 ///
 /// The first interval begins at the time that was set ([`Integrator::set_time`]), each of the

@@ -1,6 +1,22 @@
 //! What the last call did.
 
 /// What the last call of an adaptive integrator did, successful or not.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0] - 9.81 * x[0].sin()]
+/// }
+///
+/// let mut adaptive = Adaptive::<Pendulum, DormandPrince5>::new(AdaptiveOptions::default())?;
+/// adaptive.solve(&vector![1.0, 0.0], &vector![0.0], 2.0)?;
+/// let statistics = adaptive.statistics();
+/// assert_eq!(statistics.steps, adaptive.times().count() - 1);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct AdaptiveStatistics {

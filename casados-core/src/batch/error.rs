@@ -4,6 +4,22 @@ use crate::error::{Argument, Error};
 use core::fmt;
 
 /// Why a batch has not all of its results.
+///
+/// ```
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut results = vec![casados::result::Nominal::default(); 3];
+/// // No interval, but three places for results.
+/// let error = batch.solve(&Intervals { h: &[0.1], ..Default::default() }, &mut results);
+/// assert!(matches!(error, Err(BatchError::Length { .. })));
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BatchError {

@@ -3,6 +3,22 @@
 use crate::statistics::Statistics;
 
 /// What the last call did.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// let (x0, mut ends) = ([vector![0.0, 1.0]; 16], vec![casados::result::Nominal::default(); 16]);
+/// batch.solve(&Intervals { x0: &x0, u: &[vector![1.0]], h: &[0.1], ..Default::default() }, &mut ends)?;
+/// assert_eq!((batch.statistics().failed, batch.statistics().redone), (0, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BatchStatistics {

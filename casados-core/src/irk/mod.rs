@@ -129,6 +129,27 @@ pub type Irk<M, B, T = f64, W = crate::memory::Heap> = <B as Implicit>::Integrat
 pub type Irk<M, B, T, W> = <B as Implicit>::Integrator<M, T, W>;
 
 /// A method that an implicit integrator takes.
+///
+/// ```
+/// use casados::irk::Implicit;
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// /// As long as a type says it, any method will do.
+/// type Solver<B> = Irk<Cart, B>;
+/// fn name<B: Implicit>() -> &'static str {
+///     std::any::type_name::<Solver<B>>()
+/// }
+/// assert!(name::<RadauIIA<2>>().contains("RadauIIA"));
+/// let end = Solver::<RadauIIA<2>>::new(Options::default())?.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?.x;
+/// assert!((end - vector![0.75, 2.0]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not an implicit Runge-Kutta method",
     note = "`Gauss<S>`, `RadauIIA<S>` and `Custom<S>` are"

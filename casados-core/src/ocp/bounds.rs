@@ -8,7 +8,7 @@ use super::instance::{Initial, Ocp};
 use super::names::Names;
 use super::problem::Formulation;
 use super::{constraint::Constraints, cost::Cost};
-use crate::qp::{BoundsMut, Field, QpError, Side, StageDims, check};
+use crate::qp::{BoundsMut, QpError, QpField, Side, StageDims, check};
 use crate::scalar::Real;
 use crate::shape::Shape;
 use core::ops::{Range, RangeBounds};
@@ -239,12 +239,12 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
 
     /// A constraint of the QP by its name in the problem.
     #[must_use]
-    pub fn name(&self, field: Field, stage: usize, index: usize, side: Side) -> ConstraintName {
+    pub fn name(&self, field: QpField, stage: usize, index: usize, side: Side) -> ConstraintName {
         let names = self.names();
         let of = |list: &[&'static str]| list.get(index).copied().unwrap_or("");
         let (part, (name, output)) = match field {
-            Field::StateBounds => (Part::StateBounds, (of(names.x), 0)),
-            Field::ControlBounds => (Part::ControlBounds, (of(names.u), 0)),
+            QpField::StateBounds => (Part::StateBounds, (of(names.x), 0)),
+            QpField::ControlBounds => (Part::ControlBounds, (of(names.u), 0)),
             _ if stage == self.intervals() => (Part::TerminalBounds, P::Terminal::name(index)),
             _ => (Part::PathBounds, P::Path::name(index)),
         };
@@ -273,25 +273,25 @@ impl<P: Formulation<T>, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let known = self.names();
         let (nx, nu) = (known.x.len(), known.u.len());
         let rows = match field {
-            Field::A | Field::B | Field::Q => nx,
-            Field::C | Field::D if stage == self.intervals() => P::Terminal::ROWS,
-            Field::C | Field::D => P::Path::ROWS,
-            Field::R | Field::S => nu,
-            Field::GradientX | Field::GradientU => 1,
+            QpField::A | QpField::B | QpField::Q => nx,
+            QpField::C | QpField::D if stage == self.intervals() => P::Terminal::ROWS,
+            QpField::C | QpField::D => P::Path::ROWS,
+            QpField::R | QpField::S => nu,
+            QpField::GradientX | QpField::GradientU => 1,
             _ => return None,
         };
         let (row, column) = (index.checked_rem(rows)?, index.checked_div(rows)?);
         let (list, by) = match field {
-            Field::A | Field::Q => (known.x, known.x),
-            Field::B => (known.x, known.u),
-            Field::R => (known.u, known.u),
-            Field::S => (known.u, known.x),
-            Field::C | Field::GradientX => (&[][..], known.x),
+            QpField::A | QpField::Q => (known.x, known.x),
+            QpField::B => (known.x, known.u),
+            QpField::R => (known.u, known.u),
+            QpField::S => (known.u, known.x),
+            QpField::C | QpField::GradientX => (&[][..], known.x),
             _ => (&[][..], known.u),
         };
         let (of, output) = match field {
-            Field::C | Field::D if stage == self.intervals() => P::Terminal::name(row),
-            Field::C | Field::D => P::Path::name(row),
+            QpField::C | QpField::D if stage == self.intervals() => P::Terminal::name(row),
+            QpField::C | QpField::D => P::Path::name(row),
             _ => (list.get(row).copied().unwrap_or(""), 0),
         };
         let by = by.get(column).copied().unwrap_or("");

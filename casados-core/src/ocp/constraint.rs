@@ -158,6 +158,31 @@ impl<S: Shape, T: Real, A: Constraints<S, T>, B: Constraints<S, T>> Constraints<
 
 /// `lower ≤ g(x, z, u, p, t) ≤ upper` of the outputs of a function. A side may be infinite; equal
 /// bounds are an equation.
+///
+/// ```
+/// use casados::ocp::{Constraint, GeneralCost, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+/// #[function]
+/// fn speed(x: [f64; 2], _u: f64) -> f64 { x[1] }
+///
+/// // At most 1.2 m/s, or 100 for each m/s above: from rest to 1 m in a second.
+/// let fast = Constraint::<Speed>::new([f64::NEG_INFINITY], [1.2]).soft(100.0, 0.0);
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .path_constraints(fast)
+///     .on(Horizon::uniform(20, 0.05))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 20.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// let speeds = ocp.solution()?.state("x[1]")?.to_vec();
+/// assert!(speeds[..20].iter().all(|speed| *speed < 1.2 + 1e-5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Constraint<F: Function, T: Plain = f64> {

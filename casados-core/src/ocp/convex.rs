@@ -28,6 +28,16 @@ pub trait Convex<T> {
 /// `w δ (|r| − ½ δ)` where it is larger: outliers have a bounded force.
 ///
 /// P. J. Huber, "Robust estimation of a location parameter", Ann. Math. Statist. 35 (1964).
+///
+/// ```
+/// use casados::ocp::{Convex, Huber};
+///
+/// // ½ r² up to 0.5, then linear; gradient and Hessian are zero before.
+/// let huber = Huber { weights: [1.0], delta: [0.5] };
+/// let (mut gradient, mut hessian) = ([0.0], [0.0]);
+/// assert_eq!(huber.evaluate(&[2.0], &mut gradient, &mut hessian), 0.5 * (2.0 - 0.25));
+/// assert_eq!((gradient, hessian), ([0.5], [0.0]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Huber<T, const NY: usize> {
     /// `w`, from zero on.
@@ -38,6 +48,16 @@ pub struct Huber<T, const NY: usize> {
 
 /// The smooth sister of [`Huber`], with second derivatives everywhere:
 /// `w δ² (√(1 + (r/δ)²) − 1)`.
+///
+/// ```
+/// use casados::ocp::{Convex, PseudoHuber};
+///
+/// let smooth = PseudoHuber { weights: [1.0], delta: [1.0] };
+/// let (mut gradient, mut hessian) = ([0.0], [0.0]);
+/// let value = smooth.evaluate(&[3.0_f64.sqrt()], &mut gradient, &mut hessian);
+/// assert!((value - 1.0).abs() < 1e-15); // √(1 + 3) − 1
+/// assert!((gradient[0] - 0.75_f64.sqrt()).abs() < 1e-15); // r/√(1 + r²)
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PseudoHuber<T, const NY: usize> {
     /// `w`, from zero on.

@@ -5,6 +5,13 @@ use crate::qp::part_mut;
 use crate::scalar::Real;
 
 /// What is done with the Hessian of a stage that is not positive definite.
+///
+/// ```
+/// use casados::ocp::{Convexification, Exact, GaussNewton};
+///
+/// assert_eq!(Exact::default().convexification, Convexification::Reduced);
+/// assert_eq!(GaussNewton::default().convexification, Convexification::Project);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Convexification {

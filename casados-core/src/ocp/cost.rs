@@ -197,6 +197,24 @@ impl<S: Shape, T: Real, A: Cost<S, T>, B: Cost<S, T>> Cost<S, T> for (A, B) {
 /// The sum of all outputs `y(x, z, u, p, t)` of a function, with its exact Hessian.
 ///
 /// If that is not positive semidefinite, the stages are made convex.
+///
+/// ```
+/// use casados::ocp::{GeneralCost, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(4, 0.5))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.guess(&[0.0, 0.0], &[2.0])?;
+/// println!("{ocp}"); // the cost by its name
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct GeneralCost<F: Function, T: Plain = f64> {

@@ -43,6 +43,15 @@ pub struct GaussNewton {
 /// The Hessian of the Lagrangian. Where costs or constraints depend on algebraic states, all
 /// intervals are simulated first: what second derivatives of these states are multiplied by depends
 /// on them.
+///
+/// ```
+/// use casados::ocp::{Convexification, Exact};
+///
+/// // Stage by stage instead of all together.
+/// let exact = Exact { convexification: Convexification::Project };
+/// assert_ne!(exact, Exact::default());
+/// // `HeapSqp::new(&ocp)?.exact(exact)` takes it.
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exact {
     /// What is done where it is not convex. Default [`Convexification::Reduced`].

@@ -2,7 +2,7 @@
 
 use super::names::Names;
 use crate::error::Error;
-use crate::qp::{Field, QpError, Side};
+use crate::qp::{QpError, QpField, Side};
 use core::fmt;
 
 /// A part of a problem.
@@ -77,7 +77,6 @@ impl fmt::Debug for Text {
 
 /// A constraint by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct ConstraintName {
     /// What kind of bounds.
     pub part: Part,
@@ -232,7 +231,7 @@ pub enum OcpError {
     NonFiniteDerivative {
         /// Where it is in the QP: `A`, `B` of dynamics, `C`, `D` of constraints, gradients of
         /// costs; `Q`, `R`, `S` are second derivatives.
-        field: Field,
+        field: QpField,
         /// The stage.
         stage: usize,
         /// What is differentiated: a state at the end of the interval or a constraint; or the first

@@ -4,6 +4,16 @@ use super::error::OcpError;
 use crate::scalar::Real;
 
 /// The nodes in time.
+///
+/// Nodes increase; times are those that the model sees, in its units.
+///
+/// ```
+/// use casados::ocp::Horizon;
+///
+/// assert_eq!(Horizon::uniform(20, 0.05).intervals(), 20);
+/// // Short intervals first, where it matters.
+/// assert_eq!(Horizon::nodes(&[0.0, 0.1, 0.3, 0.7]).intervals(), 3);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Horizon<'a, T> {
     /// Intervals of equal length, from time zero on.

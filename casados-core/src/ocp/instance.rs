@@ -41,6 +41,33 @@ pub(super) enum Initial {
 ///
 /// It prints itself as mathematics, with names, bounds and sizes (`println!("{ocp}")`). A clone on
 /// the heap has its bounds, data and iterate, and integrators of its own.
+///
+/// # Example
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// const N: usize = 20;
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(N, 0.05))?;
+/// // Bounds by the names of the model, stages by ranges: from rest to rest in a second.
+/// ocp.fix_initial_state(&[0.0, 0.0])?;
+/// ocp.bound("x[0]", N.., 1.0, 1.0)?.bound("x[1]", N.., 0.0, 0.0)?.bound("u", .., -8.0, 8.0)?;
+/// ocp.guess(&[0.0, 0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// // The best push falls linearly from 6 to −6, and so do its samples, about as much.
+/// let solution = ocp.solution()?;
+/// assert!((solution.control("u")?[0] - 6.0).abs() < 0.5);
+/// assert!((solution.state("x[0]")?[N / 2] - 0.5).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone)]
 pub struct Ocp<P, T, D, M> {
     pub(super) problem: P,
@@ -60,6 +87,8 @@ pub struct Ocp<P, T, D, M> {
 }
 
 /// A problem with its memory on the heap.
+///
+/// `problem.on(horizon)` makes it; [`Ocp`] has its methods, and an example.
 #[cfg(feature = "alloc")]
 pub type HeapOcp<P, T = f64> = Ocp<P, T, Vec<StageDims>, Vec<T>>;
 

@@ -18,6 +18,27 @@ use core::ops::Range;
 ///
 /// Its Hessian is `JᵀWJ`, that of Gauss and Newton; the exact one has the second derivatives of `y`
 /// too.
+///
+/// ```
+/// use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// /// What follows a reference: the position, and the push with little weight.
+/// #[function]
+/// fn track(x: [f64; 2], u: f64) -> [f64; 2] { [x[0], u] }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .stage_cost(LeastSquaresCost::<Track>::diagonal(&[1.0, 1e-6]))
+///     .on(Horizon::uniform(20, 0.1))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.guess(&[0.0, 0.0], &[0.0])?;
+/// ocp.set_reference(.., &[1.0, 0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?.gauss_newton();
+/// assert!(sqp.solve(&mut ocp)?.is_converged());
+/// assert!((ocp.solution()?.state("x[0]")?[15] - 1.0).abs() < 0.05);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct LeastSquaresCost<F: Function, T: Plain = f64> {

@@ -119,6 +119,30 @@ pub enum Status {
 }
 
 /// The outcome of a run. The iterate of the problem is the best one, whatever the status.
+///
+/// Runs return it; it prints itself in a line. Whether the iterate is a solution, `is_converged`
+/// says.
+///
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem, Status};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn price(x: f64, u: f64) -> f64 { x * x + u * u }
+///
+/// let mut ocp = Problem::new(Map::<Push, f64>::new())
+///     .stage_cost(GeneralCost::<Price>::new())
+///     .on(Horizon::uniform(5, 1.0))?;
+/// ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// match outcome.status {
+///     Status::Converged | Status::Acceptable => println!("{}", outcome.objective),
+///     status => panic!("{status}"),
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Outcome {

@@ -11,6 +11,27 @@ use crate::shape::{Matrix, Outputs, Plain, Shape, plain};
 use bytemuck::Zeroable;
 
 /// `x_{k+1} = y(x_k, u_k, p_k, t_k)`: a [`Function`] with as many outputs as there are states.
+///
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Map, Problem};
+/// use casados::prelude::*;
+///
+/// /// A store that is filled and drained.
+/// #[function]
+/// fn store(x: f64, u: f64) -> f64 { 0.9 * x + u }
+/// #[function]
+/// fn price(_x: f64, u: f64) -> f64 { u * u }
+///
+/// let mut ocp = Problem::new(Map::<Store, f64>::new())
+///     .stage_cost(GeneralCost::<Price>::new())
+///     .on(Horizon::uniform(5, 1.0))?;
+/// ocp.fix_initial_state(&[0.0])?.bound("x", 5.., 1.0, 1.0)?.guess(&[0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// // u_k is proportional to what is left of it at the end, 0.9^(4 − k).
+/// let u = ocp.solution()?.control("u")?.to_vec();
+/// assert!((u[3] / u[4] - 0.9).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Map<F: Function, T: Plain> {

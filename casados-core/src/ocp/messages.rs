@@ -1,7 +1,7 @@
 //! What errors say: what, where by name, the values, and the way out.
 
 use super::error::{ConstraintName, OcpError, Part};
-use crate::qp::{Field, Side};
+use crate::qp::{QpField, Side};
 use core::fmt;
 
 impl Part {
@@ -143,9 +143,9 @@ impl fmt::Display for OcpError {
             Self::NonFiniteDerivative { field, stage, of, output, by, value } => {
                 write!(f, "stage {stage}: ")?;
                 match field {
-                    Field::A | Field::B => write!(f, "the derivative of the next `{of}` by `{by}`")?,
-                    Field::C | Field::D => write!(f, "the derivative of output {output} of `{of}` by `{by}`")?,
-                    Field::GradientX | Field::GradientU => write!(f, "the derivative of the cost by `{by}`")?,
+                    QpField::A | QpField::B => write!(f, "the derivative of the next `{of}` by `{by}`")?,
+                    QpField::C | QpField::D => write!(f, "the derivative of output {output} of `{of}` by `{by}`")?,
+                    QpField::GradientX | QpField::GradientU => write!(f, "the derivative of the cost by `{by}`")?,
                     _ => write!(f, "the second derivative of the Lagrangian by `{of}` and `{by}`")?,
                 }
                 write!(f, " is {value}: another guess, or bounds that keep away from there, may help")

@@ -10,6 +10,31 @@ use crate::shape::Shape;
 /// not said is not there.
 ///
 /// A problem on a horizon is an [`Ocp`](super::Ocp).
+///
+/// ```text
+/// min  Σ_k l(x_k, z_k, u_k, p_k, t_k) + e(x_N)        x_{k+1} = φ(x_k, u_k, p_k)        lg ≤ g(x_k, z_k, u_k, p_k, t_k) ≤ ug
+/// ```
+///
+/// ```
+/// use casados::ocp::{Constraint, GeneralCost, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+/// #[function]
+/// fn speed(x: [f64; 2], _u: f64) -> f64 { x[1] }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?) // φ
+///     .running_cost(GeneralCost::<Effort>::new()) // l, times the lengths of intervals
+///     .path_constraints(Constraint::<Speed>::new([-1.0], [1.0])) // g
+///     .on(Horizon::uniform(20, 0.1))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 20.., 1.0, 1.0)?;
+/// println!("{ocp}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Problem<D, L = (), E = (), G = (), H = ()> {
     /// What happens between two nodes.

@@ -16,7 +16,7 @@ use super::instance::Ocp;
 use super::problem::Formulation;
 #[cfg(feature = "alloc")]
 use crate::qp::{HeapInteriorPoint, HeapSolution};
-use crate::qp::{QpSolver, Solution, StageDims, Start, Statistics};
+use crate::qp::{QpSolver, QpStart, QpStatistics, Solution, StageDims};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
 use alloc::vec::Vec;
@@ -106,7 +106,7 @@ pub struct Feedback<'a, T> {
     /// The control to be applied: the first of the plan.
     pub u: &'a [T],
     /// What the QP took.
-    pub statistics: Statistics,
+    pub statistics: QpStatistics,
 }
 
 #[cfg(feature = "alloc")]
@@ -206,7 +206,7 @@ impl<'a, P: Formulation<T>, S: QpSolver<T>, T: Real, D: AsRef<[StageDims]>, M: A
         let Self { qp_solver, ocp, solution, warm } = self;
         ocp.fix_initial_state(x0)?;
         solution.copy_from(&ocp.iterate);
-        let start = if *warm { Start::Warm } else { Start::Cold };
+        let start = if *warm { QpStart::Warm } else { QpStart::Cold };
         let statistics = qp_solver
             .solve(ocp.qp(), start, solution.view_mut())
             .map_err(|error| ocp.derivative(&error).unwrap_or_else(|| error.into()))?;

@@ -16,6 +16,25 @@ use crate::shape::{Matrix, Shape};
 use alloc::vec::Vec;
 
 /// All intervals of a horizon at once: lanes of registers, and threads (feature `parallel`).
+///
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem, Shooting};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// let batch = Batch::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut ocp = Problem::new(Shooting::new(batch))
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(40, 0.05))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 40.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Shooting<M: Dae, B, const S: usize, T: Real> {
     batch: Integrator<M, B, S, T>,
     x: Vec<VectorX<M, T>>,

@@ -36,6 +36,23 @@ pub(super) const fn origin<M: Dae>() -> Origin {
 /// quadrature, which has no such matrix, the Hessian is known to exact methods only.
 ///
 /// References of integrals are parameters, which every stage has for itself.
+///
+/// ```
+/// use casados::ocp::{Along, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// /// The speed, too, costs something all along the way.
+/// #[function]
+/// fn price(x: [f64; 2], u: f64) -> f64 { 0.5 * (x[1] * x[1] + u * u) }
+///
+/// let irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut ocp = Problem::new(Along::new(irk, Quadrature::<Price>::new())).on(Horizon::uniform(10, 0.1))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// assert!(HeapSqp::new(&ocp)?.solve(&mut ocp)?.is_converged());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Along<I, Q> {
     /// The integrator.

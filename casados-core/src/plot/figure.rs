@@ -43,6 +43,17 @@ impl From<Sparsity> for Cell {
 ///
 /// Columns are filled from the top, the first one first; all panels of a column have the same
 /// height.
+///
+/// ```
+/// use casados::plot::{Figure, Panel};
+///
+/// let wave = |t: usize| (0.1 * t as f64, (0.1 * t as f64).sin());
+/// let figure = Figure::new()
+///     .with(Panel::new("A sine").x("time, s").line("sine", (0..70).map(wave)))
+///     .with(Panel::new("Held").steps("sine", (0..70).step_by(10).map(wave)));
+/// assert!(figure.to_svg().contains("A sine"));
+/// // figure.save("sine.svg")?;
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Figure {
     columns: Vec<(f64, Vec<Cell>)>,

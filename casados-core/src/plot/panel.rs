@@ -10,6 +10,14 @@ use core::ops::Range;
 /// Two axes, and what is drawn over them.
 ///
 /// Ranges follow from the data unless they are given.
+///
+/// ```
+/// use casados::plot::{Figure, Panel};
+///
+/// let errors = [(1.0, 1e-2), (2.0, 6e-4), (4.0, 4e-5)];
+/// let panel = Panel::new("Convergence").x("steps").y("error").log_x().log_y().dots("Rk4", errors);
+/// assert!(Figure::new().with(panel).to_svg().starts_with("<svg"));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Panel {
     pub(super) title: String,

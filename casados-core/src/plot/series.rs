@@ -5,6 +5,13 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 /// Points that belong together. What is not finite interrupts a line.
+///
+/// ```
+/// use casados::plot::{Panel, Series};
+///
+/// let dashed = Series::line("reference", [(0.0, 1.0), (5.0, 1.0)]).dashed();
+/// let _panel = Panel::new("Position").with(dashed);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Series {
     pub(super) name: String,

@@ -19,6 +19,14 @@ struct Curve {
 }
 
 /// Curves in a box with three axes of one scale, and their shadows on its floor.
+///
+/// ```
+/// use casados::plot::{Figure, Space};
+///
+/// let helix = (0..100).map(|i| 0.1 * i as f64).map(|t| [t.cos(), t.sin(), 0.1 * t]);
+/// let space = Space::new("Helix").axes(["x, m", "y, m", "z, m"]).line("way", helix);
+/// assert!(Figure::new().with(space).to_svg().contains("Helix"));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Space {
     title: String,

@@ -1,11 +1,11 @@
 //! Views of matrices in memory that somebody else laid out.
 
-use super::error::{Field, QpError};
+use super::error::{QpError, QpField};
 
 /// Where the elements of a matrix lie.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shape {
-    pub field: Field,
+    pub field: QpField,
     pub stage: usize,
     pub rows: usize,
     pub columns: usize,

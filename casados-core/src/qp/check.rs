@@ -1,7 +1,7 @@
 //! Whether data makes sense.
 
 use super::bounds::Bounds;
-use super::error::{Field, QpError};
+use super::error::{QpError, QpField};
 use super::problem::QpView;
 use crate::scalar::Real;
 
@@ -12,13 +12,13 @@ use crate::scalar::Real;
 pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
     for (k, stage) in qp.stages().enumerate() {
         let blocks = [
-            (Field::A, stage.a(), false),
-            (Field::B, stage.b(), false),
-            (Field::C, stage.c(), false),
-            (Field::D, stage.d(), false),
-            (Field::Q, stage.q(), true),
-            (Field::R, stage.r(), true),
-            (Field::S, stage.s(), false),
+            (QpField::A, stage.a(), false),
+            (QpField::B, stage.b(), false),
+            (QpField::C, stage.c(), false),
+            (QpField::D, stage.d(), false),
+            (QpField::Q, stage.q(), true),
+            (QpField::R, stage.r(), true),
+            (QpField::S, stage.s(), false),
         ];
         for (field, block, symmetric) in blocks {
             let (rows, columns) = block.shape();
@@ -29,9 +29,9 @@ pub fn check<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError> {
             }
         }
         let vectors = [
-            (Field::Offset, stage.offset()),
-            (Field::GradientX, stage.gradient_x()),
-            (Field::GradientU, stage.gradient_u()),
+            (QpField::Offset, stage.offset()),
+            (QpField::GradientX, stage.gradient_x()),
+            (QpField::GradientU, stage.gradient_u()),
         ];
         for (field, vector) in vectors {
             for (i, &value) in vector.iter().enumerate() {
@@ -47,15 +47,15 @@ pub(super) fn check_all_bounds<T: Real>(qp: QpView<'_, T>) -> Result<(), QpError
     for (k, stage) in qp.stages().enumerate() {
         // Only where some make none they are looked for.
         if !make_sense(&stage.all_bounds()) {
-            find_bounds(Field::StateBounds, k, &stage.x_bounds())?;
-            find_bounds(Field::ControlBounds, k, &stage.u_bounds())?;
-            find_bounds(Field::GeneralBounds, k, &stage.g_bounds())?;
+            find_bounds(QpField::StateBounds, k, &stage.x_bounds())?;
+            find_bounds(QpField::ControlBounds, k, &stage.u_bounds())?;
+            find_bounds(QpField::GeneralBounds, k, &stage.g_bounds())?;
         }
     }
     Ok(())
 }
 
-fn finite<T: Real>(field: Field, stage: usize, index: usize, value: T) -> Result<(), QpError> {
+fn finite<T: Real>(field: QpField, stage: usize, index: usize, value: T) -> Result<(), QpError> {
     if value.is_finite() {
         Ok(())
     } else {
@@ -97,7 +97,7 @@ fn make_sense<T: Real>(bounds: &Bounds<'_, T>) -> bool {
 }
 
 /// The first that does not.
-fn find_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
+fn find_bounds<T: Real>(field: QpField, stage: usize, bounds: &Bounds<'_, T>) -> Result<(), QpError> {
     for (index, (&lower, &upper)) in bounds.lower.iter().zip(bounds.upper).enumerate() {
         if is_range(lower, upper) {
             continue;
@@ -120,7 +120,7 @@ fn find_bounds<T: Real>(field: Field, stage: usize, bounds: &Bounds<'_, T>) -> R
             penalties.iter().enumerate().find(|(_, penalty)| !is_penalty(**penalty))
         {
             return Err(QpError::InvalidValue {
-                field: Field::Penalty,
+                field: QpField::Penalty,
                 stage,
                 index,
                 value: penalty.to_f64(),

@@ -1,14 +1,14 @@
 //! The solver clarabel behind the trait of this library (feature `clarabel`).
 
 use super::check::check;
-use super::error::{Field, QpError, Side};
+use super::error::{QpError, QpField, Side};
 use super::layout::Places;
 use super::problem::QpView;
 use super::solution::SolutionView;
-use super::solver::{QpSolver, Start};
+use super::solver::{QpSolver, QpStart};
 pub use super::sparse::SecondOrderCone;
 use super::sparse::{Origin, Sparse, Triplets};
-use super::statistics::{Residuals, Statistics};
+use super::statistics::{QpStatistics, Residuals};
 use alloc::vec::Vec;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
@@ -125,13 +125,18 @@ impl Clarabel {
         for cone in &self.cones {
             let Some(stage) = qp.stage(cone.stage) else {
                 let (expected, found) = (cone.stage + 1, qp.dims().len());
-                return Err(QpError::Dimension { field: Field::Stages, stage: cone.stage, expected, found });
+                return Err(QpError::Dimension {
+                    field: QpField::Stages,
+                    stage: cone.stage,
+                    expected,
+                    found,
+                });
             };
             let (expected, found) = (cone.first.saturating_add(cone.count), stage.dims().ng);
             let lower = stage.g_bounds().lower;
             if expected > found || cone.count == 0 {
                 return Err(QpError::Dimension {
-                    field: Field::GeneralBounds,
+                    field: QpField::GeneralBounds,
                     stage: cone.stage,
                     expected,
                     found,
@@ -141,7 +146,7 @@ impl Clarabel {
                 let value = lower.get(index).copied().unwrap_or(0.0);
                 if !value.is_finite() {
                     return Err(QpError::InvalidValue {
-                        field: Field::GeneralBounds,
+                        field: QpField::GeneralBounds,
                         stage: cone.stage,
                         index,
                         value,
@@ -178,7 +183,7 @@ impl Clarabel {
             // the user's settings.
             let solver = DefaultSolver::new(&p, &sparse.q, &k, &sparse.b, &cones, settings);
             let invalid =
-                QpError::InvalidValue { field: Field::Settings, stage: 0, index: 0, value: f64::NAN };
+                QpError::InvalidValue { field: QpField::Settings, stage: 0, index: 0, value: f64::NAN };
             self.kept = Some(Kept { solver: solver.map_err(|_| invalid)?, p, k, cones });
         }
         match &mut self.kept {
@@ -216,9 +221,9 @@ impl QpSolver<f64> for Clarabel {
     fn solve(
         &mut self,
         qp: QpView<'_, f64>,
-        _: Start,
+        _: QpStart,
         solution: SolutionView<'_, f64>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         check(qp)?;
         solution.fits(qp)?;
         self.check_settings()?;
@@ -259,12 +264,12 @@ impl QpSolver<f64> for Clarabel {
         let objective = found.obj_val;
         match found.status {
             SolverStatus::AlmostSolved if !is_refined => Err(QpError::Stalled { iterations, residuals }),
-            SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(Statistics {
+            SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(QpStatistics {
                 iterations,
                 factorisations: iterations,
                 residuals,
                 objective,
-                ..Statistics::default()
+                ..QpStatistics::default()
             }),
             SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => {
                 Err(infeasible(qp, &sparse, &found.z))

@@ -6,7 +6,7 @@ use core::fmt;
 /// A part of a QP or of its solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Field {
+pub enum QpField {
     /// `A`
     A,
     /// `B`
@@ -74,7 +74,7 @@ pub enum QpError {
     /// A length is not what the dimensions ask for.
     Dimension {
         /// What is too short or too long.
-        field: Field,
+        field: QpField,
         /// The stage, 0 where it is the whole horizon.
         stage: usize,
         /// The length that is needed.
@@ -85,7 +85,7 @@ pub enum QpError {
     /// A lower bound is above the upper one.
     CrossedBounds {
         /// Which bounds.
-        field: Field,
+        field: QpField,
         /// The stage.
         stage: usize,
         /// The element.
@@ -99,7 +99,7 @@ pub enum QpError {
     /// penalty is negative.
     InvalidValue {
         /// Where.
-        field: Field,
+        field: QpField,
         /// The stage.
         stage: usize,
         /// The element; of matrices in column-major order.
@@ -111,7 +111,7 @@ pub enum QpError {
     /// smallest.
     Infeasible {
         /// Which bounds.
-        field: Field,
+        field: QpField,
         /// The stage.
         stage: usize,
         /// The element.
@@ -171,7 +171,7 @@ pub enum QpError {
     },
 }
 
-impl fmt::Display for Field {
+impl fmt::Display for QpField {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::A => "A",

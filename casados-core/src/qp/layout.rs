@@ -9,6 +9,15 @@ use core::iter::FusedIterator;
 use core::marker::PhantomData;
 
 /// The dimensions of one stage.
+///
+/// ```
+/// use casados::qp::StageDims;
+///
+/// // Two states, a control, no general constraint; at the end no control.
+/// let mut dims = [StageDims::new(2, 1, 0); 4];
+/// dims[3].nu = 0;
+/// assert_eq!((dims[0].nx, dims[0].nu, dims[3].nu), (2, 1, 0));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct StageDims {
     /// States `x`.

@@ -19,7 +19,7 @@
     feature = "alloc",
     doc = "
 ```
-use casados_core::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start};
+use casados_core::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, QpStart};
 
 // x₊ = x + u, from x₀ = 1, with |u| ≤ 0.4, three intervals.
 let mut dims = [StageDims::new(1, 1, 0); 4];
@@ -36,14 +36,14 @@ qp.fix_initial_state(&[1.0])?;
 
 let mut solver = HeapInteriorPoint::new();
 let mut solution = HeapSolution::new(&dims)?;
-let statistics = solver.solve(qp.view(), Start::Cold, solution.view_mut())?;
+let statistics = solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
 let u0 = solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]);
 assert!((u0 + 0.4).abs() < 1e-7 && statistics.iterations < 15);
 
 // The next sampling instant begins where this one would have gone.
 qp.fix_initial_state(&[0.6])?;
 solution.shift();
-solver.solve(qp.view(), Start::Warm, solution.view_mut())?;
+solver.solve(qp.view(), QpStart::Warm, solution.view_mut())?;
 # Ok::<(), casados_core::qp::QpError>(())
 ```
 "
@@ -79,7 +79,7 @@ pub use check::check;
 pub use clarabel::{Clarabel, SecondOrderCone};
 #[cfg(feature = "alloc")]
 pub use condense::Condensing;
-pub use error::{Field, QpError, Side};
+pub use error::{QpError, QpField, Side};
 #[cfg(feature = "alloc")]
 pub use interior::HeapInteriorPoint;
 #[cfg(feature = "alloc")]
@@ -93,9 +93,9 @@ pub use residuals::residuals;
 #[cfg(feature = "alloc")]
 pub use solution::HeapSolution;
 pub use solution::{Solution, SolutionStage, SolutionStageMut, SolutionView};
-pub use solver::{QpSolver, Start};
+pub use solver::{QpSolver, QpStart};
 pub use stage::{Stage, StageMut};
-pub use statistics::{Residuals, Statistics};
+pub use statistics::{QpStatistics, Residuals};
 
 // What the optimal control problems write and read.
 pub(crate) use coupling::{is_marked, marked};

@@ -1,6 +1,6 @@
 //! The data of a QP.
 
-use super::error::{Field, QpError};
+use super::error::{QpError, QpField};
 use super::layout::{Places, StageDims, assign, end, is_absurd, part, part_mut, take_mut};
 use super::stage::{Row, Stage, StageMut};
 use crate::scalar::Real;
@@ -16,6 +16,24 @@ use core::marker::PhantomData;
 ///
 /// A new QP is all zero, without bounds. A state at the start that is given is one whose two bounds
 /// are equal: [`Qp::fix_initial_state`].
+///
+/// ```
+/// use casados::qp::{HeapQp, StageDims};
+///
+/// // x₊ = x + u from x₀ = 1, two intervals, ½ Σ (x² + u²).
+/// let mut dims = [StageDims::new(1, 1, 0); 3];
+/// dims[2].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// for mut stage in qp.stages_mut() {
+///     stage.a_mut().set(0, 0, 1.0);
+///     stage.b_mut().set(0, 0, 1.0);
+///     stage.q_mut().set(0, 0, 1.0);
+///     stage.r_mut().set(0, 0, 1.0);
+/// }
+/// qp.fix_initial_state(&[1.0])?;
+/// assert_eq!(qp.view().stages().len(), 3);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Qp<T, D, M> {
     dims: D,
@@ -85,10 +103,10 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
     pub fn in_memory(dims: D, memory: M) -> Result<Self, QpError> {
         let (expected, found) = (Self::memory(dims.as_ref()), memory.as_ref().len());
         if dims.as_ref().is_empty() {
-            return Err(QpError::Dimension { field: Field::Stages, stage: 0, expected: 1, found: 0 });
+            return Err(QpError::Dimension { field: QpField::Stages, stage: 0, expected: 1, found: 0 });
         }
         if found < expected {
-            return Err(QpError::Dimension { field: Field::Data, stage: 0, expected, found });
+            return Err(QpError::Dimension { field: QpField::Data, stage: 0, expected, found });
         }
         let stages = end::<T>(dims.as_ref()).data;
         let mut qp = Self { dims, memory, stages, number: PhantomData };
@@ -138,7 +156,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Qp<T, D, M> {
         let bounds = stage.x_bounds_mut();
         let (expected, found) = (bounds.lower.len(), x0.len());
         if expected != found {
-            return Err(QpError::Dimension { field: Field::StateBounds, stage: 0, expected, found });
+            return Err(QpError::Dimension { field: QpField::StateBounds, stage: 0, expected, found });
         }
         assign(bounds.lower, x0);
         assign(bounds.upper, x0);

@@ -1,6 +1,6 @@
 //! Solutions: variables and multipliers.
 
-use super::error::{Field, QpError};
+use super::error::{QpError, QpField};
 use super::layout::{Place, Places, StageDims, end, is_absurd, move_forward, part, part_mut, take_mut};
 use super::problem::QpView;
 use crate::scalar::Real;
@@ -14,6 +14,17 @@ use core::marker::PhantomData;
 /// Signs: the gradient of the Lagrangian at stage `k` is
 /// `H v + h + [A B]ᵀ π_{k+1} − (π_k, 0) + λ_upper − λ_lower + [C D]ᵀ (λ_upper − λ_lower) = 0`, with
 /// `π_0 = 0` and all `λ ≥ 0`.
+///
+/// ```
+/// use casados::qp::{HeapSolution, StageDims};
+///
+/// let mut dims = [StageDims::new(2, 1, 0); 4];
+/// dims[3].nu = 0;
+/// let mut solution = HeapSolution::<f64>::new(&dims)?;
+/// assert_eq!(solution.stages().map(|stage| stage.x.len() + stage.u.len()).sum::<usize>(), 11);
+/// solution.shift(); // by a stage: where the next sampling instant begins
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution<T, D, M> {
     dims: D,
@@ -153,7 +164,7 @@ impl<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>> Solution<T, D, 
     pub fn in_memory(dims: D, mut memory: M) -> Result<Self, QpError> {
         let (expected, found) = (Self::memory(dims.as_ref()), memory.as_ref().len());
         if found < expected {
-            return Err(QpError::Dimension { field: Field::Solution, stage: 0, expected, found });
+            return Err(QpError::Dimension { field: QpField::Solution, stage: 0, expected, found });
         }
         memory.as_mut().fill(T::ZERO);
         let Place { v, dynamics, row, .. } = end::<T>(dims.as_ref());
@@ -257,11 +268,11 @@ impl<'a, T> SolutionView<'a, T> {
     pub(super) fn fits(&self, qp: QpView<'_, T>) -> Result<(), QpError> {
         let (expected, found) = (qp.dims.len(), self.dims.len());
         if expected != found {
-            return Err(QpError::Dimension { field: Field::Stages, stage: 0, expected, found });
+            return Err(QpError::Dimension { field: QpField::Stages, stage: 0, expected, found });
         }
         for (stage, (a, b)) in qp.dims.iter().zip(self.dims).enumerate() {
             for (field, expected, found) in
-                [(Field::X, a.nx, b.nx), (Field::U, a.nu, b.nu), (Field::GeneralBounds, a.ng, b.ng)]
+                [(QpField::X, a.nx, b.nx), (QpField::U, a.nu, b.nu), (QpField::GeneralBounds, a.ng, b.ng)]
             {
                 if expected != found {
                     return Err(QpError::Dimension { field, stage, expected, found });

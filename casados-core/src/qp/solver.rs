@@ -3,12 +3,12 @@
 use super::error::QpError;
 use super::problem::QpView;
 use super::solution::SolutionView;
-use super::statistics::Statistics;
+use super::statistics::QpStatistics;
 
 /// Where a solver begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Start {
+pub enum QpStart {
     /// Somewhere.
     #[default]
     Cold,
@@ -27,9 +27,9 @@ pub trait QpSolver<T> {
     fn solve(
         &mut self,
         qp: QpView<'_, T>,
-        start: Start,
+        start: QpStart,
         solution: SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError>;
+    ) -> Result<QpStatistics, QpError>;
 
     /// Asks for residuals below a tolerance for now, but not for less than its options say. A
     /// solver that cannot make use of it solves as well as always.

@@ -2,7 +2,7 @@
 
 use super::block::{Block, BlockMut, Shape};
 use super::bounds::{Bounds, BoundsMut};
-use super::error::Field;
+use super::error::QpField;
 use super::layout::{Place, StageDims, part, part_mut, take_mut};
 use crate::scalar::Real;
 
@@ -44,37 +44,37 @@ impl Place {
     pub(super) const fn row_data(&self, row: Row) -> usize {
         self.offset() + self.ld_next + row as usize * self.rows
     }
-    fn shape(&self, field: Field) -> (usize, Shape) {
+    fn shape(&self, field: QpField) -> (usize, Shape) {
         let Self { nx, nu, ng, next, ld, stage, .. } = *self;
         let (matrix, hessian) = (0, self.matrix());
         let (begin, rows, columns, row, column) = match field {
-            Field::A => (matrix, next, nx, ld, 1),
-            Field::B => (matrix + nx, next, nu, ld, 1),
-            Field::C => (matrix + next * ld, ng, nx, ld, 1),
-            Field::D => (matrix + next * ld + nx, ng, nu, ld, 1),
-            Field::Q => (hessian, nx, nx, 1, ld),
-            Field::R => (hessian + nx * ld + nx, nu, nu, 1, ld),
+            QpField::A => (matrix, next, nx, ld, 1),
+            QpField::B => (matrix + nx, next, nu, ld, 1),
+            QpField::C => (matrix + next * ld, ng, nx, ld, 1),
+            QpField::D => (matrix + next * ld + nx, ng, nu, ld, 1),
+            QpField::Q => (hessian, nx, nx, 1, ld),
+            QpField::R => (hessian + nx * ld + nx, nu, nu, 1, ld),
             // u's rows left of the diagonal
             _ => (hessian + nx, nu, nx, 1, ld),
         };
         (begin, Shape { field, stage, rows, columns, row, column })
     }
     /// Where the constraints of a kind begin in vectors over constraints, and how many there are.
-    pub(super) const fn kind(&self, field: Field) -> (usize, usize) {
+    pub(super) const fn kind(&self, field: QpField) -> (usize, usize) {
         match field {
-            Field::StateBounds => (0, self.nx),
-            Field::ControlBounds => (self.nx, self.nu),
+            QpField::StateBounds => (0, self.nx),
+            QpField::ControlBounds => (self.nx, self.nu),
             _ => (self.ld, self.ng),
         }
     }
     /// What a row is.
-    pub(super) const fn name(&self, row: usize) -> (Field, usize) {
+    pub(super) const fn name(&self, row: usize) -> (QpField, usize) {
         if row < self.nx {
-            (Field::StateBounds, row)
+            (QpField::StateBounds, row)
         } else if row < self.ld {
-            (Field::ControlBounds, row - self.nx)
+            (QpField::ControlBounds, row - self.nx)
         } else {
-            (Field::GeneralBounds, row - self.ld)
+            (QpField::GeneralBounds, row - self.ld)
         }
     }
 }
@@ -85,14 +85,14 @@ macro_rules! matrices {
             $(#[$attribute])*
             #[must_use]
             pub fn $name(&self) -> Block<'a, T> {
-                let (begin, shape) = self.place.shape(Field::$field);
+                let (begin, shape) = self.place.shape(QpField::$field);
                 Block { data: self.data.get(begin..).unwrap_or_default(), shape }
             }
         )* }
         impl<'a, T: Real> StageMut<'a, T> { $(
             $(#[$attribute])*
             pub fn $name_mut(&mut self) -> BlockMut<'_, T> {
-                let (begin, shape) = self.place.shape(Field::$field);
+                let (begin, shape) = self.place.shape(QpField::$field);
                 BlockMut { data: self.data.get_mut(begin..).unwrap_or_default(), shape }
             }
         )* }
@@ -151,13 +151,13 @@ macro_rules! bounds {
             $(#[$attribute])*
             #[must_use]
             pub fn $name(&self) -> Bounds<'a, T> {
-                self.bounds(Field::$field)
+                self.bounds(QpField::$field)
             }
         )* }
         impl<'a, T: Real> StageMut<'a, T> { $(
             $(#[$attribute])*
             pub fn $name_mut(&mut self) -> BoundsMut<'_, T> {
-                self.bounds_mut(Field::$field)
+                self.bounds_mut(QpField::$field)
             }
         )* }
     };
@@ -178,7 +178,7 @@ impl<'a, T: Real> Stage<'a, T> {
     pub fn dims(&self) -> StageDims {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
     }
-    fn bounds(&self, field: Field) -> Bounds<'a, T> {
+    fn bounds(&self, field: QpField) -> Bounds<'a, T> {
         self.some_bounds(self.place.kind(field))
     }
     /// Those of everything; what is padding is zero.
@@ -205,7 +205,7 @@ impl<T: Real> StageMut<'_, T> {
     pub fn dims(&self) -> StageDims {
         StageDims::new(self.place.nx, self.place.nu, self.place.ng)
     }
-    fn bounds_mut(&mut self, field: Field) -> BoundsMut<'_, T> {
+    fn bounds_mut(&mut self, field: QpField) -> BoundsMut<'_, T> {
         let (begin, length) = self.place.kind(field);
         let rows = self.data.get_mut(self.place.row_data(Row::Lower)..).unwrap_or_default();
         let mut vectors = rows.chunks_exact_mut(self.place.rows.max(1));

@@ -53,7 +53,7 @@ impl fmt::Display for Residuals {
 /// What a solution took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct Statistics {
+pub struct QpStatistics {
     /// Newton's steps with a matrix of their own: active sets, and iterations of the interior
     /// point.
     pub iterations: usize,

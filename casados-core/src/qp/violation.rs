@@ -1,6 +1,6 @@
 //! What a point violates.
 
-use super::error::{Field, QpError, Side};
+use super::error::{QpError, QpField, Side};
 use super::layout::{Place, Places, part};
 use super::problem::QpView;
 use super::stage::Row;
@@ -9,7 +9,7 @@ use crate::scalar::Real;
 /// A bound, and by how much a point violates it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Violation {
-    pub field: Field,
+    pub field: QpField,
     pub stage: usize,
     pub index: usize,
     pub side: Side,

@@ -347,6 +347,17 @@ macro_rules! compiled {
 pub(crate) use compiled;
 
 /// One real number: `f32` or `f64`. No other type can be one, as no other can have [`Lanes`].
+///
+/// ```
+/// use casados::Real;
+///
+/// /// In whatever precision.
+/// fn mean<T: Real>(a: T, b: T) -> T {
+///     T::from_f64(0.5) * (a + b)
+/// }
+/// assert_eq!(mean(1.0_f64, 2.0), 1.5);
+/// assert_eq!(mean(1.0_f32, 2.0).to_f64(), 1.5);
+/// ```
 pub trait Real: Lanes<Cell = Self, Mask = bool> + Packed<Self> + PartialOrd + Default {
     /// Zero.
     const ZERO: Self;

@@ -3,6 +3,12 @@
 use super::{Method, Tableau};
 
 /// The explicit Euler method, order 1.
+///
+/// ```
+/// use casados::{Euler, Method};
+///
+/// assert_eq!(Euler::TABLEAU.order(), 1);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Euler;
 
@@ -11,6 +17,12 @@ impl Method<1> for Euler {
 }
 
 /// The explicit midpoint rule of Runge, order 2.
+///
+/// ```
+/// use casados::{Midpoint, Method};
+///
+/// assert_eq!(Midpoint::TABLEAU.order(), 2);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Midpoint;
 
@@ -20,6 +32,12 @@ impl Method<2> for Midpoint {
 }
 
 /// The method of Heun (explicit trapezoidal rule), order 2.
+///
+/// ```
+/// use casados::{Heun, Method};
+///
+/// assert_eq!(Heun::TABLEAU.order(), 2);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Heun;
 
@@ -29,6 +47,13 @@ impl Method<2> for Heun {
 }
 
 /// The classical Runge-Kutta method, order 4.
+///
+/// ```
+/// use casados::{Rk4, Method};
+///
+/// assert_eq!(Rk4::TABLEAU.order(), 4);
+/// assert!(Rk4::TABLEAU.is_explicit());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Rk4;
 
@@ -48,6 +73,12 @@ impl Method<4> for Rk4 {
 /// The seventh stage of the published pair has weight zero: it serves error estimates, and is left
 /// out. J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comput. Appl.
 /// Math. 6 (1980).
+///
+/// ```
+/// use casados::{DormandPrince5, Method};
+///
+/// assert_eq!(DormandPrince5::TABLEAU.order(), 5);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DormandPrince5;
 
@@ -72,6 +103,12 @@ impl Method<6> for DormandPrince5 {
 /// The method of Butcher with seven stages, order 6.
 ///
 /// J. C. Butcher, On Runge-Kutta processes of high order, J. Austral. Math. Soc. 4 (1964).
+///
+/// ```
+/// use casados::{Butcher6, Method};
+///
+/// assert_eq!(Butcher6::TABLEAU.order(), 6);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Butcher6;
 
@@ -98,6 +135,12 @@ impl Method<7> for Butcher6 {
 ///
 /// E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993),
 /// section II.5; coefficients published to 30 digits, rounded once.
+///
+/// ```
+/// use casados::{DormandPrince8, Method};
+///
+/// assert_eq!(DormandPrince8::TABLEAU.order(), 8);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct DormandPrince8;
 

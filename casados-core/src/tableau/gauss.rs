@@ -6,6 +6,14 @@ use super::{Method, Tableau};
 /// `|R(∞)| = 1`.
 ///
 /// `S = 1..=9`.
+///
+/// ```
+/// use casados::{Gauss, Method};
+///
+/// let tableau = Gauss::<3>::TABLEAU;
+/// assert_eq!((tableau.order(), tableau.stage_order()), (6, 3));
+/// assert!(tableau.is_symplectic());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Gauss<const S: usize>;
 

@@ -35,10 +35,38 @@ pub trait Method<const S: usize>: 'static {
 }
 
 /// A method with `S` stages whose [`Tableau`] is given when the integrator is built.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// // The implicit midpoint rule.
+/// let tableau = Tableau::new([[0.5]], [1.0], [0.5])?;
+/// let mut irk = Irk::<Cart, Custom<1>>::with_tableau(Options::default(), tableau)?;
+/// let x = irk.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?.x;
+/// assert!((x - vector![0.75, 2.0]).norm() < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Custom<const S: usize>;
 
 /// The coefficients of a Runge-Kutta method with `S` stages.
+///
+/// ```
+/// use casados::Tableau;
+///
+/// let heun = Tableau::new([[0.0, 0.0], [1.0, 0.0]], [0.5, 0.5], [0.0, 1.0])?;
+/// assert_eq!(heun.order(), 2);
+/// assert!(heun.is_explicit());
+/// // Weights that do not sum up to one.
+/// assert!(Tableau::new([[0.5]], [0.9], [0.5]).is_err());
+/// # Ok::<(), casados::TableauError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tableau<const S: usize> {
     name: &'static str,

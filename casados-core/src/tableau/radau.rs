@@ -5,6 +5,14 @@ use super::{Method, Tableau};
 /// Radau IIA methods with `S` stages, order `2S − 1`: stiffly accurate, L-stable, `R(∞) = 0`.
 ///
 /// `S = 1..=9`.
+///
+/// ```
+/// use casados::{RadauIIA, Method};
+///
+/// let tableau = RadauIIA::<3>::TABLEAU;
+/// assert_eq!((tableau.order(), tableau.stage_order()), (5, 3));
+/// assert!(tableau.is_stiffly_accurate());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RadauIIA<const S: usize>;
 

@@ -18,6 +18,18 @@ use std::vec::Vec;
 /// Compared are all entries, those outside of the declared patterns too: they must be zero.
 /// Tolerances are bounds of the rounding errors of both sides at that very point (running error
 /// analysis), to which differences add their own estimate of truncation.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::{Points, check_derivatives};
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0] - 9.81 * x[0].sin()]
+/// }
+///
+/// check_derivatives::<Pendulum>(&Points::random(20)).assert();
+/// ```
 pub fn check_derivatives<M: GraphDae>(points: &Points<M>) -> Report {
     let mut report = check_by_differences(points);
     for (number, v, mu) in samples(points) {

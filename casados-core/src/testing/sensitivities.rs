@@ -29,6 +29,21 @@ use std::vec::Vec;
 /// meant.
 ///
 /// Errors are those of the integrator at the given inputs.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::check_sensitivities;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn pendulum(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0] - 9.81 * x[0].sin()]
+/// }
+///
+/// let mut irk = Irk::<Pendulum, Gauss<2>>::new(Options::default())?;
+/// check_sensitivities(&mut irk, &vector![0.3, 0.0], &vector![0.5], &Default::default(), 0.1)?.assert();
+/// # Ok::<(), casados::Error>(())
+/// ```
 pub fn check_sensitivities<M: Dae, I: Integrator<Model = M, Number = f64, Memory = Heap>>(
     integrator: &mut I,
     x0: &VectorX<M, f64>,

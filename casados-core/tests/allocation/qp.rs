@@ -1,7 +1,7 @@
 //! A solver of QPs allocates in its first call only.
 
 use crate::COUNT;
-use casados_core::qp::{Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, StageDims, Start};
+use casados_core::qp::{Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
 
 #[test]
 fn memory_is_allocated_once() -> Result<(), casados_core::qp::QpError> {
@@ -25,19 +25,19 @@ fn memory_is_allocated_once() -> Result<(), casados_core::qp::QpError> {
         let result = solver.solve(qp.view(), start, solution.view_mut());
         result.map(|_| COUNT.get() - before)
     };
-    assert_eq!(count(Start::Cold)?, 2, "numbers and indices");
-    assert_eq!(count(Start::Cold)?, 0);
-    assert_eq!(count(Start::Warm)?, 0);
+    assert_eq!(count(QpStart::Cold)?, 2, "numbers and indices");
+    assert_eq!(count(QpStart::Cold)?, 0);
+    assert_eq!(count(QpStart::Warm)?, 0);
     let mut condensing = Condensing::new(3, HeapInteriorPoint::new());
     let mut count = |start| {
         let before = COUNT.get();
         let result = condensing.solve(qp.view(), start, solution.view_mut());
         result.map(|_| COUNT.get() - before)
     };
-    assert!(count(Start::Cold)? > 0);
+    assert!(count(QpStart::Cold)? > 0);
     // Dimensions are kept of two calls.
-    count(Start::Cold)?;
-    assert_eq!(count(Start::Cold)?, 0);
-    assert_eq!(count(Start::Warm)?, 0);
+    count(QpStart::Cold)?;
+    assert_eq!(count(QpStart::Cold)?, 0);
+    assert_eq!(count(QpStart::Warm)?, 0);
     Ok(())
 }

@@ -49,10 +49,26 @@ use bytemuck::allocation::try_zeroed_box;
 
 /// An adaptive integrator with events.
 ///
-/// ```text
-/// let bounce = Event::jump::<Height, Bounce>(Crossing::Falling);
-/// let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(options)?, &[bounce])?;
-/// let end = ball.forward(&x0, &u, 3.0)?;      // end.x, end.dx_dx0, end.occurrences[0].t
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::{SVector, vector};
+///
+/// /// A ball that falls: height m, velocity m/s.
+/// #[ode]
+/// fn ball(x: [f64; 2]) -> [f64; 2] { [x[1], -10.0] }
+/// #[function]
+/// fn height(x: [f64; 2]) -> f64 { x[0] }
+/// /// A fifth of the velocity is lost.
+/// #[function]
+/// fn bounce(x: [f64; 2]) -> [f64; 2] { [x[0], -0.8 * x[1]] }
+///
+/// let bounces = Event::jump::<Height, Bounce>(Crossing::Falling);
+/// let mut ball = Hybrid::new(Adaptive::<Ball, Radau>::new(AdaptiveOptions::default())?, &[bounces])?;
+/// let end = ball.forward(&vector![5.0, 0.0], &SVector::<f64, 0>::zeros(), 1.5)?;
+/// // It hits the ground after a second, at 10 m/s.
+/// assert!((end.solution.occurrences[0].t - 1.0).abs() < 1e-12);
+/// assert!((end.solution.nominal.x - vector![8.0 * 0.5 - 1.25, 8.0 - 5.0]).norm() < 1e-11);
+/// # Ok::<(), casados::Error>(())
 /// ```
 ///
 /// All calls take the length `h` of the interval, as those of the integrator. Times of events are

@@ -10,6 +10,8 @@ use crate::scalar::Real;
 use alloc::vec::Vec;
 
 /// A nonlinear interior point with its memory on the heap.
+///
+/// `HeapIpm::new(&ocp)?` makes it; [`Ipm`] has its methods, and an example.
 pub type HeapIpm<T = f64> = Ipm<T, Vec<StageDims>, Vec<T>, Vec<u32>>;
 
 impl<T: Real> HeapIpm<T> {

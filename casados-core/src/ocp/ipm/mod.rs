@@ -66,6 +66,30 @@ use alloc::vec::Vec;
 ///
 /// A. Wächter, L. T. Biegler, Math. Program. 106 (2006); periodic states by parametric recursion,
 /// inertia by J. R. Bunch, L. Kaufman, Math. Comp. 31 (1977).
+///
+/// # Example
+/// ```
+/// use casados::ocp::{GeneralCost, HeapIpm, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(10, 0.1))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?;
+/// ocp.bound("u", .., -3.0, 3.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut ipm = HeapIpm::new(&ocp)?;
+/// assert!(ipm.solve(&mut ocp)?.is_converged());
+/// // Without a bound the push would begin at about 3 / 1 s² · 1 m.
+/// let push = ocp.solution()?.control("u")?.to_vec();
+/// assert!(push.iter().all(|u| u.abs() <= 3.0 + 1e-6));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Ipm<T, D, M, I> {
     /// Options, which may be changed between calls.

@@ -6,7 +6,7 @@
 use super::lengths::{Lengths, reading};
 use super::work::Work;
 use crate::qp::interior::{First, Iterate, Sides};
-use crate::qp::{Field, Places, QpError, QpView, SolutionView, Store, assign};
+use crate::qp::{Places, QpError, QpField, QpView, SolutionView, Store, assign};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// The iterate of Newton's method in its memory, whose contents stay as they were.
@@ -19,8 +19,8 @@ pub(super) fn attach<'a, T: Real>(
     numbers: &'a mut impl Store<T>,
     indices: &'a mut impl Store<u32>,
 ) -> Result<Iterate<'a, T>, QpError> {
-    let mut numbers = numbers.at_least(lengths.numbers, Field::Numbers)?;
-    let mut indices = indices.at_least(lengths.counts.indices(), Field::Indices)?;
+    let mut numbers = numbers.at_least(lengths.numbers, QpField::Numbers)?;
+    let mut indices = indices.at_least(lengths.counts.indices(), QpField::Indices)?;
     let first = if lengths.fixed { First::Fixed } else { First::Free };
     let mut sides = Sides::new(lengths.counts, &mut numbers, &mut indices);
     sides.compliance = T::from_f64(T::EPSILON).sqrt();

@@ -7,6 +7,16 @@ use crate::scalar::Real;
 /// Options of [`Ipm`](super::Ipm). Letters are those of Wächter and Biegler, "On the implementation
 /// of an interior-point filter line-search algorithm for large-scale nonlinear programming", Math.
 /// Program. 106 (2006).
+///
+/// A later version may have more fields: change those of a solver, or write
+/// `..IpmOptions::new::<f64>()`.
+///
+/// ```
+/// use casados::ocp::{Barrier, IpmOptions};
+///
+/// let options = IpmOptions { tolerance: 1e-10, ..IpmOptions::new::<f64>() };
+/// assert_eq!((options.barrier, options.max_iterations), (Barrier::Monotone, 200));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IpmOptions {
     /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below. Default 1e-8; of

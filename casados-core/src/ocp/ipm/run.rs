@@ -17,7 +17,7 @@ use crate::ocp::instance::Ocp;
 use crate::ocp::log::reserve;
 use crate::ocp::log::{Iteration, Outcome, Status};
 use crate::ocp::problem::Formulation;
-use crate::qp::{Field, StageDims, Store};
+use crate::qp::{QpField, StageDims, Store};
 use crate::scalar::Real;
 use core::ops::ControlFlow;
 
@@ -178,8 +178,8 @@ where
         let lengths = Lengths::of(ocp.qp());
         let capacity = lengths.all_soft(ocp.qp());
         let length = Work::<T>::length(ocp.qp().dims, ocp.ends(), &capacity.counts);
-        self.work.at_least(length, Field::Numbers)?.fill(T::ZERO);
-        self.numbers.at_least(capacity.numbers, Field::Numbers)?.fill(T::ZERO);
+        self.work.at_least(length, QpField::Numbers)?.fill(T::ZERO);
+        self.numbers.at_least(capacity.numbers, QpField::Numbers)?.fill(T::ZERO);
         let push = if self.options.warm_start { self.options.warm_push } else { self.options.bound_push };
         let (qp, iterate) = ocp.qp_and_iterate();
         push_inside(qp, lengths.fixed, push, &mut iterate.view_mut());

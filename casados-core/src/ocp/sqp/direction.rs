@@ -10,7 +10,7 @@ use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::Iteration;
 use crate::ocp::problem::Formulation;
-use crate::qp::{QpError, QpSolver, StageDims, Start, Statistics};
+use crate::qp::{QpError, QpSolver, QpStart, QpStatistics, StageDims};
 use crate::scalar::Real;
 
 /// The first regularisation that is tried, and the smallest one.
@@ -92,7 +92,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let reduced = self.curvature.convexification() == Convexification::Reduced;
         let warm = self.options.warm_start && (row.iteration > 0 || reduced);
         self.qp_solver.relax(self.options.qp_accuracy * row.residuals.largest());
-        let start = if warm { Start::Warm } else { Start::Cold };
+        let start = if warm { QpStart::Warm } else { QpStart::Cold };
         let Err(error) = self.regularised(ocp, state, start, row) else { return Ok(Ok(Direction::Step)) };
         let may_help = matches!(
             error,
@@ -109,7 +109,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let (worst, bounds) = ocp.worst(self.penalties(ocp));
         let gaps = ocp.gaps();
         let before = bounds + gaps;
-        if self.regularised(ocp, state, Start::Cold, row).is_err() {
+        if self.regularised(ocp, state, QpStart::Cold, row).is_err() {
             // Without objective and curvature it is nearly a linear program.
             if self.nearest(ocp, state, row, before).is_err() {
                 return Ok(Err(error));
@@ -131,7 +131,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.set_elastic(ocp, state, penalty);
             // Forces are as large as penalties, and have as many digits.
             self.qp_solver.relax(DIGITS * penalty);
-            stays = self.regularised(ocp, state, Start::Cold, row).is_ok();
+            stays = self.regularised(ocp, state, QpStart::Cold, row).is_ok();
             if stays && self.violation_of_solution(ocp) < STAYS * before {
                 // It is, and from now on it does.
                 state.penalty = penalty;
@@ -194,7 +194,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         self.set_elastic(ocp, state, penalty);
         ocp.forget_objective(T::from_f64(FLAT * penalty / violation));
         self.qp_solver.relax(DIGITS * penalty);
-        let result = self.solve_qp(ocp, Start::Cold, row);
+        let result = self.solve_qp(ocp, QpStart::Cold, row);
         self.set_elastic(ocp, state, alone);
         result
     }
@@ -212,7 +212,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         &mut self,
         ocp: &mut Ocp<P, T, D, M>,
         state: &mut State<T>,
-        start: Start,
+        start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError>
     where
@@ -261,7 +261,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
     fn solve_qp<P: Formulation<T>>(
         &mut self,
         ocp: &Ocp<P, T, D, M>,
-        start: Start,
+        start: QpStart,
         row: &mut Iteration,
     ) -> Result<(), QpError> {
         let mut start = start;
@@ -269,17 +269,17 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
             self.solution.copy_from(&ocp.iterate);
             let result = self.qp_solver.solve(ocp.qp(), start, self.solution.view_mut());
             row.qp_iterations += match &result {
-                Ok(Statistics { iterations, .. })
+                Ok(QpStatistics { iterations, .. })
                 | Err(QpError::MaxIterations { iterations, .. } | QpError::Stalled { iterations, .. }) => {
                     *iterations
                 }
                 Err(_) => 0,
             };
             let Err(error) = result else { return Ok(()) };
-            if start == Start::Cold || matches!(error, QpError::NotConvex { .. }) {
+            if start == QpStart::Cold || matches!(error, QpError::NotConvex { .. }) {
                 return Err(error);
             }
-            start = Start::Cold;
+            start = QpStart::Cold;
         }
     }
 }

@@ -46,6 +46,35 @@ use alloc::vec::Vec;
 /// residuals are small at the solution, as in tracking; elsewhere it may not converge at all.
 ///
 /// Memory is made for one problem, of whose dimensions all others are to be.
+///
+/// # Errors
+/// [`OcpError`] where there is nothing to go on with: data that make no sense, or dynamics that
+/// cannot be integrated at the first iterate. How a run ended otherwise is the `status` of its
+/// [`Outcome`](super::Outcome).
+///
+/// # Example
+/// ```
+/// use casados::ocp::{GeneralCost, HeapSqp, Horizon, Problem};
+/// use casados::prelude::*;
+///
+/// /// A cart on a rail that is pushed: position m, velocity m/s; acceleration m/s².
+/// #[ode]
+/// fn cart(x: [f64; 2], u: f64) -> [f64; 2] { [x[1], u] }
+/// #[function]
+/// fn effort(_x: [f64; 2], u: f64) -> f64 { 0.5 * u * u }
+///
+/// let mut ocp = Problem::new(Irk::<Cart, Gauss<2>>::new(Options::default())?)
+///     .running_cost(GeneralCost::<Effort>::new())
+///     .on(Horizon::uniform(10, 0.1))?;
+/// ocp.fix_initial_state(&[0.0, 0.0])?.bound("x[0]", 10.., 1.0, 1.0)?.guess(&[0.0, 0.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?;
+/// sqp.options.tolerance = 1e-9;
+/// let outcome = sqp.solve(&mut ocp)?;
+/// // A linear-quadratic problem: one step, and one that finds nothing to do.
+/// assert!(outcome.is_converged() && outcome.iterations <= 2);
+/// println!("{}{outcome}", sqp.log());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Sqp<S, C, T, D, M> {
     /// Options, which may be changed between calls.
@@ -72,6 +101,8 @@ pub struct Sqp<S, C, T, D, M> {
 }
 
 /// Sequential quadratic programming with its memory on the heap.
+///
+/// `HeapSqp::new(&ocp)?` makes it; [`Sqp`] has its methods, and an example.
 #[cfg(feature = "alloc")]
 pub type HeapSqp<S = HeapInteriorPoint, C = Exact, T = f64> = Sqp<S, C, T, Vec<StageDims>, Vec<T>>;
 

@@ -13,7 +13,7 @@ use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::problem::Formulation;
-use crate::qp::{Arrays, QpSolver, StageDims, Start, add_symmetric, part};
+use crate::qp::{Arrays, QpSolver, QpStart, StageDims, add_symmetric, part};
 use crate::scalar::Real;
 
 /// `ε`
@@ -43,7 +43,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         ocp.flatten(T::from_f64(SMALL), T::ONE);
         self.solution.copy_from(&ocp.iterate);
         self.qp_solver.relax(self.options.tolerance);
-        let result = self.qp_solver.solve(ocp.qp(), Start::Warm, self.solution.view_mut());
+        let result = self.qp_solver.solve(ocp.qp(), QpStart::Warm, self.solution.view_mut());
         ocp.set_penalties(self.penalties(ocp), None);
         let multipliers = self.solution.multipliers_mut();
         if result.is_ok() && multipliers.iter().all(|m| m.abs() <= T::from_f64(LARGEST)) {

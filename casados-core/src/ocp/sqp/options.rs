@@ -22,6 +22,16 @@ pub enum Globalisation {
 }
 
 /// Options of [`Sqp`](super::Sqp).
+///
+/// A later version may have more fields: change those of a solver, or write
+/// `..SqpOptions::new::<f64>()`.
+///
+/// ```
+/// use casados::ocp::{Globalisation, SqpOptions};
+///
+/// let options = SqpOptions { globalisation: Globalisation::Filter, ..SqpOptions::new::<f64>() };
+/// assert_eq!((options.tolerance, options.max_iterations), (1e-6, 200));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SqpOptions {
     /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below; positive. Default

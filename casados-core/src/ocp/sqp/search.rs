@@ -9,7 +9,7 @@ use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::log::{Iteration, Watch};
 use crate::ocp::problem::Formulation;
-use crate::qp::{QpSolver, Solution, StageDims, Start};
+use crate::qp::{QpSolver, QpStart, Solution, StageDims};
 use crate::scalar::Real;
 
 /// Weights are at least this part of the largest multiplier: constraints without a force, as at
@@ -136,7 +136,7 @@ impl<S: QpSolver<T>, C, T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T
         let ends = work.as_mut().get_mut(..ocp.ends()).unwrap_or_default();
         ocp.correct(trial, ends);
         trial.copy_from(solution);
-        let Ok(statistics) = qp_solver.solve(ocp.qp(), Start::Warm, trial.view_mut()) else { return false };
+        let Ok(statistics) = qp_solver.solve(ocp.qp(), QpStart::Warm, trial.view_mut()) else { return false };
         row.qp_iterations += statistics.iterations;
         let weights = (options.globalisation == Globalisation::Merit).then_some(&*weights);
         let there = ocp.measure(trial, weights, ends).ok();

@@ -27,7 +27,7 @@ use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 use crate::ocp::linearise::dot;
 use crate::ocp::problem::Formulation;
-use crate::qp::{Arrays, Field, StageDims, Store, add_symmetric, assign, pad, part, part_mut, take_mut};
+use crate::qp::{Arrays, QpField, StageDims, Store, add_symmetric, assign, pad, part, part_mut, take_mut};
 use crate::scalar::Real;
 
 /// What `sᵀr` is of `sᵀB s` at least.
@@ -91,7 +91,7 @@ impl<S, C, T: Real, D: AsRef<[StageDims]>, M> Sqp<S, C, T, D, M> {
         M: AsRef<[T]> + AsMut<[T]> + Store<T>,
     {
         let length = length::<T>(self.solution.dims());
-        self.history.at_least(length, Field::Numbers)?;
+        self.history.at_least(length, QpField::Numbers)?;
         Ok(self.with(Secant(update)))
     }
 }

@@ -21,8 +21,8 @@ use super::layout::{Places, StageDims, pad, part};
 use super::memory::reserve;
 use super::problem::{HeapQp, QpView};
 use super::solution::{HeapSolution, SolutionView};
-use super::solver::{QpSolver, Start};
-use super::statistics::Statistics;
+use super::solver::{QpSolver, QpStart};
+use super::statistics::QpStatistics;
 use crate::scalar::Real;
 use alloc::vec::Vec;
 use block::{Condense, Largest, Work};
@@ -32,6 +32,29 @@ use plan::{Kind, Origin, blocks, is_bounded, limits, translate};
 /// A solver that sees problems condensed in blocks of some intervals.
 ///
 /// Memory is on the heap, and allocated by the first call and by those with larger problems.
+///
+/// ```
+/// use casados::qp::{Condensing, HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
+///
+/// // x₊ = x + u from x₀ = 1, two intervals, ½ Σ (x² + u²).
+/// let mut dims = [StageDims::new(1, 1, 0); 3];
+/// dims[2].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// for mut stage in qp.stages_mut() {
+///     stage.a_mut().set(0, 0, 1.0);
+///     stage.b_mut().set(0, 0, 1.0);
+///     stage.q_mut().set(0, 0, 1.0);
+///     stage.r_mut().set(0, 0, 1.0);
+/// }
+/// qp.fix_initial_state(&[1.0])?;
+/// let mut solution = HeapSolution::new(&dims)?;
+/// // Both intervals in one block.
+/// let mut solver = Condensing::new(2, HeapInteriorPoint::new());
+/// solver.solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// let u0 = solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]);
+/// assert!((u0 + 0.6).abs() < 1e-7);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Condensing<T, S> {
     /// The solver of condensed problems.
@@ -108,9 +131,9 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
     fn solve(
         &mut self,
         qp: QpView<'_, T>,
-        start: Start,
+        start: QpStart,
         mut solution: SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         super::check::check_all_bounds(qp)?;
         solution.fits(qp)?;
         if qp.is_coupled() {
@@ -139,7 +162,7 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
         let target = condensed.data_mut();
         let matrices = Work::new(&largest, work);
         T::registers(Condense { qp, block: *block, rows, work: matrices, dims, target, origins });
-        if start == Start::Warm {
+        if start == QpStart::Warm {
             copy((qp, *block, rows), solution.reborrow(), start_and_solution.view_mut(), false);
         }
         let result = solver.solve(condensed.view(), start, start_and_solution.view_mut());
@@ -152,7 +175,7 @@ impl<T: Real, S: QpSolver<T>> QpSolver<T> for Condensing<T, S> {
             let g = work.get_mut(..pad::<T>(largest.n.max(condensed_n))).unwrap_or_default();
             let difference = quadratic(qp, solution.v, g)
                 - quadratic(condensed.view(), start_and_solution.view_mut().v, g);
-            Statistics { objective: statistics.objective + difference, ..statistics }
+            QpStatistics { objective: statistics.objective + difference, ..statistics }
         })
     }
 }

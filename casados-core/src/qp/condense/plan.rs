@@ -1,6 +1,6 @@
 //! Which stages become one, and what their constraints were before.
 
-use crate::qp::error::{Field, QpError};
+use crate::qp::error::{QpError, QpField};
 use crate::qp::layout::{Place, Places, StageDims, part};
 use crate::qp::problem::QpView;
 use crate::qp::stage::Row;
@@ -59,17 +59,17 @@ pub fn translate<T: Real>(
     dims: &[StageDims],
     rows: &[Origin],
 ) -> QpError {
-    let find = |stage: usize, field: Field, index: usize| {
+    let find = |stage: usize, field: QpField, index: usize| {
         let range = blocks(qp.dims.len(), size).nth(stage)?;
         match field {
-            Field::GeneralBounds => {
+            QpField::GeneralBounds => {
                 let before = dims.get(..stage)?.iter().map(|d| d.ng).sum::<usize>();
                 let origin = rows.get(before + index)?;
                 let place = Places::<T>::new(qp.dims).nth(origin.stage)?;
                 let (field, index) = place.name(origin.index);
                 Some((origin.stage, field, index))
             }
-            Field::ControlBounds => {
+            QpField::ControlBounds => {
                 let mut left = index;
                 for stage in range.rev() {
                     let nu = qp.dims.get(stage)?.nu;
@@ -89,8 +89,8 @@ pub fn translate<T: Real>(
             QpError::Infeasible { field, stage, index, side, violation }
         }
         QpError::NotConvex { stage, index, pivot } => {
-            let found = find(stage, Field::ControlBounds, index);
-            let (stage, _, index) = found.unwrap_or((stage, Field::ControlBounds, index));
+            let found = find(stage, QpField::ControlBounds, index);
+            let (stage, _, index) = found.unwrap_or((stage, QpField::ControlBounds, index));
             QpError::NotConvex { stage, index, pivot }
         }
         QpError::InvalidValue { .. } | QpError::CrossedBounds { .. } => match crate::qp::check::check(qp) {

@@ -23,7 +23,7 @@ use super::sides::{Sides, set};
 use super::terms::Terms;
 use crate::qp::layout::{assign, part_mut};
 use crate::qp::solution::SolutionView;
-use crate::qp::statistics::Statistics;
+use crate::qp::statistics::QpStatistics;
 use crate::scalar::{Packed, Real};
 
 /// What a side is, as an element of a list of indices.
@@ -43,8 +43,8 @@ impl<T: Real> Iterate<'_, T> {
         tries: usize,
         limits: &Limits<T>,
         solution: &mut SolutionView<'_, T>,
-    ) -> Result<Statistics, Statistics> {
-        let mut statistics = Statistics::default();
+    ) -> Result<QpStatistics, QpStatistics> {
+        let mut statistics = QpStatistics::default();
         if tries == 0 {
             return Err(statistics);
         }
@@ -88,7 +88,7 @@ impl<T: Real> Iterate<'_, T> {
                 return Ok(statistics);
             }
             if statistics.refinements >= REFINEMENTS {
-                return Err(Statistics { refinements: 0, ..statistics });
+                return Err(QpStatistics { refinements: 0, ..statistics });
             }
             self.sides.unsettle();
             self.no_dynamics();

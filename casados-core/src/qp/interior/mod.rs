@@ -38,12 +38,12 @@ pub(crate) use symmetric::Symmetric;
 pub(crate) use vector::dot;
 
 use super::check::check_all_bounds;
-use super::error::{Field, QpError};
+use super::error::{QpError, QpField};
 use super::layout::{StageDims, is_absurd};
 use super::problem::QpView;
 use super::solution::SolutionView;
-use super::solver::{QpSolver, Start};
-use super::statistics::Statistics;
+use super::solver::{QpSolver, QpStart};
+use super::statistics::QpStatistics;
 use super::violation::{self, linear_penalties};
 use crate::scalar::Real;
 #[cfg(feature = "alloc")]
@@ -64,6 +64,28 @@ use run::{Attempt, Limits, Run, Runs};
 /// not, the interior point follows.
 ///
 /// Violated bounds of an infeasible problem are found by solving it once more with all bounds soft.
+///
+/// ```
+/// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims};
+///
+/// // x₊ = x + u from x₀ = 1, two intervals, ½ Σ (x² + u²).
+/// let mut dims = [StageDims::new(1, 1, 0); 3];
+/// dims[2].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// for mut stage in qp.stages_mut() {
+///     stage.a_mut().set(0, 0, 1.0);
+///     stage.b_mut().set(0, 0, 1.0);
+///     stage.q_mut().set(0, 0, 1.0);
+///     stage.r_mut().set(0, 0, 1.0);
+/// }
+/// qp.fix_initial_state(&[1.0])?;
+/// let mut solution = HeapSolution::new(&dims)?;
+/// HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// // By Riccati's recursion: P₂ = 1, P₁ = 1.5, P₀ = 1.6, u₀ = −P₁/(1 + P₁) x₀.
+/// let u0 = solution.stages().next().map_or(f64::NAN, |stage| stage.u[0]);
+/// assert!((u0 + 0.6).abs() < 1e-7);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct InteriorPoint<T, N, I> {
     /// Options, which may be changed between calls.
@@ -143,8 +165,8 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         attempt: Attempt,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
-    ) -> (Result<Statistics, QpError>, bool) {
-        let (mut result, mut infeasible) = (Ok(Statistics::default()), false);
+    ) -> (Result<QpStatistics, QpError>, bool) {
+        let (mut result, mut infeasible) = (Ok(QpStatistics::default()), false);
         let ran = self.prepared(qp, attempt, over, solution, (&mut result, &mut infeasible));
         (ran.and(result), infeasible)
     }
@@ -155,14 +177,14 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
         attempt: Attempt,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
-        (result, infeasible): (&mut Result<Statistics, QpError>, &mut bool),
+        (result, infeasible): (&mut Result<QpStatistics, QpError>, &mut bool),
     ) -> Result<(), QpError> {
         let no_bound = T::from_f64(self.options.no_bound);
         let reading = Reading { fixed: is_first_fixed(qp), penalties: attempt.penalties, no_bound };
         let counts = count(qp, &reading);
         let length = Iterate::<T>::memory_of(qp, &counts);
-        let mut numbers = self.numbers.at_least(length, Field::Numbers)?;
-        let mut indices = self.indices.at_least(counts.indices(), Field::Indices)?;
+        let mut numbers = self.numbers.at_least(length, QpField::Numbers)?;
+        let mut indices = self.indices.at_least(counts.indices(), QpField::Indices)?;
         numbers.fill(T::ZERO);
         let mut sides = Sides::new(counts, &mut numbers, &mut indices);
         sides.list(qp, &reading);
@@ -188,17 +210,17 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     fn again(
         &mut self,
         qp: QpView<'_, T>,
-        start: Start,
+        start: QpStart,
         mut error: QpError,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         let (locate, most) = (self.options.locate, self.options.max_iterations);
         let mut attempt = Attempt {
             penalties: Penalties::Given,
-            start: Start::Cold,
-            proximal: start == Start::Cold,
-            statistics: Statistics::default(),
+            start: QpStart::Cold,
+            proximal: start == QpStart::Cold,
+            statistics: QpStatistics::default(),
             iterations: most,
         };
         let mut located = false;
@@ -242,9 +264,9 @@ impl<T: Real, N: Store<T>, I: Store<u32>> QpSolver<T> for InteriorPoint<T, N, I>
     fn solve(
         &mut self,
         qp: QpView<'_, T>,
-        start: Start,
+        start: QpStart,
         solution: SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         self.solve_until(qp, start, solution, &mut || false)
     }
 
@@ -262,7 +284,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     ///
     /// # Example
     /// ```
-    /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, StageDims, Start};
+    /// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, StageDims, QpStart};
     /// use std::time::{Duration, Instant};
     ///
     /// let dims = [StageDims::new(1, 1, 0), StageDims::new(1, 0, 0)];
@@ -276,18 +298,18 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
     /// qp.fix_initial_state(&[1.0])?;
     /// let (mut solver, mut solution) = (HeapInteriorPoint::new(), HeapSolution::new(&dims)?);
     /// let deadline = Instant::now() + Duration::from_secs(60);
-    /// solver.solve_until(qp.view(), Start::Cold, solution.view_mut(), &mut || Instant::now() > deadline)?;
-    /// let late = solver.solve_until(qp.view(), Start::Cold, solution.view_mut(), &mut || true);
+    /// solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || Instant::now() > deadline)?;
+    /// let late = solver.solve_until(qp.view(), QpStart::Cold, solution.view_mut(), &mut || true);
     /// assert!(matches!(late, Err(QpError::OutOfTime { .. })));
     /// # Ok::<(), QpError>(())
     /// ```
     pub fn solve_until(
         &mut self,
         qp: QpView<'_, T>,
-        start: Start,
+        start: QpStart,
         mut solution: SolutionView<'_, T>,
         over: &mut dyn FnMut() -> bool,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         self.options.check::<T>()?;
         if cfg!(not(feature = "alloc")) && qp.is_coupled() {
             return Err(QpError::Coupled);
@@ -298,7 +320,7 @@ impl<T: Real, N: Store<T>, I: Store<u32>> InteriorPoint<T, N, I> {
             penalties: Penalties::Given,
             start,
             proximal: false,
-            statistics: Statistics::default(),
+            statistics: QpStatistics::default(),
             iterations: self.options.max_iterations,
         };
         match self.run(qp, attempt, over, &mut solution).0 {

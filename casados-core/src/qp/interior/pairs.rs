@@ -12,7 +12,7 @@ use super::sides::{Sides, set};
 use super::vector::{dot, largest_negative_ratio};
 use crate::qp::layout::part;
 use crate::qp::solution::SolutionView;
-use crate::qp::solver::Start;
+use crate::qp::solver::QpStart;
 use crate::qp::statistics::{larger, positive};
 use crate::scalar::{Packed, Real};
 
@@ -54,12 +54,12 @@ impl<T: Real> Sides<'_, T> {
 
     /// Slacks at least this far from zero, with multipliers from a solution or such that all
     /// products are equal. `scratch` has the distances from the bounds.
-    pub fn begin(&mut self, start: Start, distance: T, solution: &SolutionView<'_, T>) {
+    pub fn begin(&mut self, start: QpStart, distance: T, solution: &SolutionView<'_, T>) {
         let sides = self.counts.sides();
         for (slack, &value) in self.slack.iter_mut().zip(&*self.scratch).take(sides) {
             *slack = value.max(distance);
         }
-        if start == Start::Warm {
+        if start == QpStart::Warm {
             self.take_multipliers(solution);
         }
         for (multiplier, &slack) in self.multiplier.iter_mut().zip(&*self.slack).take(sides) {

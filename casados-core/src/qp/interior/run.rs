@@ -10,19 +10,19 @@ use super::vector::{dot, largest_size};
 use crate::qp::error::QpError;
 use crate::qp::layout::{Places, assign, part, part_mut};
 use crate::qp::solution::SolutionView;
-use crate::qp::solver::Start;
-use crate::qp::statistics::{Statistics, larger};
+use crate::qp::solver::QpStart;
+use crate::qp::statistics::{QpStatistics, larger};
 use crate::scalar::{Packed, Real, Registers, compiled};
 
 /// How a problem is to be solved.
 #[derive(Clone, Copy)]
 pub struct Attempt {
     pub penalties: Penalties,
-    pub start: Start,
+    pub start: QpStart,
     /// Whether steps are kept short by proximal terms, for Hessians that are singular.
     pub proximal: bool,
     /// What attempts before have taken.
-    pub statistics: Statistics,
+    pub statistics: QpStatistics,
     /// The iterations at which it ends.
     pub iterations: usize,
 }
@@ -36,7 +36,7 @@ pub struct Run<'r, 'a, 's, T> {
     pub over: &'r mut dyn FnMut() -> bool,
     pub attempt: Attempt,
     pub solution: &'r mut SolutionView<'s, T>,
-    pub result: &'r mut Result<Statistics, QpError>,
+    pub result: &'r mut Result<QpStatistics, QpError>,
     /// Whether the multipliers prove that no point satisfies all constraints.
     pub infeasible: &'r mut bool,
 }
@@ -51,11 +51,11 @@ impl<T: Real> Registers<T> for Run<'_, '_, '_, T> {
     fn run<E: Packed<T>>(self) {
         let Self { iterate, options, limits, over, mut attempt, solution, result, infeasible } = self;
         let warm = [&*solution.v, solution.lower, solution.upper];
-        if attempt.start == Start::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
-            attempt.start = Start::Cold;
+        if attempt.start == QpStart::Warm && !warm.iter().all(|all| dot::<T, E>(all, all).is_finite()) {
+            attempt.start = QpStart::Cold;
         }
         let tries =
-            if attempt.start == Start::Warm { options.active_sets.min(attempt.iterations) } else { 0 };
+            if attempt.start == QpStart::Warm { options.active_sets.min(attempt.iterations) } else { 0 };
         // No closure: it would be compiled for another machine.
         *result = match iterate.by_active_sets::<E>(tries, &limits, solution) {
             Ok(statistics) => Ok(statistics),
@@ -145,7 +145,7 @@ impl<T: Real> Iterate<'_, T> {
         solution: &mut SolutionView<'_, T>,
     ) {
         let start = attempt.start;
-        if start == Start::Warm {
+        if start == QpStart::Warm {
             self.take_point(solution);
         }
         self.give_initial_state();
@@ -155,9 +155,9 @@ impl<T: Real> Iterate<'_, T> {
         let warm = gap.max(T::from_f64(options.warm_distance));
         let distance = match start {
             // The farther it is from being feasible, the less its slacks and multipliers mean.
-            Start::Warm if warm < cold => warm,
+            QpStart::Warm if warm < cold => warm,
             // Slacks that are small beside violations make steps short.
-            Start::Cold if attempt.proximal => gap.max(cold),
+            QpStart::Cold if attempt.proximal => gap.max(cold),
             _ => cold,
         };
         self.sides.begin(start, distance, solution);
@@ -173,7 +173,7 @@ impl<T: Real> Iterate<'_, T> {
         limits: &Limits<T>,
         over: &mut dyn FnMut() -> bool,
         solution: &mut SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         let mut out_of_time = false;
         let Attempt { mut statistics, iterations: most, .. } = *attempt;
         let known_refinements = statistics.refinements;
@@ -274,11 +274,11 @@ impl<T: Real> Iterate<'_, T> {
     #[inline(always)]
     fn judge_end<E: Packed<T>>(
         &mut self,
-        mut statistics: Statistics,
+        mut statistics: QpStatistics,
         limits: &Limits<T>,
         [out_of_time, stalled]: [bool; 2],
         solution: &mut SolutionView<'_, T>,
-    ) -> Result<Statistics, QpError> {
+    ) -> Result<QpStatistics, QpError> {
         let objective = self.evaluate::<E>(solution.dynamics);
         let (judged, iterations) = (self.judged::<E>(), statistics.iterations);
         let residuals = judged.into();
