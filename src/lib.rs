@@ -69,7 +69,7 @@ pub mod error {
 /// Vectors and matrices of a model, and what is known about it before it runs.
 ///
 /// With the dimensions of a model `M` that is generic, its initial state is a `VectorX<M, f64>`;
-/// of a known model it is an `SVector<f64, NX>` of [`nalgebra`](crate::nalgebra).
+/// of a known model it is an `SVector<f64, NX>` of [`nalgebra`].
 ///
 /// ```
 /// use casados::model::{VectorU, VectorX};
