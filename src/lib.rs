@@ -51,9 +51,23 @@ pub use casados_core::__private;
 /// # Ok::<(), casados::Error>(())
 /// ```
 pub mod prelude {
-    pub use casados_core::Integrator as _;
-    pub use casados_core::prelude::*;
-    pub use casados_macros::{dae, function, ode};
+    pub use crate::Integrator as _;
+    #[doc(no_inline)]
+    pub use crate::options::{Jacobian, Newton, Start};
+    #[doc(no_inline)]
+    pub use crate::result::Seeds;
+    #[cfg(feature = "alloc")]
+    #[doc(no_inline)]
+    pub use crate::{
+        Adaptive, AdaptiveOptions, Batch, BatchError, Crossing, Event, Heap, Hybrid, Intervals, Piecewise,
+        Radau,
+    };
+    #[doc(no_inline)]
+    pub use crate::{
+        Butcher6, Custom, Dae, DormandPrince5, DormandPrince8, Erk, Error, Euler, Function, Gauss, Heun,
+        Inline, Irk, LeastSquares, Midpoint, Ode, Options, Quadrature, RadauIIA, Rk4, Tableau, dae, function,
+        ode,
+    };
 }
 
 /// Choices of [`Options`].

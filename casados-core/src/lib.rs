@@ -119,21 +119,3 @@ pub mod __private {
         Scalar, Shape,
     };
 }
-
-/// What most programs need: `use casados::prelude::*;`
-pub mod prelude {
-    #[cfg(feature = "alloc")]
-    pub use crate::adaptive::{Adaptive, AdaptiveOptions, Crossing, Event, Hybrid, Piecewise, Radau};
-    #[cfg(feature = "alloc")]
-    pub use crate::batch::{Batch, BatchError, Intervals};
-    #[cfg(feature = "alloc")]
-    pub use crate::memory::Heap;
-    pub use crate::options::{Jacobian, Newton, Options, Start};
-    pub use crate::quadrature::{LeastSquares, Quadrature};
-    pub use crate::result::Seeds;
-    pub use crate::tableau::{
-        Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Midpoint, RadauIIA, Rk4,
-        Tableau,
-    };
-    pub use crate::{Dae, Erk, Error, Function, Inline, Irk, Ode};
-}

@@ -163,6 +163,19 @@ pub trait Dae: 'static {
 }
 
 /// From where to where a variable may be.
+///
+/// ```
+/// use casados::model::Range;
+/// use casados::prelude::*;
+///
+/// #[dae(range(x = 0.0..=2.0), nominal(z = 1.0))]
+/// fn tank(xdot: [f64; 1], x: [f64; 1], z: [f64; 1], u: [f64; 1]) -> [f64; 2] {
+///     [xdot[0] - u[0] + z[0], z[0] * z[0] - x[0]]
+/// }
+///
+/// assert_eq!(Tank::RANGES[1], Range { low: 0.0, high: 2.0 });
+/// assert!(Tank::RANGES[1].contains(1.0) && !Range::ANY.contains(f64::NAN));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// The smallest value.

@@ -87,6 +87,12 @@ impl Default for Newton {
 }
 
 /// The Jacobian in Newton's method.
+///
+/// ```
+/// use casados::options::{Jacobian, Newton};
+///
+/// assert_eq!(Newton::default().jacobian, Jacobian::Auto);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Jacobian {

@@ -116,6 +116,25 @@ pub struct Directional<M: Dae, T: Plain, const C: usize> {
 
 /// `C` directions `(δx₀, δu, δp)`, one a column: the argument of `directional`. By default all are
 /// zero.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let mut seeds = Seeds::<Cart, f64, 2>::default();
+/// seeds.x0[(1, 0)] = 1.0; // the velocity in the first direction
+/// seeds.u[(0, 1)] = 1.0; // the push in the second
+/// let end = irk.directional(&vector![0.0, 1.0], &vector![2.0], 0.5, &seeds)?;
+/// assert!((end.dx.column(0) - vector![0.5, 1.0]).norm() < 1e-14);
+/// assert!((end.dx.column(1) - vector![0.125, 0.5]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 pub struct Seeds<M: Dae, T: Plain, const C: usize> {
@@ -159,6 +178,22 @@ pub struct Adjoint<M: Dae, T: Plain = f64, const C: usize = 1> {
 }
 
 /// The solution, its derivatives, and the gradient of `λᵀx`.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// let end = irk.forward_adjoint(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
+/// assert!((end.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
+/// assert!((end.grad_u[0] - 0.125).abs() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]
@@ -242,6 +277,22 @@ pub struct Dense<M: Dae, T: Plain = f64> {
 }
 
 /// The solution at a time inside the interval, and its derivatives.
+///
+/// ```
+/// use casados::prelude::*;
+/// use nalgebra::vector;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
+/// irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
+/// let middle = irk.dense_forward(0.25)?;
+/// assert!((middle.dx_du - vector![0.03125, 0.25]).norm() < 1e-14);
+/// # Ok::<(), casados::Error>(())
+/// ```
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
 #[non_exhaustive]

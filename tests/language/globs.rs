@@ -31,9 +31,10 @@ names! {
 /// The list above has all of the prelude.
 #[test]
 fn all_names_of_the_prelude_are_listed() {
-    let source = include_str!("../../casados-core/src/lib.rs");
-    let (_, prelude) = source.split_once("pub mod prelude {").expect("there is a prelude");
-    let code = prelude.lines().filter(|line| !line.trim_start().starts_with("#["));
+    let source = include_str!("../../src/lib.rs");
+    let (_, rest) = source.split_once("pub mod prelude {").expect("there is a prelude");
+    let (prelude, _) = rest.split_once("\n}").expect("it ends");
+    let code = prelude.lines().filter(|line| !line.trim_start().starts_with("#[") && !line.contains("as _;"));
     let names: Vec<&str> = code
         .flat_map(|line| line.split(|c: char| !c.is_alphanumeric()))
         .filter(|word| word.starts_with(char::is_uppercase))

@@ -26,6 +26,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// An integrator of many intervals: `Batch` of `f64`.
+#[doc(hidden)]
 pub trait Horizon: Sized + Send + 'static {
     /// Its model.
     type Model: Dae;
@@ -108,6 +109,7 @@ impl<M: Dae, B: Method<S> + 'static, const S: usize> Horizon for batch::Integrat
 }
 
 /// The functions of the batch `B`.
+#[doc(hidden)]
 pub struct Horizons<B: Horizon> {
     settings: Settings<Options>,
     count: usize,

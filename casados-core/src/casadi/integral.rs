@@ -12,6 +12,7 @@ use alloc::boxed::Box;
 use core::marker::PhantomData;
 
 /// The integrals of all outputs of a function, or none.
+#[doc(hidden)]
 pub trait Integral<M: Dae>: 'static {
     /// How many.
     const COUNT: usize;
@@ -35,6 +36,7 @@ pub trait Integral<M: Dae>: 'static {
 }
 
 /// No integrals.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Nothing;
 
@@ -58,6 +60,7 @@ impl<M: Dae> Integral<M> for Nothing {
 }
 
 /// The integrals of all outputs of a function `F`.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Of<F>(PhantomData<fn() -> F>);
 

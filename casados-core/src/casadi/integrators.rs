@@ -25,6 +25,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// What can be chosen about the functions of an integrator.
+#[doc(hidden)]
 #[derive(Clone, Debug)]
 pub struct Settings<O> {
     /// The length of the interval.
@@ -51,6 +52,7 @@ impl<O: Default> Settings<O> {
 }
 
 /// The functions of the integrator `I` with the integrals `Q`.
+#[doc(hidden)]
 pub struct Integrators<I: Interval, Q = Nothing> {
     settings: Settings<I::Options>,
     signatures: Vec<Signature>,

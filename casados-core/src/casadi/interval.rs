@@ -19,6 +19,7 @@ use bytemuck::Zeroable;
 pub type Along<'a, M> = Option<&'a mut dyn Integrand<M, f64>>;
 
 /// An integrator of one interval: `Irk`, `Erk` and `Adaptive` of `f64` on the heap.
+#[doc(hidden)]
 pub trait Interval: Sized + Send + 'static {
     /// Its model.
     type Model: Dae;

@@ -55,6 +55,7 @@ impl Failure {
 }
 
 /// A client that is made when it is needed first, and forgotten when nobody refers to it any more.
+#[doc(hidden)]
 pub struct Library<C: Client> {
     make: fn() -> C,
     state: Mutex<State<C>>,

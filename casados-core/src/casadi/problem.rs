@@ -25,6 +25,7 @@ pub type Make = fn() -> Result<Box<dyn Program>, Box<dyn core::error::Error>>;
 /// The functions of a problem, in the order of their numbers: `nlp`, `nlp_f`, `nlp_g`,
 /// `nlp_grad_f`, `nlp_jac_g`, `nlp_hess_l`, `nlp_grad`, `nlp_bounds`, `jac_nlp`, `adj1_nlp`,
 /// `jac_adj1_nlp`, `nlp_trajectory`.
+#[doc(hidden)]
 pub struct Problems {
     make: Make,
     layout: Layout,

@@ -34,6 +34,13 @@ pub trait Curvature<D, T: Real>: Copy {
 
 /// Least-squares costs have `JᵀWJ`, general ones their exact Hessian; dynamics and constraints have
 /// none.
+///
+/// ```
+/// use casados::ocp::{Convexification, GaussNewton};
+///
+/// // What `HeapSqp::new(&ocp)?.gauss_newton()` takes.
+/// assert_eq!(GaussNewton::default().convexification, Convexification::Project);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GaussNewton {
     /// What is done where a general cost is not convex.

@@ -11,6 +11,7 @@ use crate::shape::{Matrix, Plain, Shape};
 use core::fmt;
 
 /// What is given of one interval.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Interval<'a, T> {
     /// The state at its start.
@@ -31,6 +32,7 @@ pub struct Interval<'a, T> {
 }
 
 /// The intervals of a horizon at the current iterate.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Nodes<'a, T> {
     pub(super) v: &'a [T],
@@ -80,6 +82,7 @@ impl<'a, T: Real> Nodes<'a, T> {
 
 /// What comes out of an interval: matrices as slices, column after column. What was not asked for
 /// is empty.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a, T> {
     /// The state at the end, `φ(x, u, p)`.
@@ -149,6 +152,7 @@ impl<'a, M: Dae, T: Real> From<&'a Hessian<M, T>> for Step<'a, T> {
 }
 
 /// An integral cost of an interval and its derivatives.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct IntegralTerms<'a, T> {
     /// The value.
@@ -172,6 +176,7 @@ impl<T: Real> Default for IntegralTerms<'_, T> {
 }
 
 /// What happens to stages that are variables.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StageAction<T> {
     /// They go a part of their step.
@@ -183,6 +188,7 @@ pub enum StageAction<T> {
 }
 
 /// What takes the results of the intervals, in order.
+#[doc(hidden)]
 pub type Sink<'a, T> = &'a mut dyn FnMut(usize, &Step<'_, T>);
 
 /// What happens between two nodes: `x_{k+1} = φ(x_k, u_k, p_k)`.

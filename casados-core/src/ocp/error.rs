@@ -92,6 +92,23 @@ pub struct ConstraintName {
 
 /// What is wrong with a problem, or what went wrong where it was evaluated: what, at which stage,
 /// and the values.
+///
+/// ```
+/// use casados::ocp::{GeneralCost, Horizon, Map, OcpError, Problem};
+/// use casados::prelude::*;
+///
+/// #[function]
+/// fn push(x: f64, u: f64) -> f64 { x + u }
+/// #[function]
+/// fn price(x: f64, u: f64) -> f64 { x * x + u * u }
+///
+/// let problem = Problem::new(Map::<Push, f64>::new()).stage_cost(GeneralCost::<Price>::new());
+/// let mut ocp = problem.on(Horizon::uniform(5, 1.0))?;
+/// let error = ocp.bound("v", .., -1.0, 1.0).err();
+/// println!("{}", error.map_or(String::new(), |error| error.to_string())); // which names there are
+/// assert!(matches!(ocp.bound("u", .., 1.0, -1.0), Err(OcpError::CrossedBounds { .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum OcpError {

@@ -68,6 +68,29 @@ pub enum Side {
 ///
 /// After `Infeasible`, `MaxIterations`, `OutOfTime`, `Stalled` and `NotConvex` the solution holds
 /// the best iterate.
+///
+/// ```
+/// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpError, QpSolver, QpStart, StageDims};
+///
+/// // x₊ = u, |u| ≤ 1, but x₁ = 2.
+/// let mut dims = [StageDims::new(1, 1, 0); 2];
+/// dims[1].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// for mut stage in qp.stages_mut() {
+///     stage.b_mut().set(0, 0, 1.0);
+///     stage.q_mut().set(0, 0, 1.0);
+///     stage.r_mut().set(0, 0, 1.0);
+///     stage.u_bounds_mut().set(0, -1.0, 1.0);
+/// }
+/// qp.fix_initial_state(&[0.0])?;
+/// if let Some(mut last) = qp.stage_mut(1) {
+///     last.x_bounds_mut().set(0, 2.0, 2.0);
+/// }
+/// let mut solution = HeapSolution::new(&dims)?;
+/// let outcome = HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut());
+/// assert!(matches!(outcome, Err(QpError::Infeasible { .. })));
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum QpError {

@@ -18,6 +18,28 @@ use crate::scalar::Real;
 /// The variables `e` of soft bounds are eliminated: they are the violations, and the multiplier of
 /// a violated soft bound must be `linear + quadratic · e`; of one that is not violated it may be
 /// anything from zero to that.
+///
+/// ```
+/// use casados::qp::{HeapInteriorPoint, HeapQp, HeapSolution, QpSolver, QpStart, StageDims, residuals};
+///
+/// let mut dims = [StageDims::new(1, 1, 0); 3];
+/// dims[2].nu = 0;
+/// let mut qp = HeapQp::<f64>::new(&dims)?;
+/// for mut stage in qp.stages_mut() {
+///     stage.a_mut().set(0, 0, 1.0);
+///     stage.b_mut().set(0, 0, 1.0);
+///     stage.q_mut().set(0, 0, 1.0);
+///     stage.r_mut().set(0, 0, 1.0);
+/// }
+/// qp.fix_initial_state(&[1.0])?;
+/// let mut solution = HeapSolution::new(&dims)?;
+/// HeapInteriorPoint::new().solve(qp.view(), QpStart::Cold, solution.view_mut())?;
+/// // The objective is ½ P₀ x₀² with P₀ = 1.6.
+/// let (residuals, objective) = residuals(qp.view(), &solution);
+/// assert!(residuals.stationarity < 1e-7 && residuals.dynamics < 1e-7);
+/// assert!((objective - 0.8).abs() < 1e-7);
+/// # Ok::<(), casados::qp::QpError>(())
+/// ```
 pub fn residuals<T: Real, D: AsRef<[StageDims]>, M: AsRef<[T]> + AsMut<[T]>>(
     qp: QpView<'_, T>,
     solution: &Solution<T, D, M>,

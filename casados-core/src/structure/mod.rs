@@ -13,6 +13,21 @@ pub use elimination::{Assembly, Dependent, Elimination, Kinematic, Left, Pivot, 
 pub use reduction::Reduction;
 
 /// What is known about a model before it runs.
+///
+/// ```
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// let structure = Cart::describe();
+/// println!("{structure}");
+/// assert!(structure.autonomous && structure.hessian.is_empty());
+/// // Of two rows, each has its own derivative and one other variable.
+/// assert_eq!(structure.jacobian.len(), 4);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Structure {
     /// Name of the model.

@@ -8,6 +8,19 @@ use std::vec::Vec;
 /// Points `v = (ẋ, x, z, u, p, t)` at which a model is checked.
 ///
 /// Random points are the same in every run: the generator has a fixed seed, which can be chosen.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::{Points, check_derivatives};
+///
+/// #[ode]
+/// fn cooling(x: [f64; 1], u: [f64; 1]) -> [f64; 1] {
+///     [u[0] - x[0].sqrt()]
+/// }
+///
+/// // Where there is a root.
+/// check_derivatives::<Cooling>(&Points::random(10).x(0, 0.1..=2.0)).assert();
+/// ```
 #[derive(Clone, Debug)]
 pub struct Points<M: Dae> {
     given: Vec<ArrayV<M, f64>>,

@@ -3,6 +3,12 @@
 use crate::ocp::error::OcpError;
 
 /// How far a step goes.
+///
+/// ```
+/// use casados::ocp::{Globalisation, SqpOptions};
+///
+/// assert_eq!(SqpOptions::new::<f64>().globalisation, Globalisation::Merit);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Globalisation {

@@ -14,6 +14,7 @@ static BYTES: AtomicUsize = AtomicUsize::new(0);
 
 /// For tests: from now on the second-level cache has so many bytes, if machines of this kind are
 /// asked for it; zero stands for what the machine says.
+#[doc(hidden)]
 #[cfg(feature = "testing")]
 pub fn limit_cache(bytes: usize) {
     #[cfg(target_arch = "x86_64")]

@@ -47,6 +47,7 @@ pub const REGISTERS: bool =
     cfg!(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")));
 
 /// The registers that may be used.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Level {
@@ -215,6 +216,7 @@ const UNKNOWN: u8 = u8::MAX;
 
 /// For tests: from now on no calculation of the process uses wider registers than these, nor such
 /// as the machine does not have.
+#[doc(hidden)]
 pub fn limit(limit: Level) {
     LEVEL.store(widest(limit) as u8, Ordering::Relaxed);
 }
