@@ -16,12 +16,10 @@ use core::ops::Deref;
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let end = irk.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
 /// assert!((end.x - vector![0.75, 2.0]).norm() < 1e-14);
@@ -44,12 +42,10 @@ pub struct Nominal<M: Dae, T: Plain = f64> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let end = irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
 /// assert!((end.dx_dx0[(0, 1)] - 0.5).abs() < 1e-14); // ∂position/∂velocity = h
@@ -87,12 +83,10 @@ pub struct Forward<M: Dae, T: Plain = f64> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let mut seeds = Seeds::<Cart, f64, 1>::default();
 /// seeds.u[(0, 0)] = 1.0;
@@ -120,12 +114,10 @@ pub struct Directional<M: Dae, T: Plain, const C: usize> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let mut seeds = Seeds::<Cart, f64, 2>::default();
 /// seeds.x0[(1, 0)] = 1.0; // the velocity in the first direction
@@ -151,12 +143,10 @@ pub struct Seeds<M: Dae, T: Plain, const C: usize> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let end = irk.adjoint(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
 /// assert!((end.grad_x0 - vector![1.0, 0.5]).norm() < 1e-14);
@@ -182,12 +172,10 @@ pub struct Adjoint<M: Dae, T: Plain = f64, const C: usize = 1> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let end = irk.forward_adjoint(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
 /// assert!((end.dx_du - vector![0.125, 0.5]).norm() < 1e-14);
@@ -217,12 +205,10 @@ pub struct ForwardAdjoint<M: Dae, T: Plain = f64> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// let end = irk.hessian(&vector![0.0, 1.0], &vector![2.0], 0.5, &vector![1.0, 0.0])?;
 /// assert!((end.grad_x0 - vector![1.0, 0.5]).norm() < 1e-14);
@@ -254,12 +240,10 @@ pub struct Hessian<M: Dae, T: Plain = f64> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// irk.solve(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
 /// let middle = irk.dense(0.25)?;
@@ -281,12 +265,10 @@ pub struct Dense<M: Dae, T: Plain = f64> {
 /// ```
 /// use casados::prelude::*;
 /// use nalgebra::vector;
-///
 /// #[ode]
 /// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
 ///     [x[1], u[0]]
 /// }
-///
 /// let mut irk = Irk::<Cart, Gauss<2>>::new(Options::default())?;
 /// irk.forward(&vector![0.0, 1.0], &vector![2.0], 0.5)?;
 /// let middle = irk.dense_forward(0.25)?;

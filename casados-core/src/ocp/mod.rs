@@ -86,6 +86,7 @@ mod least_squares;
 mod linearise;
 mod log;
 mod map;
+mod memory;
 mod messages;
 mod names;
 mod pattern;
