@@ -9,10 +9,10 @@
 mod awe;
 mod orbit;
 mod pendulum;
-mod pushed;
 #[path = "../../awe_orbit/problem.rs"]
 #[allow(dead_code)] // The flight that is no orbit.
 mod problem;
+mod pushed;
 mod shared;
 
 pub use orbit::*;

@@ -92,7 +92,8 @@ fn draw(solution: &HeapSolution, h: f64) -> Result<(), Box<dyn Error>> {
     *times = [0.0; 3];
     let mut points = curve.chunks_exact_mut(NUMBERS);
     for stage in solution.stages().take(INTERVALS) {
-        let (x, u) = (SVector::<f64, NX>::from_column_slice(stage.x), SVector::<f64, NU>::from_column_slice(stage.u));
+        let (x, u) =
+            (SVector::<f64, NX>::from_column_slice(stage.x), SVector::<f64, NU>::from_column_slice(stage.u));
         let lambda = SVector::from_column_slice(stage.dynamics);
         let begin = now();
         irk.hessian(&x, &u, h, &lambda)?;

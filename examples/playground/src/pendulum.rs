@@ -101,8 +101,9 @@ pub extern "C" fn pendulum_advance(seconds: f64, cart: f64, right: f64, up: f64)
 
 impl Loop {
     fn new() -> Result<Self, OcpError> {
-        let integrator =
-            || Dynamics::new(Options::default()).map_err(|error| OcpError::Integration { interval: 0, error });
+        let integrator = || {
+            Dynamics::new(Options::default()).map_err(|error| OcpError::Integration { interval: 0, error })
+        };
         let mut ocp = Problem::new(integrator()?)
             .stage_cost(LeastSquaresCost::<Deviation>::diagonal(&[1.0; 5]))
             .terminal_cost(LeastSquaresCost::<End>::diagonal(&[1.0; 4]))
@@ -137,7 +138,12 @@ impl Loop {
                 self.sample()?;
             }
             let h = left.min(SAMPLE - self.since);
-            self.x = self.plant.solve(&Vector4::from(self.x), &Vector1::new(self.force), h).map_err(failed)?.x.into();
+            self.x = self
+                .plant
+                .solve(&Vector4::from(self.x), &Vector1::new(self.force), h)
+                .map_err(failed)?
+                .x
+                .into();
             self.since += h;
             left -= h;
         }

@@ -5,6 +5,8 @@ use super::functions::{self, Doubles, Single};
 use super::neon::{neon_f32 as base_f32, neon_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::together::{Abreast, Wider, abreast, ends, of_eights, of_fours, results};
+#[cfg(target_arch = "wasm32")]
+use super::wasm::{wasm_f32 as base_f32, wasm_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{avx2_f32, avx2_f64, avx512_f32, avx512_f64, sse_f32 as base_f32, sse2_f64 as base_f64};
 #[cfg(target_arch = "x86_64")]

@@ -1,8 +1,8 @@
 //! Products of numbers side by side have the bits that one number after the other gives, in
 //! registers of any width.
 
-use super::super::*;
-use super::inside;
+#[cfg(target_arch = "x86_64")]
+use super::{super::*, inside};
 use crate::scalar::{Known, Real};
 use core::array::from_fn;
 

@@ -1,0 +1,135 @@
+//! How computations get into registers, on machines that have some.
+
+pub use super::register::*;
+use crate::scalar::{Packed, Piece, Registers};
+use core::marker::PhantomData;
+
+/// Whether there are any registers of several numbers.
+pub const REGISTERS: bool = true;
+
+/// The numbers of each lane beside each other, where no instructions do it.
+#[inline(always)]
+pub(super) fn transpose_in_memory<T: Copy + Default, R: Copy, const W: usize>(
+    mut rows: [R; W],
+    store: fn(R, &mut [T; W]),
+    load: fn(&[T; W]) -> R,
+) -> [R; W] {
+    let mut cells = [[T::default(); W]; W];
+    for (row, cell) in rows.iter().zip(&mut cells) {
+        store(*row, cell);
+    }
+    for (lane, row) in rows.iter_mut().enumerate() {
+        let mut column = [T::default(); W];
+        for (to, cell) in column.iter_mut().zip(&cells) {
+            *to = cell[lane];
+        }
+        *row = load(&column);
+    }
+    rows
+}
+
+/// Runs a computation on `S` numbers side by side in the narrowest register that holds them.
+macro_rules! side_by_side {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        #[inline(always)]
+        fn side_by_side<const S: usize, C: crate::scalar::SideBySide<Self, S>>(
+            computation: C,
+        ) -> Result<(), C> {
+            use crate::scalar::lanes;
+            // Two numbers have a register of four where there is one: with fused products,
+            // elementary functions in it take half the time of those in a register of two.
+            #[cfg(target_arch = "x86_64")]
+            if const { S > 1 && S <= $more } && lanes::level() >= lanes::Level::Avx2 {
+                computation.call::<lanes::$avx2<S>>();
+                return Ok(());
+            }
+            #[cfg(target_arch = "x86_64")]
+            if const { S > $more && S <= $most } && lanes::level() >= lanes::Level::Avx512 {
+                computation.call::<lanes::$avx512<S>>();
+                return Ok(());
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            if const { S > 1 && S <= $few } {
+                computation.call::<lanes::$base<S>>();
+                return Ok(());
+            }
+            Err(computation)
+        }
+    };
+}
+pub(crate) use side_by_side;
+
+/// Runs a computation with whole registers.
+#[cfg(target_arch = "x86_64")]
+macro_rules! widest_register {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
+            use crate::scalar::lanes::{Level, level};
+            match level() {
+                Level::Avx512 if lanes >= $most => {
+                    Ok(computation.call::<crate::scalar::lanes::$avx512<$most>>())
+                }
+                Level::Avx512 | Level::Avx2 if lanes >= $more => {
+                    Ok(computation.call::<crate::scalar::lanes::$avx2<$more>>())
+                }
+                _ => Err(computation),
+            }
+        }
+    };
+}
+#[cfg(not(target_arch = "x86_64"))]
+macro_rules! widest_register {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        fn widest<C: crate::scalar::Widest<Self>>(lanes: usize, computation: C) -> Result<C::Output, C> {
+            use crate::scalar::lanes::{Level, level};
+            if level() < Level::Base || lanes < $few {
+                return Err(computation);
+            }
+            Ok(computation.call::<crate::scalar::lanes::$base<$few>>())
+        }
+    };
+}
+pub(crate) use widest_register;
+
+/// Runs a computation on slices in a function that is compiled for the registers.
+macro_rules! packed_registers {
+    ($base:ident of $few:literal, $avx2:ident of $more:literal, $avx512:ident of $most:literal) => {
+        #[inline]
+        fn registers<C: crate::scalar::Registers<Self>>(computation: C) {
+            use crate::scalar::Scalar;
+            use crate::scalar::lanes::{Inside, Level, level, $base};
+            match level() {
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx512 => {
+                    use crate::scalar::lanes::$avx512 as Register;
+                    Register::<$most>::vectorize(Inside::<Register<$most>, _, Self>::new(computation));
+                }
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx2 => {
+                    use crate::scalar::lanes::$avx2 as Register;
+                    Register::<$more>::vectorize(Inside::<Register<$more>, _, Self>::new(computation));
+                }
+                Level::Single => computation.run::<Self>(),
+                _ => $base::<$few>::vectorize(Inside::<$base<$few>, _, Self>::new(computation)),
+            }
+        }
+    };
+}
+pub(crate) use packed_registers;
+
+/// A computation as the piece of code that a register enters.
+pub struct Inside<E, C, T>(C, PhantomData<(E, T)>);
+
+impl<E, C, T> Inside<E, C, T> {
+    /// With registers of type `E`.
+    pub fn new(computation: C) -> Self {
+        Self(computation, PhantomData)
+    }
+}
+
+impl<T, E: Packed<T>, C: Registers<T>> Piece for Inside<E, C, T> {
+    #[inline(always)]
+    fn run(self) {
+        self.0.run::<E>();
+    }
+}

@@ -1,0 +1,11 @@
+//! Machines without registers of several numbers: numbers one at a time.
+
+/// Whether there are any registers of several numbers.
+pub const REGISTERS: bool = false;
+
+macro_rules! no_registers {
+    ($($register:tt)*) => {};
+}
+pub(crate) use {
+    no_registers as packed_registers, no_registers as side_by_side, no_registers as widest_register,
+};
