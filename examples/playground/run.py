@@ -69,7 +69,7 @@ class Browser:
                 break
         port = line.split()[-1].rstrip(".")
         self.base = f"http://127.0.0.1:{port}"
-        arguments = [*FLAGS.split(), f"--user-data-dir={self.profile.name}", "--window-size=1200,1150"]
+        arguments = [*FLAGS.split(), f"--user-data-dir={self.profile.name}", "--window-size=1200,1360"]
         options = {"goog:chromeOptions": {"args": arguments}, "goog:loggingPrefs": {"browser": "ALL"}}
         session = self.call("POST", "/session", {"capabilities": {"alwaysMatch": options}})
         self.base += f"/session/{session['sessionId']}"

@@ -31,10 +31,10 @@ const orbit = { rows: [], turn: -2.3, tilt: .25, curve: null, guess: null, drag:
   canvas.onkeydown = event => { const side = { ArrowLeft: -1, ArrowRight: 1 }[event.key]; if (side) { orbit.turn += .1 * side; event.preventDefault(); } };
   const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
   const frame = now => {
-    const [c, w, h] = begin(canvas), k = Math.min(w / 560, h / 440);
+    const [c, w, h] = begin(canvas), k = Math.min(w / 420, h / 290);
     if (!orbit.drag && !still) orbit.turn += .0015;
     const [ct, st, ci, si] = [Math.cos(orbit.turn), Math.sin(orbit.turn), Math.cos(orbit.tilt), Math.sin(orbit.tilt)];
-    const at = ([x, y, z]) => { const a = x - 220, d = a * st + y * ct; return [w / 2 + k * (a * ct - y * st), h / 2 + k * (130 * ci - z * ci - d * si * .6)]; };
+    const at = ([x, y, z]) => { const a = x - 250, d = a * st + y * ct; return [w / 2 + k * (a * ct - y * st), h / 2 + k * (115 * ci - z * ci - d * si * .6)]; };
     const path = points => { c.beginPath(); points.forEach((p, i) => c[i ? "lineTo" : "moveTo"](...at(p))); c.stroke(); };
     c.strokeStyle = colour("line"); c.lineWidth = 1;
     for (let i = 0; i <= 5; i++) { path([[100 * i, -200, 0], [100 * i, 200, 0]]); if (i < 5) path([[0, 100 * i - 200, 0], [500, 100 * i - 200, 0]]); }

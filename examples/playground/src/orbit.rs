@@ -82,6 +82,8 @@ fn solve() -> Result<(), Box<dyn Error>> {
     let Outcome { iterations, objective, residuals, .. } = end;
     *RESULT.get() =
         [f64::from(u8::from(end.is_converged())), iterations as f64, objective, residuals.largest(), took];
+    // Browsers compile what runs often better: the second time is the one that counts.
+    draw(ocp.iterate(), given[0])?;
     draw(ocp.iterate(), given[0])
 }
 
