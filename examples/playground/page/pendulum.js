@@ -12,7 +12,7 @@ const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
   };
   const settings = () => list(e.pendulum_settings(), 7), state = () => list(e.pendulum_state(), 12);
   const canvas = $("scene");
-  const reset = () => { check(e.pendulum_reset()); pendulum.history = []; };
+  const reset = () => { check(e.pendulum_reset()); pendulum.history = []; $("said").textContent = ""; };
   const pause = () => { pendulum.paused = !pendulum.paused; $("pause").setAttribute("aria-pressed", pendulum.paused); $("pause").textContent = pendulum.paused ? "Go on" : "Pause"; };
   for (const [name, unit, index, low, high] of SLIDERS) {
     const label = document.createElement("label"), slider = document.createElement("input"), output = document.createElement("output");
@@ -89,7 +89,7 @@ const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
         const s = state(), b = ball(s[0], s[1]), d = [pendulum.pull[0] - b[0], pendulum.pull[1] - b[1]], f = Math.min(4, 2.5 / Math.max(1e-9, Math.hypot(...d)));
         [right, up] = [right + f * d[0], f * d[1]];
       }
-      pendulum.advance(seconds, cart, right, up);
+      try { pendulum.advance(seconds, cart, right, up); } catch (error) { reset(); $("said").textContent = `${error.message} It hangs again.`; }
     }
     draw();
     if (frames++ % 6 === 0) show();
