@@ -106,6 +106,7 @@ mod sqp;
 #[cfg(feature = "alloc")]
 mod trajectory;
 mod transfer;
+mod watch;
 mod weights;
 mod wrapped;
 

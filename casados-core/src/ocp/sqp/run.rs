@@ -12,8 +12,9 @@ use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
 #[cfg(feature = "alloc")]
 use crate::ocp::log::reserve;
-use crate::ocp::log::{Iteration, Outcome, Status, Watch};
+use crate::ocp::log::{Iteration, Outcome, Status};
 use crate::ocp::problem::Formulation;
+use crate::ocp::watch::Watch;
 use crate::qp::{QpError, QpSolver, StageDims};
 use crate::scalar::Real;
 use core::marker::PhantomData;

@@ -7,8 +7,9 @@ use super::state::{State, Taken};
 use crate::ocp::curvature::Curvature;
 use crate::ocp::error::OcpError;
 use crate::ocp::instance::Ocp;
-use crate::ocp::log::{Iteration, Watch};
+use crate::ocp::log::Iteration;
 use crate::ocp::problem::Formulation;
+use crate::ocp::watch::Watch;
 use crate::qp::{QpSolver, QpStart, Solution, StageDims};
 use crate::scalar::Real;
 
