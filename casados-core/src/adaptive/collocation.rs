@@ -9,6 +9,7 @@
 
 mod estimate;
 mod points;
+mod roughness;
 
 use super::control::LENIENT;
 use super::defect_filter::DefectFilter;
@@ -315,6 +316,15 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Stages<M, T>
             *state = *state + *error;
         }
         self.estimate(start, at_end, residuals)
+    }
+
+    fn roughness(
+        &mut self,
+        start: &Start<'_, M, T>,
+        growth: f64,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure> {
+        self.roughness(start, growth, residuals)
     }
 
     fn accept(&mut self) {

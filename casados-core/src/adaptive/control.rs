@@ -55,6 +55,47 @@ impl Predictive {
     }
 }
 
+/// The errors of the last two accepted steps with this number of stages, from which that of the next
+/// one is foreseen: of a smooth solution an estimate of order `s` behaves like `h^(s+1)`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Trend {
+    /// Lengths and errors, the last one first.
+    last: [Option<(f64, f64)>; 2],
+}
+
+impl Trend {
+    /// The error that is foreseen grows by this factor at most from step to step: what stands out
+    /// tells of a jump, not of the steps that follow.
+    const STEEP: f64 = 20.0;
+
+    /// How many times as large an error of a step of length `h` is as foreseen: one at least, and
+    /// where nothing is foreseen.
+    pub fn growth(&self, h: f64, error: f64, order: f64) -> f64 {
+        // Written so that NaN is one.
+        1f64.max(error / self.foreseen(h, order)).min(1e12)
+    }
+
+    /// The larger error of those that the last two steps let expect.
+    fn foreseen(&self, h: f64, order: f64) -> f64 {
+        let [Some(last), Some(before)] = self.last else { return f64::INFINITY };
+        let foreseen = |(step, error): (f64, f64)| error * Scalar::powf(h / step, order);
+        foreseen(last).max(foreseen(before))
+    }
+
+    /// A step was accepted. Errors below `noise` are of rounding and foretell nothing.
+    pub fn accepted(&mut self, h: f64, error: f64, order: f64, noise: f64) {
+        if error > noise || self.last[1].is_none() {
+            let most = Self::STEEP * self.foreseen(h, order);
+            self.last = [Some((h, error.min(most))), self.last[0]];
+        }
+    }
+
+    /// Forgets them: the next step is of another method.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+}
+
 /// Where steps are refused by much again and again the solution is not smooth: methods have no
 /// higher order than their estimates there.
 #[derive(Clone, Copy, Debug, Default)]

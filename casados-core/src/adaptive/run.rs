@@ -61,6 +61,8 @@ pub struct Base<M: Dae, T: Plain> {
     pub(super) ready: bool,
     /// Where Newton's method may stop.
     newton_tolerance: f64,
+    /// Estimated errors that are smaller are of rounding.
+    noise: f64,
 }
 
 /// An interval.
@@ -135,11 +137,13 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             walk.tried += 1;
             match self.attempt(stages, &mut walk) {
                 Err(failure) => {
-                    self.statistics.failed += 1;
+                    match failure {
+                        Failure::Rough(_) => self.statistics.rejected += 1,
+                        _ => self.statistics.failed += 1,
+                    }
                     walk.fail(failure);
                 }
                 Ok(error) => {
-                    let error = error * walk.refusals.weight(self.base.finer);
                     let factor = walk.factor(error, stages.count());
                     if error >= 1.0 {
                         self.statistics.rejected += 1;

@@ -42,6 +42,8 @@ pub enum Failure {
     Diverges,
     /// The model has a value that is not finite.
     NotFinite,
+    /// A force jumps in the step, or its derivatives: the factor by which it has to be shorter.
+    Rough(f64),
 }
 
 /// What is known about the convergence of the last iteration.
@@ -109,6 +111,18 @@ pub trait Stages<M: Dae, T: Real> {
     /// # Errors
     /// [`Failure::NotFinite`]
     fn error(&mut self, start: &Start<'_, M, T>, again: bool, residuals: &mut usize) -> Result<f64, Failure>;
+    /// The estimated error where the defect of a step is not that of a smooth solution, relative to
+    /// what the estimate tolerates; zero of smooth ones. `growth` is how many times as large the
+    /// error is as foreseen.
+    ///
+    /// # Errors
+    /// [`Failure::NotFinite`]
+    fn roughness(
+        &mut self,
+        start: &Start<'_, M, T>,
+        growth: f64,
+        residuals: &mut usize,
+    ) -> Result<f64, Failure>;
     /// The variables where the estimate compares the derivative of the polynomial with the
     /// solution; whether that is the end of the step, and not its start.
     fn estimates(&self, start: &Start<'_, M, T>, point: &mut ArrayV<M, T>) -> bool;

@@ -17,7 +17,7 @@ mod problems;
 mod vibrations;
 
 use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Error, Gauss, Irk, Options, Radau};
-use models::{Body, Forced, Kinetics, Linear, Orbit, Prey, Pushed, Relaxation, Rods, Springs};
+use models::{Body, Contact, Forced, Kinked, Kinetics, Linear, Orbit, Prey, Pushed, Relaxation, Rods, Springs};
 use nalgebra::SVector;
 use problems::{FAMILIES, Problem, problem};
 use std::collections::BTreeMap;
@@ -93,7 +93,7 @@ macro_rules! families {
 families!(
     springs: Springs, 20, 22; linear: Linear, 6, 42; orbit: Orbit, 4, 0; kinetics: Kinetics, 5, 8;
     relaxation: Relaxation, 2, 1; forced: Forced, 2, 5; prey: Prey, 2, 2; body: Body, 3, 3;
-    pushed: Pushed, 2, 4; spring_pendulum: SpringPendulum, 4, 1
+    pushed: Pushed, 2, 4; kinked: Kinked, 2, 7; contact: Contact, 2, 3; spring_pendulum: SpringPendulum, 4, 1
 );
 family!(
     rods: Rods, 8, 2, 2;
@@ -119,6 +119,8 @@ fn family(name: &str) -> Family {
         "prey" => prey::FAMILY,
         "body" => body::FAMILY,
         "pushed" => pushed::FAMILY,
+        "kinked" => kinked::FAMILY,
+        "contact" => contact::FAMILY,
         _ => spring_pendulum::FAMILY,
     }
 }

@@ -103,3 +103,18 @@ pub fn pushed(x: [f64; 2], p: [f64; 4], t: f64) -> [f64; 2] {
     let push = if t <= p[3] { p[2] * t.sin() * t.sin() } else { 0.0 };
     [x[1], -p[0] * p[0] * x[0] - 2.0 * p[1] * p[0] * x[1] + push]
 }
+
+/// An oscillator under a force whose derivative jumps, p = [ω², damping, frequency, phase, and what
+/// max(0, sin), its square and its cube count].
+#[ode]
+pub fn kinked(x: [f64; 2], p: [f64; 7], t: f64) -> [f64; 2] {
+    let m = (p[2] * t + p[3]).sin().max(0.0);
+    [x[1], -p[0] * x[0] - p[1] * x[1] + p[4] * m + p[5] * m * m + p[6] * m * m * m]
+}
+
+/// A mass that falls onto a spring, p = [weight, stiffness, damping of the spring].
+#[ode]
+pub fn contact(x: [f64; 2], p: [f64; 3]) -> [f64; 2] {
+    let depth = (-x[0]).max(0.0);
+    [x[1], p[1] * depth - p[2] * depth * x[1] - p[0]]
+}

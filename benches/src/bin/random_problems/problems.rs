@@ -47,7 +47,7 @@ impl Random {
 }
 
 /// Their names.
-pub const FAMILIES: [&str; 13] = [
+pub const FAMILIES: [&str; 15] = [
     "springs",
     "modes",
     "linear",
@@ -61,6 +61,8 @@ pub const FAMILIES: [&str; 13] = [
     "body",
     "pushed",
     "spring pendulum",
+    "kinked",
+    "contact",
 ];
 
 /// One of a family.
@@ -124,6 +126,16 @@ pub fn problem(family: &'static str, seed: u64) -> Problem {
                 r.between(0.3, 0.9) * t,
             ];
             (vec![r.one_of(&[0.0, 1.0]), 0.0], p, t)
+        }
+        "kinked" => {
+            let mut p = vec![r.power(-1.0, 2.0), r.one_of(&[0.0, 0.01, 0.4]), r.power(-0.3, 0.7), r.between(0.0, 6.0)];
+            let kind = r.one_of(&[0.0, 1.0, 2.0]);
+            p.extend((0..3).map(|k| if f64::from(k) == kind { 1.0 } else { 0.0 }));
+            (vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0)], p, r.between(3.0, 25.0))
+        }
+        "contact" => {
+            let p = vec![r.between(1.0, 10.0), r.power(1.0, 4.0), r.one_of(&[0.0, 1.0, 10.0])];
+            (vec![r.between(0.1, 1.0), 0.0], p, r.between(0.5, 4.0))
         }
         _ => {
             let a = r.between(0.3, 1.6);
@@ -197,7 +209,16 @@ fn linear(r: &mut Random, imaginary: bool) -> (Vec<f64>, Vec<f64>, f64) {
 
 impl Problem {
     /// Where its force is not smooth.
-    pub fn breaks(&self) -> Option<f64> {
-        if self.family == "pushed" { self.p.get(3).copied() } else { None }
+    pub fn breaks(&self) -> Vec<f64> {
+        let p = &self.p;
+        match self.family {
+            "pushed" => vec![p[3]],
+            "kinked" => {
+                let first = (p[3] / std::f64::consts::PI).ceil() as usize;
+                let times = (first..).map(|k| (k as f64 * std::f64::consts::PI - p[3]) / p[2]);
+                times.take_while(|t| *t < self.t).filter(|t| *t > 0.0).collect()
+            }
+            _ => vec![],
+        }
     }
 }

@@ -76,13 +76,15 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         if unfiltered <= 2.0 * error.max(undoubted) {
             return Ok(error);
         }
+        let at_end = self.memory.error;
         self.defect(start.h, residuals)?;
         let first = norm(&self.memory.error.as_ref()[..nx], start.scale.as_ref());
+        self.memory.error = at_end;
         Ok(self.second(first, start).max(error))
     }
 
     /// The residual at the point that is there.
-    fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
+    pub(super) fn evaluate_point(&mut self, residuals: &mut usize) -> Result<(), Failure> {
         let Memory { point, f_point, .. } = &mut *self.memory;
         *residuals += 1;
         M::residual::<T>(point, f_point);

@@ -3,6 +3,10 @@
 use super::*;
 use crate::adaptive::stages::Convergence;
 
+/// The estimate of a step in which a force jumps, or a derivative of it, is about so many times its
+/// error.
+const ROUGH_OVER_ERROR: f64 = 8.0;
+
 impl<M: Dae, T: Real> Run<'_, M, T> {
     /// Changes the number of stages where a new matrix is needed anyway, and sets the start values
     /// of the iteration.
@@ -22,6 +26,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
                 levels.change::<B>(level, next)?;
                 walk.order.change(next);
                 walk.controller.forget();
+                walk.trend.forget();
                 self.tighten::<B>(levels.get::<B>(next)?.count());
             }
         }
@@ -114,17 +119,48 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         if !error.is_finite() {
             return Err(Failure::Diverges);
         }
-        match &mut self.sensitivities {
+        let error = match &mut self.sensitivities {
             Some(sensitivities) if error < 1.0 => {
                 let mut x = VectorX::<M, T>::zeroed();
                 x.as_mut_slice().copy_from_slice(&point.as_ref()[M::Shape::NX..2 * M::Shape::NX]);
                 let (at, level) = (At { x: &x, u, p: parameters, t: walk.t }, walk.order.level);
                 let tolerances = Tolerances { tight, rtol, atol };
-                let other = sensitivities.implicit(stages, at, level, &start, &tolerances, again)?;
-                Ok(error.max(other))
+                error.max(sensitivities.implicit(stages, at, level, &start, &tolerances, again)?)
             }
-            _ => Ok(error),
+            _ => error,
+        };
+        let weighted = error * walk.refusals.weight(start.finer);
+        if weighted < 1.0 {
+            self.refuse_rough(stages, walk, error)?;
         }
+        Ok(weighted)
+    }
+
+    /// Refuses a step that is not smooth where its error would be above the tolerance that was asked
+    /// for.
+    ///
+    /// # Errors
+    /// [`Failure::Rough`], and a value that is not finite.
+    fn refuse_rough(
+        &mut self,
+        stages: &mut dyn Stages<M, T>,
+        walk: &mut Walk<T>,
+        error: f64,
+    ) -> Result<(), Failure> {
+        let Base { point, scale, asked, finer, noise, .. } = &*self.base;
+        let start = Start { point, scale, asked, finer: *finer, known: walk.accepted.is_some(), h: walk.h };
+        let (size, order) = (walk.h.to_f64().abs(), stages.count() as f64 + 1.0);
+        let counted = *finer / ROUGH_OVER_ERROR;
+        if error * counted >= 1.0 {
+            let growth = walk.trend.growth(size, error, order);
+            let rough = stages.roughness(&start, growth, &mut self.statistics.residuals)? * counted;
+            if rough >= 1.0 {
+                // Derivatives that jump leave errors like the fourth power of the step size or less.
+                return Err(Failure::Rough((0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9)));
+            }
+        }
+        walk.trend.accepted(size, error, order, *noise);
+        Ok(())
     }
 
     /// Goes to the end of a step; whether the run is over. `factor` is that of the next step size.

@@ -17,7 +17,7 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
     pub(super) fn tighten<B: Family>(&mut self, stages: usize) {
         let s = stages as f64;
         let exponent = (s + 1.0) / (2.0 * s);
-        let Base { tight, asked, finer, rtol, atol, newton_tolerance, .. } = &mut *self.base;
+        let Base { tight, asked, finer, rtol, atol, newton_tolerance, noise, .. } = &mut *self.base;
         let mut finest: f64 = 1.0;
         *finer = 0.0;
         let mut before = (T::ZERO, T::ZERO);
@@ -45,7 +45,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         } else {
             Scalar::powf(finest, s / (s + 1.0)).min(0.03)
         };
-        *newton_tolerance = wanted.max(10.0 * T::EPSILON.to_f64() / finest);
+        let rounding = T::EPSILON.to_f64() / finest;
+        (*newton_tolerance, *noise) = (wanted.max(10.0 * rounding), 100.0 * rounding);
         self.measure();
     }
 

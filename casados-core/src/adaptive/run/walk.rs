@@ -1,7 +1,7 @@
 //! Where a run is, and what its steps have told it.
 
 use super::*;
-use crate::adaptive::control::{IMPLICIT, Predictive, Refusals};
+use crate::adaptive::control::{IMPLICIT, Predictive, Refusals, Trend};
 use crate::adaptive::stages::Convergence;
 
 /// The number of stages grows where Newton's method converges at this rate or faster,
@@ -90,6 +90,7 @@ pub(super) struct Walk<T> {
     pub convergence: Convergence,
     pub controller: Predictive,
     pub refusals: Refusals,
+    pub trend: Trend,
     /// Why the last step was tried in vain.
     pub refusal: Refusal,
     /// How many steps were tried.
@@ -122,6 +123,7 @@ impl<T: Real> Walk<T> {
             convergence: Convergence::default(),
             controller: Predictive::default(),
             refusals: Refusals::default(),
+            trend: Trend::default(),
             refusal: Refusal::Error,
             tried: 0,
             singular: 0,
@@ -175,17 +177,19 @@ impl<T: Real> Walk<T> {
         self.need = if self.current { Need::Factors } else { Need::Jacobian };
     }
 
-    /// The stages were not solved.
+    /// The stages were not solved, or are those of a solution that is not smooth.
     pub fn fail(&mut self, failure: Failure) {
         self.refusal = match failure {
             Failure::NotFinite => Refusal::NotFinite,
             Failure::Slow(_) | Failure::Diverges => Refusal::NotConverged,
+            Failure::Rough(_) => Refusal::Error,
         };
         let factor = match failure {
             Failure::Slow(factor) => {
                 self.order.much_shorter = factor <= 0.5;
                 factor
             }
+            Failure::Rough(factor) => factor,
             Failure::Diverges | Failure::NotFinite => {
                 self.troubles += 1;
                 self.order.unexpected = true;
