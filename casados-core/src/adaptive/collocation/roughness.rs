@@ -30,7 +30,7 @@ impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<
         growth: f64,
         residuals: &mut usize,
     ) -> Result<f64, Failure> {
-        if S < 3 {
+        if S < 3 || !self.tableau.is_stiffly_accurate() && growth <= 1.0 {
             return Ok(0.0);
         }
         let (c, radau) = (*self.tableau.c(), self.tableau.is_stiffly_accurate());
