@@ -55,8 +55,8 @@ impl Predictive {
     }
 }
 
-/// The errors of the last two accepted steps with this number of stages, from which that of the next
-/// one is foreseen: of a smooth solution an estimate of order `s` behaves like `h^(s+1)`.
+/// The errors of the last two accepted steps with this number of stages, from which that of the
+/// next one is foreseen: of a smooth solution an estimate of order `s` behaves like `h^(s+1)`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Trend {
     /// Lengths and errors, the last one first.

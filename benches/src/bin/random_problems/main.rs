@@ -17,7 +17,9 @@ mod problems;
 mod vibrations;
 
 use casados::{Adaptive, AdaptiveOptions, DormandPrince5, DormandPrince8, Error, Gauss, Irk, Options, Radau};
-use models::{Body, Contact, Forced, Kinked, Kinetics, Linear, Orbit, Prey, Pushed, Relaxation, Rods, Springs};
+use models::{
+    Body, Contact, Forced, Kinetics, Kinked, Linear, Orbit, Prey, Pushed, Relaxation, Rods, Springs,
+};
 use nalgebra::SVector;
 use problems::{FAMILIES, Problem, problem};
 use std::collections::BTreeMap;

@@ -3,7 +3,8 @@
 //! Masses on springs with all their modes or in a smooth shape; linear systems with eigenvalues
 //! anywhere to the left or near the imaginary axis; orbits; masses on two rods; kinetics;
 //! relaxation oscillators; Duffing's oscillators; predators and prey; rigid bodies; oscillators
-//! that are pushed until a time; masses on a stiff spring.
+//! that are pushed until a time, or under a force whose derivatives jump; masses on a stiff spring,
+//! and such that fall onto one.
 
 /// A problem: its equations by name, and its numbers.
 pub struct Problem {
@@ -128,7 +129,12 @@ pub fn problem(family: &'static str, seed: u64) -> Problem {
             (vec![r.one_of(&[0.0, 1.0]), 0.0], p, t)
         }
         "kinked" => {
-            let mut p = vec![r.power(-1.0, 2.0), r.one_of(&[0.0, 0.01, 0.4]), r.power(-0.3, 0.7), r.between(0.0, 6.0)];
+            let mut p = vec![
+                r.power(-1.0, 2.0),
+                r.one_of(&[0.0, 0.01, 0.4]),
+                r.power(-0.3, 0.7),
+                r.between(0.0, 6.0),
+            ];
             let kind = r.one_of(&[0.0, 1.0, 2.0]);
             p.extend((0..3).map(|k| if f64::from(k) == kind { 1.0 } else { 0.0 }));
             (vec![r.between(-1.0, 1.0), r.between(-1.0, 1.0)], p, r.between(3.0, 25.0))

@@ -1,13 +1,14 @@
 //! Whether the defect of a step is that of a smooth solution.
 //!
-//! The polynomial `u` of a step leaves the defect `d(τ) = u̇ − f(u)`. It is zero at the nodes, and of
-//! a smooth solution `d(τ) = ℓ(τ) (d₀ + d₁ τ + …)` with `ℓ(τ) = Π_i (τ − c_i)`, where each term is
-//! smaller than the last by a factor like the step size. The error at the end of the step is the
+//! The polynomial `u` of a step leaves the defect `d(τ) = u̇ − f(u)`. It is zero at the nodes, and
+//! of a smooth solution `d(τ) = ℓ(τ) (d₀ + d₁ τ + …)` with `ℓ(τ) = Π_i (τ − c_i)`, where each term
+//! is smaller than the last by a factor like the step size. The error at the end of the step is the
 //! integral of the defect, in which all but high terms cancel: so it is of order `2s − 1` or `2s`,
 //! and the estimate, of order `s`, may be a thousand tolerances. Where a force jumps inside the
-//! step, or one of its derivatives, nothing cancels, and the estimate may be close to the error. The
-//! defect at one or two points more tells them apart (W. H. Enright, Continuous numerical methods
-//! for ODEs with defect control, J. Comput. Appl. Math. 125 (2000), on defects whose shape is known).
+//! step, or one of its derivatives, nothing cancels, and the estimate may be close to the error.
+//! The defect at one or two points more tells them apart (W. H. Enright, Continuous numerical
+//! methods for ODEs with defect control, J. Comput. Appl. Math. 125 (2000), on defects whose shape
+//! is known).
 
 use super::*;
 
@@ -16,14 +17,15 @@ use super::*;
 const SUSPECTED: f64 = 0.2;
 /// or by this part over the root of the growth of errors;
 const SUSPECTED_GROWING: f64 = 0.4;
-/// and is rough where, at another point, it differs by this part over `1 + log₁₀` of the growth from
-/// what both let expect.
+/// and is rough where, at another point, it differs by this part over `1 + log₁₀` of the growth
+/// from what both let expect.
 const ROUGH: f64 = 0.2;
 
 impl<M: Dae, B: Method<S>, T: Real, const S: usize, const G: usize> Collocation<M, B, T, S, G> {
     /// The largest defect that was looked at, filtered, relative to what the estimate tolerates;
-    /// zero where it is that of a smooth solution. Of Gauss methods the estimate looks at the end of
-    /// the step and the first further point is next to it: that one tells.
+    /// zero where it is that of a smooth solution. Of Gauss methods the estimate looks at the end
+    /// of the step and the first further point is next to it: that one tells, where the estimate
+    /// is larger than foreseen.
     pub(super) fn roughness(
         &mut self,
         start: &Start<'_, M, T>,

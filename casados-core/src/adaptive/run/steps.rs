@@ -136,8 +136,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
         Ok(weighted)
     }
 
-    /// Refuses a step that is not smooth where its error would be above the tolerance that was asked
-    /// for.
+    /// Refuses a step that is not smooth where its error would be above the tolerance that was
+    /// asked for.
     ///
     /// # Errors
     /// [`Failure::Rough`], and a value that is not finite.
@@ -155,7 +155,8 @@ impl<M: Dae, T: Real> Run<'_, M, T> {
             let growth = walk.trend.growth(size, error, order);
             let rough = stages.roughness(&start, growth, &mut self.statistics.residuals)? * counted;
             if rough >= 1.0 {
-                // Derivatives that jump leave errors like the fourth power of the step size or less.
+                // A derivative that jumps leaves an error like the fourth power of the step size,
+                // or a lower one.
                 return Err(Failure::Rough((0.9 * Scalar::powf(rough, -0.25)).clamp(0.1, 0.9)));
             }
         }
