@@ -34,9 +34,9 @@
 //! | [`Spline2`] | the tensor product of cubic splines, natural or not-a-knot | C² |
 //!
 //! **Outside of the points** all of them are continued linearly, in each variable: finite, and as
-//! smooth as inside, but for splines that are not natural: a natural one has `f″ = 0` at its ends, so
-//! that it stays C², where the second derivative of the others jumps. A linear table that should stay
-//! constant has its last value twice; a spline is clamped with the slope zero.
+//! smooth as inside, but for splines that are not natural: a natural one has `f″ = 0` at its ends,
+//! so that it stays C², where the second derivative of the others jumps. A linear table that should
+//! stay constant has its last value twice; a spline is clamped with the slope zero.
 //!
 //! **Where a linear table has a kink** its derivative is that of the piece on the right. Newton's
 //! method and error estimates of steps know nothing of kinks: steps across one lose their order.

@@ -86,9 +86,8 @@ fn the_least_spline_has_its_closed_form() {
 /// one without knots next to them, are the polynomial itself.
 #[test]
 fn cubic_polynomials_are_kept() {
-    let cubic = |x: f64| {
-        [((0.3 * x - 0.7) * x + 1.1) * x + 0.4, (0.9 * x - 1.4) * x + 1.1, 1.8 * x - 1.4, 1.8]
-    };
+    let cubic =
+        |x: f64| [((0.3 * x - 0.7) * x + 1.1) * x + 0.4, (0.9 * x - 1.4) * x + 1.1, 1.8 * x - 1.4, 1.8];
     fn on<const N: usize>(points: [f64; N], cubic: impl Fn(f64) -> [f64; 4]) {
         let values = points.map(|x| cubic(x)[0]);
         let slopes = [points[0], points[N - 1]].map(|x| cubic(x)[1]);

@@ -13,8 +13,8 @@ use syn::Result;
 /// The degree of cubic splines, and of what may be one.
 const CUBIC: u8 = 3;
 
-/// A table by the type and the function that makes it, with the number of its variables, that of the
-/// function's arguments, and its degree.
+/// A table by the type and the function that makes it, with the number of its variables, that of
+/// the function's arguments, and its degree.
 fn form(ty: &str, function: &str) -> Option<(&'static str, usize, usize, u8)> {
     Some(match (ty, function) {
         ("Linear", "new") => ("Linear", 1, 2, 1),
