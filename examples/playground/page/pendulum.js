@@ -1,7 +1,7 @@
 /** Name, unit, index, from, to; logarithmic. */
 const SLIDERS = [
   ["weight of the angle", "1/rad²", 1, 5, 100], ["weight of the position", "1/m²", 0, .3, 10], ["weight of the velocity", "s²/m²", 2, .01, 1],
-  ["weight of the rate", "s²/rad²", 3, .01, 1], ["weight of the force", "1/N²", 4, .001, .05], ["largest force", "N", 5, 7, 50], ["half of the track", "m", 6, .6, 2],
+  ["weight of the rate", "s²/rad²", 3, .01, .5], ["weight of the force", "1/N²", 4, .001, .05], ["largest force", "N", 5, 7, 50], ["half of the track", "m", 6, .6, 1.8],
 ];
 const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
 (async () => {

@@ -12,14 +12,14 @@ pub const INTERVALS: usize = 30;
 const SAMPLE: f64 = 0.04;
 /// Nearly hanging: on its way up it has to choose a side.
 const HANGING: [f64; 4] = [0.0, PI - 0.002, 0.0, 0.0];
-/// At the end of the horizon deviations weigh so many times more, and as if their weights were these
-/// at least: so it comes back to the middle in time.
+/// At the end of the horizon deviations weigh so many times more, and as if their weights were
+/// these at least: so it comes back to the middle in time.
 const END: [f64; 4] = [20.0, 20.0, 50.0, 50.0];
 const LEAST: [f64; 4] = [1.0, 0.0, 0.1, 0.1];
 /// The weight of the energy, as a multiple of that of the angle.
 const ENERGY: f64 = 4.0;
-/// Bounds of the track are soft, N/m: a push does not know them. Without a constant part: to leave a
-/// bound the cart has to go beyond it first, and would rather stay.
+/// Bounds of the track are soft, N/m: a push does not know them. Without a constant part: to leave
+/// a bound the cart has to go beyond it first, and would rather stay.
 const PENALTY: f64 = 3e4;
 
 /// Weights of position, angle, velocity, rate and force; bounds of force (N) and position (m).

@@ -9,8 +9,8 @@ type Test = Result<(), Box<dyn Error>>;
 const FRAMES: usize = 60;
 /// Seconds until it stands, from below and after a push, at most.
 const UP: usize = 20;
-/// A push as that of a key: N on the ball to the right, and seconds. The ball weighs 1 N, so it goes
-/// around once, or nearly.
+/// A push as that of a key: N on the ball to the right, and seconds. The ball weighs 1 N, so it
+/// goes around once, or nearly.
 const PUSH: [f64; 3] = [0.0, 2.0, 0.0];
 const PUSHED: f64 = 0.2;
 
@@ -44,8 +44,8 @@ fn stands(the: &mut Loop, most: usize) -> Result<(Option<f64>, f64), Box<dyn Err
     Ok((None, far))
 }
 
-/// What went wrong with these settings; seconds of the longer swing-up, and how far the cart was beyond its
-/// track after the push, m.
+/// What went wrong with these settings; seconds of the longer swing-up, and how far the cart was
+/// beyond its track after the push, m.
 fn tried(settings: &Settings) -> Result<(Vec<String>, f64, f64), Box<dyn Error>> {
     let mut wrong = Vec::new();
     let track = settings[6];
@@ -56,7 +56,7 @@ fn tried(settings: &Settings) -> Result<(Vec<String>, f64, f64), Box<dyn Error>>
         wrong.push(format!("it never stands: {:?}", the.x));
     }
     // The bounds are soft.
-    if far > track + 0.25 {
+    if far > track + 0.3 {
         wrong.push(format!("on its way up the cart was at {far}"));
     }
     the.advance(PUSHED, PUSH)?;
