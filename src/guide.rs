@@ -20,6 +20,7 @@ chapters! {
     first_model "guide/first_model.md"
     roots "guide/roots.md"
     sensitivities "guide/sensitivities.md"
+    tables "guide/tables.md"
     integrators "guide/integrators.md"
     ocp "guide/ocp.md"
     trouble "guide/trouble.md"

@@ -14,7 +14,7 @@ mod chain_problem;
 mod data;
 
 use casados::ocp::{HeapSqp, Outcome, Shooting};
-use casados::plot::{Figure, Panel, Series};
+use casados::plot::{Curve, Figure, Panel};
 use casados::prelude::*;
 use chain::Chain;
 use data::Record;
@@ -69,7 +69,7 @@ impl Picture {
             .motion(self.states.iter().step_by(2).map(|state| masses(state)));
         let times = Panel::new("Time of an iteration").x("masses").y("ms").log_y();
         let times = self.times.iter().fold(times, |panel, (name, points)| {
-            panel.with(Series::line(name, points.iter().copied()).marked())
+            panel.with(Curve::line(name, points.iter().copied()).marked())
         });
         Figure::new().size(1100, 460).with(motion).column(1.0).with(times)
     }

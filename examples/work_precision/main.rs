@@ -18,7 +18,7 @@ mod problems;
 mod record;
 mod report;
 
-use casados::plot::{Figure, Panel, Series};
+use casados::plot::{Curve, Figure, Panel};
 use cpu_time::ThreadTime;
 use peers::Peer;
 use problems::{Method, Problem};
@@ -89,8 +89,7 @@ impl Measured {
             let outcomes = runs.filter_map(|run| run.outcome.as_ref().ok()).filter(|o| o.error < 1.0);
             let points: Vec<_> = outcomes.map(|o| (o.error.max(1e-14), 1e3 * o.time)).collect();
             if !points.is_empty() {
-                let series =
-                    Series::line(solver.0, points).width(if solver.0 == "Radau" { 3.0 } else { 1.5 });
+                let series = Curve::line(solver.0, points).width(if solver.0 == "Radau" { 3.0 } else { 1.5 });
                 panel = panel.with(if run.ours { series.marked() } else { series.dashed().marked() });
             }
         }

@@ -1,8 +1,9 @@
-//! Globs stand beside each other: those of the prelude, of optimal control and quadratic programs,
-//! and nalgebra's own. A name that two of them had would not compile here.
+//! Globs stand beside each other: those of the prelude, of optimal control, quadratic programs and
+//! pictures, and nalgebra's own. A name that two of them had would not compile here.
 #![deny(ambiguous_glob_imports)]
 
 use casados::ocp::*;
+use casados::plot::*;
 use casados::prelude::*;
 use casados::qp::*;
 use nalgebra::*;
@@ -25,6 +26,7 @@ names! {
     Problem RealTime Sensitivities Shooting SolutionFactors SqpOptions Status Trajectory Update
     Block Bounds Condensing QpField HeapInteriorPoint HeapQp HeapSolution InteriorPoint InteriorPointOptions Qp
     QpError QpSolver QpStart QpStatistics QpView Residuals Side Solution Stage StageDims
+    Kind Series Cell Colour Curve Figure Panel Space Sparsity
     SVector SMatrix Vector3 Matrix3 DMatrix DVector RealField UnitQuaternion Rotation3 Isometry3
 }
 

@@ -32,6 +32,10 @@ mod seen {
     const SPEEDS: [f64; 4] = [-1.25, -0.5, 0.5, 1.75];
     const TORQUE: Spline<4> = Spline::natural(SPEEDS, [1.0, 2.0, 1.5, -LOSS]);
     const LOSS: f64 = 0.25;
+    const GAIN: Spline<3> = Spline::clamped([-1.0, 0.2, 1.0], [0.4, 1.1, -LOSS], [0.0, 2.0 * LOSS]);
+    const FREE: Spline<4> = Spline::not_a_knot(SPEEDS, [0.3, -0.8, 0.6, 1.4]);
+    static MAP: Spline2<4, 2> =
+        Spline2::not_a_knot(SPEEDS, [-1.0, 1.0], [[0.2, 0.5], [0.7, -0.1], [0.4, 0.4], [-0.6, 0.9]]);
     static SURFACE: Spline2<2, 3> =
         Spline2::natural([-0.75, 0.8], [-1.0, 0.1, 1.0], [[0.1, 0.7, 0.2], [1.0, -0.3, 0.4]]);
 
@@ -44,8 +48,9 @@ mod seen {
         const FLAT: Linear2<2, 2> = Linear2::new([-1.0, 1.0], [0.0, 0.5], [[0.3, 0.2], [0.9, -0.4]]);
         let torque = TORQUE.value(x[0]) * u;
         [
-            xdot[0] - torque - SURFACE.value(x[0], x[1] * u),
-            xdot[1] - both(&FLAT, x[1], torque) + TORQUE.derivative(x[1]) * TORQUE.value(0.3),
+            xdot[0] - torque - SURFACE.value(x[0], x[1] * u) - GAIN.value(x[1]) * FREE.value(u),
+            xdot[1] - both(&FLAT, x[1], torque) + TORQUE.derivative(x[1]) * TORQUE.value(0.3)
+                - MAP.value(u, x[0]),
         ]
     }
 }

@@ -5,7 +5,7 @@ mod reader;
 use casados::ocp::{
     Constraint, HeapOcp, HeapSqp, Horizon, Iteration, LeastSquaresCost, Log, Problem, TrajectoryError,
 };
-use casados::plot::{Colour, Figure, Panel, Series, Space, Sparsity};
+use casados::plot::{Colour, Curve, Figure, Panel, Space, Sparsity};
 use casados::prelude::*;
 use reader::{axes, groups, lines, pixels, points};
 use roxmltree::Document;
@@ -371,7 +371,7 @@ fn whatever_is_drawn_the_file_is_well_formed() -> Test {
 
 #[test]
 fn a_series_looks_as_it_is_told() -> Test {
-    let series = Series::line("limit", [(0.0, 0.0), (1.0, 1.0)]).colour(Colour::RED).width(1.0).dashed();
+    let series = Curve::line("limit", [(0.0, 0.0), (1.0, 1.0)]).colour(Colour::RED).width(1.0).dashed();
     let folder = std::env::temp_dir().join(format!("casados_plot_{}", std::process::id()));
     let path = folder.join("inside/figure.svg");
     Figure::new().with(Panel::new("").with(series).dots("dots", [(0.5, 0.5)])).save(&path)?;

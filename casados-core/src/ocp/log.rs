@@ -11,6 +11,24 @@ use alloc::vec::Vec;
 use core::fmt;
 
 /// Seconds that an iteration took; zero without the feature `std`.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// let times = outcome.times;
+/// println!("QPs took {:.0} % of it", 100.0 * times.qp / times.total());
+/// assert!(times.total() >= times.linearise && times.linearise > 0.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Times {
@@ -31,6 +49,26 @@ impl Times {
 }
 
 /// An iteration: where it began, and how it went on.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?;
+/// let outcome = sqp.solve(&mut ocp)?;
+/// // A linear problem takes one step; the last row is about the solution, from which there is none.
+/// let [first, .., last] = sqp.log().0 else { return Err("too short".into()) };
+/// assert_eq!((first.iteration, first.step, last.step), (0, 1.0, 0.0));
+/// assert!(last.residuals.largest() < 1e-6 && last.objective == outcome.objective);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Iteration {
@@ -58,6 +96,33 @@ pub struct Iteration {
 }
 
 /// How a run ended.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem, Status};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?;
+/// let outcome = sqp.solve(&mut ocp)?;
+/// match outcome.status {
+///     Status::Converged | Status::Acceptable => println!("u = {:?}", ocp.solution()?.control("u")?),
+///     // Each of them prints what it is about, and which constraint is to blame.
+///     Status::Infeasible { constraint, violation } => println!("{constraint}: {violation}"),
+///     other => println!("{other}"),
+/// }
+/// assert_eq!(outcome.status, Status::Converged);
+///
+/// sqp.options.max_iterations = 0;
+/// ocp.guess(&[1.0], &[0.0])?;
+/// assert_eq!(sqp.solve(&mut ocp)?.status, Status::MaxIterations);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Status {
@@ -318,6 +383,24 @@ impl fmt::Display for Iteration {
 
 /// Iterations, to be printed as the familiar table. Marks behind the length of a step are explained
 /// below it.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut sqp = HeapSqp::new(&ocp)?;
+/// let outcome = sqp.solve(&mut ocp)?;
+/// println!("{}", sqp.log());
+/// assert_eq!(sqp.log().0.len(), outcome.iterations + 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Log<'a>(pub &'a [Iteration]);
 

@@ -100,6 +100,24 @@ pub struct Prepared<'a, P, S, T, D, M> {
 }
 
 /// What is to be done now.
+///
+/// ```
+/// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let feedback = controller.prepare()?.feedback(&[0.8])?;
+/// // The law of the linear-quadratic regulator: nearly -0.618 x.
+/// assert!((feedback.u[0] + 0.618 * 0.8).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Feedback<'a, T> {

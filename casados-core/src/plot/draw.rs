@@ -1,8 +1,8 @@
 //! Panels become shapes.
 
 use super::axis::{Scale, rounded};
+use super::curve::Curve;
 use super::panel::Panel;
-use super::series::Series;
 use super::svg::{Anchor, Canvas, Colour, LETTERS, Point, Stroke, width};
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -37,7 +37,7 @@ impl Area {
 }
 
 /// Names and colours of a legend in rows that are not wider than `room`.
-fn legend(series: &[(&Series, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f64)>> {
+fn legend(series: &[(&Curve, Colour)], room: f64) -> Vec<Vec<(String, Stroke, f64)>> {
     let mut rows: Vec<Vec<(String, Stroke, f64)>> = Vec::new();
     let mut right = f64::INFINITY;
     for (series, colour) in series {
@@ -108,7 +108,7 @@ pub(super) fn colour_bar(canvas: &mut Canvas, area: Area, name: &str, (low, high
 
 /// Where what is in a panel, and how it is coloured.
 struct Layout<'a> {
-    coloured: Vec<(&'a Series, Colour)>,
+    coloured: Vec<(&'a Curve, Colour)>,
     legend: Vec<Vec<(String, Stroke, f64)>>,
     /// The least and the largest of what decides about colours, if there is something.
     values: Option<(f64, f64)>,
@@ -122,7 +122,7 @@ struct Layout<'a> {
 impl Panel {
     fn layout(&self, area: Area) -> Layout<'_> {
         let mut next = 0;
-        let coloured: Vec<(&Series, Colour)> = (self.series.iter())
+        let coloured: Vec<(&Curve, Colour)> = (self.series.iter())
             .map(|series| {
                 let colour = series.colour.unwrap_or_else(|| {
                     next += 1;
@@ -269,7 +269,7 @@ fn draw_legend(canvas: &mut Canvas, at: Point, rows: &[Vec<(String, Stroke, f64)
     }
 }
 
-impl Series {
+impl Curve {
     fn draw(&self, canvas: &mut Canvas, [x, y]: [&Scale; 2], colour: Colour, values: (f64, f64)) {
         let points: Vec<Point> = self.points.iter().map(|point| (x.at(point.0), y.at(point.1))).collect();
         if !self.values.is_empty() {

@@ -46,19 +46,19 @@
 //! ```
 
 mod axis;
+mod curve;
 mod draw;
 mod figure;
 mod panel;
 mod run;
-mod series;
 mod space;
 mod sparsity;
 mod svg;
 mod trajectories;
 
+pub use curve::Curve;
 pub use figure::{Cell, Figure};
 pub use panel::Panel;
-pub use series::Series;
 pub use space::Space;
 pub use sparsity::Sparsity;
 pub use svg::Colour;

@@ -1,7 +1,7 @@
 //! A panel: two axes, and what is drawn over them.
 
 use super::axis::Axis;
-use super::series::Series;
+use super::curve::Curve;
 use super::svg::Colour;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -24,7 +24,7 @@ pub struct Panel {
     pub(super) x: Axis,
     pub(super) y: Axis,
     pub(super) is_equal: bool,
-    pub(super) series: Vec<Series>,
+    pub(super) series: Vec<Curve>,
     /// Horizontal lines.
     pub(super) limits: Vec<f64>,
     pub(super) texts: Vec<((f64, f64), String)>,
@@ -104,45 +104,45 @@ impl Panel {
         self
     }
 
-    /// A series, behind which later ones are drawn.
+    /// A curve, behind which later ones are drawn.
     #[must_use]
-    pub fn with(mut self, series: Series) -> Self {
-        self.series.push(series);
+    pub fn with(mut self, curve: Curve) -> Self {
+        self.series.push(curve);
         self
     }
 
-    /// [`Series::line`]
+    /// [`Curve::line`]
     #[must_use]
     pub fn line(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        self.with(Series::line(name, points))
+        self.with(Curve::line(name, points))
     }
 
-    /// [`Series::steps`]
+    /// [`Curve::steps`]
     #[must_use]
     pub fn steps(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        self.with(Series::steps(name, points))
+        self.with(Curve::steps(name, points))
     }
 
-    /// [`Series::dots`]
+    /// [`Curve::dots`]
     #[must_use]
     pub fn dots(self, name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        self.with(Series::dots(name, points))
+        self.with(Curve::dots(name, points))
     }
 
-    /// [`Series::coloured`]
+    /// [`Curve::coloured`]
     #[must_use]
     pub fn coloured(
         self,
         name: impl Into<String>,
         points: impl IntoIterator<Item = (f64, f64, f64)>,
     ) -> Self {
-        self.with(Series::coloured(name, points))
+        self.with(Curve::coloured(name, points))
     }
 
     /// The outline of a thing in the colour of ink: wings, a wall, an obstacle.
     #[must_use]
     pub fn outline(self, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        self.with(Series::line("", points).colour(Colour::INK))
+        self.with(Curve::line("", points).colour(Colour::INK))
     }
 
     /// A thing that moves: its shape at one time after another, from light to dark.
@@ -151,8 +151,8 @@ impl Panel {
         let shapes: Vec<S> = shapes.into_iter().collect();
         let last = shapes.len().saturating_sub(1).max(1) as f64;
         for (i, shape) in shapes.into_iter().enumerate() {
-            let series = Series::line("", shape).colour(Colour::shade(i as f64 / last)).width(1.0).marked();
-            self.series.push(Series { radius: 2.0, ..series });
+            let series = Curve::line("", shape).colour(Colour::shade(i as f64 / last)).width(1.0).marked();
+            self.series.push(Curve { radius: 2.0, ..series });
         }
         self
     }

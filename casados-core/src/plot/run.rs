@@ -1,7 +1,7 @@
 //! How a solver converges, and how long things take.
 
+use super::curve::Curve;
 use super::panel::Panel;
-use super::series::Series;
 use crate::ocp::{Iteration, Log};
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -17,10 +17,10 @@ impl Panel {
             log.0.iter().map(|row| (row.iteration as f64, of(row))).collect()
         };
         Self::of_iterations("Residuals")
-            .with(Series::line("stationarity", residual(|row| row.residuals.stationarity)).marked())
-            .with(Series::line("dynamics", residual(|row| row.residuals.dynamics)).marked())
-            .with(Series::line("inequalities", residual(|row| row.residuals.inequalities)).marked())
-            .with(Series::line("complementarity", residual(|row| row.residuals.complementarity)).marked())
+            .with(Curve::line("stationarity", residual(|row| row.residuals.stationarity)).marked())
+            .with(Curve::line("dynamics", residual(|row| row.residuals.dynamics)).marked())
+            .with(Curve::line("inequalities", residual(|row| row.residuals.inequalities)).marked())
+            .with(Curve::line("complementarity", residual(|row| row.residuals.complementarity)).marked())
     }
 
     /// The largest residual over the iterations of several runs.
@@ -28,7 +28,7 @@ impl Panel {
     pub fn convergences<'a, N: Into<String>>(runs: impl IntoIterator<Item = (N, Log<'a>)>) -> Self {
         runs.into_iter().fold(Self::of_iterations("Largest residual"), |panel, (name, log)| {
             let points = log.0.iter().map(|row| (row.iteration as f64, row.residuals.largest()));
-            panel.with(Series::line(name, points).marked())
+            panel.with(Curve::line(name, points).marked())
         })
     }
 
@@ -55,7 +55,7 @@ impl Panel {
                 let share = group.len() as f64 / times.len() as f64;
                 points.extend([(edge(bin), share), (edge(bin + 1.0), share)]);
             }
-            panel.with(Series::line(name, points))
+            panel.with(Curve::line(name, points))
         })
     }
 }

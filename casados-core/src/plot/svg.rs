@@ -8,6 +8,15 @@ use core::fmt::{self, Write as _};
 pub(super) type Point = (f64, f64);
 
 /// A colour: red, green, blue.
+///
+/// ```
+/// use casados::plot::{Colour, Curve, Figure, Panel};
+///
+/// let curve = |i: usize| Curve::line("", [(0.0, i as f64), (1.0, 0.0)]).colour(Colour::of(i));
+/// let panel = (0..3).map(curve).fold(Panel::new("The palette"), Panel::with);
+/// assert_eq!(Colour::of(8), Colour::BLUE); // it begins again
+/// assert!(Figure::new().with(panel).to_svg().contains("#1f5fa8"));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colour(pub u8, pub u8, pub u8);
 

@@ -1,7 +1,7 @@
 //! Solutions of problems of optimal control over time, with their bounds.
 
+use super::curve::Curve;
 use super::panel::Panel;
-use super::series::Series;
 use super::svg::Colour;
 use crate::ocp::{Kind, Trajectory, TrajectoryError, means};
 use crate::scalar::Real;
@@ -87,14 +87,14 @@ fn points<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>) -> 
 }
 
 /// A line with its bounds, and where they are active.
-fn drawn<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>, colour: Colour) -> Vec<Series> {
+fn drawn<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>, colour: Colour) -> Vec<Curve> {
     let points = points(solution, series);
     let over = |name: String, value: &dyn Fn(&Point) -> f64| {
         let line = points.iter().map(|point| (point.time, value(point)));
         let drawn = match series.kind {
-            Kind::Control => Series::steps(name, line),
-            Kind::Terminal => Series::dots(name, line),
-            _ => Series::line(name, line),
+            Kind::Control => Curve::steps(name, line),
+            Kind::Terminal => Curve::dots(name, line),
+            _ => Curve::line(name, line),
         };
         drawn.colour(colour)
     };
@@ -105,7 +105,7 @@ fn drawn<T: Real>(solution: &Trajectory<T>, series: &crate::ocp::Series<T>, colo
         if point.is_given() || !is_near(point.bounds[side]) { f64::NAN } else { point.bounds[side] }
     };
     let active = |point: &Point| if point.is_active(span) { point.value } else { f64::NAN };
-    let mut drawn: Vec<Series> = (0..2)
+    let mut drawn: Vec<Curve> = (0..2)
         .filter(|&side| points.iter().any(|point| bound(point, side).is_finite()))
         .map(|side| over(String::new(), &|point| bound(point, side)).width(1.0).dashed())
         .collect();

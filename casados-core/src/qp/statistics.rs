@@ -3,6 +3,23 @@
 use core::fmt;
 
 /// How far a point is from the conditions of optimality: the largest element of each of the four.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let outcome = HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// println!("{}", outcome.residuals);
+/// assert!(outcome.residuals.largest() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Residuals {
@@ -51,6 +68,24 @@ impl fmt::Display for Residuals {
 }
 
 /// What a solution took.
+///
+/// ```
+/// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// let statistics = controller.prepare()?.feedback(&[0.8])?.statistics;
+/// println!("{} iterations, {}", statistics.iterations, statistics.residuals);
+/// assert!(statistics.iterations > 0 && statistics.residuals.largest() < 1e-8);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct QpStatistics {

@@ -1,4 +1,4 @@
-//! Cubic pieces by values and slopes at their ends, and the slopes of natural splines.
+//! Cubic pieces by values and slopes at their ends, and the slopes of splines.
 
 use crate::scalar::Scalar;
 
@@ -40,36 +40,45 @@ pub fn weights<S: Scalar>(x: S, [x0, x1]: [S; 2], order: u32) -> [S; 4] {
     }
 }
 
-/// The slopes at its points of the natural cubic spline: its second derivative is continuous, and
-/// zero at both ends (C. de Boor, "A Practical Guide to Splines", chapter IV).
+/// What holds at the first and the last point of a spline.
+#[derive(Clone, Copy)]
+pub enum Ends {
+    /// The second derivative is zero.
+    Natural,
+    /// These are the slopes.
+    Slopes([f64; 2]),
+    /// The third derivative is continuous at the second and the last but one point.
+    NotAKnot,
+}
+
+/// The slopes at its points of the cubic spline whose second derivative is continuous (C. de Boor,
+/// "A Practical Guide to Splines", chapter IV).
 ///
 /// ```text
 /// f′ᵢ₋₁/hᵢ₋₁ + 2 (1/hᵢ₋₁ + 1/hᵢ) f′ᵢ + f′ᵢ₊₁/hᵢ = 3 (δᵢ₋₁/hᵢ₋₁ + δᵢ/hᵢ),   δᵢ = (fᵢ₊₁ − fᵢ)/hᵢ
 /// ```
 ///
-/// The matrix is tridiagonal and diagonally dominant: no pivots have to be looked for.
-pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N]) -> [f64; N] {
+/// The matrix is tridiagonal, and no pivots have to be looked for: it is diagonally dominant, but
+/// for the rows of ends that are no knots, whose pivots are positive too.
+pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N], ends: Ends) -> [f64; N] {
+    if let (Ends::NotAKnot, 3) = (ends, N) {
+        return parabola(points, values);
+    }
     let (mut upper, mut slopes) = ([0.0; N], [0.0; N]);
     let mut i = 0;
     while i < N {
-        let (mut diagonal, mut right, mut lower) = (0.0, 0.0, 0.0);
-        if i > 0 {
-            let h = points[i] - points[i - 1];
-            lower = 1.0 / h;
-            diagonal += 2.0 / h;
-            right += 3.0 * (values[i] - values[i - 1]) / h / h;
-        }
-        if i + 1 < N {
-            let h = points[i + 1] - points[i];
-            upper[i] = 1.0 / h;
-            diagonal += 2.0 / h;
-            right += 3.0 * (values[i + 1] - values[i]) / h / h;
-        }
+        let [lower, mut diagonal, above, mut right] = match ends {
+            Ends::Slopes([first, _]) if i == 0 => [0.0, 1.0, 0.0, first],
+            Ends::Slopes([_, last]) if i + 1 == N => [0.0, 1.0, 0.0, last],
+            Ends::NotAKnot if N > 3 && i == 0 => not_a_knot(points, values, [0, 1, 2]),
+            Ends::NotAKnot if N > 3 && i + 1 == N => not_a_knot(points, values, [N - 1, N - 2, N - 3]),
+            _ => smooth(points, values, i),
+        };
         if i > 0 {
             diagonal -= lower * upper[i - 1];
             right -= lower * slopes[i - 1];
         }
-        upper[i] /= diagonal;
+        upper[i] = above / diagonal;
         slopes[i] = right / diagonal;
         i += 1;
     }
@@ -77,5 +86,49 @@ pub const fn slopes<const N: usize>(points: &[f64; N], values: &[f64; N]) -> [f6
         i -= 1;
         slopes[i - 1] -= upper[i - 1] * slopes[i];
     }
+    slopes
+}
+
+/// The row of a point: below, on and above the diagonal, and the right-hand side. The second
+/// derivatives of both sides are equal, or zero where there is one side only.
+const fn smooth<const N: usize>(points: &[f64; N], values: &[f64; N], i: usize) -> [f64; 4] {
+    let [mut lower, mut diagonal, mut above, mut right] = [0.0; 4];
+    if i > 0 {
+        let h = points[i] - points[i - 1];
+        lower = 1.0 / h;
+        diagonal += 2.0 / h;
+        right += 3.0 * (values[i] - values[i - 1]) / h / h;
+    }
+    if i + 1 < N {
+        let h = points[i + 1] - points[i];
+        above = 1.0 / h;
+        diagonal += 2.0 / h;
+        right += 3.0 * (values[i + 1] - values[i]) / h / h;
+    }
+    [lower, diagonal, above, right]
+}
+
+/// The row of an end, from which two more points go inwards: both pieces are one polynomial.
+///
+/// ```text
+/// k f′₀ + (h + k) f′₁ = ((3h + 2k) k δ₀ + h² δ₁)/(h + k)
+/// ```
+const fn not_a_knot<const N: usize>(points: &[f64; N], values: &[f64; N], [a, b, c]: [usize; 3]) -> [f64; 4] {
+    let (h, k) = (points[b] - points[a], points[c] - points[b]);
+    let (first, second) = ((values[b] - values[a]) / h, (values[c] - values[b]) / k);
+    let (both, off) = (h + k, 1.0 + h / k);
+    // Divided by `k`, which is negative at the last end.
+    [off, 1.0, off, ((3.0 * h + 2.0 * k) * first + h * (h / k) * second) / both]
+}
+
+/// The slopes of the parabola through three points.
+const fn parabola<const N: usize>(points: &[f64; N], values: &[f64; N]) -> [f64; N] {
+    let (h, k) = (points[1] - points[0], points[2] - points[1]);
+    let (first, second) = ((values[1] - values[0]) / h, (values[2] - values[1]) / k);
+    let curvature = (second - first) / (h + k);
+    let mut slopes = [0.0; N];
+    slopes[0] = first - h * curvature;
+    slopes[1] = first + h * curvature;
+    slopes[2] = second + k * curvature;
     slopes
 }

@@ -30,12 +30,13 @@
 //! | --- | --- | --- |
 //! | [`Linear`] | `(1 − s) fᵢ + s fᵢ₊₁` with `s = (x − xᵢ)/(xᵢ₊₁ − xᵢ)` | the first one jumps at the points |
 //! | [`Linear2`] | the same in both variables: bilinear in each cell | likewise |
-//! | [`Spline`] | the natural cubic spline: of all functions through the points that with the least `∫ f″² dx` | C²; the third one jumps |
-//! | [`Spline2`] | the tensor product of natural cubic splines | C² |
+//! | [`Spline`] | the cubic spline: natural (of all functions through the points that with the least `∫ f″² dx`), with given slopes at its ends, or not-a-knot | C²; the third one jumps |
+//! | [`Spline2`] | the tensor product of cubic splines, natural or not-a-knot | C² |
 //!
 //! **Outside of the points** all of them are continued linearly, in each variable: finite, and as
-//! smooth as inside. A natural spline has `f″ = 0` at its ends, so that it stays C². A table that
-//! should stay constant has its last value twice.
+//! smooth as inside, but for splines that are not natural: a natural one has `f″ = 0` at its ends,
+//! so that it stays C², where the second derivative of the others jumps. A linear table that should
+//! stay constant has its last value twice; a spline is clamped with the slope zero.
 //!
 //! **Where a linear table has a kink** its derivative is that of the piece on the right. Newton's
 //! method and error estimates of steps know nothing of kinks: steps across one lose their order.

@@ -1,12 +1,11 @@
 //! Cubic splines.
 
 use super::Table;
-use super::cubic::{slopes, weights};
+use super::cubic::{Ends, slopes, weights};
 use super::points::{check, check_values, interval, pair};
 use crate::scalar::{Real, Rows, Scalar};
 
-/// A natural cubic spline: twice continuously differentiable, through all points, linear beyond
-/// them.
+/// A cubic spline: twice continuously differentiable, through all points, linear beyond them.
 ///
 /// In each interval, with `s = (x − xᵢ)/h` and `r = 1 − s`,
 ///
@@ -14,7 +13,13 @@ use crate::scalar::{Real, Rows, Scalar};
 /// f = r² (1 + 2s) fᵢ + s² (3 − 2s) fᵢ₊₁ + h s r² f′ᵢ − h s² r f′ᵢ₊₁
 /// ```
 ///
-/// with the slopes `f′ᵢ` of which `f″` is continuous and zero at both ends.
+/// with the slopes `f′ᵢ` of which `f″` is continuous. Two more conditions hold at the ends:
+///
+/// | | at the ends | beyond them |
+/// | --- | --- | --- |
+/// | [`Spline::natural`] | `f″ = 0` | C² |
+/// | [`Spline::clamped`] | `f′` is given | C¹: `f″` falls to zero |
+/// | [`Spline::not_a_knot`] | `f‴` is continuous at the points next to them | C¹ |
 ///
 /// ```
 /// use casados::tables::Spline;
@@ -23,6 +28,10 @@ use crate::scalar::{Real, Rows, Scalar};
 /// assert_eq!(LIFT.value(8.0), 1.1);
 /// // The slope of the continuation.
 /// assert_eq!(LIFT.derivative(16.0), LIFT.derivative(30.0));
+///
+/// /// Flat at both ends, and constant beyond them.
+/// const VALVE: Spline<3> = Spline::clamped([0.0, 0.5, 1.0], [0.0, 0.5, 1.0], [0.0, 0.0]);
+/// assert_eq!((VALVE.value(-3.0), VALVE.derivative(1.0), VALVE.value(7.0)), (0.0, 0.0, 1.0));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spline<const N: usize> {
@@ -32,16 +41,43 @@ pub struct Spline<const N: usize> {
 }
 
 impl<const N: usize> Spline<N> {
-    /// The natural spline through values at increasing points.
+    /// The natural spline through values at increasing points: `f″ = 0` at both ends.
     ///
     /// # Panics
     /// Where points do not increase or a number is not finite; in a `const` that is an error of the
     /// compiler.
     #[must_use]
     pub const fn natural(points: [f64; N], values: [f64; N]) -> Self {
+        Self::new(points, values, Ends::Natural)
+    }
+
+    /// The spline through values at increasing points whose first and last slope are given: of all
+    /// functions with these values and slopes that with the least `∫ f″² dx`.
+    ///
+    /// # Panics
+    /// As [`Spline::natural`].
+    #[must_use]
+    pub const fn clamped(points: [f64; N], values: [f64; N], slopes: [f64; 2]) -> Self {
+        check_values(&slopes);
+        Self::new(points, values, Ends::Slopes(slopes))
+    }
+
+    /// The spline through values at increasing points of which the first two pieces are one
+    /// polynomial, and the last two: it is the one of a cubic polynomial, and its error is of
+    /// fourth order up to the ends, where that of a natural spline is of second order. Of three
+    /// points it is the parabola, of two the line.
+    ///
+    /// # Panics
+    /// As [`Spline::natural`].
+    #[must_use]
+    pub const fn not_a_knot(points: [f64; N], values: [f64; N]) -> Self {
+        Self::new(points, values, Ends::NotAKnot)
+    }
+
+    const fn new(points: [f64; N], values: [f64; N], ends: Ends) -> Self {
         check(&points);
         check_values(&values);
-        let slopes = slopes(&points, &values);
+        let slopes = slopes(&points, &values, ends);
         let mut nodes = [[0.0; 2]; N];
         let mut i = 0;
         while i < N {
@@ -82,8 +118,8 @@ impl<const N: usize> Table<1> for Spline<N> {
     }
 }
 
-/// A function of two variables that is a natural cubic spline in each of them: the tensor product,
-/// twice continuously differentiable, through all points of a grid, linear in each variable beyond.
+/// A function of two variables that is a cubic spline in each of them: the tensor product, twice
+/// continuously differentiable, through all points of a grid, linear in each variable beyond.
 ///
 /// `values[i][j]` belongs to `x[i]` and `y[j]`.
 ///
@@ -107,13 +143,28 @@ pub struct Spline2<const N: usize, const M: usize> {
 }
 
 impl<const N: usize, const M: usize> Spline2<N, M> {
-    /// The natural spline through values on a grid of increasing points.
+    /// The natural spline through values on a grid of increasing points, as [`Spline::natural`] in
+    /// each variable.
     ///
     /// # Panics
     /// Where points do not increase or a number is not finite; in a `const` that is an error of the
     /// compiler.
     #[must_use]
     pub const fn natural(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
+        Self::new(x, y, values, Ends::Natural)
+    }
+
+    /// The spline through values on a grid of increasing points, as [`Spline::not_a_knot`] in each
+    /// variable.
+    ///
+    /// # Panics
+    /// As [`Spline2::natural`].
+    #[must_use]
+    pub const fn not_a_knot(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
+        Self::new(x, y, values, Ends::NotAKnot)
+    }
+
+    const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N], ends: Ends) -> Self {
         check(&x);
         check(&y);
         let mut along_x = [[0.0; M]; N];
@@ -126,7 +177,7 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
                 i += 1;
             }
             check_values(&column);
-            let slopes = slopes(&x, &column);
+            let slopes = slopes(&x, &column, ends);
             while i > 0 {
                 i -= 1;
                 along_x[i][j] = slopes[i];
@@ -136,7 +187,7 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
         let mut nodes = [[[0.0; 4]; M]; N];
         let mut i = 0;
         while i < N {
-            let (along_y, along_both) = (slopes(&y, &values[i]), slopes(&y, &along_x[i]));
+            let (along_y, along_both) = (slopes(&y, &values[i], ends), slopes(&y, &along_x[i], ends));
             let mut j = 0;
             while j < M {
                 nodes[i][j] = [values[i][j], along_x[i][j], along_y[j], along_both[j]];

@@ -18,8 +18,12 @@ const G: [[f64; 4]; 6] = [
     [-0.5, 1.0, 0.3, 1.7],
 ];
 const SPLINE: Spline<6> = Spline::natural(X, F);
+const CLAMPED: Spline<6> = Spline::clamped(X, F, SLOPES);
+const SLOPES: [f64; 2] = [1.3, -2.1];
+const FREE: Spline<6> = Spline::not_a_knot(X, F);
 const LINEAR: Linear<6> = Linear::new(X, F);
 const SPLINE2: Spline2<6, 4> = Spline2::natural(X, Y, G);
+const FREE2: Spline2<6, 4> = Spline2::not_a_knot(X, Y, G);
 const LINEAR2: Linear2<6, 4> = Linear2::new(X, Y, G);
 
 fn close(found: f64, expected: f64, tolerance: f64) {
@@ -35,10 +39,11 @@ fn places() -> impl Iterator<Item = f64> {
 fn values_at_the_points_are_kept_to_the_last_bit() {
     for (x, f) in X.into_iter().zip(F) {
         assert_eq!((SPLINE.value(x), LINEAR.value(x)), (f, f));
+        assert_eq!((CLAMPED.value(x), FREE.value(x)), (f, f));
     }
     for (x, row) in X.into_iter().zip(G) {
         for (y, f) in Y.into_iter().zip(row) {
-            assert_eq!((SPLINE2.value(x, y), LINEAR2.value(x, y)), (f, f));
+            assert_eq!((SPLINE2.value(x, y), LINEAR2.value(x, y), FREE2.value(x, y)), (f, f, f));
         }
     }
 }
@@ -77,21 +82,119 @@ fn the_least_spline_has_its_closed_form() {
     assert_eq!(HAT.partial([0.3], [4]), 0.0);
 }
 
+/// A cubic polynomial with its derivatives: the spline that knows the slopes at its ends, and the
+/// one without knots next to them, are the polynomial itself.
+#[test]
+fn cubic_polynomials_are_kept() {
+    let cubic =
+        |x: f64| [((0.3 * x - 0.7) * x + 1.1) * x + 0.4, (0.9 * x - 1.4) * x + 1.1, 1.8 * x - 1.4, 1.8];
+    fn on<const N: usize>(points: [f64; N], cubic: impl Fn(f64) -> [f64; 4]) {
+        let values = points.map(|x| cubic(x)[0]);
+        let slopes = [points[0], points[N - 1]].map(|x| cubic(x)[1]);
+        let mut splines = std::vec![Spline::clamped(points, values, slopes)];
+        if N > 3 {
+            splines.push(Spline::not_a_knot(points, values));
+        }
+        for (spline, k) in splines.iter().flat_map(|spline| (0..=50).map(move |k| (spline, k))) {
+            let x = points[0] + (points[N - 1] - points[0]) * f64::from(k) / 50.0;
+            for (order, expected) in cubic(x).into_iter().enumerate() {
+                close(spline.partial([x], [order as u32]), expected, 1e-12);
+            }
+        }
+    }
+    on([-0.5, 1.5], cubic);
+    on([-0.5, 1.0, 1.5], cubic);
+    on([-0.5, 0.0, 1.0, 1.5], cubic);
+    on(X, cubic);
+    let product = |x: f64, y: f64| cubic(x)[0] * cubic(0.1 * y)[0];
+    let of_two = Spline2::not_a_knot(X, Y, X.map(|x| Y.map(|y| product(x, y))));
+    close(of_two.value(0.9, 13.0), product(0.9, 13.0), 1e-12);
+    close(of_two.partial([0.9, 13.0], [1, 2]), cubic(0.9)[1] * 0.01 * cubic(1.3)[2], 1e-12);
+}
+
+#[test]
+fn fewer_points_than_four_are_a_polynomial() {
+    let parabola = Spline::not_a_knot([0.0, 1.0, 3.0], [0.0, 1.0, 9.0]);
+    let line = Spline::not_a_knot([1.0, 3.0], [2.0, -2.0]);
+    for x in [0.0, 0.4, 1.0, 2.0, 3.0] {
+        close(parabola.value(x), x * x, 1e-14);
+        close(parabola.derivative(x), 2.0 * x, 1e-14);
+        close(line.value(x), 4.0 - 2.0 * x, 1e-14);
+    }
+}
+
+/// Clamped and not-a-knot splines are of fourth order up to the ends; natural ones of second order
+/// where the function bends there.
+#[test]
+fn errors_at_the_ends_have_their_orders() {
+    fn errors<const N: usize>() -> [f64; 3] {
+        let points: [f64; N] = core::array::from_fn(|i| 1.0 + i as f64 / (N - 1) as f64);
+        let values = points.map(f64::exp);
+        let ends = [points[0].exp(), points[N - 1].exp()];
+        let splines = [
+            Spline::natural(points, values),
+            Spline::clamped(points, values, ends),
+            Spline::not_a_knot(points, values),
+        ];
+        splines.map(|spline| {
+            let error = |k: u32| {
+                let x = 1.0 + f64::from(k) / 997.0;
+                (spline.value(x) - x.exp()).abs()
+            };
+            (0..=997).map(error).fold(0.0, f64::max)
+        })
+    }
+    let (coarse, fine) = (errors::<17>(), errors::<33>());
+    for ((coarse, fine), order) in coarse.into_iter().zip(fine).zip([2.0, 4.0, 4.0]) {
+        let found = (coarse / fine).log2();
+        assert!((found - order).abs() < 0.2, "order {found}, not {order}");
+    }
+}
+
+/// What holds at the ends of the splines of the tests.
+#[derive(Clone, Copy)]
+enum At {
+    Natural,
+    Slopes,
+    NotAKnot,
+}
+
 /// The same spline by its second derivatives at the points, from a dense system.
-fn by_moments(points: &[f64], values: &[f64], x: f64) -> f64 {
+fn by_moments(ends: At, points: &[f64], values: &[f64], x: f64) -> f64 {
     let n = points.len();
+    let h = |i: usize| points[i + 1] - points[i];
+    let slope = |i: usize| (values[i + 1] - values[i]) / h(i);
     let mut matrix = nalgebra::DMatrix::<f64>::identity(n, n);
     let mut right = nalgebra::DVector::<f64>::zeros(n);
     for i in 1..n - 1 {
-        let (h, k) = (points[i] - points[i - 1], points[i + 1] - points[i]);
-        matrix[(i, i - 1)] = h / 6.0;
-        matrix[(i, i)] = (h + k) / 3.0;
-        matrix[(i, i + 1)] = k / 6.0;
-        right[i] = (values[i + 1] - values[i]) / k - (values[i] - values[i - 1]) / h;
+        matrix[(i, i - 1)] = h(i - 1) / 6.0;
+        matrix[(i, i)] = (h(i - 1) + h(i)) / 3.0;
+        matrix[(i, i + 1)] = h(i) / 6.0;
+        right[i] = slope(i) - slope(i - 1);
+    }
+    match ends {
+        At::Natural => {}
+        At::Slopes => {
+            for (end, next, piece, sign) in [(0, 1, 0, 1.0), (n - 1, n - 2, n - 2, -1.0)] {
+                matrix[(end, end)] = h(piece) / 3.0;
+                matrix[(end, next)] = h(piece) / 6.0;
+                right[end] = sign * (slope(piece) - SLOPES[usize::from(end > 0)]);
+            }
+        }
+        At::NotAKnot => {
+            for (end, first) in [(0, 0), (n - 1, n - 3)] {
+                let (h, k) = (h(first), h(first + 1));
+                let row = [1.0 / h, -1.0 / h - 1.0 / k, 1.0 / k];
+                matrix[(end, end)] = 0.0;
+                for (j, number) in row.into_iter().enumerate() {
+                    matrix[(end, first + j)] = number;
+                }
+            }
+        }
     }
     let moments = matrix.lu().solve(&right).expect("the matrix is regular");
     let i = points[1..n - 1].iter().filter(|&&point| point <= x).count();
-    let (h, a, b) = (points[i + 1] - points[i], points[i + 1] - x, x - points[i]);
+    let (h, a, b) = (h(i), points[i + 1] - x, x - points[i]);
     (moments[i] * a * a * a + moments[i + 1] * b * b * b) / (6.0 * h)
         + (values[i] / h - moments[i] * h / 6.0) * a
         + (values[i + 1] / h - moments[i + 1] * h / 6.0) * b
@@ -100,11 +203,31 @@ fn by_moments(points: &[f64], values: &[f64], x: f64) -> f64 {
 #[test]
 fn splines_are_those_of_second_derivatives() {
     for x in places().filter(|x| (X[0]..X[5]).contains(x)) {
-        close(SPLINE.value(x), by_moments(&X, &F, x), 1e-14);
+        close(SPLINE.value(x), by_moments(At::Natural, &X, &F, x), 1e-14);
+        close(CLAMPED.value(x), by_moments(At::Slopes, &X, &F, x), 1e-13);
+        close(FREE.value(x), by_moments(At::NotAKnot, &X, &F, x), 1e-13);
         for y in [10.3, 12.9, 16.0, 19.99] {
-            let rows: Vec<f64> = G.iter().map(|row| by_moments(&Y, row, y)).collect();
-            close(SPLINE2.value(x, y), by_moments(&X, &rows, x), 1e-14);
+            for (spline, ends, tolerance) in [(SPLINE2, At::Natural, 1e-14), (FREE2, At::NotAKnot, 1e-13)] {
+                let rows: Vec<f64> = G.iter().map(|row| by_moments(ends, &Y, row, y)).collect();
+                close(spline.value(x, y), by_moments(ends, &X, &rows, x), tolerance);
+            }
         }
+    }
+}
+
+#[test]
+fn ends_are_as_they_are_given() {
+    assert_eq!([X[0], X[5]].map(|x| CLAMPED.derivative(x)), SLOPES);
+    assert_eq!([X[0] - 3.0, X[5] + 2.0].map(|x| CLAMPED.derivative(x)), SLOPES);
+    for spline in [CLAMPED, FREE] {
+        for x in &X[1..5] {
+            let sides = [x - 1e-9, x + 1e-9].map(|x| spline.partial([x], [2]));
+            close(sides[0], sides[1], 1e-6);
+        }
+    }
+    for x in [X[1], X[4]] {
+        let sides = [x - 1e-9, x + 1e-9].map(|x| FREE.partial([x], [3]));
+        close(sides[0], sides[1], 1e-12);
     }
 }
 
@@ -178,11 +301,14 @@ fn derivatives_agree_three_ways() {
     for x in places() {
         for order in 0..3 {
             check_derivatives(&SPLINE, [order], [x]);
+            check_derivatives(&CLAMPED, [order], [x]);
+            check_derivatives(&FREE, [order], [x]);
             check_derivatives(&LINEAR, [order], [x]);
         }
         for y in [7.0, 10.1, 14.0, 19.0, 25.0] {
             for orders in [[0, 0], [1, 0], [0, 1], [2, 0], [1, 1], [0, 2]] {
                 check_derivatives(&SPLINE2, orders, [x, y]);
+                check_derivatives(&FREE2, orders, [x, y]);
                 check_derivatives(&LINEAR2, orders, [x, y]);
             }
         }
@@ -224,6 +350,12 @@ fn points_have_to_increase() {
 #[should_panic(expected = "have to be finite")]
 fn values_have_to_be_finite() {
     let _ = Linear2::new([0.0, 1.0], [0.0, 1.0], [[0.0, 0.0], [0.0, f64::NAN]]);
+}
+
+#[test]
+#[should_panic(expected = "have to be finite")]
+fn slopes_have_to_be_finite() {
+    let _ = Spline::clamped([0.0, 1.0], [0.0, 1.0], [0.0, f64::INFINITY]);
 }
 
 #[test]

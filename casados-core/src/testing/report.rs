@@ -9,6 +9,20 @@ const LISTED: usize = 12;
 
 /// What a check found. It prints as a table; [`Report::assert`] panics with the table if anything
 /// is wrong.
+///
+/// ```
+/// use casados::prelude::*;
+/// use casados::testing::{Points, check_derivatives};
+///
+/// #[ode]
+/// fn oscillator(x: [f64; 2], u: f64) -> [f64; 2] {
+///     [x[1], u - x[0].sin()]
+/// }
+///
+/// let report = check_derivatives::<Oscillator>(&Points::random(5));
+/// println!("{report}");
+/// assert!(report.passed() && report.wrong.is_empty() && !report.rows.is_empty());
+/// ```
 #[derive(Clone, Debug)]
 #[must_use = "a report says whether the check has passed: call `assert` or look at `passed`"]
 pub struct Report {

@@ -1,7 +1,7 @@
 /** Name, unit, index, from, to; logarithmic. */
 const SLIDERS = [
-  ["weight of the angle", "1/rad²", 1, .5, 100], ["weight of the position", "1/m²", 0, .1, 20], ["weight of the velocity", "s²/m²", 2, .01, 5],
-  ["weight of the rate", "s²/rad²", 3, .01, 5], ["weight of the force", "1/N²", 4, .001, 1], ["largest force", "N", 5, 6, 50], ["half of the track", "m", 6, .5, 2],
+  ["weight of the angle", "1/rad²", 1, 5, 100], ["weight of the position", "1/m²", 0, .3, 10], ["weight of the velocity", "s²/m²", 2, .01, 1],
+  ["weight of the rate", "s²/rad²", 3, .01, .5], ["weight of the force", "1/N²", 4, .001, .05], ["largest force", "N", 5, 7, 50], ["half of the track", "m", 6, .6, 1.8],
 ];
 const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
 (async () => {
@@ -13,13 +13,21 @@ const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
   const settings = () => list(e.pendulum_settings(), 7), state = () => list(e.pendulum_state(), 12);
   const canvas = $("scene");
   const reset = () => { check(e.pendulum_reset()); pendulum.history = []; $("said").textContent = ""; };
+  /** What fails is said, and the pendulum hangs again; where even that fails, it stops. */
+  const attempt = action => {
+    try { action(); } catch (error) {
+      let after = "It hangs again.";
+      try { reset(); } catch { pendulum.paused = true; after = "Load the page again."; }
+      $("said").textContent = `${error.message} ${after}`;
+    }
+  };
   const pause = () => { pendulum.paused = !pendulum.paused; $("pause").setAttribute("aria-pressed", pendulum.paused); $("pause").textContent = pendulum.paused ? "Go on" : "Pause"; };
   for (const [name, unit, index, low, high] of SLIDERS) {
     const label = document.createElement("label"), slider = document.createElement("input"), output = document.createElement("output");
     Object.assign(slider, { type: "range", min: Math.log(low), max: Math.log(high), step: .01, value: Math.log(settings()[index]), id: "setting-" + index });
     const show = value => { output.textContent = `${value.toPrecision(2)} ${unit}`; slider.setAttribute("aria-valuetext", output.textContent); };
     show(settings()[index]);
-    slider.oninput = () => { const value = Math.exp(slider.value); settings()[index] = value; check(e.pendulum_apply()); show(value); };
+    slider.oninput = () => { const value = Math.exp(slider.value); settings()[index] = value; attempt(() => check(e.pendulum_apply())); show(value); };
     label.append(name, output, slider);
     $("sliders").append(label);
   }
@@ -31,7 +39,8 @@ const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
   canvas.onpointerup = canvas.onpointercancel = () => { pendulum.pull = null; };
   canvas.onkeydown = event => {
     const side = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (side) pendulum.keys = event.shiftKey ? [12 * side, 0] : [0, 2 * side];
+    // A cart is pushed by less than the controller has.
+    if (side) pendulum.keys = event.shiftKey ? [.6 * settings()[5] * side, 0] : [0, 2 * side];
     else if (event.key === " ") pause();
     else if (event.key.toLowerCase() === "r") reset();
     else return;
@@ -81,6 +90,7 @@ const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
   reset();
   let last = performance.now(), frames = 0;
   const frame = now => {
+    requestAnimationFrame(frame);
     const seconds = Math.min(.05, Math.max(0, (now - last) / 1000));
     last = now;
     if (!pendulum.paused && seconds > 0) {
@@ -89,11 +99,10 @@ const pendulum = { paused: false, pull: null, keys: [0, 0], history: [] };
         const s = state(), b = ball(s[0], s[1]), d = [pendulum.pull[0] - b[0], pendulum.pull[1] - b[1]], f = Math.min(4, 2.5 / Math.max(1e-9, Math.hypot(...d)));
         [right, up] = [right + f * d[0], f * d[1]];
       }
-      try { pendulum.advance(seconds, cart, right, up); } catch (error) { reset(); $("said").textContent = `${error.message} It hangs again.`; }
+      attempt(() => pendulum.advance(seconds, cart, right, up));
     }
     draw();
     if (frames++ % 6 === 0) show();
-    requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);
   pendulum.ready = true;

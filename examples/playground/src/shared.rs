@@ -24,6 +24,7 @@ impl<const N: usize> One<[f64; N]> {
     }
 }
 
+#[cfg(target_arch = "wasm32")]
 #[link(wasm_import_module = "page")]
 unsafe extern "C" {
     /// Milliseconds.
@@ -31,6 +32,17 @@ unsafe extern "C" {
     /// An iteration of the interior point: its number, objective, and residual.
     pub safe fn iterated(iteration: f64, objective: f64, residual: f64);
 }
+
+/// Milliseconds.
+#[cfg(not(target_arch = "wasm32"))]
+pub fn now() -> f64 {
+    static BEGIN: std::sync::LazyLock<std::time::Instant> = std::sync::LazyLock::new(std::time::Instant::now);
+    BEGIN.elapsed().as_secs_f64() * 1e3
+}
+
+/// Nobody looks.
+#[cfg(not(target_arch = "wasm32"))]
+pub fn iterated(_iteration: f64, _objective: f64, _residual: f64) {}
 
 static MESSAGE: One<String> = One::new(String::new());
 

@@ -4,7 +4,7 @@ use super::growth::{Growth, Precision};
 use super::report::{label, origin};
 use super::rows::Measured;
 use super::{Failure, Results};
-use casados::plot::{Figure, Panel, Series};
+use casados::plot::{Figure, Panel, Curve};
 use casados_benches::case::Mode;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ fn of_growth(growth: &Growth) -> Panel {
     Mode::ALL.into_iter().enumerate().fold(panel, |panel, (k, mode)| {
         let points = growth.points.iter().map(|(nx, m)| (*nx as f64, 1e6 * m[k].time.median));
         let name = format!("{}, nx^{:.2}", label(mode), growth.exponent(k));
-        panel.with(Series::line(name, points).marked())
+        panel.with(Curve::line(name, points).marked())
     })
 }
 
@@ -43,7 +43,7 @@ fn of_precision(what: &str, all: &[Precision], of: fn(&Precision) -> Measured) -
             let measured = of(p);
             (1e6 * measured.time.median, measured.error.unwrap_or(f64::NAN).max(1e-17))
         });
-        panel.with(Series::line(format!("s = {stages}"), points).marked())
+        panel.with(Curve::line(format!("s = {stages}"), points).marked())
     })
 }
 

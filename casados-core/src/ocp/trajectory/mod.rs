@@ -69,6 +69,25 @@ pub struct Trajectory<T = f64> {
 }
 
 /// What a [`Series`] is of.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, Kind, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// ocp.bound("u", .., -0.5, 0.5)?;
+/// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// let solution = ocp.solution()?;
+/// let controls = solution.series().iter().filter(|series| series.kind == Kind::Control);
+/// assert_eq!(controls.map(|series| series.name.as_str()).collect::<Vec<_>>(), ["u"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -88,6 +107,28 @@ pub enum Kind {
 }
 
 /// One quantity over time. Lists of what it has not are empty.
+///
+/// ```
+/// # use casados::ocp::{HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// ocp.bound("u", .., -0.5, 0.5)?;
+/// HeapSqp::new(&ocp)?.solve(&mut ocp)?;
+/// let solution = ocp.solution()?;
+/// let push = solution.get("u")?;
+/// assert_eq!((push.values.len(), push.lower[0], push.upper[9]), (10, Some(-0.5), Some(0.5)));
+/// // From one it is pushed as hard as the bound allows; later the bound has no force.
+/// assert!(push.is_active(0, 1e-6) && !push.is_active(5, 1e-6));
+/// assert!(push.lower_multipliers[0] > 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

@@ -4,6 +4,26 @@ use crate::qp::error::QpError;
 use crate::scalar::Real;
 
 /// Options of the interior point.
+///
+/// ```
+/// # use casados::ocp::{HeapRealTime, HeapSqp, Horizon, LeastSquaresCost, Map, Problem};
+/// # use casados::prelude::*;
+/// use casados::qp::InteriorPointOptions;
+/// # #[function]
+/// # fn push(x: f64, u: f64) -> f64 { x + u }
+/// # #[function]
+/// # fn both(x: f64, u: f64) -> [f64; 2] { [x, u] }
+/// # let mut ocp = Problem::new(Map::<Push, f64>::new())
+/// #     .stage_cost(LeastSquaresCost::<Both>::diagonal(&[1.0; 2]))
+/// #     .on(Horizon::uniform(10, 0.1))?;
+/// # ocp.fix_initial_state(&[1.0])?.guess(&[1.0], &[0.0])?;
+/// let mut controller = HeapRealTime::new(ocp)?;
+/// // A sample takes so long at most.
+/// controller.qp_solver.options =
+///     InteriorPointOptions { max_iterations: 20, locate: false, ..InteriorPointOptions::new::<f64>() };
+/// assert!(controller.prepare()?.feedback(&[0.8])?.statistics.iterations <= 20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InteriorPointOptions {
     /// Every one of the four [`Residuals`](crate::qp::Residuals) is to be below this, or below

@@ -13,22 +13,23 @@ use syn::Result;
 /// The degree of cubic splines, and of what may be one.
 const CUBIC: u8 = 3;
 
-/// A table by the type and the function that makes it, with the number of its variables and its
-/// degree.
-fn form(ty: &str, function: &str) -> Option<(&'static str, usize, u8)> {
+/// A table by the type and the function that makes it, with the number of its variables, that of
+/// the function's arguments, and its degree.
+fn form(ty: &str, function: &str) -> Option<(&'static str, usize, usize, u8)> {
     Some(match (ty, function) {
-        ("Linear", "new") => ("Linear", 1, 1),
-        ("Linear2", "new") => ("Linear2", 2, 1),
-        ("Spline", "natural") => ("Spline", 1, CUBIC),
-        ("Spline2", "natural") => ("Spline2", 2, CUBIC),
+        ("Linear", "new") => ("Linear", 1, 2, 1),
+        ("Linear2", "new") => ("Linear2", 2, 3, 1),
+        ("Spline", "natural" | "not_a_knot") => ("Spline", 1, 2, CUBIC),
+        ("Spline", "clamped") => ("Spline", 1, 3, CUBIC),
+        ("Spline2", "natural" | "not_a_knot") => ("Spline2", 2, 3, CUBIC),
         _ => return None,
     })
 }
 
 /// `Spline::natural(points, values)` and the others. `None` if it is none of them.
 pub fn construct(evaluator: &mut Evaluator, ty: &str, call: &Call) -> Result<Option<Value>> {
-    let Some((name, variables, degree)) = form(ty, call.name) else { return Ok(None) };
-    call.expect(variables + 1)?;
+    let Some((name, variables, arguments, degree)) = form(ty, call.name) else { return Ok(None) };
+    call.expect(arguments)?;
     let mut arguments = Vec::new();
     for argument in &call.arguments {
         arguments.push(numbers(evaluator, argument, call.at)?);

@@ -7,13 +7,13 @@ use alloc::vec::Vec;
 /// Points that belong together. What is not finite interrupts a line.
 ///
 /// ```
-/// use casados::plot::{Panel, Series};
+/// use casados::plot::{Curve, Panel};
 ///
-/// let dashed = Series::line("reference", [(0.0, 1.0), (5.0, 1.0)]).dashed();
+/// let dashed = Curve::line("reference", [(0.0, 1.0), (5.0, 1.0)]).dashed();
 /// let _panel = Panel::new("Position").with(dashed);
 /// ```
 #[derive(Clone, Debug)]
-pub struct Series {
+pub struct Curve {
     pub(super) name: String,
     pub(super) points: Vec<(f64, f64)>,
     /// What decides about colours, one for each point, or nothing.
@@ -26,7 +26,7 @@ pub struct Series {
     pub(super) radius: f64,
 }
 
-impl Series {
+impl Curve {
     /// A line through points. A name stands in the legend; an empty one does not.
     #[must_use]
     pub fn line(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
@@ -44,14 +44,14 @@ impl Series {
     /// Stairs: each value is held until the next point.
     #[must_use]
     pub fn steps(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let mut series = Self::line(name, []);
+        let mut curve = Self::line(name, []);
         for (x, y) in points {
-            if let Some(&(_, held)) = series.points.last() {
-                series.points.push((x, held));
+            if let Some(&(_, held)) = curve.points.last() {
+                curve.points.push((x, held));
             }
-            series.points.push((x, y));
+            curve.points.push((x, y));
         }
-        series
+        curve
     }
 
     /// Dots.
