@@ -100,7 +100,8 @@ macro_rules! errors {
 }
 
 /// A jump next to the end of a step shows nowhere: so some runs are off by more than thirty
-/// tolerances, one in twenty at most. Where only the size of the estimate tells, it is one in four of Radau.
+/// tolerances, one in twenty at most. Where only the size of the estimate tells, it is one in four
+/// of Radau.
 #[test]
 fn jumps_of_derivatives_inside_steps() {
     for errors in
