@@ -135,16 +135,13 @@ fn corners() -> Test {
     }))
 }
 
-/// Where the model has no solution, that is said; a new pendulum hangs again.
+/// A push beyond all numbers is an error; a new pendulum stands up. Newton's method finds a state
+/// after any other push.
 #[test]
 fn a_push_without_measure_is_an_error() -> Test {
     let mut the = Loop::new()?;
     the.apply(&DEFAULT)?;
-    for push in [1e3, 1e4, 1e5, 1e6, 1e8, 1e10, 1e20] {
-        let mut the = Loop::new()?;
-        the.apply(&DEFAULT)?;
-        println!("{push:e}: {:?}", (0..6).map(|_| the.advance(1.0 / 60.0, [0.0, push, 0.0]).map_err(|e| e.to_string())).collect::<Vec<_>>());
-    }
+    assert!(the.advance(0.1, [0.0, 1e20, 0.0]).is_ok());
     assert!(the.advance(0.1, [0.0, 1e200, 0.0]).is_err());
     let mut the = Loop::new()?;
     the.apply(&DEFAULT)?;
