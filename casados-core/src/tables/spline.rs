@@ -48,6 +48,8 @@ impl<const N: usize> Spline<N> {
     /// compiler.
     #[must_use]
     pub const fn natural(points: [f64; N], values: [f64; N]) -> Self {
+        check(&points);
+        check_values(&values);
         Self::new(points, values, Ends::Natural)
     }
 
@@ -58,6 +60,8 @@ impl<const N: usize> Spline<N> {
     /// As [`Spline::natural`].
     #[must_use]
     pub const fn clamped(points: [f64; N], values: [f64; N], slopes: [f64; 2]) -> Self {
+        check(&points);
+        check_values(&values);
         check_values(&slopes);
         Self::new(points, values, Ends::Slopes(slopes))
     }
@@ -71,12 +75,13 @@ impl<const N: usize> Spline<N> {
     /// As [`Spline::natural`].
     #[must_use]
     pub const fn not_a_knot(points: [f64; N], values: [f64; N]) -> Self {
+        check(&points);
+        check_values(&values);
         Self::new(points, values, Ends::NotAKnot)
     }
 
+    /// Points are checked by the callers: so the compiler names them.
     const fn new(points: [f64; N], values: [f64; N], ends: Ends) -> Self {
-        check(&points);
-        check_values(&values);
         let slopes = slopes(&points, &values, ends);
         let mut nodes = [[0.0; 2]; N];
         let mut i = 0;
@@ -151,6 +156,8 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     /// compiler.
     #[must_use]
     pub const fn natural(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
+        check(&x);
+        check(&y);
         Self::new(x, y, values, Ends::Natural)
     }
 
@@ -161,12 +168,12 @@ impl<const N: usize, const M: usize> Spline2<N, M> {
     /// As [`Spline2::natural`].
     #[must_use]
     pub const fn not_a_knot(x: [f64; N], y: [f64; M], values: [[f64; M]; N]) -> Self {
+        check(&x);
+        check(&y);
         Self::new(x, y, values, Ends::NotAKnot)
     }
 
     const fn new(x: [f64; N], y: [f64; M], values: [[f64; M]; N], ends: Ends) -> Self {
-        check(&x);
-        check(&y);
         let mut along_x = [[0.0; M]; N];
         let mut j = 0;
         while j < M {
