@@ -1,10 +1,13 @@
 //! First-order sensitivities along with the step: the variational equations of the stages.
 
-use super::step::{Base, Grid, Point, Record, Scheme, add};
+use super::doubt::Doubt;
+use super::scheme::{Grid, Scheme, is_zero};
+use super::step::{Base, Own, Point, Record, add};
 use crate::error::{Error, Place};
-use crate::model::{ArrayX, Dae, Ode};
+use crate::linalg::{beside, kernels};
+use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
-use crate::scalar::Real;
+use crate::scalar::{Lanes, Real};
 use crate::shape::{Array, Matrix, Shape};
 use bytemuck::Zeroable;
 use core::ops::Range;
@@ -13,8 +16,8 @@ use core::ops::Range;
 /// first `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Variation<M: Ode, T: Real, R: Array<T>, const S: usize> {
-    pub jacobian: M::Jacobian<T>,
+pub(super) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
+    pub jacobian: M::Jacobian<[E; 1]>,
     /// `dx_n`
     pub dx: ArrayX<M, R>,
     /// `dξ_i` of the current stage.
@@ -24,24 +27,24 @@ pub(super) struct Variation<M: Ode, T: Real, R: Array<T>, const S: usize> {
 }
 
 /// Directions in the space of `w = (x₀, u, p)`.
-pub(super) trait Directions<M: Ode, T: Real>: Copy {
+pub(super) trait Directions<M: Ode, E: Lanes>: Copy {
     /// How many.
     fn columns(self) -> usize;
     /// `row += coefficient · (direction of w_i)`
-    fn add(self, i: usize, coefficient: T, row: &mut [T]);
+    fn add(self, i: usize, coefficient: E, row: &mut [E]);
 }
 
 /// All unit vectors.
 #[derive(Clone, Copy)]
 pub(super) struct Unit;
 
-impl<M: Ode, T: Real> Directions<M, T> for Unit {
+impl<M: Ode, E: Lanes> Directions<M, E> for Unit {
     #[inline(always)]
     fn columns(self) -> usize {
         M::Shape::NW
     }
     #[inline(always)]
-    fn add(self, i: usize, coefficient: T, row: &mut [T]) {
+    fn add(self, i: usize, coefficient: E, row: &mut [E]) {
         if let Some(element) = row.get_mut(i) {
             *element = *element + coefficient;
         }
@@ -87,30 +90,26 @@ impl<M: Ode, T: Real, const C: usize> Directions<M, T> for Seeded<'_, M, T, C> {
     }
 }
 
-impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
+impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage when `k_i` and
     /// `dξ_i` are known.
     pub fn run(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        base: &mut Base<M, T, S>,
-        directions: impl Directions<M, T>,
-        mut at_stage: impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        base: &mut Base<M, E, S>,
+        directions: impl Directions<M, E>,
+        mut at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let columns = directions.columns();
-        M::jacobian_constants::<T>(&mut self.jacobian);
-        for (i, row) in self.dx.as_mut().iter_mut().enumerate() {
-            let row = &mut row.as_mut()[..columns];
-            row.fill(T::ZERO);
-            directions.add(i, T::ONE, row);
-        }
+        M::jacobian_constants::<Own<E>>(&mut self.jacobian);
+        begin::<M, E, R, _>(E::from_f64(1.0), &mut self.dx, directions);
         for step in 0..grid.steps {
             let Base { point, record, x, rest, .. } = &mut *base;
             record.x = *x;
             self.stages(scheme, grid, (point, record), step, directions, &mut at_stage)?;
-            record.end(scheme, grid, step, x, grid.compensated.then_some(rest))?;
-            self.end(scheme, grid.h, columns);
+            record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
+            self.end(scheme, &grid.h, columns);
             point.counts.steps += 1;
         }
         Ok(())
@@ -119,45 +118,69 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
     /// The stages of one step with their derivatives.
     fn stages(
         &mut self,
-        scheme: &Scheme<M, T, S>,
-        grid: Grid<T>,
-        (point, record): (&mut Point<M, T>, &mut Record<M, T, S>),
+        scheme: &Scheme<M, E, S>,
+        grid: &Grid<E>,
+        (point, record): (&mut Point<M, E>, &mut Record<M, E, S>),
         step: usize,
-        directions: impl Directions<M, T>,
-        at_stage: &mut impl FnMut(&Point<M, T>, &ArrayX<M, R>, Place) -> Result<(), Error>,
+        directions: impl Directions<M, E>,
+        at_stage: &mut impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
         for stage in 0..S {
             let at = Place { step, stage, iteration: 0 };
             point.go(scheme, grid, record, at)?;
             point.derivative_jacobian(scheme, &mut record.k[stage], &mut self.jacobian, at)?;
-            self.stage_state(scheme, grid.h, stage, directions.columns());
+            self.stage_state(scheme, &grid.h, stage, directions.columns());
             at_stage(point, &self.dxi, at)?;
-            self.stage_derivative(scheme, stage, directions);
+            let Self { dk, dxi, jacobian, .. } = self;
+            if let Some(dk) = dk.get_mut(stage) {
+                stage_derivative::<M, E, R, _, S>(scheme, jacobian, dxi, directions, dk);
+            }
         }
         Ok(())
     }
 
     /// `dξ_i = dx_n + h Σ_{j<i} a_ij dk_j`
-    fn stage_state(&mut self, scheme: &Scheme<M, T, S>, h: T, stage: usize, columns: usize) {
-        combine::<M, T, R>(&self.dx, h, &scheme.a[stage][..stage], &self.dk, columns, &mut self.dxi);
+    fn stage_state(&mut self, scheme: &Scheme<M, E, S>, h: &E, stage: usize, columns: usize) {
+        combine::<M, E, R>(&self.dx, h, &scheme.a[stage][..stage], &self.dk, columns, &mut self.dxi);
+    }
+
+    /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
+    fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, columns: usize) {
+        combine::<M, E, R>(&self.dx, h, &scheme.b, &self.dk, columns, &mut self.dxi);
+        self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
+    }
+}
+
+kernels! { by beside;
+    /// The directions, of each state a row.
+    fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
+        one: E,
+        dx: &'k mut ArrayX<M, R>,
+        directions: D,
+    ) {
+        let columns = directions.columns();
+        for (i, row) in dx.as_mut().iter_mut().enumerate() {
+            let row = &mut row.as_mut()[..columns];
+            row.fill(E::zeroed());
+            directions.add(i, one, row);
+        }
     }
 
     /// `dk_i = g_x dξ_i + g_w dw`
-    fn stage_derivative(
-        &mut self,
-        scheme: &Scheme<M, T, S>,
-        stage: usize,
-        directions: impl Directions<M, T>,
+    fn stage_derivative [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>, const S: usize] [M, E, R, D, S] <A>(
+        scheme: &'k Scheme<M, E, S>,
+        jacobian: &'k M::Jacobian<[E; 1]>,
+        dxi: &'k ArrayX<M, R>,
+        directions: D,
+        dk: &'k mut ArrayX<M, R>,
     ) {
         let (nx, columns) = (M::Shape::NX, directions.columns());
-        let Self { dk, dxi, jacobian, .. } = self;
-        let Some(dk) = dk.get_mut(stage) else { return };
         for row in dk.as_mut() {
-            row.as_mut()[..columns].fill(T::ZERO);
+            row.as_mut()[..columns].fill(E::zeroed());
         }
         for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
-            let (Some(&value), Some(row)) =
+            let (Some(&[value]), Some(row)) =
                 (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
             else {
                 continue;
@@ -165,59 +188,71 @@ impl<M: Ode, T: Real, R: Array<T>, const S: usize> Variation<M, T, R, S> {
             let Some(sum) = dk.as_mut().get_mut(row.state) else { continue };
             let (coefficient, sum, w) = (row.factor * value, &mut sum.as_mut()[..columns], variable - nx);
             if let (true, Some(dxi)) = (w < nx, dxi.as_ref().get(w)) {
-                add(coefficient, dxi.as_ref(), sum);
+                add::<A, E>(coefficient, dxi.as_ref(), sum);
             } else {
                 directions.add(w, coefficient, sum);
             }
         }
     }
 
-    /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
-    fn end(&mut self, scheme: &Scheme<M, T, S>, h: T, columns: usize) {
-        combine::<M, T, R>(&self.dx, h, &scheme.b, &self.dk, columns, &mut self.dxi);
-        self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
+    /// `sum = start + h Σ_j weights_j rates_j`, row by row.
+    fn combine [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
+        start: &'k ArrayX<M, R>,
+        h: &'k E,
+        weights: &'k [E],
+        rates: &'k [ArrayX<M, R>],
+        columns: usize,
+        sum: &'k mut ArrayX<M, R>,
+    ) {
+        for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
+            let sum = &mut sum.as_mut()[..columns];
+            sum.fill(E::zeroed());
+            for (&weight, rate) in weights.iter().zip(rates) {
+                if !is_zero(weight) {
+                    add::<A, E>(weight, rate[row].as_ref(), sum);
+                }
+            }
+            for (sum, &start) in sum.iter_mut().zip(start.as_ref()) {
+                *sum = A::add(start, *h, *sum);
+            }
+        }
+    }
+
+    /// See [`write`]. Of single numbers the first row that has one which is not finite.
+    fn copy [E: Lanes, R: Array<E>, K: Matrix<E>] [E, R, K] <A>(
+        rows: &'k [R],
+        source: Range<usize>,
+        target: &'k mut K,
+        first: usize,
+        doubt: &'k mut Doubt<E>,
+    ) -> Option<usize> {
+        let mut finite = doubt.none();
+        for (r, row) in rows.iter().enumerate() {
+            for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
+                if const { E::LANES > 1 } {
+                    finite = E::and(finite, value.is_finite());
+                } else if !E::all(value.is_finite()) {
+                    return Some(r);
+                }
+                target[(r, first + column)] = value;
+            }
+        }
+        if const { E::LANES > 1 } {
+            doubt.keep(finite);
+        }
+        None
     }
 }
 
 /// Copies row-major `rows` to columns of a matrix of the result. A value that is not finite is an
-/// error.
-pub(super) fn write<T: Real, R: Array<T>>(
+/// error, or doubted.
+pub(super) fn write<E: Lanes, R: Array<E>>(
     rows: &[R],
     source: Range<usize>,
-    target: &mut impl Matrix<T>,
+    target: &mut impl Matrix<E>,
     first: usize,
     step: usize,
+    doubt: &mut Doubt<E>,
 ) -> Result<(), Error> {
-    for (r, row) in rows.iter().enumerate() {
-        for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
-            if !value.is_finite() {
-                return Err(Error::Overflow { step, index: r });
-            }
-            target[(r, first + column)] = value;
-        }
-    }
-    Ok(())
-}
-
-/// `sum = start + h Σ_j weights_j rates_j`, row by row.
-fn combine<M: Dae, T: Real, R: Array<T>>(
-    start: &ArrayX<M, R>,
-    h: T,
-    weights: &[T],
-    rates: &[ArrayX<M, R>],
-    columns: usize,
-    sum: &mut ArrayX<M, R>,
-) {
-    for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
-        let sum = &mut sum.as_mut()[..columns];
-        sum.fill(T::ZERO);
-        for (&weight, rate) in weights.iter().zip(rates) {
-            if weight != T::ZERO {
-                add(weight, rate[row].as_ref(), sum);
-            }
-        }
-        for (sum, &start) in sum.iter_mut().zip(start.as_ref()) {
-            *sum = start + h * *sum;
-        }
-    }
+    copy(rows, source, target, first, doubt).map_or(Ok(()), |index| Err(Error::Overflow { step, index }))
 }

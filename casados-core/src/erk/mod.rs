@@ -11,16 +11,21 @@
 mod adjoint;
 mod along;
 mod calls;
+mod doubt;
+mod engine;
 mod forward;
 mod hessian;
 mod integrator;
+mod scheme;
 mod sensitivities;
 mod step;
 
 pub use integrator::Integrator;
 // What steps of variable size are made of too.
 #[cfg(feature = "alloc")]
-pub(crate) use step::{Grid, Point, Record, Scheme};
+pub(crate) use scheme::{Grid, Scheme};
+#[cfg(feature = "alloc")]
+pub(crate) use step::{Point, Record};
 
 use crate::memory::Memory;
 use crate::model::Ode;
