@@ -16,10 +16,12 @@
 
 mod answer;
 mod error;
-mod group;
+mod explicit;
+mod implicit;
 mod integrator;
 mod intervals;
 mod lanes;
+mod single;
 mod statistics;
 mod work;
 
@@ -28,11 +30,16 @@ pub use integrator::Integrator;
 pub use intervals::Intervals;
 #[cfg(feature = "casadi")]
 pub(crate) use intervals::vector;
+pub use single::{Single, Standard};
 pub use statistics::BatchStatistics;
 
-use crate::model::Dae;
+use crate::erk::Erk;
+use crate::irk::Irk;
+use crate::model::{Dae, Ode};
 use crate::scalar::Real;
-use crate::tableau::{Custom, Gauss, Method, RadauIIA};
+use crate::tableau::{
+    Butcher6, Custom, DormandPrince5, DormandPrince8, Euler, Gauss, Heun, Method, Midpoint, RadauIIA, Rk4,
+};
 
 /// The implicit integrator of many intervals, of the method `B` for the model `M`, with numbers
 /// `T`: `Batch<Model, Gauss<4>>`.
@@ -89,32 +96,40 @@ use crate::tableau::{Custom, Gauss, Method, RadauIIA};
 /// assert!(matches!(batch.status(1), Err(Error::NonFiniteInput { .. })));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub type Batch<M, B, T = f64> = <B as Batched>::Integrator<M, T>;
+pub type Batch<M, B, T = f64> = Integrator<<B as Batched<M, T>>::Single>;
 
-/// A method that a batch takes.
+/// A method that a batch of the model `M` takes, with numbers `T`.
 #[diagnostic::on_unimplemented(
-    message = "`{Self}` is not an implicit Runge-Kutta method",
-    label = "a batch needs an implicit Runge-Kutta method",
-    note = "`Gauss<S>`, `RadauIIA<S>` and `Custom<S>` are, for explicit models too; `Erk` integrates one interval after the other with \
-            explicit methods"
+    message = "`{Self}` is not a Runge-Kutta method of a fixed step",
+    label = "a batch needs a Runge-Kutta method of a fixed step",
+    note = "explicit: `Euler`, `Midpoint`, `Heun`, `Rk4`, `DormandPrince5`, `Butcher6`, `DormandPrince8`; implicit: `Gauss<S>`, `RadauIIA<S>`, `Custom<S>`"
 )]
-pub trait Batched {
-    /// Its integrator.
-    type Integrator<M: Dae, T: Real>;
+pub trait Batched<M: Dae, T: Real> {
+    /// The integrator of a single interval.
+    type Single: Single<Model = M, Number = T>;
 }
 
-impl<const S: usize> Batched for Gauss<S>
+impl<M: Dae, T: Real, const S: usize> Batched<M, T> for Gauss<S>
 where
     Self: Method<S>,
 {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, S, T>;
+    type Single = Irk<M, Self, T>;
 }
-impl<const S: usize> Batched for RadauIIA<S>
+impl<M: Dae, T: Real, const S: usize> Batched<M, T> for RadauIIA<S>
 where
     Self: Method<S>,
 {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, S, T>;
+    type Single = Irk<M, Self, T>;
 }
-impl<const S: usize> Batched for Custom<S> {
-    type Integrator<M: Dae, T: Real> = Integrator<M, Self, S, T>;
+impl<M: Dae, T: Real, const S: usize> Batched<M, T> for Custom<S> {
+    type Single = Irk<M, Self, T>;
 }
+
+macro_rules! explicit {
+    ($($method:ident),* $(,)?) => { $(
+        impl<M: Ode, T: Real> Batched<M, T> for $method {
+            type Single = Erk<M, Self, T>;
+        }
+    )* };
+}
+explicit!(Euler, Midpoint, Heun, Rk4, DormandPrince5, Butcher6, DormandPrince8);

@@ -11,7 +11,7 @@ use crate::scalar::{Lanes, Real};
 use crate::shape::Shape;
 
 /// What is beside the states at the stages: an integrand, if there is one.
-pub(super) trait Beside<M: Ode, E: Lanes> {
+pub(crate) trait Beside<M: Ode, E: Lanes> {
     /// Before the first step.
     fn begin(&mut self);
     /// Adds the value at a stage, times `h b`.
@@ -113,7 +113,7 @@ fn show<M: Ode, T: Real>(point: &Point<M, T>, to: &mut [T]) {
 }
 
 /// Nothing at all.
-pub(super) struct Nothing;
+pub(crate) struct Nothing;
 
 impl<M: Ode, E: Lanes> Beside<M, E> for Nothing {
     fn begin(&mut self) {}

@@ -38,7 +38,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         mut along: Along<'_, '_, M, T>,
     ) -> Result<&Nominal<M, T>, Error> {
         let grid = self.begin(x0, u, h)?;
-        self.engine.solve(&grid, &mut along)
+        Ok(self.engine.solve(&grid, &mut along)?.1)
     }
 
     fn forward_along(
@@ -52,7 +52,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         W: WithForward,
     {
         let grid = self.begin(x0, u, h)?;
-        self.engine.forward(&grid, &mut along)
+        Ok(self.engine.forward(&grid, &mut along)?.1)
     }
 
     fn adjoint_along(
@@ -82,6 +82,6 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
     {
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        self.engine.hessian(&grid, lambda.as_slice(), &mut along)
+        Ok(self.engine.hessian(&grid, lambda.as_slice(), &mut along)?.1)
     }
 }

@@ -12,11 +12,14 @@ use crate::linalg::{beside, kernels};
 use crate::memory::{Memory, WithForward, WithHessian};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
-use crate::scalar::Lanes;
+use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Matrix, Shape};
 use crate::statistics::Statistics;
 use crate::tableau::Tableau;
 use bytemuck::Zeroable;
+
+/// What a call answers, and the lanes for which it is good: those all of whose values were finite.
+pub(crate) type Verdict<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
 
 /// The method, and the memory of its calls.
 pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
@@ -85,49 +88,33 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         Ok([x.as_mut(), point.variables_mut()])
     }
 
-    /// The lanes of the last call that nobody doubts.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`]
-    #[cfg(feature = "alloc")]
-    pub fn good(&mut self) -> Result<E::Mask, Error> {
-        Ok(W::nominal(&mut self.base)?.point.doubt.none())
-    }
-
     /// What the last call did.
     pub fn statistics(&self) -> Statistics {
         let Counts { steps, residuals, jacobians } = self.counts;
         Statistics { steps, residuals, jacobians, ..Statistics::default() }
     }
 
-    pub fn solve(
-        &mut self,
-        grid: &Grid<E>,
-        along: &mut impl Beside<M, E>,
-    ) -> Result<&Nominal<M, E>, Error> {
+    pub fn solve(&mut self, grid: &Grid<E>, along: &mut impl Beside<M, E>) -> Verdict<'_, E, Nominal<M, E>> {
         along.begin();
         let base = W::nominal(&mut self.base)?;
         let run = base.run(&self.scheme, grid, along);
         self.counts = base.point.counts;
         run?;
         along.finish()?;
-        let Base { x, result, .. } = base;
+        let Base { point, x, result, .. } = base;
         result.x.as_mut_slice().copy_from_slice(x.as_ref());
-        Ok(result)
+        Ok((point.doubt.none(), result))
     }
 
-    pub fn forward(&mut self, grid: &Grid<E>, along: &mut impl Beside<M, E>) -> Result<&Forward<M, E>, Error>
+    pub fn forward(&mut self, grid: &Grid<E>, along: &mut impl Beside<M, E>) -> Verdict<'_, E, Forward<M, E>>
     where
         W: WithForward,
     {
-        Ok(&self.differentiate(grid, along)?.1.result.forward)
+        let (base, memory) = self.differentiate(grid, along)?;
+        Ok((base.point.doubt.none(), &memory.result.forward))
     }
 
-    pub fn forward_adjoint(
-        &mut self,
-        grid: &Grid<E>,
-        lambda: &[E],
-    ) -> Result<&ForwardAdjoint<M, E>, Error>
+    pub fn forward_adjoint(&mut self, grid: &Grid<E>, lambda: &[E]) -> Verdict<'_, E, ForwardAdjoint<M, E>>
     where
         W: WithForward,
     {
@@ -138,7 +125,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let ForwardAdjoint { grad_x0, grad_u, grad_p, .. } = &mut *result;
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
         write_gradient(gradient.as_ref(), to, grid.steps - 1, &mut base.point.doubt)?;
-        Ok(result)
+        Ok((base.point.doubt.none(), result))
     }
 
     /// The derivatives, where they belong.
@@ -169,7 +156,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         grid: &Grid<E>,
         lambda: &[E],
         along: &mut impl Beside<M, E>,
-    ) -> Result<&Adjoint<M, E>, Error> {
+    ) -> Verdict<'_, E, Adjoint<M, E>> {
         along.begin();
         let base = W::nominal(&mut self.base)?;
         let AdjointMemory { sweep, result } = W::nominal(&mut self.adjoint)?;
@@ -186,7 +173,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let to = [grad_x0.as_mut_slice(), grad_u.as_mut_slice(), grad_p.as_mut_slice()];
         write_gradient(sweep.lambda.as_ref(), to, 0, &mut base.point.doubt)?;
         write_state(base, nominal);
-        Ok(result)
+        Ok((base.point.doubt.none(), result))
     }
 
     pub fn hessian(
@@ -194,7 +181,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         grid: &Grid<E>,
         lambda: &[E],
         along: &mut impl Beside<M, E>,
-    ) -> Result<&Hessian<M, E>, Error>
+    ) -> Verdict<'_, E, Hessian<M, E>>
     where
         W: WithHessian,
     {
@@ -238,7 +225,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
             curvature.add_lower(second);
         }
         write_hessian(curvature, result, &mut base.point.doubt)?;
-        Ok(result)
+        Ok((base.point.doubt.none(), result))
     }
 }
 
@@ -259,7 +246,10 @@ kernels! { by beside;
     }
 }
 
-pub(super) fn write_state<M: Ode, E: Lanes, const S: usize>(base: &Base<M, E, S>, result: &mut Nominal<M, E>) {
+pub(super) fn write_state<M: Ode, E: Lanes, const S: usize>(
+    base: &Base<M, E, S>,
+    result: &mut Nominal<M, E>,
+) {
     result.x.as_mut_slice().copy_from_slice(base.x.as_ref());
 }
 

@@ -114,7 +114,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     /// Bytes of the integrator itself. With [`Inline`] memory this is all there is.
     pub const SIZE: usize = size_of::<Self>();
 
-    fn build(options: Options, tableau: &Tableau<S>) -> Result<Self, Error> {
+    pub(crate) fn build(options: Options, tableau: &Tableau<S>) -> Result<Self, Error> {
         options.check()?;
         if let Some(stage) = tableau.first_implicit_stage() {
             return Err(Error::NotExplicit { stage });

@@ -21,11 +21,14 @@ mod sensitivities;
 mod step;
 
 pub use integrator::Integrator;
-// What steps of variable size are made of too.
+// What steps of variable size are made of too, and batches.
 #[cfg(feature = "alloc")]
 pub(crate) use scheme::{Grid, Scheme};
 #[cfg(feature = "alloc")]
 pub(crate) use step::{Point, Record};
+// What computes a batch.
+#[cfg(feature = "alloc")]
+pub(crate) use {along::Nothing, engine::Engine};
 
 use crate::memory::Memory;
 use crate::model::Ode;

@@ -118,7 +118,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     ) -> Result<&Adjoint<M, T>, Error> {
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        self.engine.adjoint(&grid, lambda.as_slice(), &mut along)
+        Ok(self.engine.adjoint(&grid, lambda.as_slice(), &mut along)?.1)
     }
 
     /// The state at the end and the gradients of `λᵀx` for `C` seeds `λ`, the columns of `lambdas`.
@@ -175,7 +175,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     {
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        self.engine.forward_adjoint(&grid, lambda.as_slice())
+        Ok(self.engine.forward_adjoint(&grid, lambda.as_slice())?.1)
     }
 
     /// The state at the end, its derivatives, and the gradient and Hessian of `λᵀx`.

@@ -220,7 +220,7 @@ kernels! { by dispatch;
 
 impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
     /// All stages of the step.
-    pub(super) fn stages(
+    pub fn stages(
         &mut self,
         scheme: &Scheme<M, E, S>,
         grid: &Grid<E>,
