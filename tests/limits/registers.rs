@@ -57,7 +57,7 @@ fn flatten<M: Dae>(
 fn results<M: Dae, B: Send + Sync, const S: usize>(
     horizon: &Horizon<M>,
     irk: &mut irk::Integrator<M, B, S, f64, Heap>,
-    batch: &mut batch::Integrator<M, B, S, f64>,
+    batch: &mut batch::Integrator<irk::Integrator<M, B, S, f64, Heap>>,
 ) -> Result<Vec<Vec<f64>>, Box<dyn std::error::Error>> {
     let Horizon { x0, u, h, lambda } = horizon;
     let mut all = Vec::new();
@@ -85,7 +85,7 @@ fn results<M: Dae, B: Send + Sync, const S: usize>(
 fn check<M: Dae, B: Send + Sync, const S: usize>(
     horizon: &Horizon<M>,
     mut build: impl FnMut() -> Result<
-        (irk::Integrator<M, B, S, f64, Heap>, batch::Integrator<M, B, S, f64>),
+        (irk::Integrator<M, B, S, f64, Heap>, batch::Integrator<irk::Integrator<M, B, S, f64, Heap>>),
         casados::Error,
     >,
 ) -> Test {

@@ -1,13 +1,13 @@
 //! The questions that a batch can be asked, each known by what it answers.
 
-use super::intervals::Interval;
+use super::intervals::{Interval, vector};
 use super::lanes::{MOST_LANES, Verdict, unpack, yes};
 use super::single::{Group, Single};
 use crate::error::Error;
 use crate::model::Dae;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Matrix, Plain, Shape};
+use crate::shape::{Matrix, Plain, Shape, assign};
 
 /// A result of several intervals, with a number for each of them in the lanes of its registers. All
 /// of it is inlined into kernels.
@@ -93,7 +93,7 @@ pub trait Answer<M: Dae, T: Real>: Copy + Send {
 }
 
 macro_rules! answer {
-    ($type:ident, $together:ident, $alone:ident, $columns:expr) => {
+    ($type:ident, $together:ident, $columns:expr, |$single:ident, $at:ident, $to:ident| $alone:expr) => {
         impl<M: Dae, T: Real> Answer<M, T> for $type<M, T> {
             type Wide<E: Lanes<Cell: AsRef<[T]>>> = $type<M, E>;
             const COLUMNS: usize = $columns;
@@ -105,16 +105,23 @@ macro_rules! answer {
             }
             fn alone<I: Single<Model = M, Number = T>>(
                 &mut self,
-                single: &mut I,
-                interval: &Interval<'_, M, T>,
+                $single: &mut I,
+                $at: &Interval<'_, M, T>,
             ) -> Result<(), Error> {
-                single.$alone(interval, self)
+                let $to = self;
+                $alone
             }
         }
     };
 }
-answer!(Nominal, solve, solve_to, 0);
-answer!(Forward, forward, forward_to, M::Shape::NW);
-answer!(ForwardAdjoint, forward_adjoint, forward_adjoint_to, M::Shape::NW);
-answer!(Adjoint, adjoint, adjoint_to, 1);
-answer!(Hessian, hessian, hessian_to, M::Shape::NW);
+answer!(Nominal, solve, 0, |single, at, to| {
+    assign(to, single.solve_along(at.x0, &vector(at.u), at.h, None)?);
+    Ok(())
+});
+answer!(Forward, forward, M::Shape::NW, |single, at, to| single.forward_to(at, to));
+answer!(ForwardAdjoint, forward_adjoint, M::Shape::NW, |single, at, to| single.forward_adjoint_to(at, to));
+answer!(Adjoint, adjoint, 1, |single, at, to| {
+    assign(to, single.adjoint_along(at.x0, &vector(at.u), at.h, &vector(at.lambda), None)?);
+    Ok(())
+});
+answer!(Hessian, hessian, M::Shape::NW, |single, at, to| single.hessian_to(at, to));

@@ -16,8 +16,6 @@ use crate::tableau::{Method, Tableau};
 use core::slice::{from_mut, from_ref};
 
 impl<M: Ode, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap> {
-    type Model = M;
-    type Number = T;
     type Method = B;
     type Tableau = Tableau<S>;
     type Stages = ();
@@ -35,13 +33,6 @@ impl<M: Ode, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
         size_of::<ArrayX<M, E>>() * (S + 2) * columns.max(1)
     }
 
-    fn prepare(&mut self, interval: &Interval<'_, M, T>) -> Result<(), Error> {
-        if M::Shape::NP > 0 {
-            self.set_parameters(&vector(interval.p))?;
-        }
-        self.set_time(interval.t0)
-    }
-
     fn give(&mut self, _: [&[T]; 2]) -> Result<(), Error> {
         Ok(())
     }
@@ -54,22 +45,8 @@ impl<M: Ode, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
         Ok(())
     }
 
-    fn work(&self) -> Statistics {
-        self.statistics()
-    }
-
-    fn solve_to(&mut self, at: &Interval<'_, M, T>, to: &mut Nominal<M, T>) -> Result<(), Error> {
-        assign(to, self.solve(at.x0, &vector(at.u), at.h)?);
-        Ok(())
-    }
-
     fn forward_to(&mut self, at: &Interval<'_, M, T>, to: &mut Forward<M, T>) -> Result<(), Error> {
         assign(to, self.forward(at.x0, &vector(at.u), at.h)?);
-        Ok(())
-    }
-
-    fn adjoint_to(&mut self, at: &Interval<'_, M, T>, to: &mut Adjoint<M, T>) -> Result<(), Error> {
-        assign(to, self.adjoint(at.x0, &vector(at.u), at.h, &vector(at.lambda))?);
         Ok(())
     }
 

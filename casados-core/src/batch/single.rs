@@ -3,10 +3,12 @@
 use super::intervals::Interval;
 use super::lanes::{MOST_LANES, Verdict, pack};
 use crate::error::Error;
+use crate::integrator::Integrator;
+use crate::memory::Heap;
 use crate::model::Dae;
 use crate::options::Options;
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
-use crate::scalar::{Lanes, Real};
+use crate::scalar::Lanes;
 use crate::shape::Plain;
 use crate::statistics::Statistics;
 use core::any::Any;
@@ -15,11 +17,7 @@ use core::any::Any;
 /// on the heap. It integrates intervals one at a time, and knows what integrates several at once.
 ///
 /// Its methods are for the batch.
-pub trait Single: Clone + Send + Sync + Sized {
-    /// The model.
-    type Model: Dae;
-    /// The type of numbers.
-    type Number: Real;
+pub trait Single: Integrator<Memory = Heap> + Clone + Send + Sync {
     /// The method.
     type Method;
     /// The tableau of a method.
@@ -49,12 +47,6 @@ pub trait Single: Clone + Send + Sync + Sized {
     #[doc(hidden)]
     fn working_set<E: Lanes>(options: &Options, columns: usize) -> usize;
 
-    /// Parameters and time of an interval.
-    ///
-    /// # Errors
-    /// Those of the setters.
-    #[doc(hidden)]
-    fn prepare(&mut self, interval: &Interval<'_, Self::Model, Self::Number>) -> Result<(), Error>;
     /// Start values `ẋ` and `z`.
     ///
     /// # Errors
@@ -73,43 +65,41 @@ pub trait Single: Clone + Send + Sync + Sized {
     /// [`Error::OutOfMemory`]
     #[doc(hidden)]
     fn stages(&mut self, to: &mut [Self::Stages]) -> Result<(), Error>;
-    /// What the last call did.
-    #[doc(hidden)]
-    fn work(&self) -> Statistics;
 
+    /// Derivatives, where they belong.
+    ///
     /// # Errors
-    /// Those of a single call, as of the following ones.
-    #[doc(hidden)]
-    fn solve_to(
-        &mut self,
-        interval: &Interval<'_, Self::Model, Self::Number>,
-        to: &mut Nominal<Self::Model, Self::Number>,
-    ) -> Result<(), Error>;
+    /// Those of a single call.
     #[doc(hidden)]
     fn forward_to(
         &mut self,
-        interval: &Interval<'_, Self::Model, Self::Number>,
+        at: &At<'_, Self>,
         to: &mut Forward<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
-    #[doc(hidden)]
-    fn adjoint_to(
-        &mut self,
-        interval: &Interval<'_, Self::Model, Self::Number>,
-        to: &mut Adjoint<Self::Model, Self::Number>,
-    ) -> Result<(), Error>;
+    /// The same with gradients.
+    ///
+    /// # Errors
+    /// Those of a single call.
     #[doc(hidden)]
     fn forward_adjoint_to(
         &mut self,
-        interval: &Interval<'_, Self::Model, Self::Number>,
+        at: &At<'_, Self>,
         to: &mut ForwardAdjoint<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
+    /// The same with second derivatives.
+    ///
+    /// # Errors
+    /// Those of a single call.
     #[doc(hidden)]
     fn hessian_to(
         &mut self,
-        interval: &Interval<'_, Self::Model, Self::Number>,
+        at: &At<'_, Self>,
         to: &mut Hessian<Self::Model, Self::Number>,
     ) -> Result<(), Error>;
 }
+
+/// An interval of an integrator.
+type At<'a, I> = Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>;
 
 /// An integrator whose method has a tableau.
 pub trait Standard: Single {

@@ -3,17 +3,19 @@
 
 use super::answer::{Answer, Wide};
 use super::error::BatchError;
-use super::intervals::{Inputs, Interval};
+use super::intervals::{Inputs, Interval, vector};
 use super::lanes::MOST_LANES;
 use super::single::{Group, Single};
 use super::statistics::BatchStatistics;
 use crate::error::Error;
+use crate::integrator::Integrator;
 use crate::linalg::{Arithmetic, Kernel, dispatch};
+use crate::model::Dae;
 use crate::options::{Options, Start};
 use crate::result::Nominal;
 use crate::scalar::lanes::second_level_cache;
 use crate::scalar::{Lanes, Real, Widest};
-use crate::shape::assign;
+use crate::shape::{Shape, assign};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
@@ -209,10 +211,10 @@ impl<I: Single> Worker<I> {
             let again = several && !solved[i];
             *(if again { &mut self.statistics.redone } else { &mut self.statistics.alone }) += 1;
             let mut outcome = self.alone(work, interval, i, solved[i], &mut share);
-            self.statistics.add_work(&self.single.work());
+            self.statistics.add_work(&self.single.statistics());
             if solved[i] && outcome.is_err() {
                 outcome = self.alone(work, interval, i, false, &mut share);
-                self.statistics.add_work(&self.single.work());
+                self.statistics.add_work(&self.single.statistics());
             }
             if let Some(status) = share.status.get_mut(i) {
                 *status = outcome;
@@ -259,7 +261,10 @@ impl<I: Single> Worker<I> {
         share: &mut Share<'_, I, R>,
     ) -> Result<(), Error> {
         let single = &mut self.single;
-        single.prepare(interval)?;
+        if <I::Model as Dae>::Shape::NP > 0 {
+            single.set_parameters(&vector(interval.p))?;
+        }
+        single.set_time(interval.t0)?;
         if let Some(given) = work.given {
             single.give(given)?;
         }
@@ -283,7 +288,7 @@ impl<I: Single> Worker<I> {
 }
 
 /// The intervals of a group that can be computed, each in its lane.
-type Lined<'a, I> = [Option<Interval<'a, <I as Single>::Model, <I as Single>::Number>>; MOST_LANES];
+type Lined<'a, I> = [Option<Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>>; MOST_LANES];
 
 /// Gives every interval its result, where all is well and finite.
 struct Distribute<'a, E: Lanes, W, R> {

@@ -3,13 +3,15 @@
 use super::doubt::Doubt;
 use super::scheme::{Grid, Scheme, is_zero};
 use super::step::{Base, Own, Point, Record, add};
+use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place};
-use crate::linalg::{beside, kernels};
+use crate::linalg::{Arithmetic, beside, kernels};
 use crate::model::{ArrayX, Ode};
 use crate::result::Seeds;
 use crate::scalar::{Lanes, Real};
 use crate::shape::{Array, Matrix, Shape};
 use bytemuck::Zeroable;
+use core::marker::PhantomData;
 use core::ops::Range;
 
 /// Derivatives of the state in the directions of the columns: `R` is the longest row, of which the
@@ -178,7 +180,26 @@ kernels! { by beside;
         for row in dk.as_mut() {
             row.as_mut()[..columns].fill(E::zeroed());
         }
-        for entry in M::STRUCTURE.blocks[1]..M::STRUCTURE.blocks[5] {
+        let mut begin = M::STRUCTURE.blocks[1];
+        if const { E::LANES > 1 } {
+            // Entries by states lie row by row.
+            let end = M::STRUCTURE.blocks[2];
+            while begin < end {
+                let (equation, _) = M::STRUCTURE.jacobian.at(begin);
+                let last = (begin..end).find(|&entry| M::STRUCTURE.jacobian.at(entry).0 != equation);
+                let entries = begin..last.unwrap_or(end);
+                begin = entries.end;
+                let row = scheme.rows.as_ref().get(equation);
+                let Some((row, dk)) = row.and_then(|row| Some((row, dk.as_mut().get_mut(row.state)?))) else {
+                    continue;
+                };
+                let dk = dk.as_mut();
+                each_tile::<A, _>(0, columns, &mut Product::<M, E, R> {
+                    entries, jacobian, factor: row.factor, dxi, dk,
+                });
+            }
+        }
+        for entry in begin..M::STRUCTURE.blocks[5] {
             let (equation, variable) = M::STRUCTURE.jacobian.at(entry);
             let (Some(&[value]), Some(row)) =
                 (jacobian.as_ref().get(entry), scheme.rows.as_ref().get(equation))
@@ -206,6 +227,11 @@ kernels! { by beside;
     ) {
         for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
             let sum = &mut sum.as_mut()[..columns];
+            if const { E::LANES > 1 } {
+                let start = start.as_ref();
+                each_tile::<A, _>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
+                continue;
+            }
             sum.fill(E::zeroed());
             for (&weight, rate) in weights.iter().zip(rates) {
                 if !is_zero(weight) {
@@ -241,6 +267,57 @@ kernels! { by beside;
             doubt.keep(finite);
         }
         None
+    }
+}
+
+/// A row of the product of the Jacobian with `dξ`.
+struct Product<'a, M: Ode, E: Lanes, R: Array<E>> {
+    entries: Range<usize>,
+    jacobian: &'a M::Jacobian<[E; 1]>,
+    factor: E,
+    dxi: &'a ArrayX<M, R>,
+    dk: &'a mut [E],
+}
+
+impl<M: Ode, E: Lanes, R: Array<E>> AtColumns for Product<'_, M, E, R> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let mut sum = [E::zeroed(); W];
+        for entry in self.entries.clone() {
+            let w = M::STRUCTURE.jacobian.at(entry).1 - M::Shape::NX;
+            if let (Some(&[value]), Some(dxi)) = (self.jacobian.as_ref().get(entry), self.dxi.as_ref().get(w))
+            {
+                tiles::add::<A, E, W>(&mut sum, self.factor * value, dxi.as_ref(), first);
+            }
+        }
+        tiles::store(&sum, self.dk, first);
+    }
+}
+
+/// A row of a [combination](combine).
+struct Combination<'a, E, R, X> {
+    start: &'a [E],
+    h: E,
+    weights: &'a [E],
+    rates: &'a [X],
+    row: usize,
+    sum: &'a mut [E],
+    of: PhantomData<R>,
+}
+
+impl<E: Lanes, R: Array<E>, X: Array<R>> AtColumns for Combination<'_, E, R, X> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let mut sum = [E::zeroed(); W];
+        for (&weight, rate) in self.weights.iter().zip(self.rates) {
+            if let (false, Some(rate)) = (is_zero(weight), rate.as_ref().get(self.row)) {
+                tiles::add::<A, E, W>(&mut sum, weight, rate.as_ref(), first);
+            }
+        }
+        for (sum, start) in sum.iter_mut().zip(tiles::load::<E, W>(self.start, first)) {
+            *sum = A::add(start, self.h, *sum);
+        }
+        tiles::store(&sum, self.sum, first);
     }
 }
 

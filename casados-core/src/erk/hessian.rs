@@ -3,12 +3,14 @@
 
 use super::scheme::{Scheme, directions, is_zero};
 use super::step::{Own, Point, add};
+use super::tiles::{self, AtColumns, each_tile};
 use crate::error::{Error, Place, Quantity};
 use crate::linalg::{Arithmetic, beside, kernels};
 use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
+use core::ops::Range;
 
 /// The Hessian that the stages are added to.
 #[derive(Zeroable)]
@@ -82,6 +84,18 @@ kernels! { by beside;
         for (row, _) in product.as_mut().iter_mut().zip(curved.as_ref()).filter(|(_, curved)| **curved) {
             row.as_mut().fill(E::zeroed());
         }
+        if const { E::LANES > 1 } {
+            // Entries lie row by row.
+            let (mut begin, end) = (0, entries.as_ref().len());
+            while begin < end {
+                let row = M::STRUCTURE.hessian.at(begin).0;
+                let last = (begin..end).find(|&entry| M::STRUCTURE.hessian.at(entry).0 != row);
+                let of_row = begin..last.unwrap_or(end);
+                begin = of_row.end;
+                each_tile::<A, _>(0, M::Shape::NW, &mut Product::<M, E> { of_row, entries, dxi, product });
+            }
+            return;
+        }
         for (entry, &[value]) in entries.as_ref().iter().enumerate() {
             if let Some((row, column)) = directions::<M>(entry) {
                 add_row::<A, M, E>(product, row, value, column, dxi);
@@ -100,7 +114,15 @@ kernels! { by beside;
         sum: &'k mut ArrayW<M, ArrayW<M, E>>,
     ) {
         let (nx, nw) = (M::Shape::NX, M::Shape::NW);
-        for variable in 0..nw {
+        let mut begin = 0;
+        if const { E::LANES > 1 } {
+            for (row, sum) in sum.as_mut().iter_mut().enumerate() {
+                let sum = sum.as_mut();
+                each_tile::<A, _>(row, nw, &mut Projection::<M, E> { row, product, curved, dxi, sum });
+            }
+            begin = nx;
+        }
+        for variable in begin..nw {
             if !curved[variable] {
                 continue;
             }
@@ -116,6 +138,76 @@ kernels! { by beside;
                 add::<A, E>(one, &product[variable..], &mut sum[variable].as_mut()[variable..]);
             }
         }
+    }
+}
+
+/// What the entries of a row add to a [product](multiply), as those of columns too.
+struct Product<'a, M: Ode, E: Lanes> {
+    of_row: Range<usize>,
+    entries: &'a M::Hessian<[E; 1]>,
+    dxi: &'a ArrayX<M, ArrayW<M, E>>,
+    product: &'a mut ArrayW<M, ArrayW<M, E>>,
+}
+
+impl<M: Ode, E: Lanes> AtColumns for Product<'_, M, E> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let Self { of_row, entries, dxi, product } = self;
+        let rows = dxi.as_ref();
+        // Variables u and p move only in their own directions.
+        let of = |variable: usize| rows.get(variable).map(|row| row.as_ref()).unwrap_or_default();
+        let own = |variable: usize| (variable >= rows.len()).then(|| variable.checked_sub(first)).flatten();
+        let (row, _) = M::STRUCTURE.hessian.at(of_row.start);
+        let Some(row) = row.checked_sub(M::Shape::NX) else { return };
+        let Some(before) = product.as_ref().get(row) else { return };
+        let mut sum = tiles::load::<E, W>(before.as_ref(), first);
+        for entry in of_row.clone() {
+            let (Some((_, column)), Some(&[value])) = (directions::<M>(entry), entries.as_ref().get(entry))
+            else {
+                continue;
+            };
+            tiles::add::<A, E, W>(&mut sum, value, of(column), first);
+            if let Some(sum) = own(column).and_then(|at| sum.get_mut(at)) {
+                *sum = *sum + value;
+            }
+            if row == column {
+                continue;
+            }
+            let Some(other) = product.as_mut().get_mut(column) else { continue };
+            let mut more = tiles::load::<E, W>(other.as_ref(), first);
+            tiles::add::<A, E, W>(&mut more, value, of(row), first);
+            if let Some(more) = own(row).and_then(|at| more.get_mut(at)) {
+                *more = *more + value;
+            }
+            tiles::store(&more, other.as_mut(), first);
+        }
+        if let Some(product) = product.as_mut().get_mut(row) {
+            tiles::store(&sum, product.as_mut(), first);
+        }
+    }
+}
+
+/// What states add to a row of the [sum](project).
+struct Projection<'a, M: Ode, E: Lanes> {
+    row: usize,
+    product: &'a ArrayW<M, ArrayW<M, E>>,
+    curved: &'a ArrayW<M, bool>,
+    dxi: &'a ArrayX<M, ArrayW<M, E>>,
+    sum: &'a mut [E],
+}
+
+impl<M: Ode, E: Lanes> AtColumns for Projection<'_, M, E> {
+    #[inline(always)]
+    fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
+        let mut sum = tiles::load::<E, W>(self.sum, first);
+        let curved = self.product.as_ref().iter().zip(self.curved.as_ref());
+        for ((product, &curved), dxi) in curved.zip(self.dxi.as_ref()) {
+            let d = dxi[self.row];
+            if curved && !is_zero(d) {
+                tiles::add::<A, E, W>(&mut sum, d, product.as_ref(), first);
+            }
+        }
+        tiles::store(&sum, self.sum, first);
     }
 }
 

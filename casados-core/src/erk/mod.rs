@@ -19,6 +19,7 @@ mod integrator;
 mod scheme;
 mod sensitivities;
 mod step;
+mod tiles;
 
 pub use integrator::Integrator;
 // What steps of variable size are made of too, and batches.

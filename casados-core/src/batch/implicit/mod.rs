@@ -10,15 +10,11 @@ use crate::irk::{Arguments, Integrator};
 use crate::memory::Heap;
 use crate::model::{ArrayK, Dae};
 use crate::options::{Newton, Options};
-use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
+use crate::result::{Forward, ForwardAdjoint, Hessian};
 use crate::scalar::{Lanes, Real};
-use crate::shape::{Shape, assign};
-use crate::statistics::Statistics;
 use crate::tableau::{Method, Tableau};
 
 impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap> {
-    type Model = M;
-    type Number = T;
     type Method = B;
     type Tableau = Tableau<S>;
     type Stages = ArrayK<M, [T; S]>;
@@ -47,13 +43,6 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
         factors + size_of::<ArrayK<M, [E; S]>>() * columns.max(1)
     }
 
-    fn prepare(&mut self, interval: &Interval<'_, M, T>) -> Result<(), Error> {
-        if M::Shape::NP > 0 {
-            self.set_parameters(&vector(interval.p))?;
-        }
-        self.set_time(interval.t0)
-    }
-
     fn give(&mut self, [xdot, z]: [&[T]; 2]) -> Result<(), Error> {
         self.set_start(&vector(xdot), &vector(z))
     }
@@ -73,22 +62,8 @@ impl<M: Dae, B, const S: usize, T: Real> Single for Integrator<M, B, S, T, Heap>
         self.record(to)
     }
 
-    fn work(&self) -> Statistics {
-        *self.statistics()
-    }
-
-    fn solve_to(&mut self, at: &Interval<'_, M, T>, to: &mut Nominal<M, T>) -> Result<(), Error> {
-        assign(to, self.solve(at.x0, &vector(at.u), at.h)?);
-        Ok(())
-    }
-
     fn forward_to(&mut self, at: &Interval<'_, M, T>, to: &mut Forward<M, T>) -> Result<(), Error> {
         Self::forward_to(self, &Arguments { x0: at.x0, u: &vector(at.u), h: at.h }, to)
-    }
-
-    fn adjoint_to(&mut self, at: &Interval<'_, M, T>, to: &mut Adjoint<M, T>) -> Result<(), Error> {
-        assign(to, self.adjoint(at.x0, &vector(at.u), at.h, &vector(at.lambda))?);
-        Ok(())
     }
 
     fn forward_adjoint_to(
