@@ -61,7 +61,7 @@ impl<I: Single<Method = Custom<S>, Tableau = Tableau<S>>, const S: usize> Integr
     ///
     /// # Errors
     /// [`Error::InvalidOption`]; [`Error::NoInterpolation`] if the model has algebraic states and
-    /// two nodes are equal.
+    /// two nodes are equal; [`Error::NotExplicit`] of an implicit tableau for explicit methods.
     pub fn with_tableau(options: Options, tableau: Tableau<S>) -> Result<Self, Error> {
         Self::build(options, tableau)
     }
@@ -117,8 +117,8 @@ impl<I: Single> Integrator<I> {
     }
 
     /// Start values `ẋ` and `z` for Newton's method, at all stages of all intervals, instead of the
-    /// nominal values of the model: with [`Start::Zero`] they are not read, and with
-    /// [`Start::Warm`] only where there is no warm start.
+    /// nominal values of the model. Explicit methods do not read them; with [`Start::Zero`] nobody
+    /// does, and with [`Start::Warm`] only where there is no warm start.
     ///
     /// # Errors
     /// [`Error::NonFiniteInput`]: then the last values stay.

@@ -17,6 +17,26 @@ use core::any::Any;
 /// on the heap. It integrates intervals one at a time, and knows what integrates several at once.
 ///
 /// Its methods are for the batch.
+///
+/// ```
+/// use casados::batch::{Integrator, Single};
+/// use casados::prelude::*;
+/// use casados::{Custom, Tableau};
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// fn steps<I: Single>(batch: &Integrator<I>) -> usize {
+///     batch.options().steps
+/// }
+/// // Heun's method as a tableau of one's own.
+/// let heun = Tableau::new([[0.0, 0.0], [1.0, 0.0]], [0.5, 0.5], [0.0, 1.0])?;
+/// let batch = Integrator::<Erk<Cart, Custom<2>>>::with_tableau(Options::default(), heun)?;
+/// assert_eq!(steps(&batch), 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Single: Integrator<Memory = Heap> + Clone + Send + Sync {
     /// The method.
     type Method;
@@ -101,7 +121,23 @@ pub trait Single: Integrator<Memory = Heap> + Clone + Send + Sync {
 /// An interval of an integrator.
 type At<'a, I> = Interval<'a, <I as Integrator>::Model, <I as Integrator>::Number>;
 
-/// An integrator whose method has a tableau.
+/// An integrator whose method has a tableau: all but those of [`Custom`](crate::Custom).
+///
+/// ```
+/// use casados::batch::{Integrator, Standard};
+/// use casados::prelude::*;
+///
+/// #[ode]
+/// fn cart(x: [f64; 2], u: [f64; 1]) -> [f64; 2] {
+///     [x[1], u[0]]
+/// }
+///
+/// fn finer<I: Standard>() -> Result<Integrator<I>, Error> {
+///     Integrator::new(Options { steps: 4, ..Default::default() })
+/// }
+/// assert_eq!(finer::<Erk<Cart, Rk4>>()?.options().steps, 4);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait Standard: Single {
     /// That one.
     const TABLEAU: Self::Tableau;

@@ -177,26 +177,21 @@ kernels! { by beside;
         dk: &'k mut ArrayX<M, R>,
     ) {
         let (nx, columns) = (M::Shape::NX, directions.columns());
-        for row in dk.as_mut() {
-            row.as_mut()[..columns].fill(E::zeroed());
-        }
         let mut begin = M::STRUCTURE.blocks[1];
         if const { E::LANES > 1 } {
             // Entries by states lie row by row.
-            let end = M::STRUCTURE.blocks[2];
-            while begin < end {
-                let (equation, _) = M::STRUCTURE.jacobian.at(begin);
-                let last = (begin..end).find(|&entry| M::STRUCTURE.jacobian.at(entry).0 != equation);
-                let entries = begin..last.unwrap_or(end);
+            for (equation, row) in scheme.rows.as_ref().iter().enumerate() {
+                let is_other = |&entry: &usize| M::STRUCTURE.jacobian.at(entry).0 != equation;
+                let end = M::STRUCTURE.blocks[2];
+                let entries = begin..(begin..end).find(is_other).unwrap_or(end);
                 begin = entries.end;
-                let row = scheme.rows.as_ref().get(equation);
-                let Some((row, dk)) = row.and_then(|row| Some((row, dk.as_mut().get_mut(row.state)?))) else {
-                    continue;
-                };
-                let dk = dk.as_mut();
-                each_tile::<A, _>(0, columns, &mut Product::<M, E, R> {
-                    entries, jacobian, factor: row.factor, dxi, dk,
-                });
+                let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
+                let (factor, dk) = (row.factor, dk.as_mut());
+                each_tile::<A, _>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
+            }
+        } else {
+            for row in dk.as_mut() {
+                row.as_mut()[..columns].fill(E::zeroed());
             }
         }
         for entry in begin..M::STRUCTURE.blocks[5] {

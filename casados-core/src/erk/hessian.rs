@@ -211,7 +211,8 @@ impl<M: Ode, E: Lanes> AtColumns for Projection<'_, M, E> {
     }
 }
 
-/// Adds a row of `D` to one of the product: variables `u` and `p` move only in their own directions.
+/// Adds a row of `D` to one of the product: variables `u` and `p` move only in their own
+/// directions.
 #[inline(always)]
 fn add_row<A: Arithmetic, M: Ode, E: Lanes>(
     product: &mut ArrayW<M, ArrayW<M, E>>,

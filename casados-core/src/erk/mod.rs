@@ -80,6 +80,8 @@ impl<const S: usize> Explicit for Custom<S> {
 /// | [`with`](Integrator::with) | integrals along the way |
 /// | [`statistics`](Integrator::statistics) | what the last call did |
 ///
+/// Many intervals at once, side by side in registers: [`Batch`](crate::Batch).
+///
 /// By default, one step in each interval: [`Options`](crate::Options), of which `newton` and
 /// `start` are not read. Units are those of the model; results have its dimensions.
 ///

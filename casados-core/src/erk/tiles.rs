@@ -12,8 +12,8 @@ pub(super) trait AtColumns {
     fn at<A: Arithmetic, const W: usize>(&mut self, first: usize);
 }
 
-/// All columns from `first` on, the most at a time that have a register each for their sums, with as
-/// many products under way as the processor can have.
+/// All columns from `first` on, the most at a time that have a register each for their sums, with
+/// as many products under way as the processor can have.
 #[inline(always)]
 pub(super) fn each_tile<A: Arithmetic, V: AtColumns>(mut first: usize, end: usize, visit: &mut V) {
     while first + 8 <= end {

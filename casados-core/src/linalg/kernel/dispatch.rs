@@ -29,8 +29,8 @@ pub trait Kernel {
 }
 
 /// Functions that are kernels: `fn name [generics] [their names] <A>(arguments) { … }`, with the
-/// lifetime `'k`, numbers `E` and the arithmetic `A`. What runs them is [`dispatch`], or said before
-/// them: `by run;`.
+/// lifetime `'k`, numbers `E` and the arithmetic `A`. What runs them is [`dispatch`], or said
+/// before them: `by run;`.
 macro_rules! kernels {
     (by $run:path; $(
         $(#[$meta:meta])*
