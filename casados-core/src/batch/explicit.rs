@@ -3,7 +3,7 @@
 use super::intervals::{Interval, vector};
 use super::lanes::{MOST_LANES, Verdict};
 use super::single::{self, Single, Standard, gather};
-use crate::erk::{Engine, Grid, Integrator, Nothing};
+use crate::erk::{Engine, Grid, Integrator, Nothing, Panels};
 use crate::error::Error;
 use crate::memory::{Heap, Memory};
 use crate::model::{ArrayX, Ode};
@@ -77,6 +77,7 @@ pub struct Group<M: Ode, E: Lanes, const S: usize> {
     engine: Engine<M, E, S, Heap>,
     grid: Grid<E>,
     lambda: <Heap as Memory>::Nominal<ArrayX<M, E>>,
+    panels: <Heap as Memory>::Nominal<Panels<M, E, S>>,
 }
 
 impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
@@ -85,8 +86,22 @@ impl<M: Ode, E: Lanes, const S: usize> Group<M, E, S> {
         &'e mut self,
         call: impl FnOnce(&'e mut Engine<M, E, S, Heap>, &Grid<E>, &[E]) -> Verdict<'e, E, R>,
     ) -> Verdict<'e, E, R> {
-        let Self { engine, grid, lambda } = self;
+        let Self { engine, grid, lambda, .. } = self;
         call(engine, grid, Heap::nominal(lambda)?.as_ref())
+    }
+
+    /// The same of one with derivatives in all directions.
+    fn sweep<'e, R>(
+        &'e mut self,
+        call: impl FnOnce(
+            &'e mut Engine<M, E, S, Heap>,
+            &Grid<E>,
+            &[E],
+            &mut Panels<M, E, S>,
+        ) -> Verdict<'e, E, R>,
+    ) -> Verdict<'e, E, R> {
+        let Self { engine, grid, lambda, panels } = self;
+        call(engine, grid, Heap::nominal(lambda)?.as_ref(), Heap::nominal(panels)?)
     }
 }
 
@@ -96,7 +111,8 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     fn new(options: &Options, tableau: &Tableau<S>) -> Self {
         let Options { steps, compensated, .. } = *options;
         let grid = Grid { start: E::zeroed(), h: E::zeroed(), steps, compensated };
-        Self { engine: Engine::new(tableau), grid, lambda: Default::default() }
+        let (lambda, panels) = (Default::default(), Default::default());
+        Self { engine: Engine::new(tableau), grid, lambda, panels }
     }
 
     fn place(
@@ -106,7 +122,7 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
         _: Option<&[&[()]; MOST_LANES]>,
         _: bool,
     ) -> Result<(), Error> {
-        let Self { engine, grid, lambda } = self;
+        let Self { engine, grid, lambda, .. } = self;
         let [x, variables] = engine.begin()?;
         gather(intervals, x, |interval| interval.x0.as_slice());
         let (u, p) = variables[2 * M::Shape::NX..].split_at_mut(M::Shape::NU);
@@ -132,7 +148,7 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     }
 
     fn forward(&mut self) -> Verdict<'_, E, Forward<M, E>> {
-        self.call(|engine, grid, _| engine.forward(grid, &mut Nothing))
+        self.sweep(|engine, grid, _, panels| engine.forward(grid, panels, &mut Nothing))
     }
 
     fn adjoint(&mut self) -> Verdict<'_, E, Adjoint<M, E>> {
@@ -140,10 +156,10 @@ impl<M: Ode, B, T: Real, E: Lanes<Cell: AsRef<[T]> + AsMut<[T]>>, const S: usize
     }
 
     fn forward_adjoint(&mut self) -> Verdict<'_, E, ForwardAdjoint<M, E>> {
-        self.call(|engine, grid, lambda| engine.forward_adjoint(grid, lambda))
+        self.sweep(|engine, grid, lambda, panels| engine.forward_adjoint(grid, lambda, panels))
     }
 
     fn hessian(&mut self) -> Verdict<'_, E, Hessian<M, E>> {
-        self.call(|engine, grid, lambda| engine.hessian(grid, lambda, &mut Nothing))
+        self.sweep(|engine, grid, lambda, panels| engine.hessian(grid, lambda, panels, &mut Nothing))
     }
 }

@@ -12,6 +12,8 @@ use crate::shape::Shape;
 
 /// What is beside the states at the stages: an integrand, if there is one.
 pub(crate) trait Beside<M: Ode, E: Lanes> {
+    /// Whether there is one.
+    fn is_any(&self) -> bool;
     /// Before the first step.
     fn begin(&mut self);
     /// Adds the value at a stage, times `h b`.
@@ -40,6 +42,10 @@ pub(crate) trait Beside<M: Ode, E: Lanes> {
 }
 
 impl<M: Ode, T: Real> Beside<M, T> for Along<'_, '_, M, T> {
+    fn is_any(&self) -> bool {
+        self.is_some()
+    }
+
     fn begin(&mut self) {
         crate::quadrature::begin(self);
     }
@@ -116,6 +122,9 @@ fn show<M: Ode, T: Real>(point: &Point<M, T>, to: &mut [T]) {
 pub(crate) struct Nothing;
 
 impl<M: Ode, E: Lanes> Beside<M, E> for Nothing {
+    fn is_any(&self) -> bool {
+        false
+    }
     fn begin(&mut self) {}
     fn value(&mut self, _: &Point<M, E>, _: [E; 2], _: Place) -> Result<(), Error> {
         Ok(())

@@ -1,6 +1,7 @@
 //! The calls that all integrators have in common, with an integrand or without.
 
 use super::integrator::{Integrator, finite};
+use super::panels::Whole;
 use crate::error::{Argument, Error};
 use crate::integrator;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
@@ -52,7 +53,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         W: WithForward,
     {
         let grid = self.begin(x0, u, h)?;
-        Ok(self.engine.forward(&grid, &mut along)?.1)
+        Ok(self.engine.forward(&grid, &mut Whole, &mut along)?.1)
     }
 
     fn adjoint_along(
@@ -82,6 +83,6 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
     {
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        Ok(self.engine.hessian(&grid, lambda.as_slice(), &mut along)?.1)
+        Ok(self.engine.hessian(&grid, lambda.as_slice(), &mut Whole, &mut along)?.1)
     }
 }

@@ -3,8 +3,9 @@
 use super::adjoint::{Sweep, Way};
 use super::along::{Beside, Nothing};
 use super::doubt::Doubt;
-use super::forward::{Unit, Variation, write};
+use super::forward::{Variation, write};
 use super::hessian::Curvature;
+use super::panels::Sweeps;
 use super::scheme::{Grid, Scheme};
 use super::step::{Base, Counts, Record};
 use crate::error::Error;
@@ -106,19 +107,29 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         Ok((point.doubt.none(), result))
     }
 
-    pub fn forward(&mut self, grid: &Grid<E>, along: &mut impl Beside<M, E>) -> Verdict<'_, E, Forward<M, E>>
+    pub fn forward(
+        &mut self,
+        grid: &Grid<E>,
+        sweeps: &mut impl Sweeps<M, E, S>,
+        along: &mut impl Beside<M, E>,
+    ) -> Verdict<'_, E, Forward<M, E>>
     where
         W: WithForward,
     {
-        let (base, memory) = self.differentiate(grid, along)?;
+        let (base, memory) = self.differentiate(grid, sweeps, along)?;
         Ok((base.point.doubt.none(), &memory.result.forward))
     }
 
-    pub fn forward_adjoint(&mut self, grid: &Grid<E>, lambda: &[E]) -> Verdict<'_, E, ForwardAdjoint<M, E>>
+    pub fn forward_adjoint(
+        &mut self,
+        grid: &Grid<E>,
+        lambda: &[E],
+        sweeps: &mut impl Sweeps<M, E, S>,
+    ) -> Verdict<'_, E, ForwardAdjoint<M, E>>
     where
         W: WithForward,
     {
-        let (base, ForwardMemory { sweep, result }) = self.differentiate(grid, &mut Nothing)?;
+        let (base, ForwardMemory { sweep, result }) = self.differentiate(grid, sweeps, &mut Nothing)?;
         // With the Jacobian at hand the gradient is a product.
         let Sweep { forward, lambda: gradient, .. } = sweep;
         weigh::<M, E, _>(&forward.dx, lambda, &mut *gradient);
@@ -132,6 +143,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
     fn differentiate(
         &mut self,
         grid: &Grid<E>,
+        sweeps: &mut impl Sweeps<M, E, S>,
         along: &mut impl Beside<M, E>,
     ) -> Result<(&mut Base<M, E, S>, &mut ForwardMemory<M, E, S>), Error>
     where
@@ -141,7 +153,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let base = W::nominal(&mut self.base)?;
         let memory = W::forward(&mut self.forward)?;
         let (ForwardMemory { sweep, result }, scheme) = (&mut *memory, &self.scheme);
-        let run = sweep.forward.run(scheme, grid, base, Unit, |point, dxi, at| {
+        let run = sweeps.run(scheme, grid, base, &mut sweep.forward, along.is_any(), |point, dxi, at| {
             along.forward(point, dxi, [grid.h, scheme.b[at.stage]], false, at)
         });
         self.counts = base.point.counts;
@@ -180,6 +192,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         &mut self,
         grid: &Grid<E>,
         lambda: &[E],
+        sweeps: &mut impl Sweeps<M, E, S>,
         along: &mut impl Beside<M, E>,
     ) -> Verdict<'_, E, Hessian<M, E>>
     where
@@ -205,7 +218,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
             sweep.run(way, &mut base.point, records, Some(multipliers), along)?;
             base.x = start;
             base.point.counts.steps = 0;
-            variation.run(scheme, grid, base, Unit, |point, dxi, at| {
+            sweeps.run(scheme, grid, base, variation, true, |point, dxi, at| {
                 let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
                 let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
                 along.forward(point, dxi, [grid.h, b], true, at)?;

@@ -18,7 +18,7 @@ use core::ops::Range;
 /// first `columns` elements are used.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
+pub(crate) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
     pub jacobian: M::Jacobian<[E; 1]>,
     /// `dx_n`
     pub dx: ArrayX<M, R>,
@@ -29,7 +29,7 @@ pub(super) struct Variation<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
 }
 
 /// Directions in the space of `w = (x₀, u, p)`.
-pub(super) trait Directions<M: Ode, E: Lanes>: Copy {
+pub(crate) trait Directions<M: Ode, E: Lanes>: Copy {
     /// How many.
     fn columns(self) -> usize;
     /// `row += coefficient · (direction of w_i)`
@@ -141,13 +141,26 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         Ok(())
     }
 
+    /// `dk_i` by a Jacobian that is elsewhere.
+    pub fn stage_derivative(
+        &mut self,
+        scheme: &Scheme<M, E, S>,
+        jacobian: &M::Jacobian<[E; 1]>,
+        stage: usize,
+        directions: impl Directions<M, E>,
+    ) {
+        if let Some(dk) = self.dk.get_mut(stage) {
+            stage_derivative::<M, E, R, _, S>(scheme, jacobian, &self.dxi, directions, dk);
+        }
+    }
+
     /// `dξ_i = dx_n + h Σ_{j<i} a_ij dk_j`
-    fn stage_state(&mut self, scheme: &Scheme<M, E, S>, h: &E, stage: usize, columns: usize) {
+    pub fn stage_state(&mut self, scheme: &Scheme<M, E, S>, h: &E, stage: usize, columns: usize) {
         combine::<M, E, R>(&self.dx, h, &scheme.a[stage][..stage], &self.dk, columns, &mut self.dxi);
     }
 
     /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
-    fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, columns: usize) {
+    pub fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, columns: usize) {
         combine::<M, E, R>(&self.dx, h, &scheme.b, &self.dk, columns, &mut self.dxi);
         self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
     }
@@ -155,7 +168,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
 
 kernels! { by beside;
     /// The directions, of each state a row.
-    fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
+    pub fn begin [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
         one: E,
         dx: &'k mut ArrayX<M, R>,
         directions: D,
@@ -187,7 +200,7 @@ kernels! { by beside;
                 begin = entries.end;
                 let Some(dk) = dk.as_mut().get_mut(row.state) else { continue };
                 let (factor, dk) = (row.factor, dk.as_mut());
-                each_tile::<A, _>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
+                each_tile::<A, _, 4>(0, columns, &mut Product::<M, E, R> { entries, jacobian, factor, dxi, dk });
             }
         } else {
             for row in dk.as_mut() {
@@ -224,7 +237,7 @@ kernels! { by beside;
             let sum = &mut sum.as_mut()[..columns];
             if const { E::LANES > 1 } {
                 let start = start.as_ref();
-                each_tile::<A, _>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
+                each_tile::<A, _, 4>(0, columns, &mut Combination { start, h: *h, weights, rates, row, sum, of: PhantomData });
                 continue;
             }
             sum.fill(E::zeroed());

@@ -92,7 +92,7 @@ kernels! { by beside;
                 let last = (begin..end).find(|&entry| M::STRUCTURE.hessian.at(entry).0 != row);
                 let of_row = begin..last.unwrap_or(end);
                 begin = of_row.end;
-                each_tile::<A, _>(0, M::Shape::NW, &mut Product::<M, E> { of_row, entries, dxi, product });
+                each_tile::<A, _, 8>(0, M::Shape::NW, &mut Product::<M, E> { of_row, entries, dxi, product });
             }
             return;
         }
@@ -118,7 +118,7 @@ kernels! { by beside;
         if const { E::LANES > 1 } {
             for (row, sum) in sum.as_mut().iter_mut().enumerate() {
                 let sum = sum.as_mut();
-                each_tile::<A, _>(row, nw, &mut Projection::<M, E> { row, product, curved, dxi, sum });
+                each_tile::<A, _, 8>(row, nw, &mut Projection::<M, E> { row, product, curved, dxi, sum });
             }
             begin = nx;
         }

@@ -16,6 +16,7 @@ mod engine;
 mod forward;
 mod hessian;
 mod integrator;
+mod panels;
 mod scheme;
 mod sensitivities;
 mod step;
@@ -29,7 +30,7 @@ pub(crate) use scheme::{Grid, Scheme};
 pub(crate) use step::{Point, Record};
 // What computes a batch.
 #[cfg(feature = "alloc")]
-pub(crate) use {along::Nothing, engine::Engine};
+pub(crate) use {along::Nothing, engine::Engine, panels::Panels};
 
 use crate::memory::Memory;
 use crate::model::Ode;

@@ -6,6 +6,7 @@ use super::doubt::Doubt;
 use super::engine::write_state;
 use super::forward::{Seeded, write};
 use super::integrator::{Integrator, finite};
+use super::panels::Whole;
 use crate::error::{Argument, Error};
 use crate::integrator::Integrator as _;
 use crate::memory::{Memory, WithForward, WithHessian};
@@ -175,7 +176,7 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
     {
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
-        Ok(self.engine.forward_adjoint(&grid, lambda.as_slice())?.1)
+        Ok(self.engine.forward_adjoint(&grid, lambda.as_slice(), &mut Whole)?.1)
     }
 
     /// The state at the end, its derivatives, and the gradient and Hessian of `λᵀx`.

@@ -12,7 +12,7 @@ use crate::shape::Shape;
 use bytemuck::Zeroable;
 
 /// A number, or a register of several, as it lies in the arrays of the model.
-pub(super) type Own<E> = Strided<E, 1>;
+pub(crate) type Own<E> = Strided<E, 1>;
 
 /// One step: its start and the derivatives at its stages.
 #[derive(Zeroable)]
@@ -264,7 +264,7 @@ impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
 /// What every call needs.
 #[derive(Zeroable)]
 #[zeroable(bound = "")]
-pub(super) struct Base<M: Ode, E: Lanes, const S: usize> {
+pub(crate) struct Base<M: Ode, E: Lanes, const S: usize> {
     pub point: Point<M, E>,
     pub record: Record<M, E, S>,
     /// The state at the end of the step.

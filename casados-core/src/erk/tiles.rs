@@ -12,15 +12,19 @@ pub(super) trait AtColumns {
     fn at<A: Arithmetic, const W: usize>(&mut self, first: usize);
 }
 
-/// All columns from `first` on, the most at a time that have a register each for their sums, with
-/// as many products under way as the processor can have.
+/// All columns from `first` on, eight or four at most at a time: as many have a register each for
+/// their sums, and as many products under way as the processor can have.
 #[inline(always)]
-pub(super) fn each_tile<A: Arithmetic, V: AtColumns>(mut first: usize, end: usize, visit: &mut V) {
-    while first + 8 <= end {
+pub(super) fn each_tile<A: Arithmetic, V: AtColumns, const MOST: usize>(
+    mut first: usize,
+    end: usize,
+    visit: &mut V,
+) {
+    while const { MOST >= 8 } && first + 8 <= end {
         visit.at::<A, 8>(first);
         first += 8;
     }
-    if first + 4 <= end {
+    while first + 4 <= end {
         visit.at::<A, 4>(first);
         first += 4;
     }
