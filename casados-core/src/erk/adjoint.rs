@@ -84,8 +84,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             stage_seed::<M, E, R, S>(scheme, (&grid.h, stage, columns), &*lambda, &*dk, dxi);
             point.go(scheme, grid, record, at)?;
             if columns == 1 {
-                let mut mu = ArrayK::<M, [E; 1]>::zeroed();
-                multiplier::<M, E, R, S>(scheme, &*dxi, &mut mu);
+                let mu = multiplier::<M, E, R, S>(scheme, &*dxi);
                 // `∇(μᵀ f)` by reverse mode.
                 M::adjoint::<Own<E>>(&point.v, &mu, gradient);
                 point.check(gradient.as_ref().as_flattened(), Quantity::Adjoint, at, |variable| variable)?;
@@ -133,12 +132,12 @@ kernels! { by beside;
     fn multiplier [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         kbar: &'k ArrayX<M, R>,
-        mu: &'k mut ArrayK<M, [E; 1]>,
-    ) {
-        for (mu, row) in mu.as_mut().iter_mut().zip(scheme.rows.as_ref()) {
+    ) -> ArrayK<M, [E; 1]> {
+        ArrayK::<M, [E; 1]>::from_fn(|equation| {
+            let row = &scheme.rows[equation];
             let kbar = kbar.as_ref().get(row.state).map_or(E::zeroed(), |kbar| kbar.as_ref()[0]);
-            *mu = [row.factor * kbar];
-        }
+            [row.factor * kbar]
+        })
     }
 
     /// The gradient to where it belongs: `ξ̄_i` and `λ_w`.

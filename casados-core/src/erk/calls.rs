@@ -1,7 +1,7 @@
 //! The calls that all integrators have in common, with an integrand or without.
 
 use super::integrator::{Integrator, finite};
-use super::panels::Whole;
+use super::sweeps::Whole;
 use crate::error::{Argument, Error};
 use crate::integrator;
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};

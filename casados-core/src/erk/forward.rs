@@ -142,6 +142,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     }
 
     /// `dk_i` by a Jacobian that is elsewhere.
+    #[cfg(feature = "alloc")]
     pub fn stage_derivative(
         &mut self,
         scheme: &Scheme<M, E, S>,
@@ -252,29 +253,22 @@ kernels! { by beside;
         }
     }
 
-    /// See [`write`]. Of single numbers the first row that has one which is not finite.
+    /// See [`write`].
     fn copy [E: Lanes, R: Array<E>, K: Matrix<E>] [E, R, K] <A>(
         rows: &'k [R],
         source: Range<usize>,
         target: &'k mut K,
         first: usize,
         doubt: &'k mut Doubt<E>,
-    ) -> Option<usize> {
+    ) {
         let mut finite = doubt.none();
         for (r, row) in rows.iter().enumerate() {
             for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
-                if const { E::LANES > 1 } {
-                    finite = E::and(finite, value.is_finite());
-                } else if !E::all(value.is_finite()) {
-                    return Some(r);
-                }
+                finite = E::and(finite, value.is_finite());
                 target[(r, first + column)] = value;
             }
         }
-        if const { E::LANES > 1 } {
-            doubt.keep(finite);
-        }
-        None
+        doubt.keep(finite);
     }
 }
 
@@ -339,5 +333,17 @@ pub(super) fn write<E: Lanes, R: Array<E>>(
     step: usize,
     doubt: &mut Doubt<E>,
 ) -> Result<(), Error> {
-    copy(rows, source, target, first, doubt).map_or(Ok(()), |index| Err(Error::Overflow { step, index }))
+    if const { E::LANES > 1 } {
+        copy(rows, source, target, first, doubt);
+        return Ok(());
+    }
+    for (r, row) in rows.iter().enumerate() {
+        for (column, &value) in row.as_ref()[source.clone()].iter().enumerate() {
+            if !E::all(value.is_finite()) {
+                return Err(Error::Overflow { step, index: r });
+            }
+            target[(r, first + column)] = value;
+        }
+    }
+    Ok(())
 }

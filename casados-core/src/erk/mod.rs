@@ -16,10 +16,12 @@ mod engine;
 mod forward;
 mod hessian;
 mod integrator;
+#[cfg(feature = "alloc")]
 mod panels;
 mod scheme;
 mod sensitivities;
 mod step;
+mod sweeps;
 mod tiles;
 
 pub use integrator::Integrator;

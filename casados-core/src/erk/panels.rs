@@ -1,50 +1,19 @@
-//! How derivatives go along with the steps: all columns together, or a few at a time.
+//! Derivatives of groups, a few columns at a time.
 //!
-//! The columns of a group are as many times longer as it has lanes, and those of all stages leave
-//! the nearest cache. So stages are linearised first, all those of a step; then a few columns go
-//! through all of them.
+//! Columns of a group are as many times longer as it has lanes, and those of all stages leave the
+//! nearest cache. So stages are linearised first, all those of a step; then a few columns go through
+//! all of them.
 
 use super::forward::{Directions, Unit, Variation, begin};
 use super::scheme::{Grid, Scheme};
 use super::step::{Base, Own, Point};
+use super::sweeps::Sweeps;
 use crate::error::{Error, Place};
 use crate::linalg::{beside, kernels};
 use crate::model::{ArrayW, ArrayX, Ode};
 use crate::scalar::Lanes;
 use crate::shape::Shape;
 use bytemuck::Zeroable;
-
-/// How derivatives in all directions go along with the steps.
-pub(crate) trait Sweeps<M: Ode, E: Lanes, const S: usize> {
-    /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage with its `dξ_i`,
-    /// if it is to see any.
-    fn run(
-        &mut self,
-        scheme: &Scheme<M, E, S>,
-        grid: &Grid<E>,
-        base: &mut Base<M, E, S>,
-        variation: &mut Variation<M, E, ArrayW<M, E>, S>,
-        is_seen: bool,
-        at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, ArrayW<M, E>>, Place) -> Result<(), Error>,
-    ) -> Result<(), Error>;
-}
-
-/// All columns together.
-pub(crate) struct Whole;
-
-impl<M: Ode, E: Lanes, const S: usize> Sweeps<M, E, S> for Whole {
-    fn run(
-        &mut self,
-        scheme: &Scheme<M, E, S>,
-        grid: &Grid<E>,
-        base: &mut Base<M, E, S>,
-        variation: &mut Variation<M, E, ArrayW<M, E>, S>,
-        _: bool,
-        at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, ArrayW<M, E>>, Place) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        variation.run(scheme, grid, base, Unit, at_stage)
-    }
-}
 
 /// So many columns have as many products under way as a processor can have.
 const COLUMNS: usize = 4;

@@ -6,11 +6,13 @@ use super::doubt::Doubt;
 use super::engine::write_state;
 use super::forward::{Seeded, write};
 use super::integrator::{Integrator, finite};
-use super::panels::Whole;
+use super::sweeps::Whole;
 use crate::error::{Argument, Error};
 use crate::integrator::Integrator as _;
 use crate::memory::{Memory, WithForward, WithHessian};
-use crate::model::{ArrayW, MatrixXC, Ode, VectorU, VectorX};
+#[cfg(feature = "alloc")]
+use crate::model::ArrayW;
+use crate::model::{MatrixXC, Ode, VectorU, VectorX};
 use crate::quadrature::Along;
 use crate::result::{Adjoint, Directional, Forward, ForwardAdjoint, Hessian, Seeds};
 use crate::scalar::Real;
