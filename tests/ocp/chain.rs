@@ -57,8 +57,8 @@ solves!(three_masses_order_eight, "ocp/chain_3.json", 9, 4 x 4, "objective_gl4x4
 solves!(seven_masses_order_eight, "ocp/chain_7.json", 33, 4 x 4, "objective_gl4x4", 7);
 
 /// With an explicit method all intervals at once lead where one after the other do: functions
-/// differ by rounding, and both solutions have residuals of `1e-10`. Multiplied by the inverse of the
-/// Hessian, which is 0.004 for controls (`R Ts/2` twice) and 0.4 and more for states, that is
+/// differ by rounding, and both solutions have residuals of `1e-10`. Multiplied by the inverse of
+/// the Hessian, which is 0.004 for controls (`R Ts/2` twice) and 0.4 and more for states, that is
 /// 2.5e-8 and 2.5e-10; twice, as each has its own.
 #[test]
 fn explicit_methods_side_by_side() -> Test {

@@ -3,8 +3,8 @@
 use super::Together;
 use super::results::{Results, of_adjoint, of_forward, of_hessian, of_nominal, places, vector};
 use crate::case::{Case, Mode, Values};
-use casados::model::{VectorU, VectorX};
 use casados::batch::Single;
+use casados::model::{VectorU, VectorX};
 use casados::{BatchError, Intervals, batch};
 use std::hint::black_box;
 

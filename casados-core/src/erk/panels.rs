@@ -1,8 +1,8 @@
 //! Derivatives of groups, a few columns at a time.
 //!
 //! Columns of a group are as many times longer as it has lanes, and those of all stages leave the
-//! nearest cache. So stages are linearised first, all those of a step; then a few columns go through
-//! all of them.
+//! nearest cache. So stages are linearised first, all those of a step; then a few columns go
+//! through all of them.
 
 use super::forward::{Directions, Unit, Variation, begin};
 use super::scheme::{Grid, Scheme};

@@ -9,8 +9,8 @@ use crate::scalar::Lanes;
 
 /// How derivatives in all directions go along with the steps.
 pub(crate) trait Sweeps<M: Ode, E: Lanes, const S: usize> {
-    /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage with its `dξ_i`,
-    /// if it is to see any.
+    /// All steps, from `x` to `x`, with the derivatives; `at_stage` sees each stage with its
+    /// `dξ_i`, if it is to see any.
     fn run(
         &mut self,
         scheme: &Scheme<M, E, S>,
