@@ -88,7 +88,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
                 // `∇(μᵀ f)` by reverse mode.
                 M::adjoint::<Own<E>>(&point.v, &mu, gradient);
                 point.check(gradient.as_ref().as_flattened(), Quantity::Adjoint, at, |variable| variable)?;
-                along.adjoint(point, [grid.h, scheme.b[stage]], gradient, at)?;
+                along.adjoint(point.variables(), [grid.h, scheme.b[stage]], gradient, at)?;
                 if let Some(xibar) = dk.get_mut(stage) {
                     keep::<M, E, R>(&*gradient, xibar, lambda);
                 }

@@ -1,12 +1,8 @@
 //! An integrand at the stages of the steps; see [`quadrature`](crate::quadrature).
 
-use super::integrator::Integrator;
-use super::step::Point;
 use crate::error::{Error, Place};
-use crate::integrator::With;
-use crate::memory::Memory;
 use crate::model::{ArrayV, ArrayW, ArrayX, Ode};
-use crate::quadrature::{Along, Integrand};
+use crate::quadrature::Along;
 use crate::scalar::{Lanes, Real};
 use crate::shape::Shape;
 
@@ -16,12 +12,12 @@ pub(crate) trait Beside<M: Ode, E: Lanes> {
     fn is_any(&self) -> bool;
     /// Before the first step.
     fn begin(&mut self);
-    /// Adds the value at a stage, times `h b`.
-    fn value(&mut self, point: &Point<M, E>, weight: [E; 2], at: Place) -> Result<(), Error>;
+    /// Adds the value at a stage with these variables, times `h b`.
+    fn value(&mut self, v: &[E], weight: [E; 2], at: Place) -> Result<(), Error>;
     /// Adds what a stage adds to the value and its derivatives, with `dξ`.
     fn forward(
         &mut self,
-        point: &Point<M, E>,
+        v: &[E],
         dxi: &ArrayX<M, ArrayW<M, E>>,
         weight: [E; 2],
         second: bool,
@@ -30,7 +26,7 @@ pub(crate) trait Beside<M: Ode, E: Lanes> {
     /// Adds the gradient at a stage, times `h b`.
     fn adjoint(
         &mut self,
-        point: &Point<M, E>,
+        v: &[E],
         weight: [E; 2],
         gradient: &mut ArrayV<M, [E; 1]>,
         at: Place,
@@ -50,15 +46,15 @@ impl<M: Ode, T: Real> Beside<M, T> for Along<'_, '_, M, T> {
         crate::quadrature::begin(self);
     }
 
-    fn value(&mut self, point: &Point<M, T>, [h, b]: [T; 2], at: Place) -> Result<(), Error> {
+    fn value(&mut self, v: &[T], [h, b]: [T; 2], at: Place) -> Result<(), Error> {
         let Some(integrand) = self else { return Ok(()) };
-        show(point, integrand.point().0);
+        show(v, integrand.point().0);
         integrand.value(h * b, at)
     }
 
     fn forward(
         &mut self,
-        point: &Point<M, T>,
+        v: &[T],
         dxi: &ArrayX<M, ArrayW<M, T>>,
         [h, b]: [T; 2],
         second: bool,
@@ -67,8 +63,8 @@ impl<M: Ode, T: Real> Beside<M, T> for Along<'_, '_, M, T> {
         let Some(integrand) = self else { return Ok(()) };
         let nx = M::Shape::NX;
         let variables = integrand.variables();
-        let (v, d) = integrand.point();
-        show(point, v);
+        let (to, d) = integrand.point();
+        show(v, to);
         for &variable in variables {
             let variable = variable as usize;
             let (Some(row), Some(w)) = (d.get_mut(variable), variable.checked_sub(nx)) else { continue };
@@ -87,14 +83,14 @@ impl<M: Ode, T: Real> Beside<M, T> for Along<'_, '_, M, T> {
 
     fn adjoint(
         &mut self,
-        point: &Point<M, T>,
+        v: &[T],
         [h, b]: [T; 2],
         gradient: &mut ArrayV<M, [T; 1]>,
         at: Place,
     ) -> Result<(), Error> {
         let Some(integrand) = self else { return Ok(()) };
         // ξ̄_i += h b_i φ_x, λ_w += h b_i φ_w
-        show(point, integrand.point().0);
+        show(v, integrand.point().0);
         let own = integrand.adjoint(h * b, at)?;
         for (sum, &own) in gradient.as_mut().as_flattened_mut().iter_mut().zip(own) {
             *sum = *sum + own;
@@ -112,8 +108,8 @@ impl<M: Ode, T: Real> Beside<M, T> for Along<'_, '_, M, T> {
 }
 
 /// The variables to where an integrand takes them from.
-fn show<M: Ode, T: Real>(point: &Point<M, T>, to: &mut [T]) {
-    for (to, from) in to.iter_mut().zip(point.variables()) {
+fn show<T: Real>(variables: &[T], to: &mut [T]) {
+    for (to, from) in to.iter_mut().zip(variables) {
         *to = *from;
     }
 }
@@ -126,12 +122,12 @@ impl<M: Ode, E: Lanes> Beside<M, E> for Nothing {
         false
     }
     fn begin(&mut self) {}
-    fn value(&mut self, _: &Point<M, E>, _: [E; 2], _: Place) -> Result<(), Error> {
+    fn value(&mut self, _: &[E], _: [E; 2], _: Place) -> Result<(), Error> {
         Ok(())
     }
     fn forward(
         &mut self,
-        _: &Point<M, E>,
+        _: &[E],
         _: &ArrayX<M, ArrayW<M, E>>,
         _: [E; 2],
         _: bool,
@@ -139,13 +135,7 @@ impl<M: Ode, E: Lanes> Beside<M, E> for Nothing {
     ) -> Result<(), Error> {
         Ok(())
     }
-    fn adjoint(
-        &mut self,
-        _: &Point<M, E>,
-        _: [E; 2],
-        _: &mut ArrayV<M, [E; 1]>,
-        _: Place,
-    ) -> Result<(), Error> {
+    fn adjoint(&mut self, _: &[E], _: [E; 2], _: &mut ArrayV<M, [E; 1]>, _: Place) -> Result<(), Error> {
         Ok(())
     }
     fn second(&self) -> Option<&[ArrayW<M, E>]> {
@@ -153,16 +143,5 @@ impl<M: Ode, E: Lanes> Beside<M, E> for Nothing {
     }
     fn finish(&mut self) -> Result<(), Error> {
         Ok(())
-    }
-}
-
-impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
-    /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those
-    /// of the solution; see [`quadrature`](crate::quadrature).
-    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
-        &'a mut self,
-        integrand: &'b mut Q,
-    ) -> With<'a, 'b, Self, Q> {
-        With { integrator: self, integrand }
     }
 }

@@ -3,10 +3,10 @@
 use super::integrator::{Integrator, finite};
 use super::sweeps::Whole;
 use crate::error::{Argument, Error};
-use crate::integrator;
+use crate::integrator::{self, With};
 use crate::memory::{Memory, WithAdjoint, WithForward, WithHessian};
 use crate::model::{Ode, VectorP, VectorU, VectorX};
-use crate::quadrature::Along;
+use crate::quadrature::{Along, Integrand};
 use crate::result::{Adjoint, Forward, Hessian, Nominal};
 use crate::scalar::Real;
 use crate::shape::Matrix;
@@ -84,5 +84,16 @@ impl<M: Ode, B, const S: usize, T: Real, W: Memory> integrator::Integrator for I
         finite::<M, T>(lambda.as_slice(), Argument::Lambda)?;
         let grid = self.begin(x0, u, h)?;
         Ok(self.engine.hessian(&grid, lambda.as_slice(), &mut Whole, &mut along)?.1)
+    }
+}
+
+impl<M: Ode, B, const S: usize, T: Real, W: Memory> Integrator<M, B, S, T, W> {
+    /// Takes an integrand along: the value and the derivatives of `∫ l(x, u, p, t) dt` with those
+    /// of the solution; see [`quadrature`](crate::quadrature).
+    pub fn with<'a, 'b, Q: Integrand<M, T> + ?Sized>(
+        &'a mut self,
+        integrand: &'b mut Q,
+    ) -> With<'a, 'b, Self, Q> {
+        With { integrator: self, integrand }
     }
 }

@@ -154,7 +154,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         let memory = W::forward(&mut self.forward)?;
         let (ForwardMemory { sweep, result }, scheme) = (&mut *memory, &self.scheme);
         let run = sweeps.run(scheme, grid, base, &mut sweep.forward, along.is_any(), |point, dxi, at| {
-            along.forward(point, dxi, [grid.h, scheme.b[at.stage]], false, at)
+            along.forward(point.variables(), dxi, [grid.h, scheme.b[at.stage]], false, at)
         });
         self.counts = base.point.counts;
         run?;
@@ -221,7 +221,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
             sweeps.run(scheme, grid, base, variation, true, |point, dxi, at| {
                 let multipliers = multipliers.get(at.step).and_then(|of_stages| of_stages.get(at.stage));
                 let (Some(mu), Some(&b)) = (multipliers, scheme.b.get(at.stage)) else { return Ok(()) };
-                along.forward(point, dxi, [grid.h, b], true, at)?;
+                along.forward(point.variables(), dxi, [grid.h, b], true, at)?;
                 curvature.add(scheme, point, mu, dxi, at)
             })
         };

@@ -232,7 +232,7 @@ impl<M: Ode, E: Lanes, const S: usize> Record<M, E, S> {
             let at = Place { step, stage, iteration: 0 };
             point.go(scheme, grid, self, at)?;
             point.derivative(scheme, &mut self.k[stage], at)?;
-            along.value(point, [grid.h, scheme.b[stage]], at)?;
+            along.value(point.variables(), [grid.h, scheme.b[stage]], at)?;
         }
         Ok(())
     }
