@@ -154,9 +154,7 @@ impl<M: Ode, E: Lanes> AtColumns for Product<'_, M, E> {
     fn at<A: Arithmetic, const W: usize>(&mut self, first: usize) {
         let Self { of_row, entries, dxi, product } = self;
         let rows = dxi.as_ref();
-        // Variables u and p move only in their own directions.
-        let of = |variable: usize| rows.get(variable).map(|row| row.as_ref()).unwrap_or_default();
-        let own = |variable: usize| (variable >= rows.len()).then(|| variable.checked_sub(first)).flatten();
+        let of = |variable: usize| rows.get(variable).map(|row| row.as_ref());
         let (row, _) = M::STRUCTURE.hessian.at(of_row.start);
         let Some(row) = row.checked_sub(M::Shape::NX) else { return };
         let Some(before) = product.as_ref().get(row) else { return };
@@ -166,18 +164,19 @@ impl<M: Ode, E: Lanes> AtColumns for Product<'_, M, E> {
             else {
                 continue;
             };
-            tiles::add::<A, E, W>(&mut sum, value, of(column), first);
-            if let Some(sum) = own(column).and_then(|at| sum.get_mut(at)) {
-                *sum = *sum + value;
+            // Variables u and p move only in their own directions.
+            match of(column) {
+                Some(d) => tiles::add::<A, E, W>(&mut sum, value, d, first),
+                None => tiles::add_own(&mut sum, value, first, column),
             }
             if row == column {
                 continue;
             }
             let Some(other) = product.as_mut().get_mut(column) else { continue };
             let mut more = tiles::load::<E, W>(other.as_ref(), first);
-            tiles::add::<A, E, W>(&mut more, value, of(row), first);
-            if let Some(more) = own(row).and_then(|at| more.get_mut(at)) {
-                *more = *more + value;
+            match of(row) {
+                Some(d) => tiles::add::<A, E, W>(&mut more, value, d, first),
+                None => tiles::add_own(&mut more, value, first, row),
             }
             tiles::store(&more, other.as_mut(), first);
         }

@@ -64,3 +64,14 @@ pub(super) fn add<A: Arithmetic, E: Lanes, const W: usize>(sum: &mut [E; W], a: 
         }
     }
 }
+
+/// `a` more in one column, if it is among these. Each is looked at: a place that is found out when
+/// it runs would keep sums out of registers.
+#[inline(always)]
+pub(super) fn add_own<E: Lanes, const W: usize>(sum: &mut [E; W], a: E, first: usize, column: usize) {
+    for (i, sum) in sum.iter_mut().enumerate() {
+        if first + i == column {
+            *sum = *sum + a;
+        }
+    }
+}
