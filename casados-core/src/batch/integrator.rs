@@ -10,6 +10,7 @@ use super::work::parallel;
 use super::work::{Share, Work, Worker, fill, width};
 use crate::error::{Argument, Error};
 use crate::finite::check_named;
+use crate::integrator::Integrator as Alone;
 use crate::model::{Dae, VectorX, VectorZ};
 use crate::options::{Newton, Options, Start};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
@@ -17,6 +18,10 @@ use crate::shape::Matrix;
 use crate::tableau::{Custom, Tableau};
 use alloc::vec::Vec;
 use bytemuck::Zeroable;
+
+/// Start values `ẋ` and `z`.
+type Given<I> =
+    (VectorX<<I as Alone>::Model, <I as Alone>::Number>, VectorZ<<I as Alone>::Model, <I as Alone>::Number>);
 
 /// Integrates many intervals of one model, as the integrator `I` does one; see
 /// [`Batch`](super::Batch).
@@ -35,7 +40,7 @@ pub struct Integrator<I: Single> {
     workers: Vec<Worker<I>>,
     #[cfg(feature = "parallel")]
     threads: usize,
-    given: Option<(VectorX<I::Model, I::Number>, VectorZ<I::Model, I::Number>)>,
+    given: Option<Given<I>>,
     status: Vec<Result<(), Error>>,
     /// The stages of every step of every interval, and whether there are any.
     stages: Vec<I::Stages>,

@@ -29,6 +29,9 @@ pub(super) struct Sweep<M: Ode, E: Lanes, R: Array<E>, const S: usize> {
     pub lambda: ArrayW<M, R>,
 }
 
+/// The `μ_i` of the stages of a step.
+pub(super) type Multipliers<M, E, const S: usize> = [ArrayK<M, [E; 1]>; S];
+
 /// The way back over the steps.
 pub(super) struct Way<'a, M: Ode, E: Lanes, const S: usize> {
     pub scheme: &'a Scheme<M, E, S>,
@@ -54,7 +57,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         way: Way<'_, M, E, S>,
         point: &mut Point<M, E>,
         records: &[Record<M, E, S>],
-        mut multipliers: Option<&mut [[ArrayK<M, [E; 1]>; S]]>,
+        mut multipliers: Option<&mut [Multipliers<M, E, S>]>,
         along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
         let columns = way.columns.min(R::LEN);
@@ -74,7 +77,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
         &Way { scheme, grid, columns }: &Way<'_, M, E, S>,
         point: &mut Point<M, E>,
         (step, record): (usize, &Record<M, E, S>),
-        mut multipliers: Option<&mut [ArrayK<M, [E; 1]>; S]>,
+        mut multipliers: Option<&mut Multipliers<M, E, S>>,
         along: &mut impl Beside<M, E>,
     ) -> Result<(), Error> {
         let columns = columns.min(R::LEN);
@@ -84,7 +87,8 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Sweep<M, E, R, S> {
             stage_seed::<M, E, R, S>(scheme, (&grid.h, stage, columns), &*lambda, &*dk, dxi);
             point.go(scheme, grid, record, at)?;
             if columns == 1 {
-                let mu = multiplier::<M, E, R, S>(scheme, &*dxi);
+                let mut mu = ArrayK::<M, [E; 1]>::zeroed();
+                multiplier::<M, E, R, S>(scheme, &*dxi, &mut mu);
                 // `∇(μᵀ f)` by reverse mode.
                 M::adjoint::<Own<E>>(&point.v, &mu, gradient);
                 point.check(gradient.as_ref().as_flattened(), Quantity::Adjoint, at, |variable| variable)?;
@@ -132,12 +136,12 @@ kernels! { by beside;
     fn multiplier [M: Ode, E: Lanes, R: Array<E>, const S: usize] [M, E, R, S] <A>(
         scheme: &'k Scheme<M, E, S>,
         kbar: &'k ArrayX<M, R>,
-    ) -> ArrayK<M, [E; 1]> {
-        ArrayK::<M, [E; 1]>::from_fn(|equation| {
-            let row = &scheme.rows[equation];
+        mu: &'k mut ArrayK<M, [E; 1]>,
+    ) {
+        for (mu, row) in mu.as_mut().iter_mut().zip(scheme.rows.as_ref()) {
             let kbar = kbar.as_ref().get(row.state).map_or(E::zeroed(), |kbar| kbar.as_ref()[0]);
-            [row.factor * kbar]
-        })
+            *mu = [row.factor * kbar];
+        }
     }
 
     /// The gradient to where it belongs: `ξ̄_i` and `λ_w`.

@@ -1,6 +1,6 @@
 //! What computes: with single numbers one interval, with registers several of them side by side.
 
-use super::adjoint::{Sweep, Way};
+use super::adjoint::{Multipliers, Sweep, Way};
 use super::along::{Beside, Nothing};
 use super::doubt::Doubt;
 use super::forward::{Variation, write};
@@ -11,7 +11,7 @@ use super::sweeps::Sweeps;
 use crate::error::Error;
 use crate::linalg::{beside, kernels};
 use crate::memory::{Memory, WithForward, WithHessian};
-use crate::model::{ArrayK, ArrayW, ArrayX, Ode};
+use crate::model::{ArrayW, ArrayX, Ode};
 use crate::result::{Adjoint, Forward, ForwardAdjoint, Hessian, Nominal};
 use crate::scalar::{Field, Lanes};
 use crate::shape::{Array, Matrix, Shape};
@@ -22,6 +22,9 @@ use bytemuck::Zeroable;
 /// What a call answers, and the lanes for which it is good: those all of whose values were finite.
 pub(crate) type Verdict<'a, E, R> = Result<(<E as Field>::Mask, &'a R), Error>;
 
+/// The base of a call with derivatives, and where these are.
+type Differentiated<'a, M, E, const S: usize> = (&'a mut Base<M, E, S>, &'a mut ForwardMemory<M, E, S>);
+
 /// The method, and the memory of its calls.
 pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
     pub(super) scheme: Scheme<M, E, S>,
@@ -31,7 +34,7 @@ pub(crate) struct Engine<M: Ode, E: Lanes, const S: usize, W: Memory> {
     pub(super) trajectory: W::Tape<Record<M, E, S>>,
     pub(super) forward: W::Forward<ForwardMemory<M, E, S>>,
     pub(super) hessian: W::Hessian<HessianMemory<M, E>>,
-    pub(super) multipliers: W::HessianTape<[ArrayK<M, [E; 1]>; S]>,
+    pub(super) multipliers: W::HessianTape<Multipliers<M, E, S>>,
 }
 
 /// Memory of the adjoint of one seed.
@@ -145,7 +148,7 @@ impl<M: Ode, E: Lanes, const S: usize, W: Memory> Engine<M, E, S, W> {
         grid: &Grid<E>,
         sweeps: &mut impl Sweeps<M, E, S>,
         along: &mut impl Beside<M, E>,
-    ) -> Result<(&mut Base<M, E, S>, &mut ForwardMemory<M, E, S>), Error>
+    ) -> Result<Differentiated<'_, M, E, S>, Error>
     where
         W: WithForward,
     {

@@ -103,7 +103,6 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
         directions: impl Directions<M, E>,
         mut at_stage: impl FnMut(&mut Point<M, E>, &ArrayX<M, R>, Place) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let columns = directions.columns();
         M::jacobian_constants::<Own<E>>(&mut self.jacobian);
         begin::<M, E, R, _>(E::from_f64(1.0), &mut self.dx, directions);
         for step in 0..grid.steps {
@@ -111,7 +110,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
             record.x = *x;
             self.stages(scheme, grid, (point, record), step, directions, &mut at_stage)?;
             record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
-            self.end(scheme, &grid.h, columns);
+            self.end(scheme, &grid.h, directions);
             point.counts.steps += 1;
         }
         Ok(())
@@ -131,7 +130,7 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
             let at = Place { step, stage, iteration: 0 };
             point.go(scheme, grid, record, at)?;
             point.derivative_jacobian(scheme, &mut record.k[stage], &mut self.jacobian, at)?;
-            self.stage_state(scheme, &grid.h, stage, directions.columns());
+            self.stage_state(scheme, &grid.h, stage, directions);
             at_stage(point, &self.dxi, at)?;
             let Self { dk, dxi, jacobian, .. } = self;
             if let Some(dk) = dk.get_mut(stage) {
@@ -156,13 +155,20 @@ impl<M: Ode, E: Lanes, R: Array<E>, const S: usize> Variation<M, E, R, S> {
     }
 
     /// `dξ_i = dx_n + h Σ_{j<i} a_ij dk_j`
-    pub fn stage_state(&mut self, scheme: &Scheme<M, E, S>, h: &E, stage: usize, columns: usize) {
-        combine::<M, E, R>(&self.dx, h, &scheme.a[stage][..stage], &self.dk, columns, &mut self.dxi);
+    pub fn stage_state(
+        &mut self,
+        scheme: &Scheme<M, E, S>,
+        h: &E,
+        stage: usize,
+        directions: impl Directions<M, E>,
+    ) {
+        let weights = &scheme.a[stage][..stage];
+        combine::<M, E, R, _>(&self.dx, h, weights, &self.dk, directions, &mut self.dxi);
     }
 
     /// `dx_{n+1} = dx_n + h Σ_i b_i dk_i`, in the place of `dx_n`.
-    pub fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, columns: usize) {
-        combine::<M, E, R>(&self.dx, h, &scheme.b, &self.dk, columns, &mut self.dxi);
+    pub fn end(&mut self, scheme: &Scheme<M, E, S>, h: &E, directions: impl Directions<M, E>) {
+        combine::<M, E, R, _>(&self.dx, h, &scheme.b, &self.dk, directions, &mut self.dxi);
         self.dx.as_mut().copy_from_slice(self.dxi.as_ref());
     }
 }
@@ -226,14 +232,15 @@ kernels! { by beside;
     }
 
     /// `sum = start + h Σ_j weights_j rates_j`, row by row.
-    fn combine [M: Ode, E: Lanes, R: Array<E>] [M, E, R] <A>(
+    fn combine [M: Ode, E: Lanes, R: Array<E>, D: Directions<M, E>] [M, E, R, D] <A>(
         start: &'k ArrayX<M, R>,
         h: &'k E,
         weights: &'k [E],
         rates: &'k [ArrayX<M, R>],
-        columns: usize,
+        directions: D,
         sum: &'k mut ArrayX<M, R>,
     ) {
+        let columns = directions.columns();
         for (row, (sum, start)) in sum.as_mut().iter_mut().zip(start.as_ref()).enumerate() {
             let sum = &mut sum.as_mut()[..columns];
             if const { E::LANES > 1 } {

@@ -76,18 +76,18 @@ impl<M: Ode, E: Lanes, const S: usize> Sweeps<M, E, S> for Panels<M, E, S> {
                 let part = Part { first, columns: COLUMNS.min(M::Shape::NW - first) };
                 take::<M, E>(dx, part, &mut panel.dx);
                 for (stage, jacobian) in jacobians.iter().enumerate() {
-                    panel.stage_state(scheme, &grid.h, stage, part.columns);
+                    panel.stage_state(scheme, &grid.h, stage, part);
                     if is_seen {
                         put::<M, E>(&panel.dxi, part, &mut seen[stage]);
                     }
                     panel.stage_derivative(scheme, jacobian, stage, part);
                 }
-                panel.end(scheme, &grid.h, part.columns);
+                panel.end(scheme, &grid.h, part);
                 put::<M, E>(&panel.dx, part, dx);
             }
-            for stage in 0..if is_seen { S } else { 0 } {
+            for (stage, dxi) in seen.iter().enumerate().filter(|_| is_seen) {
                 point.go(scheme, grid, record, at(stage))?;
-                at_stage(point, &seen[stage], at(stage))?;
+                at_stage(point, dxi, at(stage))?;
             }
             record.end(scheme, grid, step, x, grid.compensated.then_some(rest), &mut point.doubt)?;
             point.counts.steps += 1;
